@@ -288,7 +288,7 @@ def write_run(record: Callable[..., Record]) -> Callable[..., Path]:
 
 @pytest.fixture(scope="session")
 def of_operators() -> Callable[[Workspace, str], Callable[[Plan], Plan]]:
-    """Turn a plan into one of mutants from operators: the sign of each operation of a file is changed, in the
+    """Turn a plan into one of operator mutants: the sign of each operation of a file is changed, in the
     scenarios of the plan's first experiments. The second mutant has a permanent fault."""
 
     def of(workspace: Workspace, path: str, drives: int = 2) -> Callable[[Plan], Plan]:

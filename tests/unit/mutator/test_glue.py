@@ -67,7 +67,7 @@ def test_the_step_that_calls_end_is_the_last(arguments: list[str]) -> None:
 
 
 def test_equal_runs_write_equal_bytes(arguments: list[str]) -> None:
-    """When and how often they were written does not matter. No other file is left."""
+    """It does not matter when or how often files were written. No other file is left."""
     out = Path(arguments[5])
     files = []
     for _ in range(2):
@@ -89,7 +89,7 @@ def test_steps_of_an_opened_run_are_those_of_main(arguments: list[str], tmp_path
 
 @pytest.mark.parametrize("flags", [["--height-m", "-2"], ["--height_m=-2"]])
 def test_flags_replace_keys_of_the_scenario(arguments: list[str], flags: list[str]) -> None:
-    """A change then needs no code."""
+    """Such a change needs no code."""
     trace, _ = driven([*arguments, *flags])
     assert trace["height"][0] == -3.0
 
@@ -159,7 +159,6 @@ def test_only_numbers_can_be_recorded(value: object) -> None:
 
 @pytest.mark.parametrize("value", [True, 3, np.float32(2.5), np.array(4), float("inf")])
 def test_any_single_number_is_recorded(value: float, tmp_path: Path) -> None:
-    """Numbers of Python and numpy, booleans, infinity and arrays without dimensions are single numbers."""
     run = Run(step_s=0.5, duration_s=1.0)
     run.record(a=value)
     run.write(tmp_path)
@@ -225,7 +224,7 @@ def test_times_of_equal_steps_are_exact_multiples() -> None:
 
 
 def test_a_channel_named_time_is_refused() -> None:
-    """The time would overwrite it."""
+    """The time would overwrite the channel."""
     with pytest.raises(GlueError, match="without t"):
         Run(step_s=0.5, duration_s=1.0).record(t=1.0)
 

@@ -68,7 +68,7 @@ def test_a_library_without_templates_uses_the_shipped_ones(elsewhere: Path) -> N
 
 
 def test_a_named_folder_must_exist(elsewhere: Path) -> None:
-    """The shipped one is not used instead."""
+    """The shipped folder is not used instead."""
     with pytest.raises(MutatorError, match=r"no folder .*none; expected the fault_library folder.*`library`"):
         Workspace.find(library=elsewhere / "none", templates=elsewhere)
 

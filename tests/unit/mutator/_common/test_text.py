@@ -19,7 +19,7 @@ from mutator.triggers.conditions import check_condition
     ],
 )
 def test_an_operator_of_another_language_gets_one_hint(text: str, hint: str) -> None:
-    """Valid or quoted operators get none."""
+    """Valid or quoted operators get no hint."""
     assert operator_hint(text) == hint
 
 

@@ -167,7 +167,7 @@ def test_traces_are_frames_and_exact_ones_are_rerun(driven: Run) -> None:
 
 
 def test_an_experiment_has_a_diff_a_record_and_a_plot(driven: Run) -> None:
-    """A notebook shows it as a table and a figure."""
+    """A notebook shows an experiment as a table and a figure."""
     [name] = driven.results.index
     experiment = driven.experiment(name)
     assert "# fi:" in experiment.diff

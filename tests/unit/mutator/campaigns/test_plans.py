@@ -141,7 +141,6 @@ def test_a_limit_keeps_guided_and_random_pairs(whole: Workspace) -> None:
     ],
 )
 def test_invalid_options_are_reported(toycar: Workspace, choices: dict, told: str) -> None:
-    """No fault is expanded before."""
     with pytest.raises(MutatorError, match=told):
         make_plan(toycar, "toy", Choices(**choices))
 

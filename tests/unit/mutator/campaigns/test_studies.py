@@ -126,7 +126,7 @@ def asking(toycar: Workspace, study: str) -> Path:
 
 @pytest.mark.parametrize("study", STRANGERS)
 def test_an_invalid_study_is_reported_at_the_campaign(strangers: None, toycar: Workspace, study: str) -> None:
-    """Planning refuses it, and `mutator check` lists it."""
+    """Planning refuses the study, and `mutator check` lists it."""
     before = [str(problem) for problem in check_library(toycar, "toycar")]
     path = asking(toycar, study)
     line = len(path.read_text().splitlines())

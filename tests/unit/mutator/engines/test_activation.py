@@ -100,8 +100,8 @@ def test_the_probes_template_determines_the_precision_of_the_arming_time(probe) 
 
 
 def test_a_probe_in_two_parts_equals_the_whole(probe) -> None:
-    """The common part and the trigger-specific part, run one after the other, have the same lines as the
-    whole probe."""
+    """The common part and the trigger-specific part, run one after the other, do the same as the whole probe,
+    on the same lines."""
     trigger = Trigger(name="x", condition="hwt < 2.0", hold=Hold.FOR, hold_s=0.1)
     whole, parts = {}, {}
     exec(compile(probe(trigger), "_fi", "exec"), whole)

@@ -47,7 +47,7 @@ def test_forking_processes_have_one_thread_and_end_with_the_engine(fork: Fork) -
 
 
 def test_a_fork_starts_just_before_its_fault(fork: Fork) -> None:
-    """The golden run simulates the steps before, and only a few processes wait."""
+    """The golden run simulates the earlier steps, and only a few processes wait."""
     starts = [fork.run(fork.job(at_time(0.05 * step))).start for step in (40, 41, 90, 10, 100, 0)]
     assert starts == [40, 41, 90, 10, 100, 0]
     for step in range(3, 100, 9):

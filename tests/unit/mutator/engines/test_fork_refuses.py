@@ -38,7 +38,7 @@ def test_a_target_with_pandas_is_forked(fork: Fork, edit: Edit) -> None:
 
 
 def test_a_target_that_cannot_be_imported_is_not_forked(fork: Fork, edit: Edit) -> None:
-    """The reference engine runs it, and the reason is stored."""
+    """The reference engine runs the target, and the reason is stored."""
     edit(
         "tree/toycar/go.py",
         "class Drive:",
@@ -94,7 +94,7 @@ def test_a_run_that_leaves_a_thread_is_repeated(fork: Fork, edit: Edit) -> None:
 
 @pytest.mark.slow
 def test_a_run_that_writes_into_its_tree_does_not_affect_the_next(fork: Fork, edit: Edit) -> None:
-    """The reference engine decides its result."""
+    """The reference engine decides the run's result."""
     edit(
         "tree/toycar/sensing.py",
         "        self.publish((gap",
@@ -144,8 +144,8 @@ EARLY = """
 
 
 def test_a_target_that_observes_before_its_first_step_is_not_forked(fork: Fork, edit: Edit) -> None:
-    """A fork cannot see such observations. The reference engine runs these experiments, whether the fault is
-    active then or later."""
+    """A fork cannot see such observations. The reference engine runs these experiments, even if the fault
+    becomes active later."""
     edit("fault_library/targets/toycar.yaml", "function: Drive.step,", "function: Drive.look,")
     edit("tree/toycar/go.py", '\n        self.steps = int(case["steps"])\n', EARLY)
     for trigger in (always(armed_after_s=-2.0), at_time(2.0)):

@@ -190,7 +190,7 @@ def test_emptied_bytecode_affects_only_its_own_run(toycar: Workspace, run: Run, 
 
 
 def test_a_replaced_log_or_report_counts_as_missing(run: Run) -> None:
-    """A run may remove it, or replace it with a folder or a pipe. The engine does not wait for it."""
+    """A run may remove the file, or replace it with a folder or a pipe. The engine does not wait for it."""
     head = "import os\nos.unlink('../log')\n"
     for body in ("", "os.mkdir('../log')", "os.mkfifo('../log')"):
         execution = run(entry(head + body))

@@ -219,7 +219,7 @@ def test_after_hazard_applies_to_the_whole_campaign(stopping: Fork, edit: Edit) 
 
 
 def test_a_trace_is_cut_at_a_time() -> None:
-    """A channel with its own times is cut by these."""
+    """A channel with its own times is cut according to them."""
     trace = {"t": np.arange(4.0), "a": np.arange(4.0), "b": np.array([7.0, 8.0]), "b@": np.array([0.5, 2.5])}
     cut = until(trace, 2.0, "t")
     assert {name: values.tolist() for name, values in cut.items()} == {

@@ -57,7 +57,7 @@ def broken(folder: Path, name: str, old: str, new: str) -> str:
 
 
 def test_the_expected_models_ship(clone: Workspace) -> None:
-    """Two wrap statements, and some belong to operators."""
+    """Two models wrap statements, and some belong to operators."""
     models = clone.fault_models()
     assert list(models.models) == sorted(NAMES + OF_OPERATORS)
     assert [m.name for m in models if m.kind is SnippetKind.GUARD] == ["omission", "reordering"]
@@ -66,7 +66,7 @@ def test_the_expected_models_ship(clone: Workspace) -> None:
 
 @pytest.mark.parametrize("name", NAMES + OF_OPERATORS)
 def test_the_examples_of_the_models_hold(clone: Workspace, name: str) -> None:
-    """The original can be restored from each."""
+    """The original can be restored from each example's result."""
     models = clone.fault_models()
     model = models.get(name)
     for example in model.examples:

@@ -38,7 +38,7 @@ def test_a_spec_keeps_the_order_of_its_variants(toy: Workspace) -> None:
 
 
 def test_expansion_draws_one_value_from_each_range(toy: Workspace) -> None:
-    """Integers follow the order of the ranges and have the key's unit."""
+    """An integer range gives integers. Values are in the key's unit."""
     found = of(faults(toy), "longer")
     assert [f.value // 10 for f in found] == [1, 2, 3]
     assert all(isinstance(f.value, int) and f.unit == "m" and f.aim == "H1" for f in found)

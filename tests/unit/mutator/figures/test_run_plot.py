@@ -59,7 +59,7 @@ def test_an_svg_names_channels_units_and_marks(tmp_path: Path, manifest: SimpleN
 
 
 def test_everything_after_the_end_of_the_drive_is_grey(manifest: SimpleNamespace) -> None:
-    """The axes ignore it. Without an end, nothing is grey."""
+    """The axes ignore that part. Without an end, nothing is grey."""
     faulty = trace()
     faulty["gas"] = np.where(TIME > 2.0, -500.0, faulty["gas"])
     marks = [Mark(kind=MarkKind.HAZARD, t=t, label="H") for t in (2.0, 2.5)]

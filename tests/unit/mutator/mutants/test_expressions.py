@@ -135,7 +135,8 @@ def test_no_match_or_several_is_an_error(place: FaultLocation, pieces: Iterable[
 
 
 def test_a_changed_expression_stays_in_its_place() -> None:
-    """Over several lines, its first and last lines change. Two expressions in one line share its tag."""
+    """If an expression spans several lines, its first and last lines change. Two expressions in one line
+    share the line's tag."""
     source = "def f(a, b):  # go\r\n    c = a, b\r\n    return g(a,  # first\r\n        b) + c  # sum\r\n"
     at = {"function": "f"}
     assert changed(source, (location("assigned_value", "c", **at), "None")) == source.replace(

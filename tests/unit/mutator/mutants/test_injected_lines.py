@@ -8,7 +8,6 @@ from mutator.workspace import Workspace
 
 
 def test_injected_lines_are_recognized(clone: Workspace) -> None:
-    """The import, the observation, the guards and their ids are recognized."""
     lines = {
         injected_lines.import_statement("car"): ("probe", 0, False),
         injected_lines.tagged(injected_lines.observe_call([("t", "now.time")]), injected_lines.OBSERVE_TAG): (

@@ -76,7 +76,7 @@ def counting() -> Callable[[], int]:
     [(AnchorKind.AFTER_ASSIGN, "y"), (AnchorKind.ASSIGNED_VALUE, "y"), (AnchorKind.VALUE, "x")],
 )
 def test_a_stale_value_is_two_steps_old(toy: Make, kind: AnchorKind, name: str) -> None:
-    """Until then, it is the first one. Each active period starts again."""
+    """The first value is used until then. Each active period starts again."""
     params = {"target": "y"} if kind is AnchorKind.AFTER_ASSIGN else {}
     made = toy("def f(x):\n    y = x\n    return y\n", kind, name, "stale", steps=2, **params)
     assert made.run(".xxxx.xx", counting()) == [1, 2, 2, 2, 3, 6, 7, 7]

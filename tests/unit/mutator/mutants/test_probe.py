@@ -56,7 +56,8 @@ def drive(fi: Any, lead_speeds: str, start: float = 0.0) -> str:
 def test_a_fault_is_held_as_requested(
     clone: Workspace, hold: Hold, seconds: float, armed: float, expected: str
 ) -> None:
-    """Once armed, it is active while its condition holds, for a time after that, or to the end of the run."""
+    """Once armed, a fault is active while its condition holds, for a time after that, or to the end of the
+    run."""
     fi = probe(clone, hold=hold.value, hold_s=seconds, armed_after_s=armed)
     assert drive(fi, "..xxx..xx.") == expected
 

@@ -60,8 +60,8 @@ def rendered(template: str, kind: SnippetKind = SnippetKind.INSERT, **params: Va
     ],
 )
 def test_numbers_become_exact_literals(value: float, plain: str, added: str) -> None:
-    """Non-finite ones have a form that Python reads. A whole number has no decimal point, so that an integer
-    variable stays an integer."""
+    """Non-finite numbers have a form that Python reads. A whole number has no decimal point, so that an
+    integer variable stays an integer."""
     assert rendered("{{ target }} = {{ by }}\n", by=value) == (f"x = {plain}",)
     assert rendered("{{ target }} = y {{ by | signed }}\n", by=value) == (f"x = y {added}",)
 
@@ -142,7 +142,7 @@ def test_a_guard_opens_a_block() -> None:
     ],
 )
 def test_an_expression_stays_one_operand(template: str, text: str) -> None:
-    """Brackets are added if it needs them."""
+    """Brackets are added if needed."""
     made = replace(model(template, SnippetKind.VALUE), expression=template)
     assert changed_value(made, {"by": 1.0}, "ab12", "y") == text
 
@@ -157,7 +157,7 @@ def test_a_value_must_be_one_expression_without_a_comment(template: str) -> None
 
 @pytest.mark.parametrize("target", ["x # why", "x\n", "x[\n0]", " x", None])
 def test_a_target_must_be_a_plain_name(target: Value) -> None:
-    """A comment in it would disable the assignment."""
+    """A comment in the target would disable the assignment."""
     made = replace(model("-{{ original }}", SnippetKind.VALUE), expression="-{{ original }}")
     for one in (made, model("{{ target }} = {{ target }} + 1")):
         with pytest.raises(MutatorError, match="for 'target'"):

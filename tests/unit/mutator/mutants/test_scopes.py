@@ -28,7 +28,7 @@ def test_names_of_functions() -> None:
 
 
 def test_the_files_encoding_is_used() -> None:
-    """A byte order mark may declare it."""
+    """A byte order mark may declare the encoding."""
     latin = "# coding: latin-1\ndef f(\xe9): return \xe9\n".encode("latin-1")
     assert function_names(latin) == {(2, "f"): {"\xe9"}}
     assert function_names("\ufeffdef f(\xe9): pass\r\n".encode()) == {(1, "f"): {"\xe9"}}

@@ -88,7 +88,7 @@ CHANGED = {
     ],
 )
 def test_only_the_injected_part_of_a_line_is_the_injection(stack: Stack, status: Status) -> None:
-    """An exception in the rest of the line belongs to the target, and one in asking the probe to the
+    """An exception in the rest of the line belongs to the target, and one raised by asking the probe to the
     harness."""
     assert assign_blame(execution(stack), CHANGED, ())[0] is status
 

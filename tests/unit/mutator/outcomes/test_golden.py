@@ -100,7 +100,7 @@ def test_a_difference_within_its_tolerance_does_not_count() -> None:
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_a_non_finite_value_is_an_infinite_difference(value: float) -> None:
-    """Golden has a number. The tolerance does not matter."""
+    """A tolerance does not matter."""
     channel = Channel(name="gas", unit="-", tolerance=100.0)
     difference = compare(trace(gas=[1, 1, 1]), trace(gas=[1, value, 1]), [channel], "t")
     assert difference.t_first == T[1]

@@ -179,8 +179,8 @@ def test_links_that_the_study_ignores_are_not_part_of_the_path() -> None:
 
 
 def test_a_component_that_changed_after_the_car_only_received_feedback() -> None:
-    """Something off the path leads to the speed control, which left golden after the car. So it and the
-    components that it alone feeds only received feedback. An earlier branch was reached."""
+    """Something off the path leads to the speed control, which left golden after the car. So the speed
+    control and the components that it alone feeds only received feedback. An earlier branch was reached."""
     found = path("finder", "wheel", angle=1.0, torque=1.0, place=1.1, wanted=1.5, gas=1.6)
     assert states(found) == {
         "finder": State.INJECTED,
@@ -251,7 +251,7 @@ def test_components_without_channels_are_unobserved() -> None:
 
 
 def test_two_controllers_may_stop_one_fault() -> None:
-    """The sensor feeds both."""
+    """A sensor feeds both controllers."""
     assert path("gauge", outcome=Outcome.MASKED).stopped_at == ("speed", "wheel")
     assert path("gauge", outcome=Outcome.MASKED, angle=2.0).stopped_at == ("rack",)
 
@@ -262,7 +262,7 @@ def test_an_inactive_fault_or_a_broken_run_has_no_path(outcome: Outcome | None) 
 
 
 def test_a_fault_outside_all_components_has_no_path() -> None:
-    """No component names its file, so the start is unknown."""
+    """No component names the fault's file, so the start is unknown."""
     assert WAYS.path(experiment("other"), record(Outcome.SDC, gas=1.0)) is None
 
 

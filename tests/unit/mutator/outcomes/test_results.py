@@ -116,7 +116,7 @@ def test_severity_and_times_to_the_hazard(
 
 
 def test_the_head_selects_the_columns_of_severity(experiment: Callable[..., Experiment]) -> None:
-    """A run has all of them, only the times, or, in an older run, none."""
+    """A run has all columns, only the times, or, if it is older, none."""
     scale = {"severity": SCALE.plain()}
     times = ["fault_tolerant_time", "manifest_to_hazard"]
     heads: list[tuple[dict[str, object], list[str]]] = [

@@ -54,7 +54,6 @@ def test_one_row_of_each_kind_is_counted_once(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("status", [Status.HARNESS_ERROR, Status.INVALID_MUTANT])
 def test_unusable_experiments_enter_no_other_count(tmp_path: Path, status: Status) -> None:
-    """They are harness errors and invalid mutants."""
     bad = SEEN | {"status": status.value, "outcome": "", "t_h1": "3.0", "alerts": "fcw"}
     rows = Results(write_table(tmp_path / "results.csv", SEEN, bad)).texts()
 

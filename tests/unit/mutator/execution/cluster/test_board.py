@@ -106,7 +106,7 @@ def test_a_worker_prefers_its_current_golden_run(folder: RunFolder, clock: Clock
 
 
 def test_the_last_pieces_are_shorter(folder: RunFolder, clock: Clock) -> None:
-    """Each has one run if a run takes longer than the shortest piece."""
+    """The last pieces have one run each if a run takes longer than the shortest piece."""
     there = board(folder, clock)
     first = taken(there, "alpha")
     there.done(first, "alpha", 2.0 * first.runs)
@@ -207,7 +207,7 @@ def test_an_idle_worker_leaves_the_proof_to_a_busy_one(folder: RunFolder, clock:
     assert taken(there, "beta").kind is Kind.PROVE
 
 
-def test_no_experiment_is_lost_or_repeated_at_random(folder: RunFolder, clock: Clock, ids: list[str]) -> None:
+def test_no_experiment_is_lost_or_repeated(folder: RunFolder, clock: Clock, ids: list[str]) -> None:
     """Results, deaths and duplicates come in random order."""
     draw, there, done = random.Random(5), board(folder, clock), Counter[str]()
     out: list[tuple[str, Piece]] = []

@@ -30,7 +30,7 @@ STRETCH = Stretch(python="CPython 3.11.7", packages={"numpy": "2.4.6"}, platform
     ],
 )
 def test_a_worker_with_other_versions_is_refused(change: dict[str, object], objection: str) -> None:
-    """The limits are those for resuming a run on another machine."""
+    """The rules are those for resuming a run on another machine."""
     assert Crew(STRETCH, accept=False).objection(FACTS | change) == objection
 
 

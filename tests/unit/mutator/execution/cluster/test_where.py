@@ -61,7 +61,7 @@ def test_parsing_needs_no_dask() -> None:
 
 
 def test_the_address_is_read_from_a_scheduler_file(tmp_path: Path) -> None:
-    """`dask scheduler --scheduler-file` writes it."""
+    """`dask scheduler --scheduler-file` writes the file."""
     file = tmp_path / "scheduler.json"
     file.write_text(json.dumps({"type": "Scheduler", "address": "tcp://10.0.0.1:8786", "workers": {}}))
     found = parse(str(file))
