@@ -134,7 +134,7 @@ def test_matching_experiments_are_tried_until_one_shows_the_action(place: Path) 
 
 
 def test_a_query_without_a_match_is_reported(place: Path) -> None:
-    """This includes a target without the actuator."""
+    """A target without the actuator has no match either."""
     assert "no experiment of this run matches" in drawn(place, replace(BRAKE, query='module == "radar"')).note
     assert "records no sail" in drawn(place, replace(BRAKE, actions=("sail",))).note
 

@@ -92,7 +92,7 @@ def test_each_method_alone_has_its_half_of_the_experiments(
 
 
 def test_as_coded_has_the_same_make_up(library: Workspace) -> None:
-    """Its triggers do not wait for the controller."""
+    """As coded, triggers do not wait for the controller."""
     coded = make_plan(library, "paper_guided", Choices(reading="as_coded"))
     assert kinds(coded, Method.GUIDED) == INJECTED
     assert {e.trigger.armed_after_s for e in coded.experiments} == {0.0}

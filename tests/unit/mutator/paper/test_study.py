@@ -71,7 +71,7 @@ def test_the_report_links_to_the_page_of_the_study(run: Path) -> None:
 
 
 def test_an_experiment_outside_the_plan_has_no_figure(run: Path) -> None:
-    """Both forms name the query instead."""
+    """Markdown and page show the query instead."""
     forms = study_forms(run)
     for text in forms:
         assert "No figure: its traces are not available" in text

@@ -240,7 +240,6 @@ def test_a_report_without_hazards_has_no_empty_table(run: ReportedRun) -> None:
 
 
 def test_a_report_without_activated_faults_calls_none_tolerated(run: ReportedRun) -> None:
-    """It has no link to an empty list either."""
     idle = part_of(run, names_of(run, "t_activation"))
     found = {answer.name: answer for answer in answers_of(idle)}
     assert found["dangerous"].says == found["survived"].says == "No fault was activated."

@@ -87,7 +87,6 @@ def test_many_failed_runs_are_a_link_to_all(run: Path, monkeypatch: pytest.Monke
 
 
 def test_the_report_states_its_origin(run: Path) -> None:
-    """This is plan, seed, reading, choices, sources and versions."""
     written = building.write(run, None)
     for text in (written.markdown.read_text(), written.page.read_text()):
         for fact in ("ab" * 32, "cd" * 32, "as_described", "chosen: limit", "3 of 3 planned", "2.4.6"):

@@ -103,8 +103,8 @@ def test_who_merges_is_not_an_author(toycar: Workspace, root: Path) -> None:
     assert say(toycar, "Git Smith").decision(lane(toycar).id)
 
 
-def test_uncommitted_and_untracked_changes_are_refused(toycar: Workspace, root: Path) -> None:
-    """So is a library without git."""
+def test_changes_that_git_does_not_know_are_refused(toycar: Workspace, root: Path) -> None:
+    """The cases are an uncommitted change, an untracked file, and a library without git."""
     with (root / LANE).open("a") as file:
         file.write("# more\n")
     with pytest.raises(MutatorError, match=r"lane\.yaml: cannot determine .* not committed.*commit first"):

@@ -88,7 +88,7 @@ def test_a_refused_run_leaves_no_plan(toycar: Workspace, tmp_path: Path) -> None
 
 
 def test_a_resumed_run_does_not_need_the_campaigns_spec_file(toycar: Workspace, tmp_path: Path) -> None:
-    """Its drawn faults are still approved."""
+    """The faults that the campaign drew are still approved."""
     mine = tmp_path / "mine"
     mine.mkdir()
     spec = (toycar.library / "faults/sensor/lane.yaml").read_text()

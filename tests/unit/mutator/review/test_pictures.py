@@ -58,7 +58,7 @@ def grey(jpeg: bytes) -> float:
 
 
 def test_three_levels_of_an_effect(lit: Lit) -> None:
-    """These are the least, a middle and the largest value."""
+    """The levels are the least, a middle and the largest value."""
     workspace, group = lit()
     found = drawn(workspace, group)
     assert grey(found.before) == pytest.approx(90, abs=1)
@@ -97,8 +97,7 @@ def test_images_are_cached_until_an_effect_changes(lit: Lit, runs: list[str]) ->
     assert runs == ["pictures-0"] * 2
 
 
-def test_groups_of_a_place_are_drawn_in_one_process(lit: Lit, runs: list[str]) -> None:
-    """One run of the target is enough for any number of images."""
+def test_one_run_of_the_target_draws_all_groups_of_a_place(lit: Lit, runs: list[str]) -> None:
     workspace, group = lit()
     halves = [
         replace(group, id=name, faults=faults)

@@ -27,7 +27,7 @@ HAZARD = {"outcome": Outcome.HAZARD, "t_manifest": 2.5}
 def test_counts_a_typical_and_the_worst_experiment(
     toycar: Workspace, tmp_path: Path, write_run: WriteRun
 ) -> None:
-    """They are the median of the most frequent ending and the worst of all."""
+    """The typical experiment is the median of the most frequent ending."""
     plan = make_plan(toycar, "toy", Choices())
     lane = [e.id for e in plan.experiments if e.fault.fault_type == "lane"]
     bad = {name: {"hazards": (("H3", 3.0 + i),), **HAZARD} for i, name in enumerate(lane[:2])}

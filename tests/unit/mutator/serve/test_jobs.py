@@ -48,8 +48,7 @@ def experiment(client: Client) -> str:
     return next(plan_file.ids(client.place / "runs/first"))
 
 
-def test_the_run_of_a_job_is_complete(busy: Client) -> None:
-    """It can be compared with itself."""
+def test_the_run_of_a_job_is_complete_and_can_be_compared(busy: Client) -> None:
     assert RunFolder.open(busy.place / "runs/first").finished
     [run] = busy.get("/api/runs").json["runs"]
     assert (run["key"], run["state"], run["done"]) == ("first", "finished", 2)
@@ -140,7 +139,7 @@ def test_progress_is_that_of_the_stage() -> None:
 
 
 def test_the_number_of_waiting_jobs_is_limited() -> None:
-    """Otherwise a page could fill the memory."""
+    """Without a limit, a page could fill the memory."""
     jobs = Jobs(0, lambda work: None)
     for _ in range(50):
         assert jobs.submit(job().work).state is State.QUEUED

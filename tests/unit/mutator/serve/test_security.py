@@ -40,7 +40,7 @@ def test_another_origin_is_refused(client: Client, method: str, origin: str) -> 
 
 
 def test_a_post_needs_an_origin(client: Client) -> None:
-    """It is also refused if the browser marks it as cross-site."""
+    """A POST is also refused if the browser marks it as cross-site."""
     assert client.ask("POST", "/api/jobs", {"Origin": None}, b"{}").status == 403
     for site in ("cross-site", "same-site", "anything"):
         assert client.get("/api/jobs", Sec_Fetch_Site=site).status == 403

@@ -77,7 +77,7 @@ def test_only_an_event_before_the_hazard_has_a_time_to_it() -> None:
 def test_the_interval_of_a_median_resamples_whole_faults(
     pairs: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It equals that of a simple loop that copies the runs of each fault that is drawn."""
+    """A simple loop that copies the runs of each fault drawn gives the same interval."""
     monkeypatch.setattr(medians, "RESAMPLES", 40)
     monkeypatch.setattr(medians, "_CELLS", 300)  # this takes several batches
     rng = np.random.default_rng(3)

@@ -121,7 +121,7 @@ def test_student() -> None:
 
 
 def test_the_second_implementation_gives_the_published_numbers() -> None:
-    """It is the one that checks the ten tables."""
+    """The ten tables are checked with the second implementation."""
     odds = by_hand.pooled_odds(BERKELEY)
     assert (odds["odds ratio"], odds["low"]) == pytest.approx((0.9046968, 0.7719074), abs=1e-7)
     assert by_hand.fisher((3, 1, 1, 3)) == pytest.approx(0.4857, abs=5e-5)

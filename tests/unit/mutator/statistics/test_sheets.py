@@ -13,7 +13,7 @@ ALERTS = {"0": (("fcw", 8.0),), "1": ()}
 
 
 def test_a_run_of_both_methods_has_all_tables() -> None:
-    """It has alerts only if their records exist."""
+    """The table of alerts needs records of alerts."""
     expected = [
         *("summary_guided", "summary_random", "coverage_guided", "coverage_random"),
         *("guided_against_random", "guided_against_random_by_fault_type", "matched_pairs"),

@@ -102,7 +102,7 @@ def test_coverage_by_fault_type(made: Campaign, method: str) -> None:
 
 
 def test_guided_against_random(made: Campaign) -> None:
-    """This includes the Mantel-Haenszel odds ratios and the tests by Cochran and by Breslow and Day."""
+    """The table has Mantel-Haenszel odds ratios and the tests by Cochran and by Breslow and Day."""
     for line, whole in zip(made.lines("guided_against_random"), WHOLES, strict=True):
         tables = by_hand.fourfolds(made.rows, whole)
         odds = by_hand.pooled_odds(tables.values())
@@ -140,8 +140,8 @@ def test_fisher_and_holm_by_fault_type(made: Campaign) -> None:
 
 
 def test_matched_pairs(made: Campaign) -> None:
-    """These are the pairs with a hazard in both, one or neither run, and McNemar's exact p-values with Holm's
-    adjustment."""
+    """The table has the pairs with a hazard in both, one or neither run, and McNemar's exact p-values with
+    Holm's adjustment."""
     pairs = by_hand.matched(made.rows)
     expected: list[list[Any]] = []
     for which, some in (
@@ -185,7 +185,7 @@ def test_propagation_times(made: Campaign) -> None:
 
 
 def test_from_alert_to_hazard(made: Campaign) -> None:
-    """These are the Kaplan-Meier median, its interval, and the share after the driver's time."""
+    """The table has the Kaplan-Meier median, its interval, and the share after the driver's time."""
     lines = iter(made.lines("alert_to_hazard"))
     for method, scenario, rows in _groups(made):
         alerted = [row for row in rows if "t_alert" in row and row["status"] == "ok"]

@@ -26,7 +26,7 @@ def contents(folder: Path) -> set[Path]:
 
 
 def test_everything_that_a_run_wrote_is_deleted(run: Path) -> None:
-    """This includes half-written files left by a kill, and scratch folders of any shape."""
+    """A kill can leave half-written files, and scratch folders have any shape."""
     (run / "report" / "tables").mkdir(parents=True)
     (run / "report" / ".REPORT.md.4711").touch()
     odd = run / "work" / "1-x" / "out"
@@ -72,7 +72,7 @@ def test_a_run_folder_with_another_file_stays(run: Path, stranger: str) -> None:
 
 
 def test_a_folder_of_other_files_stays_despite_its_run_json(tmp_path: Path) -> None:
-    """So does a folder with another schema."""
+    """A folder with another schema stays as well."""
     for head, names in (
         ('{"schema":"run/1"}', ["a", "b", "c", "d", "e"]),
         ('{"schema":"run/99"}', []),

@@ -71,7 +71,7 @@ def test_what_is_not_a_ledger_is_refused(run: Path, content: str) -> None:
 
 
 def test_a_forged_ledger_is_refused(run: Path) -> None:
-    """Its checksum is valid, but its content is not that of a ledger."""
+    """The checksum is valid, but the content is not that of a ledger."""
     data = {"schema": digests.SCHEMA, "finished": True, "files": [], "rewriting": {}}
     files.write_json(run / digests.FILE, data | {"sum": digests.digest(data)})
     with pytest.raises(MutatorError, match="not a ledger"):

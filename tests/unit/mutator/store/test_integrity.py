@@ -152,7 +152,6 @@ def test_an_unclosed_segment_is_read(run: Path) -> None:
 
 
 def test_a_segment_of_another_run_is_refused(run: Path) -> None:
-    """Its name makes no difference."""
     path = unsealed(run, plan="0" * 64)
     assert str(problem(run)).startswith(f"{path}:1: records of plan 0000000000000000")
 
@@ -180,7 +179,7 @@ def test_a_missing_record_of_a_finished_run_is_reported(run: Path, reseal: Calla
 
 
 def test_a_plan_with_a_duplicate_experiment_is_refused(run: Path, reseal: Callable[[Path], None]) -> None:
-    """So is a plan whose chunks have a different number of experiments."""
+    """A plan whose chunks have different numbers of experiments is refused as well."""
     path = run / plan_file.EXPERIMENTS
     lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join([*lines[:-1], lines[0]]))
@@ -192,7 +191,7 @@ def test_a_plan_with_a_duplicate_experiment_is_refused(run: Path, reseal: Callab
 
 
 def test_a_folder_without_its_digests_is_refused(run: Path) -> None:
-    """It was made to look like a folder of an older version."""
+    """The folder was made to look like one of an older version."""
     head = run / "run.json"
     head.write_text(head.read_text().replace('"run/3"', '"run/1"'))
     assert "run/1 in a folder with digests.json" in str(problem(run))
@@ -204,7 +203,7 @@ def test_a_folder_without_its_digests_is_refused(run: Path) -> None:
 
 
 def test_a_folder_that_is_being_written_is_not_damaged(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its owner rewrites a file while it is opened."""
+    """The owner rewrites a file while the folder is opened."""
     real, seen = integrity.problems, []
 
     def look(*arguments: object, **more: object) -> list[MutatorError]:
@@ -221,7 +220,6 @@ def test_a_folder_that_is_being_written_is_not_damaged(run: Path, monkeypatch: p
 
 @pytest.mark.parametrize("key", ["limits", "goldens", "chunks", "sources", "choices", "provenance", "plan"])
 def test_an_invalid_value_in_an_old_run_json_is_reported_by_key(run: Path, key: str) -> None:
-    """It has no digest."""
     data = json.loads((run / "run.json").read_text()) | {"schema": "run/1"}
     (run / digests.FILE).unlink()
     for value in (3, [3], [[3]], {"a": [None]}):

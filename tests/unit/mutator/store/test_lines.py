@@ -35,7 +35,7 @@ def values(segment: Segment) -> list[object]:
 
 
 def test_lines_are_read_as_appended(tmp_path: Path) -> None:
-    """They can be any JSON values."""
+    """A line can be any JSON value."""
     given = [1.5, float("inf"), None, 'ü\n"sum"', {"sum": "0" * 16}, [[], {}]]
     segment = read_segment(write(tmp_path / "records" / "a.jsonl", *given))
     assert values(segment) == given

@@ -73,7 +73,7 @@ def test_a_pipe_in_place_of_a_plan_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("where", ["experiment", "trigger", "fault", "injection", "anchor"])
 def test_an_unknown_field_of_a_newer_plan_is_refused(experiment: Make, tmp_path: Path, where: str) -> None:
-    """It could change the experiment."""
+    """An unknown field could change the experiment."""
     plan_file.write(tmp_path, [experiment()], [1])
     [fault], [line] = lines(tmp_path, "faults.jsonl"), lines(tmp_path, "experiments.jsonl")
     injection = fault["injections"][0]  # type: ignore[index]

@@ -27,7 +27,7 @@ def write(run: Path, name: str, *records: Record) -> Path:
 
 
 def test_records_are_read_as_written(tmp_path: Path, record: MakeRecord) -> None:
-    """This includes infinite deviations and missing activations."""
+    """Deviations may be infinite, and activations missing."""
     first = record(
         "a" * 16, max_dev=(("gas", float("inf")),), hazards=(("H1", 3.25),), alerts=(("fcw", 3.0),)
     )
@@ -110,7 +110,7 @@ def test_a_second_record_is_refused(tmp_path: Path, record: MakeRecord) -> None:
 
 
 def test_records_of_the_earlier_schema_are_read(tmp_path: Path, record: MakeRecord) -> None:
-    """They have no checksums. Neither schema accepts the lines of the other."""
+    """The earlier schema has no checksums. Neither schema accepts the lines of the other."""
     path = write(tmp_path, "0001-gw0.jsonl", record())
     old = [{"schema": "records/1"}, {k: v for k, v in asdict(record()).items() if k != "patch"}]
     path.write_text("".join(f"{json.dumps(line)}\n" for line in old))

@@ -80,8 +80,7 @@ def test_packed_bytes_do_not_depend_on_the_order_of_arrival(tmp_path: Path, pack
     assert files(tmp_path) == files(packed)
 
 
-def test_the_budget_keeps_the_best_series(tmp_path: Path) -> None:
-    """It makes no difference how often series are packed."""
+def test_the_budget_keeps_the_best_series_however_often_they_are_packed(tmp_path: Path) -> None:
     runs = [tmp_path / "once", tmp_path / "twice"]
     append(runs[0], "0001-main", IDS)
     pack(runs[0], "p", WORTH, 1)
@@ -130,7 +129,7 @@ def test_a_torn_end_loses_what_was_in_flight_alone(tmp_path: Path) -> None:
 
 
 def test_experiments_of_a_damaged_chunk_can_be_rerun(tmp_path: Path) -> None:
-    """Then each is read from a separate file. The same holds for a damaged index."""
+    """A rerun stores each series in a separate file. The same holds for a damaged index."""
     append(tmp_path, "0001-main", IDS[:3])
     pack(tmp_path, "p", WORTH, 500)
     index = SeriesFolder(tmp_path).index

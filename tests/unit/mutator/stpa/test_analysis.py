@@ -1,4 +1,4 @@
-"""The shipped hazard analysis, and how mistakes in an analysis are found."""
+"""The shipped hazard analysis, and mistakes in an analysis."""
 
 import shutil
 from pathlib import Path
@@ -47,19 +47,17 @@ def analysis(clone: Workspace) -> Analysis:
     return load_analysis(clone.library / "stpa")
 
 
-def test_the_analysis_that_ships(
+def test_the_shipped_analysis_has_no_problem(
     analysis: Analysis, specs: tuple[FaultSpec, ...], manifest: TargetManifest
 ) -> None:
-    """The shipped analysis has no gap or contradiction, and each of its context tables is proved to cover
-    everything."""
+    """Each of its context tables is proved to cover everything."""
     assert check_analysis(analysis, specs, manifest) == []
     assert [table.coverage.beyond for table in analysis.tables.values()] == [None, None]
     assert set(analysis.structure.control_actions) == {"accelerate", "decelerate", "steer"}
 
 
-def test_the_papers_locations_are_the_ones_with_faults(analysis: Analysis) -> None:
-    """Faults are injected at the radar, camera frames, the vision output, car sensors and the controllers'
-    software, and nowhere else. The paper has none in software."""
+def test_faults_are_injected_at_the_papers_locations(analysis: Analysis) -> None:
+    """Faults in the controllers' software are the only ones that the paper lacks."""
     places = {place for factor in analysis.factors.values() if factor.faults for place in factor.where}
     sensed = {"own_speed", "own_motion", "steer_angle"}
     assert places == {"radar_points", "pictures", "vision_lead", "path", *sensed, "acc", "lkas"}
@@ -68,8 +66,8 @@ def test_the_papers_locations_are_the_ones_with_faults(analysis: Analysis) -> No
     assert faults and all(fault.startswith("software/") for fault in faults)
 
 
-def test_places_of_both_readings_count(clone: Workspace) -> None:
-    """If a spec has another location as coded, it is listed at both locations."""
+def test_a_spec_with_two_locations_is_listed_at_both(clone: Workspace) -> None:
+    """A spec can have another location as coded."""
     assert injected(clone.spec("radar/jamming")) == {
         "selfdrive/sim/radar.py::RadarSensor.measure",
         "selfdrive/sim/simulator.py::Simulator.step",
@@ -120,11 +118,8 @@ def test_places_of_both_readings_count(clone: Workspace) -> None:
         (FACTORS, "faults: [radar/chaff]", "faults: []", "neither faults nor no_fault in 'CF1'"),
     ],
 )
-def test_what_does_not_fit_together_is_refused(
-    folder: Path, file: str, old: str, new: str, said: str
-) -> None:
-    """Gaps, overlaps, unknown names and dangling names are refused with file and line when the analysis is
-    loaded."""
+def test_an_inconsistent_analysis_is_refused(folder: Path, file: str, old: str, new: str, said: str) -> None:
+    """Gaps, overlaps, unknown names and dangling names are reported with file and line."""
     spoil(folder, file, old, new)
     with pytest.raises(MutatorError) as caught:
         load_analysis(folder)
@@ -176,7 +171,7 @@ def test_what_does_not_fit_together_is_refused(
         ),
     ],
 )
-def test_gaps_and_contradictions_are_found(
+def test_gaps_and_contradictions_are_reported_with_their_line(
     folder: Path,
     specs: tuple[FaultSpec, ...],
     manifest: TargetManifest,
@@ -185,17 +180,14 @@ def test_gaps_and_contradictions_are_found(
     new: str,
     said: str,
 ) -> None:
-    """A gap, or a contradiction with the tables, the library or the target, is reported at its line."""
     spoil(folder, file, old, new)
     problems = check_analysis(load_analysis(folder), specs, manifest)
     assert [p for p in problems if said in str(p) and p.where and p.line], [str(p) for p in problems]
 
 
-def test_a_category_or_a_hazard_that_is_left_out(
+def test_every_hazard_and_category_must_be_judged(
     folder: Path, specs: tuple[FaultSpec, ...], manifest: TargetManifest
 ) -> None:
-    """A hazard without unsafe control actions is reported. Every control action must be judged in all four
-    categories."""
     text = (folder / UNSAFE).read_text()
     (folder / UNSAFE).write_text(text[: text.index("  UCA14:")])
     (folder / FACTORS).write_text((folder / FACTORS).read_text().replace(", UCA14]", "]"))

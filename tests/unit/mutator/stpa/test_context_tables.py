@@ -1,4 +1,4 @@
-"""Context tables, and the hazards that they refer to."""
+"""Context tables and their hazards."""
 
 import math
 import re
@@ -14,7 +14,7 @@ from mutator.workspace import Workspace
 
 
 def test_rows_become_triggers(toy: Workspace) -> None:
-    """Each row becomes a trigger with the row's name and with constants replaced by their values."""
+    """Constants in the row's conditions are replaced by their values."""
     near, far = toy.context_table("pedals").triggers(hold_s=3.0, armed_after_s=1.5)
     assert near == Trigger(name="near", condition="hwt <= 2.0", hold=Hold.FOR, hold_s=3.0, armed_after_s=1.5)
     assert far.condition == "not hwt <= 2.0"
@@ -36,8 +36,7 @@ def test_an_unknown_row(toy: Workspace) -> None:
         ("provided: H1,", "provided: 1,", "9: 1 for 'provided'; expected text"),
     ],
 )
-def test_a_mistake_is_answered(toy: Workspace, old: str, new: str, said: str) -> None:
-    """A table and its conditions are read as strictly as other files."""
+def test_a_mistake_in_a_table_is_reported(toy: Workspace, old: str, new: str, said: str) -> None:
     path = toy.library / "stpa" / "contexts" / "pedals.yaml"
     path.write_text(path.read_text().replace(old, new, 1))
     with pytest.raises(MutatorError) as caught:
@@ -45,9 +44,8 @@ def test_a_mistake_is_answered(toy: Workspace, old: str, new: str, said: str) ->
     assert said in str(caught.value).replace(f"{path}:", "")
 
 
-def test_rows_ask_for_what_a_target_observes(toy: Workspace) -> None:
-    """A name that is neither a constant nor an observed value is reported at its line, with the known
-    names."""
+def test_an_unknown_name_in_a_row_is_reported(toy: Workspace) -> None:
+    """The error lists the constants and the observed values."""
     path = toy.library / "stpa" / "contexts" / "pedals.yaml"
     path.write_text(path.read_text().replace("when: hwt <= safe_hwt_s", "when: hwt <= safe", 1))
     table, variables = load_context_table(path), toy.manifest("toy").observation.variables
@@ -65,8 +63,8 @@ def test_hazards_lead_to_known_accidents(toy: Workspace) -> None:
         toy.hazards()
 
 
-def test_the_table_that_ships(clone: Workspace) -> None:
-    """Four contexts cover every observation exactly once and include the paper's hazardous cells."""
+def test_the_shipped_table_covers_everything_once(clone: Workspace) -> None:
+    """The table's four contexts include the paper's hazardous cells."""
     table = clone.context_table("accelerate_decelerate")
     triggers = table.triggers()
     assert [t.name for t in triggers] == ["C1", "C2", "C3", "C4"]
@@ -99,8 +97,7 @@ def test_the_safe_headway_is_data(clone: Workspace, tmp_path: Path) -> None:
     assert load_context_table(path).rows[1].condition == "hwt <= 3.0 and rs > 0.0"
 
 
-def test_the_table_in_the_docs_can_be_used(clone: Workspace, tmp_path: Path) -> None:
-    """The table in the docs loads. Its rows are proved to cover everything exactly once."""
+def test_the_table_in_the_docs_loads_and_is_proved(clone: Workspace, tmp_path: Path) -> None:
     page = clone.library.parent / "docs" / "how-to" / "change-the-hazard-analysis.md"
     (text, *_) = re.findall(r"```yaml\n(.*?)```", page.read_text(), re.DOTALL)
     (tmp_path / "closing.yaml").write_text(text)
@@ -117,8 +114,8 @@ def test_rows_judge_the_same_actions(toy: Workspace) -> None:
         load_context_table(path)
 
 
-def test_what_cannot_be_proved_is_accepted_and_said(toy: Workspace) -> None:
-    """A table whose conditions compare two variables is accepted without a proof."""
+def test_a_table_that_compares_two_variables_is_not_proved(toy: Workspace) -> None:
+    """The table is accepted."""
     path = toy.library / "stpa" / "contexts" / "pedals.yaml"
     path.write_text(path.read_text().replace("hwt <= safe_hwt_s", "v_ego <= v_lead"))
     table = load_context_table(path)

@@ -21,8 +21,8 @@ def prove(*conditions: str):
         ("v_ego < 0.3", "v_ego >= 0.3 and hwt <= 2", "v_ego >= 0.3 and hwt > 2"),
     ],
 )
-def test_a_right_table_is_proved(conditions: tuple[str, ...]) -> None:
-    """A table that covers everything exactly once passes, whatever the form of its comparisons."""
+def test_a_table_that_covers_everything_once_is_proved(conditions: tuple[str, ...]) -> None:
+    """Comparisons are written in several forms."""
     found = prove(*conditions)
     assert (found.beyond, found.place) == (None, None)
     assert found.cells > 0
@@ -41,8 +41,10 @@ def test_a_right_table_is_proved(conditions: tuple[str, ...]) -> None:
         (("t >= -1",), "t < -1.0", ()),
     ],
 )
-def test_a_wrong_table_is_told_where(conditions: tuple[str, ...], place: str, rows: tuple[str, ...]) -> None:
-    """The first cell with no context or with several is named, including cells at borders."""
+def test_the_first_wrong_cell_is_named(
+    conditions: tuple[str, ...], place: str, rows: tuple[str, ...]
+) -> None:
+    """A wrong cell has no context or several."""
     found = prove(*conditions)
     assert (found.place, found.rows) == (place, rows)
 
@@ -53,15 +55,14 @@ def test_neighbouring_numbers_leave_no_cell_between() -> None:
 
 
 @pytest.mark.parametrize("condition", ["rs < v_ego", "rs + 1 > 0", "abs(rs) < 1", "1 < 2"])
-def test_beyond_a_proof(condition: str) -> None:
-    """A comparison of another kind is reported as not provable."""
+def test_other_comparisons_are_not_provable(condition: str) -> None:
     found = prove(condition, f"not {condition}")
     assert found.beyond is not None and "not a comparison of one variable with a constant" in found.beyond
     assert found.place is None
 
 
-def test_too_many_cells_are_beyond_it_too() -> None:
-    """A table with too many cells is reported as not provable, so that the time is bounded."""
+def test_a_table_with_too_many_cells_is_not_provable() -> None:
+    """The limit bounds the time."""
     names = ("t", "d_rel", "v_ego", "v_lead", "hwt", "rs")
     found = prove(" and ".join(f"{name} != {i}" for name in names for i in range(4)), "True")
     assert found.beyond is not None and "531441 cells" in found.beyond

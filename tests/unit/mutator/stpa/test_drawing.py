@@ -38,7 +38,6 @@ def test_boxes_stand_apart_and_inside(layout: Layout) -> None:
 
 
 def test_arrows_join_their_boxes_and_cross_no_other(analysis: Analysis, layout: Layout) -> None:
-    """An arrow starts and ends at the edges of its two boxes and crosses no box."""
     for name, link in analysis.structure.links.items():
         points = layout.arrows[name].points
         for place, point in ((link.from_, points[0]), (link.to, points[-1])):
@@ -77,8 +76,8 @@ def test_labels_are_clear_of_boxes_arrows_and_each_other(analysis: Analysis, lay
                 assert not any(meets(area, a, b) for a, b in pairwise(arrow.points)), (name, other)
 
 
-def test_places_of_faults_stand_out(analysis: Analysis) -> None:
-    """The diagram is well-formed and reproducible. Only places with faults have the colour of faults."""
+def test_only_places_with_faults_have_their_colour(analysis: Analysis) -> None:
+    """The diagram is well-formed and reproducible."""
     text = draw(analysis)
     assert text == draw(analysis)
     root = ElementTree.fromstring(text)
@@ -89,15 +88,11 @@ def test_places_of_faults_stand_out(analysis: Analysis) -> None:
     assert {"ACC", "LKAS", "steer torque", "CF13, 14"} <= set(words)
 
 
-def test_the_picture_in_the_docs_is_this_one(analysis: Analysis) -> None:
-    """The docs have the current diagram.
-
-    After a change, run `mutator stpa --svg docs/explanation/hazard-analysis.svg`.
-    """
+def test_the_diagram_in_the_docs_is_current(analysis: Analysis) -> None:
+    """After a change, run `mutator stpa --svg docs/explanation/hazard-analysis.svg`."""
     assert (CLONE / "docs" / "explanation" / "hazard-analysis.svg").read_text() == draw(analysis)
 
 
-def test_names_in_short() -> None:
-    """If names have a common beginning, only the first is written in full."""
+def test_a_common_beginning_of_names_is_written_once() -> None:
     assert short(["CF9"]) == "CF9"
     assert short(["CF9", "CF10"]) == "CF9, 10"

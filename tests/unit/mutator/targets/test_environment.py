@@ -1,4 +1,4 @@
-"""The environment variables that a manifest sets for its target's processes."""
+"""The environment variables that a manifest sets."""
 
 from pathlib import Path
 
@@ -25,8 +25,7 @@ def with_env(workspace: Workspace, env: str) -> Path:
     return path
 
 
-def test_both_engines_set_them(fork: Fork) -> None:
-    """Reference runs and the fork server have the variable, and those of the harness."""
+def test_reference_runs_and_the_fork_server_have_the_variables(fork: Fork) -> None:
     with_env(fork.toy, "{ROAD: wet, OMP_NUM_THREADS: '1'}")
     (fork.toy.library.parent / "tree" / "toycar" / "__init__.py").write_text(USE)
     job = fork.job(at_time(2.0))
@@ -61,9 +60,8 @@ def test_films_have_them(toycar: Workspace, tmp_path: Path) -> None:
         ('{ROAD: "a\\0b"}', "3: .* for 'ROAD'; expected text without NUL"),
     ],
 )
-def test_what_cannot_be_set(toycar: Workspace, env: str, said: str) -> None:
-    """Names are checked, and values are texts. A variable that the harness sets is refused unless the
-    value is the same."""
+def test_invalid_variables_are_refused(toycar: Workspace, env: str, said: str) -> None:
+    """A variable that the harness sets is refused unless the value is the same."""
     path = with_env(toycar, env)
     with pytest.raises(MutatorError) as caught:
         toycar.manifest("toycar")

@@ -1,4 +1,4 @@
-"""Target manifests describe a foreign tree with data only."""
+"""Target manifests."""
 
 from pathlib import Path
 
@@ -18,7 +18,6 @@ FILM = 'film: {run: ["x={film}"], module: show, args: ["{out}"], still: ["{film}
 
 
 def test_a_manifest_is_read(toy: Workspace) -> None:
-    """Root, package, entry, channels and the place of observation are read from the manifest."""
     manifest = toy.manifest("toy")
     assert manifest.root == (toy.library.parent / "target").resolve()
     assert manifest.step_s == 0.1
@@ -36,8 +35,8 @@ def test_actuators_are_exact_and_rounding_counts_for_no_other_channel(toy: Works
     assert found == {"speed": 0.5, "pedal": 0.0, "wish": 1e-9, "gap": 0.0}
 
 
-def test_ground_truth_may_be_reckoned(toy: Workspace) -> None:
-    """Values that a target does not store are computed from names, attributes and items that it has."""
+def test_ground_truth_may_be_computed(toy: Workspace) -> None:
+    """Formulas use names, attributes and items that the target has."""
     path = toy.library / "targets" / "toy.yaml"
     text = path.read_text().replace("is: now.gap", "is: 'now[\"lead\"].x[-1] - (now.x + 4.5)'")
     path.write_text(text.replace("is: now.lead_speed", "is: 'hypot(now.v[0], now.v[1]) > 3'"))
@@ -47,7 +46,7 @@ def test_ground_truth_may_be_reckoned(toy: Workspace) -> None:
 
 
 def test_a_manifest_of_the_older_schema_is_read(toy: Workspace) -> None:
-    """An older manifest observes the same four values for every target. Its errors have line numbers."""
+    """An older manifest observes the same four values for every target."""
     path = toy.library / "targets" / "toy.yaml"
     before, text = toy.manifest("toy").observation, path.read_text()
     head, _, rest = text.partition("  time: now.time")
@@ -70,8 +69,7 @@ def test_a_manifest_of_the_older_schema_is_read(toy: Workspace) -> None:
         toy.manifest("toy")
 
 
-def test_arguments(toy: Workspace) -> None:
-    """Placeholders are replaced, and changes add their arguments. An unknown change is refused."""
+def test_arguments_have_placeholders_and_changes(toy: Workspace) -> None:
     manifest = toy.manifest("toy")
     given = manifest.arguments(scenario=Path("s.yaml"), seed=3, out=Path("o"), changes=("alone",))
     assert given == ("s.yaml", "--seed", "3", "--out", "o", "--alone", "--quiet")
@@ -80,8 +78,7 @@ def test_arguments(toy: Workspace) -> None:
 
 
 def test_placeholders_anywhere_in_an_argument(toy: Workspace) -> None:
-    """Each placeholder is replaced once, in the arguments of the entry, of changes and of independent
-    runs. Other braces stay."""
+    """Each placeholder is replaced once. Other braces stay."""
     path = toy.library / "targets" / "toy.yaml"
     text = path.read_text().replace("alone: [--alone, --quiet]", 'alone: ["--in={out}/x", \'{"a": {}}\']')
     text = text.replace("  changes:", '  independent: ["--log={out}:{seed}"]\n  changes:')
@@ -92,8 +89,8 @@ def test_placeholders_anywhere_in_an_argument(toy: Workspace) -> None:
     assert given == ("s{seed}.yaml", "--seed", "3", "--out", "o", "--log=o:3", "--in=o/x", '{"a": {}}')
 
 
-def test_arguments_may_be_left_out(toy: Workspace) -> None:
-    """If the entry has no arguments, the scenario, the seed and the output folder are passed as options."""
+def test_without_arguments_the_entry_gets_options(toy: Workspace) -> None:
+    """The options are the scenario, the seed and the output folder."""
     path = toy.library / "targets" / "toy.yaml"
     lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join(line for line in lines if not line.startswith("  args:")))
@@ -101,8 +98,8 @@ def test_arguments_may_be_left_out(toy: Workspace) -> None:
     assert given == ("--scenario", "s", "--seed", "3", "--out", "o")
 
 
-def test_the_harness_names_the_cache(toy: Workspace) -> None:
-    """`{cache}` is the target's folder in the user's cache, and is the same in every run."""
+def test_the_cache_is_the_same_in_every_run(toy: Workspace) -> None:
+    """`{cache}` is the target's folder in the user's cache."""
     path = toy.library / "targets" / "toy.yaml"
     path.write_text(path.read_text().replace('"{out}"', '"{out}", --cache, "{cache}"'))
     manifest = toy.manifest("toy")
@@ -111,9 +108,8 @@ def test_the_harness_names_the_cache(toy: Workspace) -> None:
         assert given[given.index("--cache") + 1] == str(caches.of_target("toy"))
 
 
-def test_a_target_may_say_how_it_is_filmed(toy: Workspace) -> None:
-    """A film adds arguments with a folder in the run's output. The module of its command is checked like
-    other modules."""
+def test_a_film_adds_arguments(toy: Workspace) -> None:
+    """The module of its command is checked like other modules."""
     with pytest.raises(MutatorError, match=r"target toy cannot be filmed; expected `film` in its manifest"):
         toy.manifest("toy").filming()
     path = toy.library / "targets" / "toy.yaml"
@@ -143,7 +139,7 @@ def test_the_root_can_be_given(toy: Workspace, tmp_path: Path) -> None:
 
 
 def test_the_root_may_be_the_shipped_controller(toy: Workspace) -> None:
-    """`shipped:target` is the controller that ships with the harness, wherever the manifest is stored."""
+    """`shipped:target` is its name, wherever the manifest is stored."""
     path = toy.library / "targets" / "toy.yaml"
     text = path.read_text()
     line = next(line for line in text.splitlines() if line.startswith("root:"))
@@ -157,8 +153,7 @@ def test_the_root_may_be_the_shipped_controller(toy: Workspace) -> None:
 
 
 def test_a_manifest_is_a_snapshot(toy: Workspace) -> None:
-    """A manifest is a snapshot: an edit is seen only by a manifest that is loaded later. Bytecode is not
-    part of a tree."""
+    """An edit is seen only by a manifest that is loaded later. Bytecode is not part of a tree."""
     manifest = toy.manifest("toy")
     before = manifest.tree
     (manifest.root / "toycar" / "__pycache__").mkdir()
@@ -215,8 +210,7 @@ def test_a_manifest_is_a_snapshot(toy: Workspace) -> None:
         ("  derived:", "  deriven:", "23: unknown key 'deriven'; expected one of at, time, values, derived"),
     ],
 )
-def test_a_mistake_is_answered(toy: Workspace, old: str, new: str, said: str) -> None:
-    """A manifest is read as strictly as other files."""
+def test_a_mistake_in_a_manifest_is_reported(toy: Workspace, old: str, new: str, said: str) -> None:
     path = toy.library / "targets" / "toy.yaml"
     path.write_text(path.read_text().replace(old, new, 1))
     with pytest.raises(MutatorError) as caught:
@@ -233,11 +227,10 @@ def test_a_mistake_is_answered(toy: Workspace, old: str, new: str, said: str) ->
         ("packages: [drive.py]", None, ("drive",)),
     ],
 )
-def test_packages_and_modules(
+def test_the_probe_is_in_the_only_package(
     toy: Workspace, packages: str, package: str | None, names: tuple[str, ...]
 ) -> None:
-    """The probe is in the package if there is only one. With several packages or a plain module, it is
-    outside."""
+    """With several packages or a plain module, it is outside."""
     path = toy.library / "targets" / "toy.yaml"
     text = path.read_text().replace("package: toycar", packages)
     path.write_text(text.replace('"toycar/**/*.py"', '"**/*.py"'))
@@ -252,8 +245,7 @@ def test_packages_and_modules(
             _ = toy.manifest("toy").tree
 
 
-def test_files_may_be_left_out(toy: Workspace) -> None:
-    """By default, the tree has exactly the files of the packages, including data files, and the modules."""
+def test_without_files_the_tree_has_all_files_of_the_packages(toy: Workspace) -> None:
     path = toy.library / "targets" / "toy.yaml"
     lines = path.read_text().replace("package: toycar", "packages: [toycar, drive.py]").splitlines()
     path.write_text("\n".join(line for line in lines if not line.startswith("files:")))
@@ -278,9 +270,8 @@ def test_files_may_be_left_out(toy: Workspace) -> None:
         ("package: toycar\npackages: [toycar]", "5: both `package` and `packages`; expected one of them"),
     ],
 )
-def test_packages_that_cannot_be(toy: Workspace, packages: str, said: str) -> None:
-    """Names must be unique, and must be import names or module files at the root. Exactly one of the two
-    keys is allowed."""
+def test_invalid_packages_are_refused(toy: Workspace, packages: str, said: str) -> None:
+    """Names must be unique, and must be import names or module files at the root."""
     path = toy.library / "targets" / "toy.yaml"
     path.write_text(path.read_text().replace("package: toycar", packages))
     with pytest.raises(MutatorError) as caught:
@@ -288,8 +279,7 @@ def test_packages_that_cannot_be(toy: Workspace, packages: str, said: str) -> No
     assert said in str(caught.value).replace(f"{path}:", "")
 
 
-def test_a_package_that_is_not_there(toy: Workspace) -> None:
-    """A manifest is refused when its tree is read if no file belongs to its package."""
+def test_a_package_without_files_is_refused(toy: Workspace) -> None:
     path = toy.library / "targets" / "toy.yaml"
     path.write_text(path.read_text().replace("package: toycar", "package: other"))
     with pytest.raises(MutatorError, match="no file of package 'other'"):
@@ -308,14 +298,14 @@ def test_a_package_that_is_not_there(toy: Workspace) -> None:
         ("a/b", set()),
     ],
 )
-def test_globs(glob: str, hits: set[str]) -> None:
-    """`*` matches within a folder, `**` matches across folders, and a glob must match the whole path."""
+def test_globs_match_the_whole_path(glob: str, hits: set[str]) -> None:
+    """`*` matches within a folder, `**` across folders."""
     paths = ["a/x.py", "a/b/y.py", "a/b/c/z.py", "a/b/d.dbc", "w.py", "a/xXpy"]
     assert {p for p in paths if matches(p, [glob])} == hits
 
 
-def test_links_count_as_what_they_lead_to(toy: Workspace, tmp_path: Path) -> None:
-    """A linked file or folder is part of the tree and can have faults. The mutant has a copy of it."""
+def test_linked_files_are_part_of_the_tree(toy: Workspace, tmp_path: Path) -> None:
+    """A linked file can have faults. The mutant has a copy of it."""
     outside = tmp_path / "outside"
     outside.mkdir()
     root = toy.manifest("toy").root / "toycar"
@@ -334,8 +324,7 @@ def test_links_count_as_what_they_lead_to(toy: Workspace, tmp_path: Path) -> Non
     assert (outside / "sensor.py").read_bytes() == before
 
 
-def test_a_link_that_leads_nowhere(toy: Workspace) -> None:
-    """A dangling link is reported with its target, and not as a missing file."""
+def test_a_dangling_link_is_reported_with_its_target(toy: Workspace) -> None:
     link = toy.manifest("toy").root / "toycar" / "glue.py"
     link.symlink_to("/nowhere/glue.py")
     with pytest.raises(
@@ -345,7 +334,6 @@ def test_a_link_that_leads_nowhere(toy: Workspace) -> None:
 
 
 def test_digests_do_not_depend_on_order(tmp_path: Path) -> None:
-    """Equal files give the same digest, in whatever order they were created."""
     for name, order in (("a", ["x.py", "y.py"]), ("b", ["y.py", "x.py"])):
         (tmp_path / name).mkdir()
         for file in order:

@@ -1,4 +1,4 @@
-"""An error for a mistyped manifest gives the file, the line, the known values, and the remedy."""
+"""The errors for mistyped manifests."""
 
 import re
 from pathlib import Path
@@ -56,8 +56,7 @@ def path(tmp_path: Path) -> Path:
     return tmp_path / "cart.yaml"
 
 
-def test_it_is_well_without_a_mistake(path: Path) -> None:
-    """Without the mistakes, the manifest is valid."""
+def test_the_manifest_is_valid_without_the_mistakes(path: Path) -> None:
     path.write_text(WHOLE)
     assert load_manifest(path).hazards == ("HIT", "LATE")
 
@@ -104,9 +103,10 @@ def test_it_is_well_without_a_mistake(path: Path) -> None:
         ("alerts: [beep]", "alerts: [beep, Beep]", "'Beep'", "once"),
     ],
 )
-def test_a_mistake_is_told_with_what_to_do(path: Path, right: str, wrong: str, got: str, known: str) -> None:
-    """Each of more than thirty kinds of mistakes is reported with file and line, the value, the
-    expectation and a remedy."""
+def test_a_mistake_is_reported_with_a_remedy(
+    path: Path, right: str, wrong: str, got: str, known: str
+) -> None:
+    """Every error has file and line, the value, and the expectation."""
     assert right in WHOLE
     path.write_text(WHOLE.replace(right, wrong, 1))
     with pytest.raises(MutatorError) as caught:

@@ -25,8 +25,7 @@ def edit(path: Path, old: str, new: str) -> None:
 
 
 def test_an_overlay_is_part_of_the_tree(pole: Workspace) -> None:
-    """All files of the overlay are in the tree and in the digest, under their paths. A run must import its
-    modules from the tree."""
+    """A run must import its modules from the tree."""
     before = pole.manifest("pole")
     assert before.tree.overlaid == {"drive.py", "glue_parts/scenario.py"}
     assert before.overlay == (pole.library / "overlays" / "pole").resolve()
@@ -42,8 +41,7 @@ def test_an_overlay_is_part_of_the_tree(pole: Workspace) -> None:
     assert not (before.root / "drive.py").exists()
 
 
-def test_an_overlay_may_be_named_from_the_library(pole: Workspace) -> None:
-    """A path not found next to the manifest is searched in the library."""
+def test_an_overlay_is_searched_in_the_library_too(pole: Workspace) -> None:
     edit(pole.library / MANIFEST, "../overlays/pole", "overlays/pole")
     assert "drive.py" in pole.manifest("pole").tree.overlaid
     edit(pole.library / MANIFEST, "overlays/pole", "overlays/none")
@@ -51,7 +49,7 @@ def test_an_overlay_may_be_named_from_the_library(pole: Workspace) -> None:
         pole.manifest("pole")
 
 
-def test_a_tree_with_an_overlay_is_driven(pole: Workspace) -> None:
+def test_a_tree_with_an_overlay_is_run(pole: Workspace) -> None:
     """The entry module and the observation are in the overlay. Faults in the foreign modules take effect."""
     trial = try_fault("sensor/angle", "tilted", 1.0, value=60, workspace=pole)
     assert trial.record.outcome is Outcome.HAZARD
@@ -60,8 +58,7 @@ def test_a_tree_with_an_overlay_is_driven(pole: Workspace) -> None:
     assert trial.record.outcome is Outcome.HAZARD
 
 
-def test_no_fault_is_injected_into_glue(pole: Workspace) -> None:
-    """A spec with a place in the overlay is refused at its line."""
+def test_no_fault_can_be_injected_into_an_overlay(pole: Workspace) -> None:
     spec = pole.library / "faults" / "sensor" / "angle.yaml"
     edit(
         spec,
@@ -75,9 +72,8 @@ def test_no_fault_is_injected_into_glue(pole: Workspace) -> None:
 
 
 @pytest.mark.parametrize("name", ["regulator.py", "filters/low_pass.py", "notes.txt"])
-def test_a_path_that_both_have(pole: Workspace, name: str) -> None:
-    """A file of the overlay is refused if the root has a file with the same path, whether or not that file
-    is part of the tree."""
+def test_a_file_of_both_overlay_and_root_is_refused(pole: Workspace, name: str) -> None:
+    """The root's file need not be part of the tree."""
     (pole.manifest("pole").root / "notes.txt").write_text("mine")
     path = pole.library / "overlays" / "pole" / name
     path.parent.mkdir(exist_ok=True)
@@ -92,8 +88,7 @@ def test_the_probes_name_in_an_overlay(pole: Workspace) -> None:
         build(pole.manifest("pole"), pole.fault_models(), None, always())
 
 
-def test_linked_glue(pole: Workspace, tmp_path: Path) -> None:
-    """A link to a file, a folder or the overlay itself works like the original."""
+def test_a_linked_overlay_works_like_the_original(pole: Workspace, tmp_path: Path) -> None:
     whole = pole.manifest("pole").tree
     overlay, elsewhere = pole.library / "overlays" / "pole", tmp_path / "elsewhere"
     shutil.move(overlay / "glue_parts", elsewhere / "glue_parts")
@@ -108,7 +103,7 @@ def test_linked_glue(pole: Workspace, tmp_path: Path) -> None:
 
 
 def test_errors_name_the_file_of_the_overlay(pole: Workspace) -> None:
-    """An error in the glue names the glue's own path. `doctor` names root and overlay."""
+    """`doctor` names root and overlay."""
     overlay = (pole.library / "overlays" / "pole").resolve()
     edit(pole.library / MANIFEST, "after_assign: now", "after_assign: then")
     with pytest.raises(MutatorError) as caught:
@@ -119,8 +114,7 @@ def test_errors_name_the_file_of_the_overlay(pole: Workspace) -> None:
     assert f"{pole.manifest('pole').root} and {overlay}: 6 files" in found.found
 
 
-def test_films_know_the_overlay(pole: Workspace, tmp_path: Path) -> None:
-    """The command that shows a film finds the glue and the foreign modules in one folder."""
+def test_the_film_command_has_the_overlay_and_the_root_in_one_folder(pole: Workspace, tmp_path: Path) -> None:
     body = "import sys, drive, pole; open(sys.argv[1], 'w').write(drive.__file__)"
     (pole.library / "overlays" / "pole" / "show.py").write_text(body)
     film = 'film: {run: [], module: show, args: ["{out}"], still: []}\n'

@@ -1,4 +1,4 @@
-"""The packages that a target needs. Missing ones are reported, and present ones are recorded."""
+"""The packages that a target needs."""
 
 from importlib import metadata
 from pathlib import Path
@@ -36,9 +36,7 @@ def lacking(toycar: Workspace) -> Workspace:
     return requiring(toycar, *wanted)
 
 
-def test_what_is_missing_is_named_before_anything_runs(lacking: Workspace, tmp_path: Path) -> None:
-    """A trial and a campaign report each missing package or wrong version before anything runs, with a
-    remedy."""
+def test_missing_packages_are_reported_before_anything_runs(lacking: Workspace, tmp_path: Path) -> None:
     with pytest.raises(MutatorError, match=SAID):
         try_fault("sensor/lane", "A", 1.0, workspace=lacking)
     with pytest.raises(MutatorError, match=SAID):
@@ -46,8 +44,7 @@ def test_what_is_missing_is_named_before_anything_runs(lacking: Workspace, tmp_p
     assert not (tmp_path / "run" / "checks.json").exists()
 
 
-def test_check_and_doctor_name_it(lacking: Workspace) -> None:
-    """Both commands report the missing package."""
+def test_check_and_doctor_report_a_missing_package(lacking: Workspace) -> None:
     problem, *_ = check_library(lacking, "toycar")
     with pytest.raises(MutatorError, match=SAID):
         raise problem
@@ -56,8 +53,7 @@ def test_check_and_doctor_name_it(lacking: Workspace) -> None:
     assert found.remedy == "pip install 'no-such-thing==1.0' 'numpy>=999'"
 
 
-def test_what_is_no_requirement(toycar: Workspace) -> None:
-    """A requirement that pip would reject is refused at its line."""
+def test_an_invalid_requirement_is_refused_at_its_line(toycar: Workspace) -> None:
     requiring(toycar, "numpy >> 2")
     with pytest.raises(
         MutatorError, match=r"toycar.yaml:3: 'numpy >> 2'; expected a requirement as pip takes"
@@ -65,8 +61,8 @@ def test_what_is_no_requirement(toycar: Workspace) -> None:
         toycar.manifest("toycar")
 
 
-def test_versions_are_noted_with_the_run(toycar: Workspace, tmp_path: Path) -> None:
-    """A stretch of work has the versions of all required packages, whether or not a run uses them."""
+def test_versions_are_stored_with_a_stretch_of_work(toycar: Workspace, tmp_path: Path) -> None:
+    """The versions of all required packages are stored, whether or not a run uses them."""
     requiring(toycar, "HypoThesis>=6")
     folder = freeze(make_plan(toycar, "small"), tmp_path / "run", toycar)
     begin_stretch(folder, toycar, records="0001-*", accept=False)

@@ -1,4 +1,4 @@
-"""Roots of targets. An installed package is found where pip installed it, and is not imported."""
+"""Roots of targets, including installed packages."""
 
 import shutil
 import sys
@@ -33,7 +33,7 @@ def installed(pole: Workspace, **keys: str) -> Workspace:
     return pole
 
 
-def test_an_installed_package(pole: Workspace, site: Path) -> None:
+def test_the_tree_of_an_installed_package(pole: Workspace, site: Path) -> None:
     """The tree has the package's files and the overlay, and no other packages. Nothing is imported."""
     manifest = installed(pole, root="installed:filters_of_poles", packages="[filters_of_poles]").manifest(
         "pole"
@@ -79,24 +79,24 @@ def test_an_installed_module(pole: Workspace, site: Path) -> None:
         ),
     ],
 )
-def test_what_is_not_installed(pole: Workspace, site: Path, keys: dict[str, str], said: str) -> None:
-    """A missing package, a package without source, and a tree that would include other packages are
-    refused."""
+def test_an_installed_package_must_have_a_source_of_its_own(
+    pole: Workspace, site: Path, keys: dict[str, str], said: str
+) -> None:
+    """A missing package, and a tree that would include other packages, are refused as well."""
     with pytest.raises(MutatorError, match=f"pole.yaml:{said}"):
         installed(pole, **keys).manifest("pole")
 
 
-def test_check_tells_a_missing_package_once(pole: Workspace) -> None:
-    """An unreadable manifest is reported once, however many campaigns use its target."""
+def test_check_reports_a_missing_package_once(pole: Workspace) -> None:
     installed(pole, root="installed:none_of_poles", packages="[none_of_poles]", requires='["poles>=1"]')
     (problem,) = check_library(pole, "pole")
     assert problem.remedy == "pip install 'poles>=1'"
 
 
-def test_an_installed_package_is_driven(
+def test_a_mutant_of_an_installed_package_runs_from_its_own_tree(
     pole: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A mutant of an installed package runs from its own tree, and the installed package stays unchanged."""
+    """The installed package stays unchanged."""
     root, site = pole.manifest("pole").root, tmp_path / "site"
     shutil.move(root / "filters", site / "filters")
     for name in ("pole.py", "regulator.py"):  # the glue may have requirements

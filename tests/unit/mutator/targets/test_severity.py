@@ -25,17 +25,16 @@ classes:
     ("kph", "severity"),
     [(0, "S0"), (3.99, "S0"), (4, "S1"), (19.9, "S1"), (20, "S2"), (39.9, "S2"), (40, "S3"), (150, "S3")],
 )
-def test_the_shipped_scale(kph: float, severity: str) -> None:
-    """The shipped target's contacts are classed by the strict limits of the ranges in SAE J2980."""
+def test_the_shipped_scale_is_that_of_sae_j2980(kph: float, severity: str) -> None:
+    """Contacts are classed by the strict limits of its ranges."""
     workspace = Workspace.find()
     scale = workspace.scale_of(workspace.manifest("openpilot"))
     assert scale is not None
     assert scale.class_of(kph * KPH) == severity
 
 
-def test_the_shipped_masses() -> None:
-    """The simulated car is the simulator's Civic. In a contact at 20 m/s with an equal car, delta-v is
-    half of that."""
+def test_the_shipped_contact_is_with_an_equal_car() -> None:
+    """The mass is that of the simulator's car, so delta-v is half the closing speed."""
     contact = Workspace.find().manifest("openpilot").contact
     assert contact is not None
     assert (contact.hazard, contact.mass, contact.delta_v(20.0)) == ("H1", 1461.6, 10.0)
@@ -54,8 +53,8 @@ def test_the_shipped_masses() -> None:
         ("from_kph: 40", "from_mps: 11", "7: "),
     ],
 )
-def test_mistakes_in_a_scale(tmp_path: Path, old: str, new: str, message: str) -> None:
-    """A scale needs all four classes with increasing delta-v. The error gives the line."""
+def test_mistakes_in_a_scale_are_reported(tmp_path: Path, old: str, new: str, message: str) -> None:
+    """A scale needs all four classes with increasing delta-v."""
     (tmp_path / "hard.yaml").write_text(SCALE)
     assert load_scale(tmp_path / "hard.yaml").classes[2] == ("S2", 20 * KPH, "c")
     (tmp_path / "hard.yaml").write_text(SCALE.replace(old, new))
@@ -72,9 +71,9 @@ def test_mistakes_in_a_scale(tmp_path: Path, old: str, new: str, message: str) -
         ("mass_kg: 1461.6", "mass_kg: 0", "0"),
     ],
 )
-def test_mistakes_in_a_manifest(tmp_path: Path, old: str, new: str, message: str) -> None:
-    """The terminal hazard, the final speed and the scale that a manifest names must exist. Masses must be
-    positive."""
+def test_mistakes_in_a_manifests_severity_are_reported(
+    tmp_path: Path, old: str, new: str, message: str
+) -> None:
     workspace = Workspace.find()
     text = (
         workspace.targets["openpilot"]

@@ -1,4 +1,4 @@
-"""The files of a target in memory, and values that are derived from them."""
+"""The files of a target in memory."""
 
 from pathlib import Path
 
@@ -8,8 +8,7 @@ from mutator.errors import MutatorError
 from mutator.targets.source_tree import read_tree
 
 
-def test_derived_once(tmp_path: Path) -> None:
-    """A derived value is computed once for each path and function, from the file as it was read."""
+def test_a_value_is_derived_once_for_each_path_and_function(tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text("a = 1\n")
     (tmp_path / "b.py").write_text("b = 1\n")
     tree = read_tree(tmp_path, ["*.py"])
@@ -28,8 +27,7 @@ def test_derived_once(tmp_path: Path) -> None:
     assert tree.derived("a.py", name) == "a.py"
 
 
-def test_a_file_that_the_target_lacks(tmp_path: Path) -> None:
-    """If a path is not one of the manifest's files, the error names it, and nothing is derived."""
+def test_an_unknown_path_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.txt").write_text("a")
     tree = read_tree(tmp_path, ["*.py"])
     with pytest.raises(MutatorError, match=r"no file 'a\.txt' in the target"):

@@ -31,9 +31,7 @@ FOLLOWING = {"t": 3.0, "d_rel": 40.0, "v_ego": 20.0, "v_lead": 18.0, "hwt": 2.0,
         (" True ", "True"),
     ],
 )
-def test_one_text_for_one_condition(text: str, canonical: str) -> None:
-    """Spelling and constants are normalized. The canonical text stays the same when it is normalized
-    again."""
+def test_equal_conditions_have_one_canonical_text(text: str, canonical: str) -> None:
     assert check_condition(text, {"safe": 3}) == canonical
     assert check_condition(canonical) == canonical
 
@@ -64,16 +62,14 @@ def test_one_text_for_one_condition(text: str, canonical: str) -> None:
         ("-" * 980 + "t > 0", "too much in one expression"),
     ],
 )
-def test_anything_else_is_refused(text: str, piece: str) -> None:
-    """Any condition other than a plain comparison of observed values is an error that shows the invalid
-    text."""
+def test_only_comparisons_of_observed_values_are_conditions(text: str, piece: str) -> None:
+    """The error shows the invalid text."""
     with pytest.raises(MutatorError) as caught:
         check_condition(text, variables=FOLLOWING)
     assert piece in str(caught.value)
 
 
-def test_what_is_not_known_is_not_a_number() -> None:
-    """A condition is evaluated for known values. If a value is missing, no comparison holds."""
+def test_no_comparison_of_a_missing_value_holds() -> None:
     assert evaluate("hwt == 2 and rs == 2", FOLLOWING)
     assert not evaluate("gap > 1", FOLLOWING) and not evaluate("gap <= 1", FOLLOWING)
 
@@ -90,16 +86,14 @@ def test_what_is_not_known_is_not_a_number() -> None:
         ("-abs(rs)", "-abs(rs)", "-abs(rs)"),
     ],
 )
-def test_formulas(text: str, canonical: str, code: str) -> None:
-    """A formula is a number computed from the variables. It has one canonical text and becomes code that
-    cannot raise."""
+def test_formulas_have_a_canonical_text_and_code(text: str, canonical: str, code: str) -> None:
+    """The code cannot raise."""
     assert check_formula(text, FOLLOWING) == check_formula(canonical, FOLLOWING) == canonical
     assert to_code(canonical, number=True) == code
 
 
 @pytest.mark.parametrize("text", ["t > 1", "gap", "1 if t else 2", "(1 if t > 0 else 2) + 1", "hypot(t)"])
-def test_what_is_no_formula_is_refused(text: str) -> None:
-    """Truth values, unknown names, and choices inside sums are refused."""
+def test_an_invalid_formula_is_refused(text: str) -> None:
     with pytest.raises(MutatorError):
         check_formula(text, FOLLOWING)
 
@@ -112,7 +106,7 @@ def test_names_come_in_the_order_of_the_text() -> None:
     ("a", "b", "result"), [(1.0, 0.0, math.inf), (-1.0, 0.0, -math.inf), (1.0, -0.0, -math.inf)]
 )
 def test_division_by_zero_is_infinite(a: float, b: float, result: float) -> None:
-    """Division follows IEEE 754, so every condition is either true or false."""
+    """With IEEE 754, every condition is either true or false."""
     assert divide(a, b) == result
     assert math.isnan(divide(0.0, b))
     assert evaluate("1 / t > 5", {**FOLLOWING, "t": 0.0})

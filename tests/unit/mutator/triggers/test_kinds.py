@@ -1,4 +1,4 @@
-"""The kinds of triggers, built by code or parsed from a user's text."""
+"""The kinds of triggers."""
 
 import math
 
@@ -12,8 +12,8 @@ from mutator.triggers.kinds import always, at_time, draw_time, read_trigger
 FOLLOWING = {"t": 3.0, "d_rel": 40.0, "v_ego": 20.0, "v_lead": 18.0}
 
 
-def test_what_is_typed_makes_a_trigger_of_its_kind() -> None:
-    """`always`, a time and a condition are recognized. A condition waits until it is armed."""
+def test_the_text_of_a_trigger_decides_its_kind() -> None:
+    """A condition waits until it is armed."""
     assert read_trigger("always", 1.5, ("t", "hwt")) == always(armed_after_s=1.5)
     assert read_trigger("12.5", 1.5, ("t", "hwt")) == at_time(12.5)
     typed = read_trigger("hwt<=2", 1.5, ("t", "hwt"))
@@ -21,14 +21,12 @@ def test_what_is_typed_makes_a_trigger_of_its_kind() -> None:
 
 
 @pytest.mark.parametrize("text", ["", "soon", "nan", "hwt", "1 +"])
-def test_anything_else_is_refused(text: str) -> None:
-    """Any other text is reported as a user's error."""
+def test_any_other_text_is_refused(text: str) -> None:
     with pytest.raises(MutatorError):
         read_trigger(text, 0.0, ("t", "hwt"))
 
 
-def test_ready_made_triggers() -> None:
-    """`always` and a point in time last to the end of the run."""
+def test_always_and_a_time_last_to_the_end_of_the_run() -> None:
     assert always().hold is Hold.TO_END
     assert at_time(3).condition == "t >= 3.0"
     assert at_time(3).hold is Hold.TO_END
@@ -40,7 +38,7 @@ def test_ready_made_triggers() -> None:
 
 
 def test_random_times_are_starts_of_steps() -> None:
-    """A drawn time depends only on the seed and the key, lies in its interval, and is the start of a step."""
+    """A drawn time depends only on the seed and the key."""
     times = [draw_time(7, f"key {i}", first_s=1.5, last_s=29.5, step_s=0.01) for i in range(300)]
     assert times == [draw_time(7, f"key {i}", first_s=1.5, last_s=29.5, step_s=0.01) for i in range(300)]
     assert all(1.5 <= t <= 29.5 and t == round(t * 100) / 100 for t in times)
@@ -49,7 +47,6 @@ def test_random_times_are_starts_of_steps() -> None:
 
 
 def test_random_times_need_an_interval() -> None:
-    """An interval that ends before it starts, and a negative seed, are refused."""
     with pytest.raises(MutatorError, match="seed -1; expected 0 or more"):
         draw_time(-1, "k", first_s=1.0, last_s=2.0, step_s=0.01)
     with pytest.raises(MutatorError, match="expected an interval"):

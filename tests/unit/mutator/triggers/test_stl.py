@@ -44,7 +44,6 @@ def text(formula: Formula) -> str:
 
 
 def far(formula: Formula) -> int:
-    """The number of steps that the formula looks ahead."""
     match formula:
         case ("<=" | ">=", _, _):
             return 0
@@ -80,9 +79,8 @@ def defined(formula: Formula, i: int, values: dict[str, list[float]]) -> float:
 
 @settings(deadline=None, max_examples=300)
 @given(formulas(), st.lists(st.tuples(st.integers(0, 4), st.integers(0, 4)), min_size=1, max_size=12))
-def test_robustness_is_that_of_the_definition(formula: Formula, rows: list[tuple[int, int]]) -> None:
-    """A formula has a value at a step after its whole window was observed. Before that, and if the record
-    is too short, it has none."""
+def test_robustness_equals_the_definition(formula: Formula, rows: list[tuple[int, int]]) -> None:
+    """A formula has a value at a step only after its whole window was observed."""
     x, y = (np.array(column, dtype=float) for column in zip(*rows, strict=True))
     time = np.arange(len(rows)) * STEP
     found = stl.robustness(text(formula), {"t": time, "x": x, "y": y}, STEP)
@@ -92,8 +90,7 @@ def test_robustness_is_that_of_the_definition(formula: Formula, rows: list[tuple
     assert found.tolist() == expected[: len(rows)]
 
 
-def test_an_answer_that_never_came() -> None:
-    """If a formula has a predicate and a future operator, each is evaluated at its own step."""
+def test_a_predicate_and_a_future_operator_have_their_own_steps() -> None:
     x = np.array([1.0, 6, 6, 6, 6])
     found = stl.robustness("(x > 5) implies eventually[0,2](x < 5)", {"t": np.arange(5.0), "x": x}, 1.0)
     assert found.tolist() == [np.inf, np.inf, 4, -1, -1]
@@ -103,16 +100,15 @@ def test_an_answer_that_never_came() -> None:
     ("step_s", "bound", "steps"), [(1 / 30, "1", 30), (0.01, "0.07", 7), (0.5, "500ms", 1)]
 )
 def test_bounds_count_whole_steps(step_s: float, bound: str, steps: int) -> None:
-    """A bound in seconds becomes a number of steps, even if the length of a step has no short decimal
-    form."""
+    """The length of a step may have no short decimal form."""
     time = np.arange(40) * step_s
     found = stl.robustness(f"always[0:{bound}](x < 1)", {"t": time, "x": np.zeros(40)}, step_s)
     assert found.tolist() == [np.inf] * steps + [1.0] * (40 - steps)
 
 
 @pytest.mark.parametrize("third", [0.35, 0.1, np.nan])
-def test_steps_of_another_length_are_refused(third: float) -> None:
-    """Uneven steps are refused, because the logic counts steps."""
+def test_uneven_steps_are_refused(third: float) -> None:
+    """The logic counts steps."""
     values = {"t": np.array([0.0, 0.1, third]), "x": np.zeros(3)}
     with pytest.raises(MutatorError, match=r"a step of \S+ s at 0.1 s.*expected steps of 0.1 s"):
         stl.robustness("x < 1", values, 0.1)
@@ -131,10 +127,9 @@ def test_steps_of_another_length_are_refused(third: float) -> None:
         ("once[2:1](x < 3)", "a time that ends before it begins"),
     ],
 )
-def test_what_is_no_formula(
+def test_an_invalid_formula_raises_and_prints_nothing(
     formula: str, message: str, caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    """An invalid formula raises the harness's own error, and rtamt prints nothing."""
     with caplog.at_level(logging.WARNING), pytest.raises(MutatorError, match=message) as found:
         stl.check(formula, ["x", "y"], STEP)
     assert "INVALID" not in str(found.value)
@@ -142,12 +137,11 @@ def test_what_is_no_formula(
 
 
 @pytest.mark.parametrize("formula", ["1 / (x - 1) < 3", "sqrt(0 - x) < 3", "next(x > 3) or rise(y < 2)"])
-def test_arithmetic_is_no_mistake_before_there_are_numbers(formula: str) -> None:
-    """A check accepts arithmetic that is invalid only for some values, because it knows no values."""
+def test_a_check_accepts_arithmetic_that_some_values_make_invalid(formula: str) -> None:
+    """A check knows no values."""
     stl.check(formula, ["x", "y"], STEP)
 
 
-def test_arithmetic_that_cannot_be() -> None:
-    """Arithmetic that rtamt cannot compute is reported as an error of the formula."""
+def test_arithmetic_that_rtamt_cannot_compute_is_reported() -> None:
     with pytest.raises(MutatorError, match="division by zero in '1 / x < 3'"):
         stl.robustness("1 / x < 3", {"t": np.zeros(1), "x": np.zeros(1)}, STEP)

@@ -20,8 +20,8 @@ DERIVED = {"hwt": "(gap / speed)", "risk": "(1.0 / hwt)"}
         ("risk", ["/", 1.0, ["/", "gap", "speed"]]),
     ],
 )
-def test_a_formula_is_a_tree_of_its_operators(text: str, made: object) -> None:
-    """In a tree, operators come first, numbers are floats, and a derived value is replaced by its formula."""
+def test_a_formula_becomes_a_tree_of_operators(text: str, made: object) -> None:
+    """Operators come first, numbers are floats, and a derived value is replaced by its formula."""
     assert tree(check_formula(text, KNOWN, over_time=True), DERIVED) == made
 
 
@@ -36,6 +36,6 @@ def test_a_formula_is_a_tree_of_its_operators(text: str, made: object) -> None:
         ),
     ],
 )
-def test_a_chain_of_comparisons_is_all_of_them(text: str, made: object) -> None:
-    """`a < b <= c` becomes `a < b and b <= c`. Truth values are unchanged."""
+def test_a_chain_of_comparisons_becomes_a_conjunction(text: str, made: object) -> None:
+    """Truth values are unchanged."""
     assert tree(check_condition(text, variables=KNOWN, over_time=True), {}) == made

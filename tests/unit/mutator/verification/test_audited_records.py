@@ -1,4 +1,4 @@
-"""Checks of records in an audit find fields that contradict each other."""
+"""An audit finds records whose fields contradict each other."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -36,9 +36,10 @@ def flaws(record: Record) -> list[str]:
         ({"left": (("gas", 2.5, 1.0),)}, "actuators left golden at [2.5]; expected first at None"),
     ],
 )
-def test_what_left_golden(record: MakeRecord, fields: dict[str, Any], told: str) -> None:
-    """Channels must belong to the target, times must lie within the drive, and the time of the first
-    actuator must be that of the manifestation. Runs without recorded channels are exempt."""
+def test_deviations_must_fit_the_target_and_the_drive(
+    record: MakeRecord, fields: dict[str, Any], told: str
+) -> None:
+    """Runs without recorded channels are exempt."""
     head = HEAD | {"channels": [[name, "-", "internal", "", ""] for name in ("gas", "brake", "seen")]}
     one = Recorded(Path("r.jsonl"), 7, record(**FINE | fields))
     found = [str(flaw) for flaw in verdicts(head, [one], MANIFEST)]
@@ -57,8 +58,7 @@ def test_what_left_golden(record: MakeRecord, fields: dict[str, Any], told: str)
         BAD_END | {"status": Status.CRASHED, "activation": Activation(first=2.0, last=3.0, count=5)},
     ],
 )
-def test_a_record_without_contradiction(record: MakeRecord, fields: dict[str, Any]) -> None:
-    """A valid result of a run is never reported."""
+def test_a_valid_record_is_not_reported(record: MakeRecord, fields: dict[str, Any]) -> None:
     assert flaws(record(**FINE | fields)) == []
 
 
@@ -83,10 +83,8 @@ def test_a_record_without_contradiction(record: MakeRecord, fields: dict[str, An
         (BAD_END | {"status": Status.TIMEOUT, "trace_digest": "f"}, "trace_digest f; expected none"),
     ],
 )
-def test_contradictions_are_told_with_their_line(
+def test_contradictions_are_reported_with_their_line(
     record: MakeRecord, fields: dict[str, Any], told: str
 ) -> None:
-    """For each contradiction, experiment, file and line, the value found and the expected value are
-    reported."""
     found = flaws(record(**FINE | fields))
     assert any(f"r.jsonl:7: {'e' * 16}: {told}" in text for text in found), found

@@ -19,7 +19,6 @@ def test_this_machine_can_run_campaigns_but_for_the_library() -> None:
 
 
 def test_a_missing_package_fails_with_its_pip_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A missing requirement is a failure, and the finding says what to install."""
     monkeypatch.setattr(importlib.metadata, "requires", lambda _: ["no-such-package>=2,<3"])
     [finding] = [f for f in doctor.examine(NO_LIBRARY) if f.name == "no-such-package"]
     assert finding.level is Level.FAIL
@@ -27,7 +26,7 @@ def test_a_missing_package_fails_with_its_pip_line(monkeypatch: pytest.MonkeyPat
 
 
 def test_another_version_is_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A package outside its range of versions is a warning with both versions, because it may still work."""
+    """The package may still work."""
     monkeypatch.setattr(importlib.metadata, "requires", lambda _: ["numpy>=999"])
     [finding] = [f for f in doctor.examine(NO_LIBRARY) if f.name == "numpy"]
     assert finding.level is Level.WARN
@@ -45,7 +44,6 @@ def test_a_folder_without_locks_is_a_warning(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_a_child_that_cannot_start_fails(monkeypatch: pytest.MonkeyPatch) -> None:
-    """An interpreter that cannot start child processes is a failure, because it cannot run experiments."""
     monkeypatch.setattr(doctor.sys, "executable", "/no/such/python")
     [finding] = [f for f in doctor.examine(NO_LIBRARY) if f.name == "child process"]
     assert finding.level is Level.FAIL

@@ -1,4 +1,4 @@
-"""Findings from running a target. Each kind of misbehaving controller is reported with the line."""
+"""Findings from running a target."""
 
 import re
 from pathlib import Path
@@ -36,12 +36,11 @@ def line_of(toy: Workspace, text: str, file: str = "driver.py") -> int:
 
 
 def driven(toy: Workspace) -> dict[str, Finding]:
-    """The findings by name."""
     return {finding.name: finding for finding in check_drive(toy, "toycar", SCENARIO)}
 
 
-def test_a_sound_target_has_nothing_to_tell(toy: Workspace) -> None:
-    """Everything is checked and passes. The canary of each campaign runs once."""
+def test_a_sound_target_passes_every_check(toy: Workspace) -> None:
+    """The canary of each campaign runs once."""
     found = driven(toy)
     assert {name: one.level for name, one in found.items()} == dict.fromkeys(
         ["golden A", "fast engines", "statements", "triggers", "canary small"], Level.OK
@@ -76,11 +75,10 @@ SETS = (
     ],
     ids=["clock", "unseeded generator", "set order"],
 )
-def test_what_is_not_deterministic_is_told_with_its_line(
+def test_a_nondeterministic_line_is_reported(
     toy: Workspace, edits: list[tuple[str, str]], imports: str, line: str, told: str
 ) -> None:
-    """If two runs differ, channel, step, time and both values are reported, with the line that probably
-    causes the difference."""
+    """The finding has channel, step, time and both values."""
     for old, new in edits:
         change(toy, "driver.py", old, new)
     change(toy, "driver.py", "class Driver", f"{imports}\n\n\nclass Driver")
@@ -94,10 +92,8 @@ def test_what_is_not_deterministic_is_told_with_its_line(
 
 
 @pytest.mark.parametrize("made", ["names()", "held['names']"], ids=["returned", "in a dict"])
-def test_a_set_that_is_not_found_by_reading_is_told_as_one(toy: Workspace, made: str) -> None:
-    """A difference caused only by the hash seed is reported as such, with the remedy for hashes and
-    without a line. This includes a set of constants whose order in loaded bytecode differs from that in
-    fresh bytecode."""
+def test_an_effect_of_the_hash_seed_is_reported_without_a_line(toy: Workspace, made: str) -> None:
+    """A set of constants in loaded bytecode can have another order than in fresh bytecode."""
     names = "{'x', 'y', 'zed', 'q'}"
     change(toy, "sensing.py", "class Sensor", f"def names():\n    return {names}\n\n\nclass Sensor")
     change(
@@ -114,11 +110,10 @@ def test_a_set_that_is_not_found_by_reading_is_told_as_one(toy: Workspace, made:
 
 
 @pytest.mark.parametrize("long", [False, True], ids=["brief", "long"])
-def test_a_thread_pool_is_told_with_its_line(
+def test_a_thread_pool_is_reported_with_its_line(
     toy: Workspace, long: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A pool with ordered results is deterministic, but its threads prevent forking. Name, line and remedy
-    are reported, even if a run is too slow to try forking."""
+    """A pool with ordered results is deterministic, but its threads prevent forking."""
     change(
         toy,
         "driver.py",
@@ -151,8 +146,7 @@ def test_a_thread_pool_is_told_with_its_line(
     assert "--drive" not in fast.remedy  # the timeout under test
 
 
-def test_a_clock_that_shows_nowhere_is_no_more_than_a_note(toy: Workspace) -> None:
-    """Reading a clock passes the check if trace and record are the same."""
+def test_reading_a_clock_without_effect_is_only_a_note(toy: Workspace) -> None:
     change(toy, "driver.py", "class Driver", "import time\n\n\nclass Driver")
     change(
         toy,
@@ -165,8 +159,8 @@ def test_a_clock_that_shows_nowhere_is_no_more_than_a_note(toy: Workspace) -> No
     assert [place.line for place in found["clocks"].places] == [line_of(toy, "time.perf_counter()")]
 
 
-def test_lines_are_those_of_the_target(toy: Workspace) -> None:
-    """Lines that are added for counting shift other lines. The report has the line numbers of the target."""
+def test_reported_lines_are_those_of_the_target(toy: Workspace) -> None:
+    """Lines that are added for counting shift other lines."""
     change(toy, "sensing.py", "class Sensor", "import time\n\n\nclass Sensor")
     change(
         toy,
@@ -178,9 +172,7 @@ def test_lines_are_those_of_the_target(toy: Workspace) -> None:
     assert (place.file, place.line) == ("toycar/sensing.py", line_of(toy, "time.time()", "sensing.py"))
 
 
-def test_a_fault_whose_place_is_never_executed_is_told(toy: Workspace) -> None:
-    """An anchor in a branch that no run executes is reported with the line of its spec. Other anchors are
-    not."""
+def test_an_anchor_that_no_run_executes_is_reported(toy: Workspace) -> None:
     change(
         toy,
         "sensing.py",
@@ -201,8 +193,8 @@ def test_a_fault_whose_place_is_never_executed_is_told(toy: Workspace) -> None:
     assert place.what == "sensor/lane/shifted: toycar/sensing.py, Sensor.sense, after_assign offset"
 
 
-def test_a_place_counts_only_with_the_changes_of_its_fault(toy: Workspace) -> None:
-    """A statement is reported if runs reach it only without the fault's change of the scenario."""
+def test_an_anchor_reached_only_without_the_faults_change_is_reported(toy: Workspace) -> None:
+    """A fault may change its scenario."""
     change(
         toy,
         "sensing.py",
@@ -219,15 +211,13 @@ def test_a_place_counts_only_with_the_changes_of_its_fault(toy: Workspace) -> No
 @pytest.mark.parametrize(
     ("count", "told"), [(0, "none"), (1, "1 trigger, which is reached"), (2, "2 triggers, all are reached")]
 )
-def test_what_was_reached_is_counted(toy: Workspace, count: int, told: str) -> None:
-    """The wording depends on whether none, one or several were reached."""
+def test_the_wording_fits_the_number_of_places_reached(toy: Workspace, count: int, told: str) -> None:
     finding = Reach(toy, toy.manifest("toycar"), [])._finding("trigger", count, [], "")
     assert (finding.name, finding.found) == ("triggers", told)
 
 
-def test_a_trigger_that_no_scenario_reaches_is_told(toy: Workspace) -> None:
-    """A context that never occurs is reported with its line, and so is a random time after the end of
-    every run."""
+def test_a_trigger_that_no_scenario_reaches_is_reported(toy: Workspace) -> None:
+    """Either its context never occurs, or its random time comes after the end of every run."""
     change(toy, "fault_library/stpa/contexts/near_far.yaml", "near_s: 2.0", "near_s: 0.01")
     change(toy, "fault_library/campaigns/small.yaml", "random_until_s: 5.5", "random_until_s: 9.0")
     found = driven(toy)["triggers"]
@@ -249,23 +239,22 @@ def test_a_canary_that_does_no_harm_is_told_with_all_values(toy: Workspace) -> N
     assert found.found.count(" m") == 4
 
 
-def test_a_target_that_crashes_or_is_harmful_is_told(toy: Workspace) -> None:
-    """Reasons against a golden run are reported as in the checks before a campaign."""
+def test_a_crashing_or_hazardous_target_is_reported(toy: Workspace) -> None:
+    """The reasons are those of the checks before a campaign."""
     change(toy, "driver.py", "        gap, closing", "        1 / 0\n        gap, closing")
     found = driven(toy)["golden A"]
     assert (found.level, "crashed: ZeroDivisionError" in found.found) == (Level.FAIL, True)
 
 
-def test_what_is_not_well_is_not_forked(toy: Workspace) -> None:
-    """If golden runs differ, forking is not tried, because it would differ for the same reason."""
+def test_a_nondeterministic_target_is_not_forked(toy: Workspace) -> None:
+    """A fork would differ for the same reason."""
     change(toy, "driver.py", "class Driver", "import time\n\n\nclass Driver")
     change(toy, "driver.py", *CLOCK)
     fast = driven(toy)["fast engines"]
     assert (fast.level, "not tried, because its golden run fails" in fast.found) == (Level.WARN, True)
 
 
-def test_a_target_without_steps_is_told_what_it_lacks(toy: Workspace) -> None:
-    """Without `entry.stepwise`, nothing can be forked, and the finding names the manifest."""
+def test_a_target_without_a_stepwise_entry_is_reported(toy: Workspace) -> None:
     change(toy, "fault_library/targets/toycar.yaml", "  stepwise: begin\n", "")
     found = driven(toy)
     assert found["golden A"].level is Level.OK

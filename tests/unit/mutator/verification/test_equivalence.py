@@ -1,4 +1,4 @@
-"""The equivalence check: its sample of experiments and its findings."""
+"""The equivalence check."""
 
 import json
 from collections.abc import Callable
@@ -24,8 +24,7 @@ Reseal = Callable[..., None]
 
 
 def test_the_sample_has_every_fault_type_and_scenario(experiment: Callable[..., Experiment]) -> None:
-    """The sample has one experiment in a hundred and at least 20, is the same for the same seed, and
-    includes rare cases."""
+    """The sample has one experiment in a hundred and at least 20."""
     many = [experiment(value, f"S{value % 5:.0f}") for value in range(3000)]
     rare = experiment(1.0, "S9", spec="vision/rain/rate")
     sample = equivalence.sample([*many, rare], 1)
@@ -59,8 +58,8 @@ def test_a_record_that_differs_fails_the_campaign(toycar: Workspace, proven: Pat
 
 
 @pytest.mark.slow
-def test_what_is_lost_of_a_proof_is_run_again(toycar: Workspace, proven: Path, reseal: Reseal) -> None:
-    """An incomplete check is not a success. The same command completes it, with any engine."""
+def test_an_incomplete_check_is_resumed(toycar: Workspace, proven: Path, reseal: Reseal) -> None:
+    """Any engine can complete the check."""
     (path,) = (proven / "proof").iterdir()
     path.write_text(path.read_text().splitlines()[0] + "\n")
     reseal(proven, finished=False)
@@ -90,7 +89,7 @@ _BELIEVE = """
 
 @pytest.fixture
 def sharing(toycar: Workspace, tmp_path: Path) -> Workspace:
-    """A toy whose runs read a file about the world from some time on, unless they are told to forget it."""
+    """A toy whose runs read a file about the world from some time on, unless `--forget` is given."""
     go, world = (tmp_path / "toy/tree/toycar" / name for name in ("go.py", "world.py"))
     believe = _BELIEVE.replace("{kept}", str(tmp_path / "kept"))
     go.write_text(go.read_text().replace("\n    return Drive(case)\n", believe))
@@ -111,11 +110,10 @@ def sharing(toycar: Workspace, tmp_path: Path) -> Workspace:
         ("0.5 0.01", "in the proof: differs from golden at 0."),
     ],
 )
-def test_the_proof_believes_nothing_that_runs_share(
+def test_an_error_that_runs_share_fails_the_campaign(
     sharing: Workspace, tmp_path: Path, kept: str, told: str
 ) -> None:
-    """An error that golden runs and forks share fails the campaign and names the experiment, whether it
-    appears before or after the fault begins. Correct shared data pass."""
+    """The error appears before or after the fault begins."""
     (tmp_path / "kept").write_text(kept)
     out = tmp_path / "run"
     try:
@@ -130,9 +128,8 @@ def test_the_proof_believes_nothing_that_runs_share(
         assert (code, found) == (0, "")
 
 
-def test_which_engine_runs(toycar: Workspace) -> None:
-    """Forking is the default where it is possible and worthwhile. An engine that is requested is used or
-    refused."""
+def test_forking_is_the_default_where_it_is_worthwhile(toycar: Workspace) -> None:
+    """An engine that is requested is used or refused."""
     manifest = toycar.manifest("toycar")
     assert choose_engine(None, manifest, 1000) == "fork"
     assert choose_engine(None, manifest, 10) == "reference"
@@ -154,9 +151,8 @@ def threaded(toycar: Workspace, tmp_path: Path) -> Workspace:
     return toycar
 
 
-def test_where_nothing_was_forked_no_proof_is_driven(threaded: Workspace, tmp_path: Path) -> None:
-    """If the reference engine ran every experiment, there is no equivalence check. The summary says why
-    nothing was forked. The folder equals one of the reference engine, and its audit finds nothing."""
+def test_without_forks_there_is_no_equivalence_check(threaded: Workspace, tmp_path: Path) -> None:
+    """The folder equals one of the reference engine, and its audit finds nothing."""
     summary = run_campaign(threaded, "small", tmp_path / "run", engine="fork", choices=Choices(limit=1))
     assert (summary.proof, summary.exit_code) == (None, 0)
     assert summary.not_forked.endswith("only one can be forked: besides the main one, 'poll'")
@@ -173,18 +169,16 @@ def test_where_nothing_was_forked_no_proof_is_driven(threaded: Workspace, tmp_pa
         ("reference", ""),
     ],
 )
-def test_few_experiments_are_said_not_to_be_worth_forking(
+def test_the_summary_says_that_a_campaign_is_too_small_to_fork(
     toycar: Workspace, tmp_path: Path, engine: str | None, note: str
 ) -> None:
-    """If the harness decided not to fork a small campaign, the summary says so."""
     summary = run_campaign(toycar, "small", tmp_path / "run", engine=engine, choices=Choices(limit=1))
     assert (summary.proof, summary.proof_note) == (None, note)
 
 
 @pytest.mark.slow
-def test_a_proof_that_was_begun_in_vain_goes(threaded: Workspace, tmp_path: Path) -> None:
-    """If nothing turns out to be forked, the check's earlier runs are deleted, so that the seal does not
-    depend on timing."""
+def test_runs_of_an_unneeded_check_are_deleted(threaded: Workspace, tmp_path: Path) -> None:
+    """With these runs, the seal would depend on timing."""
     run = tmp_path / "run"
     seal = run_campaign(threaded, "small", run, engine="fork", choices=Choices(limit=2)).seal
     folder = RunFolder.open(run)
@@ -203,8 +197,7 @@ def test_a_proof_that_was_begun_in_vain_goes(threaded: Workspace, tmp_path: Path
 
 
 @pytest.mark.slow
-def test_what_is_run_again_by_another_engine_is_proved(toycar: Workspace, tmp_path: Path) -> None:
-    """An experiment that must still run may be forked, whatever its previous run reported."""
+def test_an_experiment_that_must_run_again_may_be_forked(toycar: Workspace, tmp_path: Path) -> None:
     run = tmp_path / "run"
     run_campaign(toycar, "small", run, engine="reference", choices=Choices(limit=2))
     folder = RunFolder.open(run)

@@ -1,4 +1,4 @@
-"""The check of a library, its templates and its target, and the shipped library."""
+"""The check of a library, and the shipped library."""
 
 import ast
 from collections import Counter
@@ -56,14 +56,12 @@ def faults(everything: dict[str, tuple[Fault, ...]]) -> dict[str, tuple[Fault, .
     return {name: tuple(f for f in found if f.module not in BEYOND) for name, found in everything.items()}
 
 
-def test_the_library_that_ships_has_no_problem(clone: Workspace) -> None:
-    """In the shipped library, every spec expands, every anchor is found once, and every shape compiles and
-    can be undone."""
+def test_the_shipped_library_has_no_problem(clone: Workspace) -> None:
+    """Every spec expands, every anchor is found once, and every shape compiles and can be undone."""
     assert check_library(clone, "openpilot") == []
 
 
-def test_counts(faults: dict[str, tuple[Fault, ...]]) -> None:
-    """Each fault type has as many values as the experiments that it reproduces, in both readings."""
+def test_fault_types_have_as_many_values_as_they_reproduce(faults: dict[str, tuple[Fault, ...]]) -> None:
     assert list(faults) == ["as_described", "as_coded"]
     for found in faults.values():
         assert Counter((f.module, f.fault_type) for f in found) == COUNTS
@@ -71,8 +69,7 @@ def test_counts(faults: dict[str, tuple[Fault, ...]]) -> None:
 
 
 def test_values_and_signs(faults: dict[str, tuple[Fault, ...]]) -> None:
-    """An invisible vehicle appears faster, and ghosts appear closer. Values lie in their ranges, in their
-    units."""
+    """An invisible vehicle appears faster, and ghosts appear closer."""
     by_spec: dict[str, list[Fault]] = {}
     for fault in faults["as_described"]:
         by_spec.setdefault(fault.spec, []).append(fault)
@@ -101,11 +98,8 @@ def test_values_and_signs(faults: dict[str, tuple[Fault, ...]]) -> None:
 
 
 def test_aims_holds_and_changes(faults: dict[str, tuple[Fault, ...]]) -> None:
-    """Faults without a lead vehicle aim at H2. Steering, lane and image faults aim at H3, and the others
-    at H1.
-
-    Lost data latch as described, and bad images latch as coded.
-    """
+    """Faults without a lead vehicle aim at H2. Steering, lane and image faults aim at H3, and the others at
+    H1. Lost data latch as described, and bad images latch as coded."""
     for fault in faults["as_described"]:
         seen = fault.module == "vision_input"
         lateral = seen or fault.fault_type in ("steer", "path_model", "camera_unavailable")
@@ -119,8 +113,8 @@ def test_aims_holds_and_changes(faults: dict[str, tuple[Fault, ...]]) -> None:
 
 
 def test_readings(faults: dict[str, tuple[Fault, ...]]) -> None:
-    """Both readings have the same values. As coded, units are wrong, lanes drift, and jamming stops all
-    CAN messages."""
+    """Both readings have the same values. As coded, units are wrong, lanes drift, and jamming stops all CAN
+    messages."""
     described, coded = faults["as_described"], faults["as_coded"]
     assert [(f.spec, f.value) for f in described] == [(f.spec, f.value) for f in coded]
     differing = {f.fault_type for f, g in zip(described, coded, strict=True) if f.injections != g.injections}
@@ -155,8 +149,7 @@ def test_radar_and_camera_can_be_compared(faults: dict[str, tuple[Fault, ...]]) 
         assert values[f"{module}/relative_distance/shorter"] == shorter
 
 
-def test_levels_of_disturbed_pictures(faults: dict[str, tuple[Fault, ...]]) -> None:
-    """Levels, gains, biases and kernels are those of the published table and reach the effect unchanged."""
+def test_levels_of_image_effects_are_the_published_ones(faults: dict[str, tuple[Fault, ...]]) -> None:
     levels: dict[str, list[object]] = {}
     for fault in faults["as_described"]:
         if fault.module == "vision_input":
@@ -174,9 +167,9 @@ def test_levels_of_disturbed_pictures(faults: dict[str, tuple[Fault, ...]]) -> N
     }
 
 
-def test_each_effect_has_a_seed_of_its_own(everything: dict[str, tuple[Fault, ...]]) -> None:
-    """Each level has a different seed, and so does each of two effects in one frame. The seeds are equal
-    in both readings."""
+def test_each_effect_has_its_own_seed(everything: dict[str, tuple[Fault, ...]]) -> None:
+    """Each level has a different seed, and so does each of two effects in one frame. The readings share
+    seeds."""
     seeds = {
         reading: [dict(i.params)["seed"] for f in found for i in f.injections if i.model == "image_effect"]
         for reading, found in everything.items()
@@ -185,8 +178,10 @@ def test_each_effect_has_a_seed_of_its_own(everything: dict[str, tuple[Fault, ..
     assert len(set(seeds["as_described"])) == len(seeds["as_described"])
 
 
-def test_two_effects_in_one_picture(clone: Workspace, everything: dict[str, tuple[Fault, ...]]) -> None:
-    """The effects of a spec act in its order, so that rain falls in front of a foggy road."""
+def test_two_effects_act_in_the_order_of_the_spec(
+    clone: Workspace, everything: dict[str, tuple[Fault, ...]]
+) -> None:
+    """Rain falls in front of a foggy road."""
     manifest, models = clone.manifest("openpilot"), clone.fault_models()
     fault = next(f for f in everything["as_described"] if f.fault_type == "rain_and_fog")
     made = build(manifest, models, fault, always())
@@ -194,8 +189,8 @@ def test_two_effects_in_one_picture(clone: Workspace, everything: dict[str, tupl
     assert 0 < text.index(f"import Fog  # fi:{made.injections[0]}") < text.index("lambda: Rain(5.0, ")
 
 
-def test_no_fault_gets_into_the_cache_of_pictures(clone: Workspace) -> None:
-    """Code that draws the road or reads frames cannot have faults, because runs share its output."""
+def test_code_that_draws_or_reads_frames_cannot_have_faults(clone: Workspace) -> None:
+    """Runs share its output."""
     manifest = clone.manifest("openpilot")
     todo, closed = ["selfdrive/sim/road_renderer.py", "selfdrive/sim/image_folder.py"], set()
     while todo:
@@ -217,9 +212,9 @@ def test_no_fault_gets_into_the_cache_of_pictures(clone: Workspace) -> None:
 
 
 @pytest.mark.slow
-def test_every_mutant_of_the_library(clone: Workspace, everything: dict[str, tuple[Fault, ...]]) -> None:
-    """Every fault, in both readings and all four contexts, compiles, and the original can be restored from
-    it."""
+def test_every_mutant_of_the_library_compiles_and_can_be_undone(
+    clone: Workspace, everything: dict[str, tuple[Fault, ...]]
+) -> None:
     manifest, models = clone.manifest("openpilot"), clone.fault_models()
     triggers = clone.context_table("accelerate_decelerate").triggers(armed_after_s=1.5)
     ids = set()
@@ -242,8 +237,7 @@ def edited(toy: Workspace, file: str, old: str, new: str) -> list[str]:
     return [str(p).replace(f"{toy.library.parent}/", "") for p in check_library(toy, "toy")]
 
 
-def test_a_target_that_lost_an_anchor(toy: Workspace) -> None:
-    """Each variant whose statement is missing is a separate problem, at the line of its anchor."""
+def test_each_variant_without_its_anchor_is_a_problem(toy: Workspace) -> None:
     problems = edited(toy, "target/toycar/sensor.py", "gap = truth.gap", "distance = truth.gap")
     assert len(problems) == 3, "two variants, one of them in two readings"
     assert problems[0].startswith(
@@ -252,14 +246,12 @@ def test_a_target_that_lost_an_anchor(toy: Workspace) -> None:
     )
 
 
-def test_a_target_with_a_second_hit(toy: Workspace) -> None:
-    """An anchor with two candidates is a problem that lists both."""
+def test_an_anchor_with_two_candidates_lists_both(toy: Workspace) -> None:
     problems = edited(toy, "target/toycar/sensor.py", "gap = truth.gap", "gap = 0\n        gap = truth.gap")
     assert "assignment to 'gap' matches 2 statements in Sensor.measure: lines 14, 15" in problems[0]
 
 
 def test_problems_do_not_hide_each_other(toy: Workspace) -> None:
-    """If a table and a spec are broken, both are reported."""
     (toy.library / "stpa" / "contexts" / "pedals.yaml").write_text("schema: context_table/9\n")
     problems = edited(toy, "fault_library/faults/sensor/distance.yaml", "model: scale", "model: skale")
     assert len(problems) == 2
@@ -291,6 +283,5 @@ def test_problems_do_not_hide_each_other(toy: Workspace) -> None:
     ],
 )
 def test_other_problems(toy: Workspace, file: str, old: str, new: str, said: str) -> None:
-    """Unknown hazards, a missing place of observation and a target that does not parse are reported."""
     problems = edited(toy, file, old, new)
     assert any(said in problem for problem in problems)

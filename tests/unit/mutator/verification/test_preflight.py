@@ -1,4 +1,4 @@
-"""The checks before a campaign. Each of them can fail, and none is repeated without need."""
+"""The checks before a campaign."""
 
 import re
 import shutil
@@ -26,15 +26,13 @@ def frozen(toycar: Workspace, tmp_path: Path) -> RunFolder:
 
 
 def change(toycar: Workspace, old: str, new: str, name: str = "go") -> None:
-    """Edit the toy target."""
     path = toycar.library.parent / "tree" / "toycar" / f"{name}.py"
     assert old in path.read_text()
     path.write_text(path.read_text().replace(old, new))
 
 
 def test_a_sound_target_passes(toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Anchors, two golden runs, the null mutant and the canary all pass. For the same sources, they are
-    not run again."""
+    """For the same sources, the checks are not run again."""
     folder = frozen(toycar, tmp_path)
     told: list[Progress] = []
     results = run_checks(toycar, folder, workers=2, notify=told.append)
@@ -86,8 +84,7 @@ def test_a_damaged_golden_run_is_made_again(toycar: Workspace, tmp_path: Path) -
 def test_an_unsound_target_is_refused(
     toycar: Workspace, tmp_path: Path, old: str, new: str, told: str
 ) -> None:
-    """No campaign starts if its target is non-deterministic, reaches a hazard without a fault, or differs
-    from its manifest."""
+    """The target is non-deterministic, reaches a hazard without a fault, or differs from its manifest."""
     change(toycar, old, new)
     folder = frozen(toycar, tmp_path)
     with pytest.raises(CheckFailed, match=re.escape(told)):
@@ -95,7 +92,6 @@ def test_an_unsound_target_is_refused(
 
 
 def test_an_observation_that_is_not_reached_is_refused(toycar: Workspace, tmp_path: Path) -> None:
-    """If the observation statement never runs, the probe proves nothing, and the check fails."""
     change(toycar, "        drive.step()", "        Drive.other(drive)")
     change(toycar, "    def step(self):", "    def step(self):\n        now = 0\n\n    def other(self):")
     manifest = toycar.library / "targets" / "toycar.yaml"
@@ -110,8 +106,7 @@ def test_an_observation_that_is_not_reached_is_refused(toycar: Workspace, tmp_pa
 
 
 def test_a_harmless_canary_is_refused(toycar: Workspace, tmp_path: Path) -> None:
-    """If no value of the canary reaches its hazard, the check fails, because hazards might be missed. The
-    values tried are listed."""
+    """A campaign without hazards might have missed them. The values tried are listed."""
     path = toycar.campaign("small")
     path.write_text(path.read_text().replace("at_s: 1.0", "at_s: 5.9"))
     folder = frozen(toycar, tmp_path)
@@ -126,8 +121,6 @@ def test_a_harmless_canary_is_refused(toycar: Workspace, tmp_path: Path) -> None
 
 
 def test_a_canary_that_harms_with_another_value_passes(toycar: Workspace, tmp_path: Path) -> None:
-    """If the largest value of the canary does no harm, other values are tried. The result names both
-    values."""
     change(toycar, "offset = world.offset", "shown = world.offset\n        offset = shown", "sensing")
     change(toycar, "closing, offset))", "closing, shown if offset > 2.0 else offset))", "sensing")
     results = run_checks(toycar, frozen(toycar, tmp_path))
@@ -136,10 +129,9 @@ def test_a_canary_that_harms_with_another_value_passes(toycar: Workspace, tmp_pa
     assert re.fullmatch(r"reached H3 with 1\.\d+ m, and not with 2\.\d+ m", canary.detail)
 
 
-def test_an_anchor_that_is_gone_is_told_before_anything_runs(
+def test_a_missing_anchor_is_reported_before_any_run(
     toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A fault whose statement is missing is reported with its spec, before any run."""
     change(toycar, "offset = world.offset", "shift = world.offset", "sensing")
     change(toycar, "closing, offset))", "closing, shift))", "sensing")
     folder = frozen(toycar, tmp_path)
@@ -176,9 +168,8 @@ def test_other_golden_runs_than_before_are_refused(
     assert {path: path.read_bytes() for path in folder.path.rglob("*") if path.is_file()} == before
 
 
-def test_a_canary_whose_run_was_ended_from_outside_is_run_again(toycar: Workspace, tmp_path: Path) -> None:
-    """A signal to one run does not affect the result of the check. A run that does not end well is
-    repeated only once."""
+def test_a_canary_whose_run_was_killed_is_run_again(toycar: Workspace, tmp_path: Path) -> None:
+    """A run is repeated only once."""
     canary = frozen(toycar, tmp_path).canary
     fine = CheckRun(problem="", hazards=(("H3", 1.0),))
     runs = iter([CheckRun(problem="crashed: killed by SIGHUP"), fine])

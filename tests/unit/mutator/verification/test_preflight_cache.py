@@ -1,4 +1,4 @@
-"""Checks are run once for the same sources, in any run folder. Damaged results are ignored."""
+"""Cached results of the checks before a campaign."""
 
 import os
 import shutil
@@ -31,7 +31,7 @@ def checked(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar) -
 
 @pytest.fixture
 def cache(checked: tuple[Workspace, RunFolder], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A copy of the resulting cache, which is in use; return its only entry."""
+    """Copy the resulting cache for use and return its only entry."""
     copied = shutil.copytree(checked[1].path.parent / "cache", tmp_path / "cache")
     monkeypatch.setenv("XDG_CACHE_HOME", str(copied))
     (entry,) = (tmp_path / "cache" / "mutator" / "checks").iterdir()
@@ -39,7 +39,7 @@ def cache(checked: tuple[Workspace, RunFolder], tmp_path: Path, monkeypatch: pyt
 
 
 class Driven(Exception):
-    """Raised if a test runs the target."""
+    pass
 
 
 @pytest.fixture
@@ -51,8 +51,9 @@ def nothing_is_driven(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("cache", "nothing_is_driven")
-def test_another_folder_drives_nothing(checked: tuple[Workspace, RunFolder], tmp_path: Path) -> None:
-    """A second folder of the same sources gets the same bytes of results and golden runs immediately."""
+def test_another_folder_takes_results_from_the_cache(
+    checked: tuple[Workspace, RunFolder], tmp_path: Path
+) -> None:
     toy, before = checked
     folder = freeze(make_plan(toy, "small", Choices(only='method == "guided"')), tmp_path / "run", toy)
     assert all(result.passed for result in run_checks(toy, folder))
@@ -65,10 +66,10 @@ def test_another_folder_drives_nothing(checked: tuple[Workspace, RunFolder], tmp
 @pytest.mark.usefixtures("nothing_is_driven")
 @pytest.mark.parametrize("damaged", ["checks.json", "golden/A/log.npz", "golden/A+alone/said.json", ""])
 @pytest.mark.parametrize("content", [b"", b"{}", None])
-def test_a_damaged_entry_is_not_believed(
+def test_a_damaged_entry_is_ignored(
     checked: tuple[Workspace, RunFolder], tmp_path: Path, cache: Path, damaged: str, content: bytes | None
 ) -> None:
-    """If a file of an entry is empty, changed or missing, the entry is ignored, and the checks run again."""
+    """A file of the entry is empty, changed or missing."""
     if not damaged:
         shutil.rmtree(cache)
     elif content is None:
@@ -83,11 +84,10 @@ def test_a_damaged_entry_is_not_believed(
 
 @pytest.mark.usefixtures("nothing_is_driven")
 @pytest.mark.parametrize("how", ["another word in a result", "another file", "a pipe"])
-def test_nothing_in_an_entry_may_be_another(
+def test_a_changed_entry_is_ignored(
     checked: tuple[Workspace, RunFolder], tmp_path: Path, cache: Path, how: str
 ) -> None:
-    """An entry is either used unchanged or ignored, because its results and golden runs are part of a
-    seal."""
+    """The results and golden runs of an entry become part of a seal."""
     if how == "another file":
         shutil.copy(cache / "golden" / "A" / "log.npz", cache / "golden" / "A" / "log2.npz")
     elif how == "a pipe":
@@ -105,14 +105,13 @@ def test_nothing_in_an_entry_may_be_another(
 
 @pytest.mark.usefixtures("cache", "nothing_is_driven")
 @pytest.mark.parametrize("changed", ["seed", "target", "machine"])
-def test_other_sources_are_checked(
+def test_another_seed_target_or_machine_has_no_entry(
     checked: tuple[Workspace, RunFolder],
     toycar: Workspace,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     changed: str,
 ) -> None:
-    """With another seed, target or machine, there is no entry."""
     if changed == "machine":
         monkeypatch.setattr("platform.node", lambda: "elsewhere")
     if changed == "target":
@@ -131,8 +130,9 @@ def test_a_damaged_entry_is_replaced(checked: tuple[Workspace, RunFolder], cache
     assert list(cache.parent.iterdir()) == [cache]
 
 
-def test_no_room_for_a_cache_is_no_error(checked: tuple[Workspace, RunFolder], tmp_path: Path) -> None:
-    """If the cache cannot be created, nothing is stored and nothing is printed."""
+def test_a_cache_that_cannot_be_created_is_no_error(
+    checked: tuple[Workspace, RunFolder], tmp_path: Path
+) -> None:
     (tmp_path / "file").write_text("")
     preflight_cache.store(tmp_path / "file" / "entry", checked[1].path, "checks.json", checked[1].work)
     assert (tmp_path / "file").read_text() == ""

@@ -1,4 +1,4 @@
-"""Repair moves damaged parts aside and keeps intact ones, and the folder can be opened again."""
+"""Repair moves damaged parts aside and keeps intact ones."""
 
 import json
 import shutil
@@ -57,8 +57,8 @@ LOSSES: dict[str, tuple[Callable[[list[bytes]], list[bytes]], int]] = {
 
 
 @pytest.mark.parametrize("loss", LOSSES)
-def test_the_intact_lines_of_a_segment_stay(run: Path, made: Path, loss: str) -> None:
-    """Only the lost lines must be run again. The damaged file is kept unchanged in another folder."""
+def test_only_damaged_lines_of_a_segment_are_lost(run: Path, made: Path, loss: str) -> None:
+    """The damaged file is kept unchanged in another folder."""
     change, lost = LOSSES[loss]
     edit(run / RECORDS, change)
     damaged = (run / RECORDS).read_bytes()
@@ -70,8 +70,7 @@ def test_the_intact_lines_of_a_segment_stay(run: Path, made: Path, loss: str) ->
     assert any(text.startswith(f"{RECORDS}: ") for text in said)
 
 
-def test_who_computed_checksums_anew_is_not_believed(run: Path) -> None:
-    """A file whose checksums are valid, but which is not the file that was closed, loses all its lines."""
+def test_a_segment_with_forged_checksums_loses_all_lines(run: Path) -> None:
     head, *lines = [json.loads(line) for line in (run / RECORDS).read_text().splitlines()]
     lines[4]["outcome"] = "sdc"
     values = [{k: v for k, v in line.items() if k != "sum"} for line in lines]
@@ -94,8 +93,8 @@ def test_a_segment_that_is_gone_is_forgotten(run: Path) -> None:
     assert folder.records() == {} and said == [f"{RECORDS} is gone"]
 
 
-def test_a_lost_patch_takes_its_record_with_it(run: Path, put_patches: Callable[..., None]) -> None:
-    """A lost patch also removes its record. Running the experiment again restores both."""
+def test_a_lost_patch_removes_its_record(run: Path, put_patches: Callable[..., None]) -> None:
+    """Running the experiment again restores both."""
     one, other = list(plan_file.ids(run))[:2]
     [file] = Patches(run).files()
     put_patches(run, {one: b"other", other: None})
@@ -107,9 +106,8 @@ def test_a_lost_patch_takes_its_record_with_it(run: Path, put_patches: Callable[
     assert any(one in text for text in said)
 
 
-def test_a_damaged_block_takes_the_records_with_it_whose_patches_need_it(run: Path) -> None:
-    """The first block of a file is a complete patch, and the others are differences from it. If it is
-    lost, all experiments of the file are run again."""
+def test_a_damaged_first_block_removes_all_records_of_its_file(run: Path) -> None:
+    """The first block is a complete patch, and the others are differences from it."""
     [file] = Patches(run).files()
     data = file.read_bytes()
     file.write_bytes(data[:60] + bytes([data[60] ^ 1]) + data[61:])
@@ -119,9 +117,8 @@ def test_a_damaged_block_takes_the_records_with_it_whose_patches_need_it(run: Pa
 
 
 @pytest.mark.parametrize("name", ["checks.json", "golden/A/log.npz"])
-def test_what_run_makes_again_is_put_aside(run: Path, name: str) -> None:
-    """A file that `run` can rebuild is moved aside. The run then counts as unfinished, so that `run`
-    rebuilds it."""
+def test_what_run_can_rebuild_is_moved_aside(run: Path, name: str) -> None:
+    """The run then counts as unfinished, so that `run` rebuilds the file."""
     (run / name).write_bytes(b"other")
     said, folder = repaired(run)
     assert said == [f"{name} set aside: `mutator run` rebuilds it"]
@@ -133,23 +130,22 @@ def test_what_run_makes_again_is_put_aside(run: Path, name: str) -> None:
     assert (run / "damaged" / f"{name}.2").read_bytes() == b"again"
 
 
-def test_the_plan_for_people_is_made_anew(run: Path, made: Path) -> None:
-    """plan.csv is written again from the plan, so the run stays finished."""
+def test_plan_csv_is_written_again(run: Path, made: Path) -> None:
+    """The run stays finished."""
     (run / "plan.csv").unlink()
     said, folder = repaired(run)
     assert said == ["plan.csv rebuilt from the plan"] and folder.finished
     assert (run / "plan.csv").read_bytes() == (made / "plan.csv").read_bytes()
 
 
-def test_strangers_go(run: Path) -> None:
-    """Files that the finished run did not write are moved aside."""
+def test_unknown_files_are_moved_aside(run: Path) -> None:
     (run / "records" / "0002-a.jsonl").write_bytes(b"anything\n")
     _, folder = repaired(run)
     assert len(folder.records()) == 24 and not (run / "records" / "0002-a.jsonl").exists()
 
 
-def test_damaged_costs_lose_their_line(run: Path) -> None:
-    """Timings are not part of the seal. Those that remain can be read."""
+def test_damaged_timings_are_removed(run: Path) -> None:
+    """Timings are not part of the seal."""
     edit(run / "timings" / "0001-a.jsonl", lambda x: [*x[:3], x[3].replace(b"1.0", b"9.0"), *x[4:]])
     with pytest.raises(MutatorError, match=r"0001-a\.jsonl:4: a damaged line"):
         RunFolder.open(run).timings()
@@ -158,8 +154,8 @@ def test_damaged_costs_lose_their_line(run: Path) -> None:
 
 
 @pytest.mark.parametrize("content", [None, b"{", b"{}"])
-def test_a_damaged_ledger_is_made_of_the_files(run: Path, content: bytes | None) -> None:
-    """Only a seal that was known before can vouch for a rebuilt ledger. The output says so."""
+def test_a_damaged_ledger_is_rebuilt_from_the_files(run: Path, content: bytes | None) -> None:
+    """Only a seal that was known before can vouch for it. The output says so."""
     path = run / digests.FILE
     path.unlink() if content is None else path.write_bytes(content)
     said, folder = repaired(run)
@@ -167,8 +163,8 @@ def test_a_damaged_ledger_is_made_of_the_files(run: Path, content: bytes | None)
     assert len(folder.records()) == 24 and not folder.finished
 
 
-def test_what_nobody_can_make_again_stays(run: Path) -> None:
-    """A damaged campaign file or plan stays in place, so that a copy can replace it."""
+def test_a_damaged_campaign_file_or_plan_stays(run: Path) -> None:
+    """A copy can replace it."""
     (run / "campaign.yaml").write_text("other")
     assert repair(RunFolder.unverified(run)) == []
     assert (run / "campaign.yaml").read_text() == "other"
@@ -177,16 +173,14 @@ def test_what_nobody_can_make_again_stays(run: Path) -> None:
         repair(RunFolder.unverified(run))
 
 
-def test_a_sound_run_is_left_alone(run: Path) -> None:
-    """In an intact run, nothing is moved aside or written."""
+def test_an_intact_run_is_not_changed(run: Path) -> None:
     before = (run / digests.FILE).stat().st_mtime_ns
     assert repair(RunFolder.unverified(run)) == []
     assert (run / digests.FILE).stat().st_mtime_ns == before and not (run / "damaged").exists()
 
 
-def test_a_killed_repair_leaves_no_finished_run(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """If a repair is killed at any point after it moved something, the folder can be opened, and the run
-    resumes."""
+def test_a_run_resumes_after_a_killed_repair(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The kill comes at any point after something was moved."""
     edit(run / RECORDS, lambda x: [*x[:3], x[3].replace(b"ok", b"no"), *x[4:]])
     with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
         patched.setattr(digests, "close_segments", kill)
@@ -199,8 +193,7 @@ def kill(*_: object, **__: object) -> None:
     raise KeyboardInterrupt
 
 
-def test_repair_waits_for_nobody(run: Path) -> None:
-    """A folder that is in use, or that has an earlier schema, is refused."""
+def test_a_folder_in_use_or_of_an_earlier_schema_is_refused(run: Path) -> None:
     with owned(run), pytest.raises(MutatorError, match="in use"):
         repair(RunFolder.unverified(run))
     head = run / "run.json"
@@ -211,8 +204,7 @@ def test_repair_waits_for_nobody(run: Path) -> None:
 
 @pytest.mark.parametrize("name", NO_FILES)
 @pytest.mark.parametrize("is_link", [False, True])
-def test_what_is_no_file_is_put_aside(run: Path, name: str, is_link: bool) -> None:
-    """A folder in place of a file is moved aside with its content. A dangling link is moved, too."""
+def test_a_folder_or_link_in_place_of_a_file_is_moved_aside(run: Path, name: str, is_link: bool) -> None:
     (run / name).unlink()
     if is_link:
         (run / name).symlink_to(run / "nowhere")

@@ -1,4 +1,4 @@
-"""The seal is one digest of exactly those parts of a run that determine its result."""
+"""The seal covers exactly the parts of a run that determine its result."""
 
 import json
 import shutil
@@ -37,9 +37,8 @@ def sealed(run: Path) -> str | None:
     return seal_of(RunFolder.unverified(run))
 
 
-def test_a_seal_does_not_depend_on_who_computed_when(made: Path, run: Path, reseal: Reseal) -> None:
-    """Other sessions, workers and orders of records give the same seal. So do lost timings and another
-    processor."""
+def test_the_seal_does_not_depend_on_workers_or_order(made: Path, run: Path, reseal: Reseal) -> None:
+    """Sessions, lost timings and the processor make no difference either."""
     path = run / "records" / "0001-a.jsonl"
     head, *lines = path.read_text().splitlines()
     path.write_text("\n".join([head, *lines[12:], ""]))
@@ -55,8 +54,7 @@ def test_a_seal_does_not_depend_on_who_computed_when(made: Path, run: Path, rese
     assert sealed(run) == known
 
 
-def test_tries_that_failed_are_not_in_it(made: Path, run: Path) -> None:
-    """A retried harness error does not affect the seal."""
+def test_a_retried_harness_error_does_not_affect_the_seal(made: Path, run: Path) -> None:
     folder = RunFolder.open(run)
     name = next(iter(folder.share()))
     head = {"schema": SCHEMA, "plan": folder.head["plan"]}
@@ -98,15 +96,17 @@ CHANGES: dict[str, Callable[[Path], None]] = {
 
 
 @pytest.mark.parametrize("change", CHANGES)
-def test_all_that_counts_is_in_it(made: Path, run: Path, reseal: Reseal, change: str) -> None:
-    """Another record, patch, golden run, check, source, choice or version changes the seal."""
+def test_any_change_of_the_result_changes_the_seal(
+    made: Path, run: Path, reseal: Reseal, change: str
+) -> None:
+    """The cases are records, patches, golden runs, checks, sources, choices and versions."""
     CHANGES[change](run)
     reseal(run)
     assert sealed(run) not in (None, sealed(made))
 
 
-def test_what_is_not_finished_has_none(run: Path) -> None:
-    """An unfinished run has no seal. An old run without digests has none either."""
+def test_an_unfinished_run_has_no_seal(run: Path) -> None:
+    """An old run without digests has none either."""
     digests.close_segments(run, finished=False)
     folder = RunFolder.open(run)
     assert (seal_of(folder), seal_or_why_not(folder)) == (None, "none: the run is not finished")
@@ -115,9 +115,8 @@ def test_what_is_not_finished_has_none(run: Path) -> None:
     assert seal_or_why_not(folder) == "none: not verifiable, because run/1 has no digests"
 
 
-def test_a_record_is_in_it_as_it_was_written(made: Path, run: Path) -> None:
-    """The seal covers bytes, not what they mean, so a field that is added to records later does not change
-    it."""
+def test_the_seal_covers_records_as_they_were_written(made: Path, run: Path) -> None:
+    """A field that is added to records later does not change it."""
     path = run / "records" / "0001-a.jsonl"
     lines = path.read_text().splitlines()
     assert canonical(json.loads(lines[1])) != lines[1]  # the checksum is the first key

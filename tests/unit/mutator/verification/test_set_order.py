@@ -24,8 +24,7 @@ from mutator.verification.set_order import places
         "class A:\n    def f(self):\n        self.y = set()\n    def g(self):\n        return list(self.y)",
     ],
 )
-def test_a_set_that_is_gone_through_is_found(line: str) -> None:
-    """Loops, comprehensions, lists, sums and `pop` depend on the order of a set."""
+def test_code_that_depends_on_the_order_of_a_set_is_found(line: str) -> None:
     assert len(places(line.encode())) == 1
 
 

@@ -31,11 +31,9 @@ SEEN = [(0.0, 40.0, 20.0, 18.0), (1.0, 20.0, 20.0, 18.0), (2.0, 40.0, 20.0, 18.0
         (Trigger(name="always", condition="True"), []),
     ],
 )
-def test_what_never_holds_is_told(
+def test_triggers_that_never_hold_are_reported(
     toycar: Workspace, experiment: MakeExperiment, trigger: Trigger, said: list[str]
 ) -> None:
-    """A remark names each trigger whose time comes after the last observation, or whose condition never
-    holds while it is armed, with the number of affected experiments."""
     waiting = [("S1", replace(experiment(value), trigger=trigger)) for value in (1.0, 2.0)]
     told = remarks(
         toycar,
@@ -48,9 +46,8 @@ def test_what_never_holds_is_told(
         assert part in told[0]
 
 
-def test_what_is_observed_is_read_back(tmp_path: Path) -> None:
-    """Observations are read back unchanged, by the keys of their golden runs. If nothing is stored, there
-    are none."""
+def test_observations_are_read_by_their_golden_runs(tmp_path: Path) -> None:
+    """If nothing is stored, there are none."""
     assert read_observed(tmp_path) == {}
     write_observed(tmp_path, "town/A+alone", SEEN)
     assert {key: rows.tolist() for key, rows in read_observed(tmp_path).items()} == {
@@ -58,9 +55,8 @@ def test_what_is_observed_is_read_back(tmp_path: Path) -> None:
     }
 
 
-def test_triggers_are_told_of_cached_checks_too(toycar: Workspace, tmp_path: Path) -> None:
-    """Unreached triggers are also known if golden runs come from the cache. A resumed run does not repeat
-    the warning."""
+def test_triggers_are_checked_with_cached_golden_runs(toycar: Workspace, tmp_path: Path) -> None:
+    """A resumed run does not repeat the warning."""
     campaign = toycar.library / "campaigns" / "small.yaml"
     text = campaign.read_text().replace("methods: [guided, random]", "methods: [guided]")
     campaign.write_text(text.replace("table: near_far", "list: [{when: v_ego > 99}, {at_s: 50}]"))

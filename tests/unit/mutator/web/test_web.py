@@ -13,8 +13,8 @@ from mutator.review import page as review
 SERVED = ("jobs.js", "served.js", "start.js", "served.css")  # a server's page loads it by its address
 
 
-def test_carried_data_come_back_and_are_the_same_each_time() -> None:
-    """JSON is compressed without a time stamp and written in base64, which cannot end a script element."""
+def test_embedded_data_round_trip_and_are_reproducible() -> None:
+    """Base64 cannot end a script element."""
     value = {"text": "</script> ⟨1⟩", "numbers": [0.1, None, 3]}
     text = web.packed(value)
     assert json.loads(gzip.decompress(base64.b64decode(text))) == value
@@ -31,8 +31,8 @@ def test_plain_data_cannot_end_their_element() -> None:
     assert json.loads(text) == {"text": "</script><!--"}
 
 
-def test_what_json_does_not_know_is_refused() -> None:
-    """NaN is written as something else, because a page cannot read it."""
+def test_nan_is_refused() -> None:
+    """Callers must write it as something else, because a page cannot read it."""
     with pytest.raises(ValueError, match="JSON"):
         web.packed([float("nan")])
 
