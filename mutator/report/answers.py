@@ -57,7 +57,7 @@ def _told(run: ReportedRun) -> pd.DataFrame:
 
 
 def _warned(row: Row) -> str:
-    """The first alert and its lead, for example `fcw, 1.2 s`; or `only after`, or `none`."""
+    """The first alert and how long before the hazard it came; or `only after`, or `none`."""
     if row.reaction_time is None:
         return "only after" if row.alerts else "none"
     return f"{row.alerts[0]}, {row.reaction_time:.1f} s"

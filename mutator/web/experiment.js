@@ -181,7 +181,7 @@ class Experiment {
     } }, title);
     place.replaceChildren(el("div.buttons", { role: "group", "aria-label": "Diff layout" },
       button("unified", "Unified"), button("split", "Side by side"), Dom.copyButton(() => patch, "Copy diff")), shown,
-      el("p.quiet", {}, "Not shown: the probe, a helper module that is the same in every mutant."));
+      el("p.quiet", {}, "Not shown: the probe, the module that evaluates the mutant's trigger."));
     renderDiff(shown, patch, { mode: this.mode });
     const lines = Diff.injected(patch);
     snippet.replaceChildren(...lines.map(({ path, lines: code }) => el("div", {}, el("p.quiet", {}, path),

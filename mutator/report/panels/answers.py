@@ -72,7 +72,7 @@ def _labelled(head: str, cell: Cell, meanings: Mapping[str, str]) -> str:
 
 
 def _explained(codes: str, meanings: Mapping[str, str]) -> str:
-    """Codes such as `H1, H3` or `severity S2`, with their meanings as a tooltip."""
+    """Codes of hazards or of a severity class, with their meanings as a tooltip."""
     names = codes.removeprefix("severity ").split(", ")
     about = "; ".join(meanings[name] for name in names if name in meanings)
     return Markup('<abbr title="{}">{}</abbr>').format(about, codes) if about else codes
