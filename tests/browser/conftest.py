@@ -1,7 +1,5 @@
-"""The report page in the system's Chromium: a toy run with synthetic records, and a browser.
-
-The fixtures run no experiment. Every test fails on an error in the browser's console.
-"""
+"""A toy run with synthetic records, and the system's Chromium, which opens its report. Every test fails on an
+error in the browser's console."""
 
 import os
 import shutil
@@ -58,11 +56,8 @@ def browser() -> Iterator[Any]:
 
 
 def record(experiment: Experiment, number: int, patch: bytes) -> Record:
-    """Return a synthetic record with that patch.
-
-    Every fifth experiment is not activated, and three of ten end in a hazard. One is a harness error and one
-    a crash.
-    """
+    """Return a synthetic record with that patch. Of ten, two are not activated, and three end in a hazard.
+    One is a harness error and one a crash."""
     status = {3: Status.HARNESS_ERROR, 4: Status.CRASHED}.get(number, Status.OK)
     active = number % 5 > 0
     hazard = status is Status.OK and number % 10 > 6
@@ -142,11 +137,9 @@ class Page:
 
     @property
     def found(self) -> str:
-        """Return the count above the table, such as `24 experiments`."""
         return str(self.page.inner_text("#found"))
 
     def column(self, name: str) -> list[str]:
-        """Return the texts of a column in the rendered rows."""
         script = """name => {
             const heads = [...document.querySelectorAll('#grid th')];
             const rows = [...document.querySelectorAll('#grid tr[data-at]')];
@@ -172,7 +165,6 @@ Serve = Callable[..., AbstractContextManager[str]]
 
 @pytest.fixture(scope="session")
 def serve() -> Serve:
-    """Serve a library in a thread of this process and return the address with its token."""
     pytest.importorskip("uvicorn", reason="extra `serve` is not installed")
     from mutator.serve.app import Site
     from mutator.serve.runs import Runs
@@ -203,10 +195,8 @@ def serve() -> Serve:
 
 @pytest.fixture
 def visit(browser: Any) -> Iterator[Callable[..., Any]]:
-    """Open an address as a separate visitor.
-
-    An error in the console fails the test, except the errors that a browser logs for a failed request.
-    """
+    """Open an address as a separate visitor. An error in the console fails the test, unless the browser logs
+    it for a failed request."""
     errors: list[str] = []
     contexts = []
 
@@ -236,7 +226,7 @@ SERIOUS = """async () => {
 
 @pytest.fixture(scope="session")
 def serious_faults() -> Callable[[Any], list[str]]:
-    """Return the serious accessibility faults that axe-core finds in the page's current state."""
+    """Return the serious accessibility faults that axe-core finds now."""
     package = pytest.importorskip("axe_playwright_python", reason="extra `test` is not installed")
     source = (Path(package.__path__[0]) / "axe.min.js").read_text(encoding="utf-8")
 

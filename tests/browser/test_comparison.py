@@ -1,4 +1,4 @@
-"""The page of a comparison with more changes than the page shows at once."""
+"""The page of a comparison with more changes than the page shows."""
 
 import dataclasses
 from collections.abc import Callable
@@ -23,24 +23,21 @@ def worse(e: Experiment) -> dict[str, Any]:
 
 @pytest.fixture
 def found(toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path]) -> Comparison:
-    """Return changes of every pair, some of them to a hazard, each many times."""
+    """Return changes of every pair, many times each, some of them to a hazard."""
     few = compare(write_run(toycar, tmp_path / "before"), write_run(toycar, tmp_path / "after", worse))
     return dataclasses.replace(
         few, matching=dataclasses.replace(few.matching, pairs=few.matching.pairs * COPIES)
     )
 
 
-def test_more_changes_than_are_shown(
+def test_a_long_comparison_is_cut_and_can_be_filtered(
     browser: Any,
     found: Comparison,
     tmp_path: Path,
     serious_faults: Callable[[Any], list[str]],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The page shows no more rows than the limit, new hazards first.
-
-    Filters search all changes, and axe-core finds no serious fault.
-    """
+    """New hazards come first. Filters search all changes."""
     monkeypatch.setattr(pages, "SHOWN", SHOWN)
     page = browser.new_page()
     errors: list[str] = []

@@ -14,7 +14,7 @@ TAG = '# fi:a0 was:    x = "a\u2028b" # c'
 
 @pytest.mark.parametrize("end", ["\n", "\r\n"])
 def test_a_tag_reaches_to_the_end_of_its_line(browser: Any, end: str) -> None:
-    """A tag reaches to the end of its line. A diff shows it dimmed, and the injected lines leave it out."""
+    """A diff shows the tag dimmed, and the injected lines leave it out."""
     lines = ["+from car import _fi  # fi:probe", '-x = "a\u2028b" # c', f"+{CHANGED}{TAG}", "+y = 1  # fi:a0"]
     patch = "diff --git a/m.py b/m.py\n--- a/m.py\n+++ b/m.py\n@@ -1,1 +1,3 @@\n" + end.join([*lines, ""])
     page = browser.new_page()

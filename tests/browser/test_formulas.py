@@ -17,7 +17,6 @@ COUNT = 150  # of each
 
 
 def term(rng: random.Random, depth: int = 3) -> str:
-    """Return a random term with at most that many levels."""
     if depth == 0:
         return rng.choice([*NAMES, "0", "1.5", "inf", "3e5"])
     a, b, c = (term(rng, depth - 1) for _ in range(3))
@@ -49,7 +48,7 @@ def values() -> dict[str, np.ndarray]:
 
 
 def test_python_and_the_page_agree_on_formulas(browser: Any, values: dict[str, np.ndarray]) -> None:
-    """Python and the page compute equal values, also for infinite and missing inputs."""
+    """The inputs include infinite and missing values."""
     rng = random.Random(18)
     formulas = [check_formula(formula(rng), NAMES, over_time=True) for _ in range(COUNT)]
     conditions = [check_condition(condition(rng), variables=NAMES, over_time=True) for _ in range(COUNT)]

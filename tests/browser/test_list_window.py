@@ -1,4 +1,4 @@
-"""The window of the list of experiments: its height and its rows after a filter."""
+"""The list of experiments, which renders only the rows in its window."""
 
 from typing import TYPE_CHECKING
 
@@ -40,8 +40,7 @@ def test_a_filter_that_leaves_few_rows_leaves_a_low_window(page: "Page") -> None
     assert height(page) == before
 
 
-def test_other_rows_are_shown_from_the_first_on(page: "Page") -> None:
-    """A filter shows its worst rows first, even if the list was scrolled before."""
+def test_a_filter_scrolls_to_the_worst_rows(page: "Page") -> None:
     page.page.evaluate(LONG, COPIES)
     page.page.evaluate(f"{WINDOW}.scrollTop = 1e6")
     page.page.wait_for_function("!document.querySelector('#grid tr[data-at=\"0\"]')")
@@ -57,8 +56,7 @@ def test_an_experiment_named_by_the_start_of_its_id_is_marked_in_the_list(page: 
     assert page.texts("#grid tr.open code") == [name]
 
 
-def test_the_same_rows_stay_where_they_are(page: "Page") -> None:
-    """If the map's measure or the columns change, the list does not scroll."""
+def test_other_columns_or_measures_do_not_scroll_the_list(page: "Page") -> None:
     page.page.evaluate(LONG, COPIES)
     page.page.evaluate(f"{WINDOW}.scrollTop = 9000")
     page.page.select_option("#measure", "activated")

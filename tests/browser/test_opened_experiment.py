@@ -1,4 +1,4 @@
-"""An opened experiment that did not end well, and the effects of closing an experiment."""
+"""An opened experiment that did not end well, and closing an experiment."""
 
 from typing import TYPE_CHECKING
 
@@ -21,10 +21,10 @@ WITHOUT_EVENTS = """() => {
 @pytest.mark.parametrize(
     ("status", "said"), [("harness_error", "The harness failed"), ("crashed", "No event was")]
 )
-def test_of_an_experiment_that_did_not_end_well_nothing_is_made_up(
+def test_a_failed_experiment_shows_no_activation_and_no_replay_command(
     page: "Page", status: str, said: str
 ) -> None:
-    """The page says neither that the fault was never activated nor that a command can restore a replay."""
+    """The page does not know whether the fault was activated."""
     page.open(f"status={status}")
     page.page.evaluate(WITHOUT_EVENTS)
     page.page.click(FIRST)

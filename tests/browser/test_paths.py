@@ -1,4 +1,4 @@
-"""Fault paths in the report page: an experiment's strip and the campaign's control structure."""
+"""Fault paths in the report page."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -43,7 +43,7 @@ QUIET = {"activation": None, "outcome": Outcome.NOT_ACTIVATED}
 
 
 def became(experiment: Experiment) -> dict[str, Any]:
-    """Lane faults change the gap, distance faults are held, silence is never active."""
+    """Lane faults change the gap, distance faults are held, and silence is never active."""
     return {"lane": CHANGED, "distance": MASKED}.get(experiment.fault.fault_type, QUIET)
 
 
@@ -76,10 +76,7 @@ def opened(open_report: "Callable[[Path], Page]", report: Path) -> "Page":
 
 
 def test_an_experiment_opens_with_its_path(opened: "Page") -> None:
-    """Boxes are in causal order, each with its state as a word and the time of its first channel.
-
-    A replay highlights the boxes reached so far.
-    """
+    """Boxes are in causal order. A replay highlights the boxes reached so far."""
     opened.choose("kind", "sensor/lane")
     opened.page.click("#grid tr[data-at] >> nth=0")
     opened.page.wait_for_selector(".path-strip")
@@ -99,8 +96,8 @@ def test_an_experiment_opens_with_its_path(opened: "Page") -> None:
     assert opened.texts(".path-box.is-ahead strong") == ["World"]
 
 
-def test_a_held_fault_says_where(opened: "Page") -> None:
-    """A masked fault names the component that stopped it. A fault that was never activated says so."""
+def test_a_masked_fault_names_the_component_that_stopped_it(opened: "Page") -> None:
+    """A fault that was never activated says so."""
     opened.choose("kind", "sensor/distance")
     opened.page.click("#grid tr[data-at] >> nth=0")
     opened.page.wait_for_selector(".path-box.is-held")
@@ -111,11 +108,7 @@ def test_a_held_fault_says_where(opened: "Page") -> None:
 
 
 def test_the_control_structure_counts_and_filters(opened: "Page") -> None:
-    """Each link shows the share of faults that passed, for all faults or for the chosen type.
-
-    A link leads to the experiments that passed, and a box to those that it stopped. A table has the same
-    numbers.
-    """
+    """A link leads to the experiments whose faults passed it, and a box to those that it stopped."""
     count = "#ways [data-link='commands'] .count"
     opened.choose("kind", "sensor/lane")
     lanes = int(opened.found.split()[0])

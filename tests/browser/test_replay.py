@@ -1,4 +1,4 @@
-"""The replay of an experiment: what it shows at a time and how the user changes the time."""
+"""The replay of an experiment."""
 
 import math
 from collections.abc import Iterator
@@ -87,7 +87,6 @@ class Replayed:
         return float(self.page.evaluate(T))
 
     def settle(self) -> None:
-        """Wait until the page has drawn everything that is due."""
         frames = "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
         self.page.evaluate(frames)
 
@@ -104,7 +103,6 @@ class Replayed:
         return list(self.page.eval_on_selector_all(selector, "all => all.map((e) => e.textContent)"))
 
     def pixels(self, selector: str) -> set[tuple[int, ...]]:
-        """Return the opaque colours of a canvas."""
         script = """(canvas) => {
             const { width, height } = canvas, copy = new OffscreenCanvas(width, height), found = new Set();
             const context = copy.getContext("2d", { willReadFrequently: true });
@@ -120,7 +118,7 @@ class Replayed:
 
 @pytest.fixture(scope="module")
 def replayed(browser: Any, run: "Path") -> Iterator[Replayed]:
-    """The replay on a wide screen in a page that allows motion."""
+    """The replay on a wide screen, with motion allowed."""
     context = browser.new_context(viewport={"width": 1000, "height": 900}, reduced_motion="no-preference")
     page, errors = context.new_page(), list[str]()
     page.on("console", lambda m: errors.append(m.text) if m.type in ("error", "warning") else None)
@@ -140,8 +138,8 @@ def seek(replayed: Replayed, t: float) -> None:
     replayed.settle()
 
 
-def test_it_waits_shortly_before_the_activation(browser: Any, replayed: Replayed) -> None:
-    """The replay starts paused, with the scene and the plots of differing channels, actuators first."""
+def test_a_replay_starts_paused_shortly_before_the_activation(browser: Any, replayed: Replayed) -> None:
+    """Plots of actuators come first."""
     replayed.show(FACTS)
     assert replayed.t == BEGIN - 1.0
     assert not replayed.page.evaluate("player.clock.isPlaying")
@@ -153,11 +151,8 @@ def test_it_waits_shortly_before_the_activation(browser: Any, replayed: Replayed
     assert sorted(plots) == ["brake", "gap", "speed"]
 
 
-def test_keys_step_and_go_to_the_ends(replayed: Replayed) -> None:
-    """An arrow key moves by a sample, or by a second with Shift. End goes to the end of the drive.
-
-    The page's events follow.
-    """
+def test_keys_move_the_replay(replayed: Replayed) -> None:
+    """An arrow key moves by a sample, or by a second with Shift. The page's events follow."""
     seek(replayed, 1.0)
     replayed.press("ArrowRight")
     assert replayed.t == 1.05
@@ -173,10 +168,6 @@ def test_keys_step_and_go_to_the_ends(replayed: Replayed) -> None:
 
 
 def test_the_time_bar_is_dragged_and_has_a_button_for_each_mark(replayed: Replayed) -> None:
-    """A drag to the middle shows half of the run, and a mark's button jumps to the mark.
-
-    The bar shows the state.
-    """
     bar = replayed.page.locator(".timebar").bounding_box()
     y = bar["y"] + bar["height"] / 2
     replayed.page.mouse.move(bar["x"] + 5, y)
@@ -192,11 +183,8 @@ def test_the_time_bar_is_dragged_and_has_a_button_for_each_mark(replayed: Replay
     assert "gap 17.5" in told
 
 
-def test_values_of_plots_are_those_of_the_series(replayed: Replayed) -> None:
-    """Plots show the values at the replay's time and under the pointer.
-
-    Moving the pointer does not change the time.
-    """
+def test_plots_show_the_values_of_the_series(replayed: Replayed) -> None:
+    """Moving the pointer does not change the time."""
     seek(replayed, 3.0)
     at = TIMES.index(3.0)
     head = '.plot-of[data-channel="gap"] .value'
@@ -214,13 +202,10 @@ def test_values_of_plots_are_those_of_the_series(replayed: Replayed) -> None:
 
 
 @pytest.mark.parametrize(("high", "note"), [(30000, "axis cut: values range from 2 to 30000"), (150, None)])
-def test_a_moment_of_huge_values_leaves_the_rest_to_be_seen(
+def test_a_moment_of_huge_values_does_not_flatten_the_plot(
     replayed: Replayed, high: float, note: str | None
 ) -> None:
-    """If values are huge, the axis is cut off with a note.
-
-    Values a hundred times the usual ones are not cut off.
-    """
+    """The axis is cut off with a note. Values a hundred times the usual ones are not cut off."""
     values = {"golden": [2.0] * STEPS, "faulty": [3.0 if t > BEGIN else 2.0 for t in TIMES]}
     values["faulty"][50] = high
     channel = SERIES["channels"][0] | {"name": "hwt"} | values
@@ -233,8 +218,8 @@ def test_a_moment_of_huge_values_leaves_the_rest_to_be_seen(
     assert f"largest difference {high - 2}" in label.replace(".0", "")
 
 
-def test_marks_close_together_have_each_a_button(replayed: Replayed) -> None:
-    """No button covers another, even if many marks share a time."""
+def test_marks_close_together_have_separate_buttons(replayed: Replayed) -> None:
+    """The marks may share a time."""
     marks = [["alert", 2.5 + i / 1000, f"alert_{i}"] for i in range(6)]
     replayed.show(FACTS, SERIES | {"marks": marks})
     script = "all => all.map((e) => { const { x, y } = e.getBoundingClientRect(); return `${x} ${y}`; })"
@@ -242,11 +227,8 @@ def test_marks_close_together_have_each_a_button(replayed: Replayed) -> None:
     replayed.show(FACTS)
 
 
-def test_plots_are_chosen_and_zoomed(replayed: Replayed) -> None:
-    """An instrument switches its plot on and off.
-
-    The keys + and 0 zoom, and the bar shows the visible part.
-    """
+def test_plots_are_selected_and_zoomed(replayed: Replayed) -> None:
+    """An instrument switches its plot on and off."""
     replayed.page.click(".gauge:has-text('calm')")
     assert replayed.page.locator('.plot-of[data-channel="calm"]').count() == 1
     assert replayed.page.get_attribute(".gauge:has-text('calm')", "aria-pressed") == "true"
@@ -280,8 +262,7 @@ def test_after_the_end_of_the_drive_all_is_gray(replayed: Replayed) -> None:
     assert not vivid(replayed.pixels(room))
 
 
-def test_what_the_controller_believes_is_named_out_of_sight(replayed: Replayed) -> None:
-    """A ghost 170 m ahead, too far to be drawn, is still shown with its distance."""
+def test_a_ghost_too_far_to_draw_is_named_with_its_distance(replayed: Replayed) -> None:
     ghost = ACTOR | {"name": "believed_lead", "x": 172.0, "believed": True}
     replayed.show(FACTS | {"scene": SCENE | {"actors": [*SCENE["actors"], ghost]}})
     replayed.page.evaluate("""() => {
@@ -294,8 +275,8 @@ def test_what_the_controller_believes_is_named_out_of_sight(replayed: Replayed) 
     replayed.show(FACTS)
 
 
-def test_it_plays_and_pauses_where_the_drive_ends(replayed: Replayed) -> None:
-    """The replay pauses at the end of the drive and continues on request. It shows its frame rate."""
+def test_a_replay_pauses_at_the_end_of_the_drive(replayed: Replayed) -> None:
+    """The user can continue it. The frame rate is shown."""
     replayed.show(FACTS)
     seek(replayed, 2.2)
     replayed.press(" ")
@@ -311,8 +292,8 @@ def test_it_plays_and_pauses_where_the_drive_ends(replayed: Replayed) -> None:
     assert not replayed.page.evaluate("player.clock.isPlaying")
 
 
-def test_both_clocks_tell_one_time_in_each_picture(replayed: Replayed) -> None:
-    """During playback, the time above the plots equals the replay's time. Only values update less often."""
+def test_the_plots_and_the_replay_show_the_same_time(replayed: Replayed) -> None:
+    """During playback, only values update less often."""
     replayed.show(FACTS)
     seek(replayed, 2.2)
     replayed.page.evaluate("""() => {
@@ -329,8 +310,8 @@ def test_both_clocks_tell_one_time_in_each_picture(replayed: Replayed) -> None:
     assert [shown for shown, _ in times] == [told for _, told in times]
 
 
-def test_what_came_stays_to_be_read(replayed: Replayed) -> None:
-    """The state lists past events, even if their place on the road is out of sight."""
+def test_past_events_stay_listed(replayed: Replayed) -> None:
+    """The place of an event on the road may be out of sight."""
     replayed.show(FACTS)
     seek(replayed, 2.02)
     assert replayed.texts(".states .chip") == ["fault active"]
@@ -358,8 +339,8 @@ def test_with_reduced_motion_it_shows_two_pictures_a_second(page: "Page") -> Non
     assert all(b - a > 0.4 for a, b in pairwise(steps[1:]))
 
 
-def test_a_replay_that_has_left_the_page_draws_no_more(replayed: Replayed) -> None:
-    """A replay that has left the page requests no frame, however many were opened before."""
+def test_a_closed_replay_draws_nothing(replayed: Replayed) -> None:
+    """Any number of replays may have been opened before."""
     for _ in range(3):
         replayed.show(FACTS)
         replayed.page.click(".replay-player .play")

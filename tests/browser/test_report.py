@@ -32,8 +32,8 @@ def rows(run: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-def test_filters_leave_what_fits_and_are_in_the_address(page: "Page", rows: list[dict[str, str]]) -> None:
-    """Two facets and a search leave the matching rows of results.csv. Back undoes each step."""
+def test_filters_select_rows_and_are_in_the_address(page: "Page", rows: list[dict[str, str]]) -> None:
+    """Back undoes each step."""
     hazards = [row for row in rows if row["outcome"] == "hazard"]
     page.choose("outcome", "hazard")
     assert page.found == f"{len(hazards)} of {COUNT} experiments"
@@ -68,10 +68,7 @@ def test_a_click_on_a_head_sorts_and_what_is_empty_is_last(page: "Page", rows: l
 
 
 def test_an_opened_experiment_shows_its_diff_spec_and_commands(page: "Page", run: Path) -> None:
-    """An opened experiment shows its injected lines side by side and unified.
-
-    Its commands contain the opened folder. Back closes the experiment.
-    """
+    """Commands contain the opened folder. Back closes the experiment."""
     page.page.click("#grid tr[data-at] >> nth=0")
     page.page.wait_for_selector("#experiment .diff")
     name = page.fragment.removeprefix("e=")
@@ -97,11 +94,8 @@ def test_an_opened_experiment_shows_its_diff_spec_and_commands(page: "Page", run
     page.page.wait_for_selector("#experiment", state="hidden")
 
 
-def test_the_list_stays_beside_an_opened_experiment(page: "Page") -> None:
-    """The experiment's head shows its position among the filtered rows, and the page's title follows.
-
-    A click in the list opens another experiment.
-    """
+def test_the_list_stays_next_to_an_opened_experiment(page: "Page") -> None:
+    """A click in the list opens another experiment."""
     page.choose("outcome", "hazard")
     count, title = len(page.column("ending")), page.page.title()
     page.page.locator("#grid tr[data-at] >> nth=1").scroll_into_view_if_needed()
@@ -128,8 +122,7 @@ def test_the_list_stays_beside_an_opened_experiment(page: "Page") -> None:
     assert page.page.locator("#tables").is_visible()
 
 
-def test_answers_lead_to_the_experiments_they_speak_of(page: "Page", rows: list[dict[str, str]]) -> None:
-    """One click opens the worst experiment. A link's list has as many experiments as its answer says."""
+def test_answers_link_to_their_experiments(page: "Page", rows: list[dict[str, str]]) -> None:
     hazards = [row for row in rows if row["outcome"] == "hazard"]
     silent = [row for row in hazards if not row["reaction_time"]]
     page.page.click(".dangerous td a >> nth=0")
@@ -142,8 +135,8 @@ def test_answers_lead_to_the_experiments_they_speak_of(page: "Page", rows: list[
     assert len(silent) not in (0, len(hazards))
 
 
-def test_the_worst_is_the_first_of_the_list(page: "Page") -> None:
-    """If the user has chosen no order, the list starts with hazards."""
+def test_the_list_starts_with_the_worst(page: "Page") -> None:
+    """If the user has chosen no order, hazards come first."""
     endings = page.column("ending")
     assert endings == sorted(
         endings, key=["hazard", "crashed", "sdc", "not activated", "harness error"].index
@@ -152,8 +145,7 @@ def test_the_worst_is_the_first_of_the_list(page: "Page") -> None:
     assert [int(text) for text in page.column("rank")] == list(range(1, COUNT + 1))
 
 
-def test_a_link_that_asks_for_what_is_not_there_says_so(page: "Page") -> None:
-    """The page reports a filter, value or column in a link that these results lack."""
+def test_a_link_with_an_unknown_filter_value_or_column_is_reported(page: "Page") -> None:
     page.open("alert=none")
     assert page.found == f'{COUNT} experiments. This page has no filter "alert"'
     page.open("scenario=Q")
@@ -170,26 +162,22 @@ def test_none_is_a_value_of_a_filter_and_of_a_search(page: "Page", rows: list[di
     assert 0 < without < COUNT
 
 
-def test_the_words_of_the_page_are_explained(page: "Page") -> None:
-    """The page explains outcomes, counts, silent hazards and triggers."""
+def test_terms_of_the_page_are_explained(page: "Page") -> None:
+    """The terms include outcomes, counts, silent hazards and triggers."""
     page.page.click(".words summary")
     assert page.page.is_visible(".glossary")
     words = {"sdc", "masked", "golden run", "silent hazard", "guided", "rank", "near"}
     assert words <= {*page.texts(".glossary dt")}
 
 
-def test_two_keys_lead_to_the_list(page: "Page") -> None:
-    """The first Tab stop skips to the list of experiments."""
+def test_the_first_tab_stop_skips_to_the_list(page: "Page") -> None:
     page.page.keyboard.press("Tab")
     page.page.keyboard.press("Enter")
     assert page.page.evaluate("document.activeElement.dataset.at") == "0"
 
 
-def test_series_are_loaded_from_beside_the_page(page: "Page", run: Path, rows: list[dict[str, str]]) -> None:
-    """A packed or separate series has a replay with the numbers that Python reads.
-
-    An experiment without a series shows the command.
-    """
+def test_series_are_loaded_from_their_files(page: "Page", run: Path, rows: list[dict[str, str]]) -> None:
+    """The replay has the numbers that Python reads. An experiment without a series shows the command."""
     series = SeriesFolder(run)
     assert series.index is not None
     names = {*series.index.entries, *series.kept_ids()}
@@ -219,10 +207,7 @@ def test_series_are_loaded_from_beside_the_page(page: "Page", run: Path, rows: l
     assert "--trace" in page.page.inner_text("#experiment .replay .command")
 
 
-def test_a_series_that_cannot_be_read_comes_with_the_command_that_drives_it_again(
-    page: "Page", run: Path
-) -> None:
-    """If a series is damaged, the opened experiment says what is damaged and how to restore its replay."""
+def test_a_damaged_series_is_shown_with_the_command_that_restores_it(page: "Page", run: Path) -> None:
     name = SeriesFolder(run).kept_ids()[0]
     page.page.evaluate(
         "() => { SeriesFile.load = () => Promise.reject(new Error('series/x.js is damaged')); }"
@@ -235,10 +220,8 @@ def test_a_series_that_cannot_be_read_comes_with_the_command_that_drives_it_agai
 
 
 def test_a_cell_of_the_heat_map_filters(page: "Page", rows: list[dict[str, str]]) -> None:
-    """A cell's text is its counts, which filters for results do not change.
-
-    A second press removes the filter.
-    """
+    """A cell's text is its counts, which filters for results do not change. A second press removes the
+    filter."""
     cell = '#heat button[aria-label^="sensor/lane in B:"]'
     here = [row for row in rows if (row["fault_type"], row["scenario"]) == ("lane", "B")]
     used = [row for row in here if row["status"] != "harness_error"]
@@ -272,10 +255,7 @@ MEDIANS = """async () => {
 
 
 def test_the_map_shows_the_median_of_a_metric(page: "Page", rows: list[dict[str, str]]) -> None:
-    """The map shows the median over the activated faults.
-
-    The user can choose medians, worst values and shares.
-    """
+    """The median is over the activated faults. The user can also choose worst values and shares."""
     used = [row for row in rows if row["status"] != "harness_error"]
     times = [float(row["t_activation"]) for row in used if row["t_activation"]]
     text, options = page.page.evaluate(MEDIANS)
@@ -284,10 +264,7 @@ def test_the_map_shows_the_median_of_a_metric(page: "Page", rows: list[dict[str,
 
 
 def test_columns_can_be_chosen_and_values_searched(page: "Page", rows: list[dict[str, str]]) -> None:
-    """A chosen column is shown, can be sorted and is in the address.
-
-    A comparison in the search keeps the matching rows.
-    """
+    """A chosen column can be sorted and is in the address."""
     page.page.click("summary:has-text('Columns')")
     page.page.check(".option:has-text('max dev gas') input")
     page.page.uncheck(".option:has-text('variant') input")
@@ -309,8 +286,7 @@ def test_columns_can_be_chosen_and_values_searched(page: "Page", rows: list[dict
     assert page.page.locator('#grid th[data-column="variant"]').count() == 1
 
 
-def test_a_shared_link_shows_the_same(page: "Page") -> None:
-    """The address restores filter, order and opened experiment."""
+def test_a_shared_link_restores_filter_order_and_experiment(page: "Page") -> None:
     page.choose("method", "guided")
     page.page.click('#grid th[data-column="scenario"] button')
     page.page.click("#grid tr[data-at] >> nth=2")
@@ -323,8 +299,8 @@ def test_a_shared_link_shows_the_same(page: "Page") -> None:
     assert "No such experiment" in page.page.inner_text("#experiment")
 
 
-def test_all_can_be_done_with_the_keyboard(page: "Page") -> None:
-    """`/` searches, j and k move, Enter opens, j continues while it is open, Esc closes, ? helps."""
+def test_the_keyboard_is_enough(page: "Page") -> None:
+    """`/` searches, j and k move, Enter opens, Esc closes, ? helps."""
     keys, focused = page.page.keyboard, "document.activeElement.dataset.at"
     keys.press("/")
     assert page.page.evaluate("document.activeElement.id") == "search"
@@ -356,7 +332,6 @@ def test_all_can_be_done_with_the_keyboard(page: "Page") -> None:
 
 
 def test_text_of_a_run_is_never_markup(page: "Page", rows: list[dict[str, str]]) -> None:
-    """A crashed run's message is shown as plain text."""
     crashed = next(row["experiment_id"] for row in rows if row["status"] == "crashed")
     page.open(f"e={crashed}")
     assert page.page.inner_text("#experiment .detail") == "<b>the disk</b> is gone"
@@ -365,7 +340,7 @@ def test_text_of_a_run_is_never_markup(page: "Page", rows: list[dict[str, str]])
 def test_a_target_without_alerts_has_no_column_for_them(
     page: "Page", run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """If the target has no alerts, table, filters and map do not mention them. Sorting still works."""
+    """Table, filters and map do not mention alerts. Sorting still works."""
     other = tmp_path / "run"
     shutil.copytree(run, other, ignore=shutil.ignore_patterns("report"))
     monkeypatch.setattr(RunFolder, "has_alerts", False)

@@ -1,4 +1,4 @@
-"""The report page on screens of any size, in both colour schemes, and on paper."""
+"""The report page on any screen, in both colour schemes, and on paper."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -14,7 +14,7 @@ EXPERIMENTS = 24  # of the run
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_a_telephone_shows_it_without_scrolling_sideways(browser: Any, run: Path, scheme: str) -> None:
+def test_a_narrow_screen_does_not_scroll_sideways(browser: Any, run: Path, scheme: str) -> None:
     """At 400 pixels only tables are wider than the screen. An experiment fills the screen."""
     context = browser.new_context(viewport={"width": 400, "height": 800}, color_scheme=scheme)
     page = context.new_page()
@@ -47,9 +47,7 @@ TITLES = """[...document.querySelectorAll("h1")].filter((h) => h.checkVisibility
 def test_axe_finds_no_serious_fault(
     page: "Page", serious_faults: "Callable[[Any], list[str]]", width: int
 ) -> None:
-    """axe finds no serious fault wide and narrow, light and dark, with the list alone and with an open
-    experiment.
-    """
+    """The screen is wide or narrow, and light or dark, with the list alone or with an open experiment."""
     page.page.set_viewport_size({"width": width, "height": 900})
     for scheme in ("light", "dark"):
         page.page.emulate_media(color_scheme=scheme, reduced_motion="reduce")
@@ -62,8 +60,8 @@ def test_axe_finds_no_serious_fault(
         assert page.page.evaluate(TITLES) == ["toy"]
 
 
-def test_heads_are_whole_and_a_short_table_has_a_low_window(page: "Page") -> None:
-    """No column title is cut off. Below the last row of a short table there is almost no space."""
+def test_column_titles_are_not_cut_off(page: "Page") -> None:
+    """Below the last row of a short table there is almost no space."""
     cut = "all => all.filter((b) => b.scrollWidth > b.clientWidth).map((b) => b.textContent)"
     assert page.page.eval_on_selector_all("#grid thead button", cut) == []
     page.page.evaluate("document.querySelector('#grid').style.setProperty('--rows', 3)")
@@ -87,8 +85,8 @@ def scrolled(page: "Page") -> Iterator["Page"]:
     yield page
 
 
-def test_paper_gets_the_rows_that_fit_the_filters(page: "Page") -> None:
-    """Paper gets every matching row, up to a stated limit, and nothing that is only for screens."""
+def test_paper_has_the_filtered_rows(page: "Page") -> None:
+    """The number of rows has a stated limit. Parts that are only for screens are left out."""
     page.page.emulate_media(media="print")
     page.page.evaluate("dispatchEvent(new Event('beforeprint'))")
     assert len(page.column("experiment_id")) == EXPERIMENTS
@@ -100,8 +98,8 @@ def test_paper_gets_the_rows_that_fit_the_filters(page: "Page") -> None:
 
 
 @pytest.mark.parametrize("due", ["grid.scrollTop = 310", "grid.style.height = '200px'"])
-def test_a_redraw_that_is_due_while_printing_is_for_paper(scrolled: "Page", due: str) -> None:
-    """If the window is scrolled or resized right before printing, paper still gets the first rows."""
+def test_paper_has_the_first_rows_after_a_late_redraw(scrolled: "Page", due: str) -> None:
+    """The window is scrolled or resized right before printing."""
     printing = f"""async () => {{
         const frame = () => new Promise(requestAnimationFrame), grid = document.querySelector('#grid');
         {due};

@@ -49,14 +49,12 @@ def shown(page: Any) -> int:
 
 
 def unfold(page: Any) -> None:
-    """Open every stack of similar groups."""
     closed = page.locator("[data-do=unfold][aria-expanded=false]:visible")
     while closed.count():
         closed.first.click()
 
 
-def test_groups_are_found_and_the_view_is_in_the_address(open_page: Callable[..., Any]) -> None:
-    """Text and states narrow the list. The address restores the view."""
+def test_filters_narrow_the_list_and_are_in_the_address(open_page: Callable[..., Any]) -> None:
     page = open_page()
     unfold(page)
     assert (shown(page), page.inner_text("#found")) == (5, "5 groups")
@@ -72,7 +70,7 @@ def test_groups_are_found_and_the_view_is_in_the_address(open_page: Callable[...
 
 
 def test_marks_become_commands(open_page: Callable[..., Any]) -> None:
-    """Keys move between groups and mark them. The commands name the marked groups with shell quoting."""
+    """The commands name the marked groups with shell quoting."""
     page = open_page("q=gap")
     unfold(page)
     for key in "jajr":
@@ -90,11 +88,8 @@ def test_marks_become_commands(open_page: Callable[..., Any]) -> None:
     assert page.locator("#commands code").count() == 1
 
 
-def test_groups_that_are_alike_are_folded(open_page: Callable[..., Any]) -> None:
-    """The first group stands for all that are alike.
-
-    One key unfolds them, another marks all after a question.
-    """
+def test_similar_groups_are_folded(open_page: Callable[..., Any]) -> None:
+    """One key unfolds them. Another marks all of them after a question."""
     page = open_page("q=gap")
     assert shown(page) == 1
     assert page.inner_text("[data-do=unfold]:visible") == "1 more like this"
@@ -120,8 +115,8 @@ def test_all_that_a_filter_shows_are_marked_after_a_question(open_page: Callable
     assert page.inner_text("#commands code").startswith("mutator review reject ")
 
 
-def test_holes_and_values_are_there(open_page: Callable[..., Any]) -> None:
-    """The diff shows its holes. A key opens the table of values with their range above it."""
+def test_a_diff_shows_its_holes_and_their_values(open_page: Callable[..., Any]) -> None:
+    """A key opens the table of values with their range above it."""
     page = open_page("q=longer")
     page.keyboard.press("j")
     assert page.locator(".group:visible mark.hole").all_inner_texts() == ["⟨by⟩"]
@@ -130,8 +125,7 @@ def test_holes_and_values_are_there(open_page: Callable[..., Any]) -> None:
     assert page.inner_text(".group:visible .values summary").startswith("Values (8): by + ")
 
 
-def test_a_narrow_screen_needs_no_scrolling_sideways(open_page: Callable[..., Any]) -> None:
-    """Wide content scrolls in its own box."""
+def test_wide_content_scrolls_in_its_own_box(open_page: Callable[..., Any]) -> None:
     page = open_page(viewport={"width": 400, "height": 800})
     assert page.evaluate("document.documentElement.scrollWidth") == 400
 

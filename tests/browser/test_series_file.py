@@ -1,4 +1,4 @@
-"""The page reads the same numbers from a series as Python, in a fixture of the format."""
+"""The page and Python read the same numbers from a series in a fixture of the format."""
 
 import json
 import shutil
@@ -64,7 +64,7 @@ def as_read(run: Path, name: str) -> list[dict[str, Any]]:
 
 
 def test_a_page_and_python_read_the_numbers_of_the_fixture(browser: Any, run: Path) -> None:
-    """From a packed or separate series, Python and the page read the fixture's recorded bits."""
+    """The series is packed or in a separate file."""
     expected = json.loads((FIXTURE / "series.json").read_text())
     for name, known in expected.items():
         told = [{key: one[key] for key in ("name", "t", "golden", "faulty")} for one in known["channels"]]
@@ -75,11 +75,8 @@ def test_a_page_and_python_read_the_numbers_of_the_fixture(browser: Any, run: Pa
         assert found["end"] == known["about"]["end"]
 
 
-def test_a_page_has_the_points_between_the_values(browser: Any, run: Path) -> None:
-    """The page reads the points between values.
-
-    The cases are a value at every second time, infinite values and a longer run.
-    """
+def test_the_page_reads_the_points_between_the_values(browser: Any, run: Path) -> None:
+    """The cases are a value at every second time, infinite values and a longer run."""
     t = np.arange(9) / 20
     rows = [np.arange(7, dtype="<f4"), np.array([1, np.inf, -np.inf, np.nan], dtype="<f4")]
     about = {"start": 0.0, "end": 0.3, "channels": [{"name": "a"}, {"name": "b"}]}
@@ -103,8 +100,8 @@ def test_a_page_has_the_points_between_the_values(browser: Any, run: Path) -> No
     assert np.array(a["faulty"], dtype="<u4").view("<f4").tolist() == [0, 1, 4, -7.5, 9, 16, 25, 36, 49, 64]
 
 
-def test_a_damaged_series_is_said_to_be(browser: Any, run: Path) -> None:
-    """A flipped bit in a series gives a message and no plot. An experiment without a series gives null."""
+def test_a_damaged_series_gives_a_message(browser: Any, run: Path) -> None:
+    """An experiment without a series gives null."""
     name = next(iter(json.loads((FIXTURE / "series.json").read_text())))
     for path in (run / "series").glob(f"{16 * '[0-9a-f]'}.js"):
         data = path.read_bytes()

@@ -25,10 +25,8 @@ def address(
         yield found
 
 
-def test_a_served_report_is_the_page_that_the_file_is(
-    address: str, visit: Callable[..., Any], run: Path, tmp_path: Path
-) -> None:
-    """The server's policy allows the report's scripts, styles and series, so its replay works."""
+def test_a_served_report_works(address: str, visit: Callable[..., Any], run: Path, tmp_path: Path) -> None:
+    """The server's policy allows the report's scripts, styles and series."""
     series = json.loads((tmp_path / "runs/night/plan/experiments.jsonl").read_text().splitlines()[1])
     page = visit(address, f"/runs/night/report/index.html#e={series['id']}")
     page.wait_for_selector("html[data-ready]", state="attached")
@@ -37,10 +35,8 @@ def test_a_served_report_is_the_page_that_the_file_is(
 
 
 def test_a_hostile_report_runs_no_script(address: str, browser: Any, tmp_path: Path) -> None:
-    """A report with a valid stamp but foreign scripts is shown, and none of these scripts runs.
-
-    The scripts are inline, in a handler, in a link, from a file of the run and from elsewhere.
-    """
+    """The report has a valid stamp. The foreign scripts are inline, in a handler, in a link, from a file of
+    the run and from elsewhere."""
     night = tmp_path / "runs" / "night"
     (night / "series/kept").mkdir(parents=True, exist_ok=True)
     (night / "series/kept/0123456789abcdef.js").write_text(f"{HACKED};")
@@ -74,8 +70,7 @@ def test_a_hostile_report_runs_no_script(address: str, browser: Any, tmp_path: P
     context.close()
 
 
-def test_a_picture_of_a_run_is_no_page(address: str, browser: Any, tmp_path: Path) -> None:
-    """A plot that is opened directly runs no script."""
+def test_a_plot_opened_directly_runs_no_script(address: str, browser: Any, tmp_path: Path) -> None:
     plots = tmp_path / "runs/night/plots"
     plots.mkdir(exist_ok=True)
     (plots / "a.svg").write_text(
@@ -115,8 +110,6 @@ PIXEL = bytes.fromhex(
 
 
 class _Foreign(BaseHTTPRequestHandler):
-    """Another server of this machine, with a page for its visitors."""
-
     def do_GET(self) -> None:
         self.send_response(200)
         self.send_header("Content-Type", "text/html")
@@ -128,11 +121,8 @@ class _Foreign(BaseHTTPRequestHandler):
 
 
 def test_a_page_of_another_origin_reads_nothing(address: str, browser: Any, tmp_path: Path) -> None:
-    """A page of another local server gets no response, script or image, although the browser sends the
-    cookie.
-
-    It also cannot frame a page of ours.
-    """
+    """The browser sends the cookie to our server. The page of the other server gets no response, script or
+    image, and cannot frame a page of ours."""
     picture = tmp_path / "runs/night/plots/picture.png"
     picture.parent.mkdir(exist_ok=True)
     picture.write_bytes(PIXEL)

@@ -1,4 +1,4 @@
-"""The first page and the report of a server start jobs and report on them."""
+"""A server's pages start jobs and report on them."""
 
 import shutil
 from collections.abc import Callable, Iterator
@@ -24,7 +24,7 @@ def folder(run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def address(
     folder: Path, run: Path, serve: Callable[..., Any], module_patch: pytest.MonkeyPatch
 ) -> Iterator[str]:
-    """The server's address. Its library is the run's, without the faults that have no mutant."""
+    """The server's address. Its library is that of the run, without the faults that have no mutant."""
     module_patch.setattr(figures, "drawings", lambda frame: ())  # they take seconds
     root = run.parent / "toy"
     with serve(Workspace(library=root / "fault_library", templates=root / "templates"), (folder,)) as found:
@@ -38,10 +38,9 @@ def module_patch() -> Iterator[pytest.MonkeyPatch]:
         yield patch
 
 
-def test_the_first_page_leads_to_all_that_there_is(
+def test_the_first_page_lists_runs_reviews_and_forms(
     address: str, visit: Visit, serious_faults: Callable[[Any], list[str]]
 ) -> None:
-    """It lists runs with their outcomes, the reviews of targets, and forms to start jobs, on any screen."""
     page = visit(address)
     page.wait_for_selector("form.order >> nth=1")
     assert page.inner_text("#runs th a") == "night"
@@ -54,8 +53,7 @@ def test_the_first_page_leads_to_all_that_there_is(
     assert page.evaluate("document.documentElement.scrollWidth") == 390
 
 
-def test_a_job_that_is_refused_says_why(address: str, visit: Visit) -> None:
-    """The page shows the server's message next to the button."""
+def test_a_refused_job_shows_the_servers_message(address: str, visit: Visit) -> None:
     page = visit(address)
     page.fill("[name=spec]", "no/such")
     page.click("text=Try it")
@@ -63,11 +61,9 @@ def test_a_job_that_is_refused_says_why(address: str, visit: Visit) -> None:
 
 
 @pytest.mark.slow
-def test_an_experiment_is_driven_again_from_its_report(address: str, visit: Visit, folder: Path) -> None:
-    """The job is shown next to the experiment and at the foot of the page, with its log, also after a reload.
-
-    When the job is finished, the report has the new plot.
-    """
+def test_an_experiment_is_rerun_from_its_report(address: str, visit: Visit, folder: Path) -> None:
+    """The job is shown next to the experiment and at the foot of the page, also after a reload. When the job
+    is finished, the report has the new plot."""
     page = visit(address, "/runs/night/report/index.html")
     page.wait_for_selector("html[data-ready]", state="attached")
     page.click("#grid tr[data-at] >> nth=0")
@@ -86,7 +82,7 @@ def test_an_experiment_is_driven_again_from_its_report(address: str, visit: Visi
 
 @pytest.mark.slow
 def test_a_try_a_campaign_and_a_cancelled_job(address: str, visit: Visit, folder: Path) -> None:
-    """A try shows its plot, a small campaign becomes a listed run, and a cancelled job leaves no files."""
+    """A campaign becomes a listed run, and a cancelled job leaves no files."""
     page = visit(address)
     page.fill("[name=spec]", "sensor/distance")
     page.select_option("[name=variant]", "longer")

@@ -52,7 +52,6 @@ def ready(page: Any) -> None:
 
 
 def saved(page: Any, group: str) -> None:
-    """Wait until the marks of a group are confirmed."""
     page.wait_for_selector(f"#group-{group} .kept:text('saved')")
 
 
@@ -65,7 +64,6 @@ def words(page: Any, group: str) -> str:
 
 
 def test_marks_are_kept_and_found_after_a_reload(review: Callable[..., Any], library: Workspace) -> None:
-    """A decision, a flag and a remark made by keys are in the library and on the reloaded page."""
     page = review("Jane <b>Doe</b>")
     for key in "jjaf":
         page.keyboard.press(key)
@@ -101,8 +99,7 @@ def test_a_decision_and_a_flag_are_taken_back(review: Callable[..., Any], librar
     assert not load_review(library, "toycar").entries
 
 
-def test_nobody_decides_without_a_name(review: Callable[..., Any], library: Workspace) -> None:
-    """The page asks for a name before the first decision."""
+def test_a_decision_needs_a_name(review: Callable[..., Any], library: Workspace) -> None:
     page = review("")
     page.keyboard.press("j")
     page.keyboard.press("a")
@@ -110,13 +107,8 @@ def test_nobody_decides_without_a_name(review: Callable[..., Any], library: Work
     assert not load_review(library, "toycar").entries
 
 
-def test_two_reviewers_do_not_overwrite_each_other_unseen(
-    review: Callable[..., Any], library: Workspace
-) -> None:
-    """The second reviewer sees the first one's decision and decides again.
-
-    The first reviewer sees the result.
-    """
+def test_reviewers_do_not_overwrite_each_other_unseen(review: Callable[..., Any], library: Workspace) -> None:
+    """The second reviewer sees the first one's decision and decides again."""
     first, second = review("Jane"), review("Jim")
     for page in (first, second):
         page.keyboard.press("j")
@@ -133,7 +125,7 @@ def test_two_reviewers_do_not_overwrite_each_other_unseen(
 
 
 def test_remarks_of_two_reviewers_are_both_kept(review: Callable[..., Any], library: Workspace) -> None:
-    """Remarks of two reviewers are both kept without a second look, because no remark overwrites another."""
+    """No remark overwrites another, so nobody needs to look again."""
     pages = [review(name) for name in ("Jane", "Jim")]
     for page in pages:
         page.keyboard.press("j")
@@ -144,8 +136,8 @@ def test_remarks_of_two_reviewers_are_both_kept(review: Callable[..., Any], libr
     assert [one.by for one in load_review(library, "toycar").remarks(current(pages[0]))] == ["Jane", "Jim"]
 
 
-def test_all_that_a_filter_shows_are_approved_at_once(review: Callable[..., Any], library: Workspace) -> None:
-    """One question states number and states. After a yes, exactly these groups are approved."""
+def test_all_filtered_groups_are_approved_at_once(review: Callable[..., Any], library: Workspace) -> None:
+    """One question states number and states."""
     page = review("Jane", "q=gap")
     page.keyboard.press("Shift+A")
     assert page.inner_text("#ask-title") == "Approve 2 groups?"
@@ -155,8 +147,8 @@ def test_all_that_a_filter_shows_are_approved_at_once(review: Callable[..., Any]
     assert len(load_review(library, "toycar").entries) == 2
 
 
-def test_an_image_effect_has_pictures(review: Callable[..., Any]) -> None:
-    """An image effect shows the frame before it and at three levels, each with its value."""
+def test_an_image_effect_has_images(review: Callable[..., Any]) -> None:
+    """The page shows the frame before the effect and at three levels, each with its value."""
     page = review("Jane", "q=light")
     page.wait_for_selector(".pictures figure:nth-child(4)")
     pictures = page.locator(".pictures img")
@@ -172,13 +164,10 @@ def test_an_image_effect_has_pictures(review: Callable[..., Any]) -> None:
     ]
 
 
-def test_what_changed_since_an_approval_is_shown_as_a_diff(
+def test_a_change_since_an_approval_is_shown_as_a_diff(
     review: Callable[..., Any], library: Workspace
 ) -> None:
-    """A changed line makes an effect's approval stale, also in an open page.
-
-    The card shows old and new line.
-    """
+    """The approval becomes stale even in an open page."""
     page = review("Jane", "q=light")
     page.keyboard.press("j")
     page.keyboard.press("a")
@@ -202,10 +191,9 @@ def test_what_changed_since_an_approval_is_shown_as_a_diff(
         lens.write_text(text)
 
 
-def test_a_mark_that_waited_is_about_the_diff_that_was_shown(
+def test_a_pending_approval_is_not_applied_to_later_code(
     library: Workspace, serve: Callable[..., Any], visit: Visit
 ) -> None:
-    """An approval that did not reach the server is not applied to later code after a reload."""
     rmtree(library.library / "reviews", ignore_errors=True)
     lens = library.library.parent / "tree/toycar/lens.py"
     text = lens.read_text()
@@ -230,10 +218,8 @@ def test_a_mark_that_waited_is_about_the_diff_that_was_shown(
 
 
 @pytest.mark.slow
-def test_marks_outlive_a_server_that_is_gone(
-    library: Workspace, serve: Callable[..., Any], visit: Visit
-) -> None:
-    """Marks wait in the tab and go to the next server, also after a reload if the page is still available."""
+def test_marks_survive_a_stopped_server(library: Workspace, serve: Callable[..., Any], visit: Visit) -> None:
+    """Marks wait in the tab and go to the next server."""
     rmtree(library.library / "reviews", ignore_errors=True)
     with serve(library, token="first") as address:
         page = visit(address, ADDRESS)
@@ -255,13 +241,9 @@ def test_marks_outlive_a_server_that_is_gone(
     assert len(load_review(library, "toycar").entries) == 1
 
 
-def test_everyone_can_use_it_on_any_screen(
+def test_the_review_page_is_accessible_on_any_screen(
     review: Callable[..., Any], serious_faults: Callable[[Any], list[str]]
 ) -> None:
-    """With decisions, a flag, a remark and images, axe-core finds no serious fault in light and dark.
-
-    A narrow screen does not scroll sideways.
-    """
     page = review("Jane")
     for key in "jajrjf":
         page.keyboard.press(key)

@@ -23,7 +23,6 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A copy of the library, the templates and the target, without reviews."""
     pytest.importorskip("uvicorn", reason="extra `serve` is not installed")
     copy = tmp_path_factory.mktemp("whole")
     for name in ("fault_library", "templates", "target"):
@@ -48,7 +47,6 @@ def serving(root: Path, port: int = 0) -> Iterator[tuple[subprocess.Popen[str], 
 
 
 def opened(context: Any, address: str) -> Any:
-    """The review page, in its own tab."""
     page = context.new_page()
     page.goto(address)
     page.goto(address.partition("/?")[0] + "/review/openpilot")
@@ -74,11 +72,8 @@ def shown(page: Any, group: str) -> str:
     return "".join(kind[0] for kind in kinds)
 
 
-def test_twenty_groups_outlive_reloads_and_killed_servers(browser: Any, root: Path) -> None:
-    """Twenty marks survive a reload and a killed server, in the page and in the library.
-
-    Ten come before the reload, five during the kill and five after the restart.
-    """
+def test_twenty_marks_survive_reloads_and_killed_servers(browser: Any, root: Path) -> None:
+    """Ten come before the reload, five during the kill and five after the restart."""
     context = browser.new_context(reduced_motion="reduce")
     context.set_default_timeout(90_000)
     marks: dict[str, str] = {}
@@ -110,8 +105,7 @@ def test_twenty_groups_outlive_reloads_and_killed_servers(browser: Any, root: Pa
     context.close()
 
 
-def test_an_effect_on_a_picture_of_the_road_is_seen(browser: Any, root: Path) -> None:
-    """The page shows the effect on a camera frame of the road, before it and at three levels."""
+def test_an_effect_on_the_road_is_shown_at_three_levels(browser: Any, root: Path) -> None:
     context = browser.new_context(reduced_motion="reduce")
     context.set_default_timeout(90_000)
     with serving(root) as (_, address):

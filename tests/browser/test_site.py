@@ -34,7 +34,6 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="session")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The site as `tox -e docs` builds it."""
     for package in ("sphinx", "furo", "myst_nb"):
         pytest.importorskip(package, reason="extra `docs` is not installed")
     out = tmp_path_factory.mktemp("site")
@@ -65,7 +64,7 @@ def visited(browser: Any) -> Iterator[Any]:
 
 
 @pytest.mark.parametrize("width", [WIDE, NARROW])
-def test_every_page_opens_from_its_file(site: Path, visited: Any, width: int) -> None:
+def test_every_page_works_from_its_file(site: Path, visited: Any, width: int) -> None:
     """No page logs an error, misses a file, uses the network or is wider than the screen."""
     pages = sorted(page for page in site.rglob("*.html") if page != site / "index.html")  # which redirects
     assert len(pages) > 60
@@ -78,8 +77,8 @@ def test_every_page_opens_from_its_file(site: Path, visited: Any, width: int) ->
     assert wider == {}
 
 
-def test_the_first_page_is_the_front_page(site: Path, visited: Any) -> None:
-    """index.html leads to the page of docs/README.md, which lists every page of the site in its sidebar."""
+def test_index_html_leads_to_the_readme(site: Path, visited: Any) -> None:
+    """The sidebar of that page lists every page of the site."""
     visited.goto((site / "index.html").as_uri())
     visited.wait_for_url("**/docs/README.html")
     links = "all => all.map((a) => new URL(a.href).pathname)"
@@ -93,7 +92,7 @@ def test_the_first_page_is_the_front_page(site: Path, visited: Any) -> None:
 def test_pages_are_accessible(
     site: Path, browser: Any, page: str, scheme: str, serious_faults: Callable[[Any], list[str]]
 ) -> None:
-    """axe-core finds no serious fault in pages of each kind, light and dark."""
+    """The pages are of each kind, light and dark."""
     shown = browser.new_page(color_scheme=scheme, reduced_motion="reduce")
     shown.goto((site / f"{page}.html").as_uri())
     assert serious_faults(shown) == []
@@ -101,7 +100,7 @@ def test_pages_are_accessible(
 
 
 def test_search_finds_what_newcomers_look_for(site: Path, visited: Any) -> None:
-    """For each word that newcomers type, the page that answers it is among the first results."""
+    """The page that answers a word is among the first results."""
     missed = {}
     for words, page in FOUND.items():
         visited.goto(f"{(site / 'search.html').as_uri()}?q={words}")

@@ -1,4 +1,4 @@
-"""The source view of a run with mutation operators: marks lead to experiments."""
+"""The source view of a run with mutation operators."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -19,7 +19,7 @@ HAZARD = {"outcome": Outcome.HAZARD, "hazards": (("H3", 4.0),), "t_manifest": 2.
 
 
 def became(experiment: Experiment) -> dict[str, Any]:
-    """Return the effects: permanent mutants do harm, transient ones are masked."""
+    """Return the effects. Permanent mutants do harm, and transient ones are masked."""
     return HAZARD if experiment.trigger.name == "always" else {}
 
 
@@ -41,13 +41,10 @@ def report(
     return out
 
 
-def test_a_mark_lists_the_experiments_that_it_counts(
+def test_a_mark_lists_its_experiments(
     report: Path, open_report: "Callable[[Path], Page]", serious_faults: Callable[[Any], list[str]]
 ) -> None:
-    """A mark lists the line's permanent or transient experiments, and the line's number lists both.
-
-    The keyboard works, and colours and roles are accessible.
-    """
+    """A line's number lists its permanent and its transient experiments. Colours and roles are accessible."""
     page = open_report(report)
     assert serious_faults(page.page) == []
     line = page.page.locator(".source tr", has_text="gas = min")
@@ -66,7 +63,7 @@ def test_a_mark_lists_the_experiments_that_it_counts(
 
 
 def test_the_source_fits_a_narrow_screen(report: Path, open_report: "Callable[[Path], Page]") -> None:
-    """Long lines scroll in their own box, also in the dark theme. The page is no wider than the screen."""
+    """Long lines scroll in their own box."""
     page = open_report(report).page
     page.set_viewport_size({"width": 390, "height": 800})
     page.emulate_media(color_scheme="dark")

@@ -1,4 +1,4 @@
-"""The page of a run with more experiments than it lists shows the worst ones and counts all."""
+"""The page of a run with more experiments than the page lists."""
 
 import shutil
 from collections.abc import Callable
@@ -18,7 +18,7 @@ LISTED = 10
 
 @pytest.fixture
 def large(run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The run of the other tests with a page that lists ten of the 24 experiments."""
+    """The run of the other tests, with a page that lists ten of the 24 experiments."""
     shutil.copytree(run, tmp_path / "run")
     monkeypatch.setattr(browse, "LISTED", LISTED)
     monkeypatch.setattr(figures, "drawings", lambda frame: ())
@@ -26,14 +26,11 @@ def large(run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "run"
 
 
-def test_the_worst_are_listed_and_the_map_counts_all(
+def test_the_page_lists_the_worst_and_counts_all(
     run: Path, large: Path, open_report: "Callable[[Path], Page]"
 ) -> None:
-    """The page says how many experiments it lists and how to see the others.
-
-    Its list is the start of the whole list. In every measure, its map and tiles equal those of the whole
-    page.
-    """
+    """The page says how to see the others. In every measure, its map and tiles equal those of the whole
+    page."""
     whole, page = open_report(run), open_report(large)
     assert page.found == "10 experiments listed, the worst of 24"
     told = page.page.inner_text(".listed")
