@@ -77,7 +77,9 @@ def test_equal_runs_write_equal_bytes(arguments: list[str]) -> None:
     assert set(files[0]) == {"trace.npz", "record.json"}
 
 
-def test_steps_of_an_opened_run_are_those_of_main(arguments: list[str], tmp_path: Path) -> None:
+def test_a_run_stepped_from_outside_writes_the_same_files_as_main(
+    arguments: list[str], tmp_path: Path
+) -> None:
     driven(arguments)
     run = Ball.open(arguments)
     while not run.done:
@@ -230,7 +232,9 @@ def test_a_channel_named_time_is_refused() -> None:
 
 
 @pytest.mark.parametrize("rows", [0, 2])
-def test_a_step_records_once(arguments: list[str], rows: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_step_that_does_not_record_once_is_an_error(
+    arguments: list[str], rows: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(Ball, "step", lambda run: [run.record(a=1.0) for _ in range(rows)])
     with pytest.raises(GlueError, match=f"recorded {rows} rows"):
         Ball.main(arguments)

@@ -36,5 +36,5 @@ def test_each_shortage_has_a_remedy(error: Exception, said: str) -> None:
 @pytest.mark.parametrize(
     "error", [ValueError("x"), ImportError("No module named 'x'"), OSError(errno.ENOENT, "")]
 )
-def test_other_errors(error: Exception) -> None:
+def test_other_errors_are_no_shortages(error: Exception) -> None:
     assert shortage(error) is None

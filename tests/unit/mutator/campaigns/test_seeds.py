@@ -76,7 +76,7 @@ def test_each_seed_has_its_own_golden_runs(
     assert {folder.golden_folder(e).name for e in plan_file.read_all(folder.path)} <= keys
 
 
-def test_a_plan_that_is_written_part_by_part_is_the_one_in_memory(
+def test_a_plan_written_in_parts_equals_the_one_in_memory(
     toycar: Workspace, campaign: Callable[..., Path], tmp_path: Path
 ) -> None:
     path = campaign()

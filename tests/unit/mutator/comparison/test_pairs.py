@@ -131,7 +131,9 @@ SDC = {"outcome": Outcome.SDC, "t_manifest": 2.5}
         (BROKEN, REFUSED, ""),
     ],
 )
-def test_changes(experiment: Make, a: dict[str, Any], b: dict[str, Any], changes: str) -> None:
+def test_each_kind_of_change_is_reported(
+    experiment: Make, a: dict[str, Any], b: dict[str, Any], changes: str
+) -> None:
     """Times count from the activation."""
     e = experiment()
     pair = Pair(e, e, row(**a), row(**b))

@@ -47,7 +47,7 @@ def start_of(probe: str, seen: Observed) -> Start | None:
         (Trigger(name="x", condition="d_rel < 0.0 or rs > 0.0"), None),
     ],
 )
-def test_first_active_step(probe, trigger: Trigger, step: int | None) -> None:
+def test_a_fork_starts_at_the_first_active_step(probe, trigger: Trigger, step: int | None) -> None:
     start = start_of(probe(trigger), SEEN)
     assert (start.step if start else None) == step
     if start:

@@ -123,7 +123,7 @@ def test_a_file_that_the_run_digests_must_be_written_to_disk(changes: Changes) -
         changes(reads_itself=("car/*.py",))
 
 
-def test_more_than_inserted_lines(changes: Changes) -> None:
+def test_a_change_beyond_inserted_lines_is_not_swapped(changes: Changes) -> None:
     manifest = SimpleNamespace(
         package="car",
         reads_itself=(),

@@ -99,7 +99,7 @@ def test_a_good_run_leaves_its_trace_and_record(run: Run) -> None:
         ("import os; os.kill(os.getpid(), 15)", Status.HARNESS_ERROR, "killed from outside by SIGTERM"),
     ],
 )
-def test_ways_to_end(run: Run, body: str, status: Status, detail: str) -> None:
+def test_each_way_to_end_has_its_status(run: Run, body: str, status: Status, detail: str) -> None:
     execution = run(entry(body))
     assert (execution.status, execution.detail) == (status, detail)
 

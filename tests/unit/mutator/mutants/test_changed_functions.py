@@ -45,7 +45,9 @@ def file() -> ParsedFile:
         (0, b"LIMIT = 2  # fi:0a\n", False),  # outside all functions, so undecided
     ],
 )
-def test_a_change_of_a_function(file: ParsedFile, line: int, text: bytes, known: bool) -> None:
+def test_compiling_a_changed_function_shows_whether_the_file_compiles(
+    file: ParsedFile, line: int, text: bytes, known: bool
+) -> None:
     edits = [
         probe_import(file, None),
         Edit(index=line, rank=Rank.INSTEAD, lines=(text,)),

@@ -147,7 +147,7 @@ REORDERED = """def f(x):
 """
 
 
-def test_two_statements_exchanged(toy: Make) -> None:
+def test_two_statements_are_exchanged(toy: Make) -> None:
     source = REORDERED.replace("y = x", "x = x * 2").replace("y = y +", "y = x +")
     made = toy(source, AnchorKind.BEFORE_ASSIGN, "x", "reordering")
     assert made.run(".x.", lambda: 1) == [12, 11, 12]
@@ -176,7 +176,7 @@ def test_exchanged_statements_raise_the_usual_error(toy: Make) -> None:
         ("def f(x):\n    y = '''a\nb'''\n    return x\n", "a string spans several lines"),
     ],
 )
-def test_statements_that_cannot_be_exchanged(toy: Make, source: str, said: str) -> None:
+def test_some_statements_cannot_be_exchanged(toy: Make, source: str, said: str) -> None:
     with pytest.raises(MutatorError, match=rf"m.py:2: .*{said}"):
         toy(source, AnchorKind.BEFORE_ASSIGN, "y", "reordering")
 

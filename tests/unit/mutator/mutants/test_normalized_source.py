@@ -41,7 +41,7 @@ def test_different_ids_stay_different() -> None:
     assert normalized(text, ids) != normalized("a('00000001'); b('00000001', 'deadbeef')", ids)
 
 
-def test_a_source_that_depends_on_an_id_or_number_does_not_compile_normalized() -> None:
+def test_the_normalized_form_of_a_source_that_needs_its_numbers_does_not_compile() -> None:
     assert compiles(b"x = 12345678")
     assert not compiles(normalized("x = 12345678", ["12345678"]).encode())
     assert not compiles(normalized("match x:\n    case {1: a, 2: b}:\n        pass", ()).encode())

@@ -76,7 +76,7 @@ def test_the_report_has_times_and_counts(clone: Workspace) -> None:
     }
 
 
-def test_nothing_before_the_first_observation(clone: Workspace) -> None:
+def test_no_fault_is_active_before_the_first_observation(clone: Workspace) -> None:
     fi = probe(clone, condition="True")
     assert not fi.active("a")
     assert fi.report()["triggered"] is None

@@ -92,7 +92,7 @@ RAN = {"first": 0.5, "last": 2.0, "count": 3}
 @pytest.mark.parametrize(
     "report", [{}, {"injections": {}}, {"injections": {"a": NEVER}}, {"injections": None}]
 )
-def test_no_activation(report: dict[str, Any]) -> None:
+def test_a_report_without_activation_has_none(report: dict[str, Any]) -> None:
     assert contract.activation_of(report) is None
 
 

@@ -87,7 +87,7 @@ def test_values_are_named_numbers() -> None:
     ]
 
 
-def test_values_of_inner_functions_are_not_the_steps() -> None:
+def test_values_of_inner_functions_are_left_out() -> None:
     (step,) = candidates(
         a="def step(x):\n    def inner():\n        deep = x + 1\n    while x:\n        x = x - 1\n    try:\n"
         "        y = abs(x)\n    except ValueError:\n        z = x * 2\n    return inner\n"

@@ -57,7 +57,7 @@ def test_src_is_the_root_of_a_project_with_a_src_layout(tree: Tree) -> None:
     assert (found.root, found.packages) == (folder / "src", ("pkg",))
 
 
-def test_an_empty_folder(tree: Tree) -> None:
+def test_an_empty_folder_has_no_packages(tree: Tree) -> None:
     assert look_at(str(tree())).packages == ()
 
 

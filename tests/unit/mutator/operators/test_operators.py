@@ -105,7 +105,7 @@ def make(tmp_path: Path, clone: Workspace) -> Make:
 
 
 @pytest.mark.parametrize("operator", CHANGES)
-def test_changes_of_operator(operator: str, make: Make) -> None:
+def test_each_operator_makes_its_changes(operator: str, make: Make) -> None:
     for body, expected in CHANGES[operator].items():
         assert [one.text for one in make(body, operator)] == expected, body
 
@@ -114,7 +114,7 @@ def test_a_yield_is_not_evaluated_twice(make: Make) -> None:
     assert not make("return (yield a) + b", "arithmetic", "return")
 
 
-def test_equal_code_is_dropped(make: Make) -> None:
+def test_mutations_to_equal_code_are_dropped(make: Make) -> None:
     assert [one.text for one in make("while True: a()", "branch")] == ["True -> not True"]
     denied = make("return not a", "comparison", "return")
     assert [(one.operator.value, one.now) for one in denied] == [

@@ -44,7 +44,7 @@ def test_events_need_an_activated_fault() -> None:
     assert first_events([("H1", 3.0), ("fcw", 0.0)], None) == ()
 
 
-def test_first_of_each_name_sorted_by_time() -> None:
+def test_the_first_event_of_each_name_is_kept() -> None:
     events = [("fcw", 1.0), ("b", 5.0), ("fcw", 4.0), ("fcw", 3.0), ("a", 5.0)]
     assert first_events(events, ACTIVE) == (("fcw", 3.0), ("a", 5.0), ("b", 5.0))
 

@@ -115,7 +115,7 @@ def test_the_last_pieces_are_shorter(folder: RunFolder, clock: Clock) -> None:
     assert sizes[-1] == 1
 
 
-def test_a_late_piece_is_repeated_and_counts_once(folder: RunFolder, clock: Clock) -> None:
+def test_a_late_piece_is_repeated_but_counted_once(folder: RunFolder, clock: Clock) -> None:
     there = board(folder, clock)
     frozen = taken(there, "alpha")
     drained_by_beta = 0

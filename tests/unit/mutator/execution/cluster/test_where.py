@@ -97,7 +97,7 @@ def test_an_invalid_scheduler_file_is_refused_by_name(text: str, tmp_path: Path)
         ("tcp://[fe80::1]:1", False),
     ],
 )
-def test_only_the_loopback_and_tls_are_closed(address: str, closed: bool) -> None:
+def test_only_loopback_and_tls_addresses_are_closed(address: str, closed: bool) -> None:
     assert connecting.is_closed(address) is closed
 
 
