@@ -17,8 +17,6 @@ TOY = Path(__file__).parents[1] / "toy"
 
 @dataclass(frozen=True)
 class Answer:
-    """A command's output and exit code."""
-
     code: int
     out: str
     err: str
@@ -33,8 +31,6 @@ Cli = Callable[..., Answer]
 
 @pytest.fixture
 def cli(capfd: pytest.CaptureFixture[str]) -> Cli:
-    """Run `mutator WORDS...` and return its answer."""
-
     def run(*words: object) -> Answer:
         capfd.readouterr()
         code = main([str(word) for word in words])
@@ -46,10 +42,8 @@ def cli(capfd: pytest.CaptureFixture[str]) -> Cli:
 
 @pytest.fixture
 def root(toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kept_checks: None) -> Path:
-    """The toy's root, set in the environment, without the deliberately broken parts.
-
-    The current folder is elsewhere, and the checks are cached.
-    """
+    """The toy's root, set in the environment, without the deliberately broken parts. The current folder is
+    elsewhere."""
     root = toy.library.parent
     shutil.rmtree(toy.library / "faults" / "hostile")
     for template in (TOY / "templates").iterdir():

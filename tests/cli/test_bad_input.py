@@ -1,4 +1,4 @@
-"""The command line's errors for mistakes in specs, templates and run folders."""
+"""Errors for mistakes in specs, templates, options and run folders."""
 
 import json
 import re
@@ -32,7 +32,6 @@ variants:
 
 @pytest.fixture
 def own(root: Path) -> Path:
-    """A valid spec that the user wrote."""
     own = Path("own.yaml")
     own.write_text(SPEC)
     return own
@@ -62,10 +61,10 @@ def test_the_spec_without_a_mistake_is_fine(cli: Cli, own: Path) -> None:
         ("module: sensor", "module: [sensor", 3, "own.yaml"),  # not YAML
     ],
 )  # fmt: skip
-def test_a_mistake_in_a_spec_is_told_with_its_place(
+def test_a_mistake_in_a_spec_is_reported_with_its_line(
     cli: Cli, own: Path, right: str, wrong: str, line: int, said: str
 ) -> None:
-    """The error gives file, line, finding and remedy. The exit code is 2, and there is no traceback."""
+    """There is no traceback."""
     assert right in SPEC
     own.write_text(SPEC.replace(right, wrong))
     answer = cli("diff", own)
@@ -75,8 +74,8 @@ def test_a_mistake_in_a_spec_is_told_with_its_place(
     assert "Traceback" not in answer.err
 
 
-def test_a_value_out_of_its_range_is_refused(cli: Cli, own: Path) -> None:
-    """A parameter outside its model's range is refused, and the error shows the range."""
+def test_a_value_out_of_range_is_refused(cli: Cli, own: Path) -> None:
+    """The error shows the range of the parameter's model."""
     flip = SPEC.replace("model: offset", "model: bit_flip").replace("          unit: m\n", "")
     own.write_text(flip.replace("by_m: error", "bit: 64"))
     answer = cli("diff", own)
@@ -85,8 +84,8 @@ def test_a_value_out_of_its_range_is_refused(cli: Cli, own: Path) -> None:
     assert "63" in answer.err
 
 
-def test_a_template_that_does_not_parse_is_told_with_its_place(cli: Cli, own: Path, root: Path) -> None:
-    """A mistake in a template is reported with the template's file and line, whichever spec uses it."""
+def test_a_template_that_does_not_parse_is_reported_with_its_line(cli: Cli, own: Path, root: Path) -> None:
+    """Any spec may use the template."""
     template = root / "templates" / "offset.py.j2"
     template.write_text(template.read_text() + "{% if %}\n")
     for words in (["diff", own], ["check"]):
@@ -96,8 +95,8 @@ def test_a_template_that_does_not_parse_is_told_with_its_place(cli: Cli, own: Pa
         assert "Traceback" not in answer.err
 
 
-def test_a_mutant_that_does_not_compile_is_the_users_to_mend(cli: Cli, own: Path, root: Path) -> None:
-    """`try` says what does not compile, runs nothing and exits with 2."""
+def test_a_mutant_that_does_not_compile_is_a_users_error(cli: Cli, own: Path, root: Path) -> None:
+    """Nothing is run."""
     template = root / "templates" / "offset.py.j2"
     template.write_text("if _fi.active('{{ fi }}'):\n    {{ target }} = = {{ by }}\n")
     answer = cli("try", own, "-s", "A")
@@ -118,10 +117,7 @@ def test_a_mutant_that_does_not_compile_is_the_users_to_mend(cli: Cli, own: Path
         (["generate", "own.yaml", "--out", "own.yaml"], "cannot be written"),
     ],
 )
-def test_a_mistake_on_the_command_line_is_told(
-    cli: Cli, own: Path, root: Path, words: list[str], said: str
-) -> None:
-    """An impossible time, context, seed or folder gets a clear error and exit code 2."""
+def test_an_invalid_option_is_reported(cli: Cli, own: Path, root: Path, words: list[str], said: str) -> None:
     contexts = root / "fault_library" / "stpa" / "contexts"
     other = (contexts / "near_far.yaml").read_text().replace("name: near_far", "name: other")
     (contexts / "other.yaml").write_text(other)
@@ -132,8 +128,8 @@ def test_a_mistake_on_the_command_line_is_told(
     assert cli("diff", "own.yaml", "--trigger", "other/near").code == 0
 
 
-def test_an_injected_line_that_raises_is_named(cli: Cli, own: Path, root: Path) -> None:
-    """If injected code raises, the mutant is invalid and its line is shown. The command succeeds."""
+def test_an_injected_line_that_raises_is_shown(cli: Cli, own: Path, root: Path) -> None:
+    """The mutant is invalid, and the command succeeds."""
     template = root / "templates" / "offset.py.j2"
     template.write_text("if _fi.active('{{ fi }}'):\n    {{ target }} = [][int({{ by }})]\n")
     answer = cli("try", own, "-s", "A")
@@ -145,8 +141,7 @@ def test_an_injected_line_that_raises_is_named(cli: Cli, own: Path, root: Path) 
     assert cli("try", own, "-s", "A", "--json").json["error"]["kind"] == "IndexError"
 
 
-def test_a_run_folder_of_a_newer_schema_is_left_alone(cli: Cli, root: Path) -> None:
-    """Every verb that reads a run folder refuses one written by a newer version."""
+def test_a_run_folder_of_a_newer_schema_is_refused(cli: Cli, root: Path) -> None:
     cli("plan", "toy", "--out", "runs/p", "--limit", "2")
     head = Path("runs/p/run.json")
     data = json.loads(head.read_text())
@@ -183,8 +178,8 @@ def test_the_command_line_names_its_options(
     assert "`" not in answer.err.partition("to do")[2]
 
 
-def test_two_targets_are_told_apart_by_an_option(cli: Cli, own: Path, root: Path) -> None:
-    """The API's argument `target` is the option --manifest, because --target is the controller's source."""
+def test_the_target_of_the_api_is_the_option_manifest(cli: Cli, own: Path, root: Path) -> None:
+    """The option --target is the controller's source."""
     targets = root / "fault_library" / "targets"
     (targets / "other.yaml").write_text((targets / "toycar.yaml").read_text())
     answer = cli("diff", "own.yaml")

@@ -15,7 +15,7 @@ pytestmark = pytest.mark.usefixtures("nowhere")
 
 @pytest.fixture
 def filled() -> Path:
-    """A cache of three files of a target, 12 kB each on any disk."""
+    """A cache of three files of a target. Each takes 12 kB on any disk."""
     place = caches.of_target("car")
     place.mkdir(parents=True)
     for name in "abc":
@@ -23,11 +23,8 @@ def filled() -> Path:
     return place
 
 
-def test_the_cache_is_listed(cli: Cli, filled: Path) -> None:
-    """The list shows the cached files' kinds, number, size and location.
-
-    JSON has the same. No library is needed.
-    """
+def test_cached_files_are_listed(cli: Cli, filled: Path) -> None:
+    """No library is needed."""
     answer = cli("cache")
     assert answer.code == 0, answer.err
     assert [line.split() for line in answer.out.splitlines()[:3]] == [
@@ -42,8 +39,8 @@ def test_the_cache_is_listed(cli: Cli, filled: Path) -> None:
     ]
 
 
-def test_the_path_alone(cli: Cli) -> None:
-    """--path prints the folder, even a missing one, for use in other commands."""
+def test_path_prints_only_the_folder(cli: Cli) -> None:
+    """Other commands can use the path. The folder may be missing."""
     assert cli("cache", "--path").out == f"{caches.folder()}\n"
 
 
@@ -51,8 +48,8 @@ def test_the_path_alone(cli: Cli) -> None:
     ("words", "left"),
     [(("--max", "25kB"), 2), (("--max", "0"), 0), (("--max", "2 GB"), 3), (("--clear",), 0)],
 )
-def test_what_is_too_much_is_deleted(cli: Cli, filled: Path, words: tuple[str, ...], left: int) -> None:
-    """--max deletes files down to a size, and --clear deletes all. Both report how much they deleted."""
+def test_max_and_clear_delete_files(cli: Cli, filled: Path, words: tuple[str, ...], left: int) -> None:
+    """Both options report how much they deleted."""
     answer = cli("cache", *words, "--json")
     assert (answer.code, len(answer.json["kept"]), len(answer.json["deleted"])) == (0, left, 3 - left)
     assert len(list(filled.iterdir())) == left
@@ -68,10 +65,8 @@ def test_what_is_too_much_is_deleted(cli: Cli, filled: Path, words: tuple[str, .
         (("--path", "--clear"), "expected: one of them"),
     ],
 )
-def test_what_makes_no_sense_deletes_nothing(
-    cli: Cli, filled: Path, words: tuple[str, ...], said: str
-) -> None:
-    """An invalid size, or both options at once, is wrong input and deletes nothing."""
+def test_invalid_options_delete_nothing(cli: Cli, filled: Path, words: tuple[str, ...], said: str) -> None:
+    """The cases are an invalid size, and both options at once."""
     answer = cli("cache", *words)
     assert answer.code == 2 and said in answer.err
     assert len(list(filled.iterdir())) == 3

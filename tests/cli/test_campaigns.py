@@ -1,7 +1,4 @@
-"""The commands that run experiments or read runs:
-
-`plan`, `run`, `report`, `show`, `rerun`, `clean`, on the toy target.
-"""
+"""The commands that run experiments or read runs, on the toy target."""
 
 import json
 import os
@@ -32,7 +29,6 @@ CHOSEN = ["--only", 'fault_type != "distance"']  # some of them always do harm, 
 
 
 def mutator(root: Path, *words: object) -> subprocess.CompletedProcess[str]:
-    """A separate `mutator` process, as a user starts it."""
     command = [sys.executable, "-m", "mutator", *map(str, words)]
     environment = os.environ | {"MUTATOR_ROOT": str(root)}
     return subprocess.run(command, capture_output=True, text=True, check=False, env=environment, cwd=root)
@@ -65,11 +61,8 @@ def experiment_with(run: Path, word: str) -> str:
     return next(line.split(",")[0] for line in results(run) if f",{word}," in line)
 
 
-def test_plan_freezes_and_runs_nothing(cli: Cli, root: Path) -> None:
-    """`plan` writes the plan and prints its table.
-
-    It also prints the expected time and disk space and the command that runs the plan.
-    """
+def test_plan_writes_the_plan_and_runs_nothing(cli: Cli, root: Path) -> None:
+    """The output has the expected time and disk space and the command that runs the plan."""
     answer = cli("plan", "toy", "--out", "p", "--only", 'fault_type == "distance"', "-n", "4")
     assert answer.code == 0
     for wanted in ("sensor/distance", "guided", "random", "total", "with 4 workers", "MB of disk"):
@@ -81,7 +74,7 @@ def test_plan_freezes_and_runs_nothing(cli: Cli, root: Path) -> None:
 
 
 def test_a_run_has_a_worker_for_each_core(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without -n, `plan` expects and `run` starts one worker for each usable core."""
+    """Only usable cores count, and `plan` expects the same number."""
     monkeypatch.setattr(campaigns, "usable_cores", lambda: 3)
     started: list[int] = []
 
@@ -99,8 +92,8 @@ def test_a_run_has_a_worker_for_each_core(cli: Cli, root: Path, monkeypatch: pyt
 
 
 @pytest.mark.parametrize("engine", ["reference", "warm", "fork"])
-def test_a_fault_that_hides_a_name_drives_nothing(cli: Cli, root: Path, engine: str) -> None:
-    """A fault that would make a module's name local is refused with file and line before any run."""
+def test_a_fault_that_hides_a_name_is_refused_before_any_run(cli: Cli, root: Path, engine: str) -> None:
+    """The fault would make a module's name local."""
     driver = root / "tree" / "toycar" / "driver.py"
     driver.write_text("HEADWAY_S = 1.5\n" + driver.read_text().replace("1.5 * speed", "HEADWAY_S * speed"))
     spec = root / "fault_library" / "faults" / "sensor" / "lane.yaml"
@@ -115,7 +108,6 @@ def test_a_fault_that_hides_a_name_drives_nothing(cli: Cli, root: Path, engine: 
 
 
 def test_a_plan_is_the_same_each_time(cli: Cli, root: Path) -> None:
-    """The same campaign and seed give the same digest. Another seed gives another digest."""
     one, two = (cli("plan", "toy", "--out", out, "--json").json for out in "ab")
     other = cli("plan", "toy", "--out", "c", "--seed", "8", "--json").json
     assert one["digest"] == two["digest"] != other["digest"]
@@ -134,8 +126,8 @@ def test_a_plan_is_the_same_each_time(cli: Cli, root: Path) -> None:
         (["toy", "--out", "full"], "not empty"),
     ],
 )
-def test_what_cannot_be_planned_is_answered(cli: Cli, root: Path, words: list[str], said: str) -> None:
-    """A wrong name, expression, reading or folder is refused with 2 before anything is written."""
+def test_an_invalid_plan_is_refused(cli: Cli, root: Path, words: list[str], said: str) -> None:
+    """A wrong name, expression, reading or folder exits with 2 before anything is written."""
     Path("full").mkdir()
     Path("full/mine.txt").touch()
     answer = cli("plan", *words)
@@ -146,7 +138,6 @@ def test_what_cannot_be_planned_is_answered(cli: Cli, root: Path, words: list[st
 
 
 def test_run_ends_with_the_table_and_the_report(finished: tuple[Path, Any]) -> None:
-    """The last lines show the counts for each fault type and the path of the report."""
     root, said = finished
     lines = said.stdout.splitlines()
     assert lines[0].split()[:5] == ["fault", "type", "injected", "activated", "manifested"]
@@ -158,8 +149,7 @@ def test_run_ends_with_the_table_and_the_report(finished: tuple[Path, Any]) -> N
     assert "experiments " in said.stderr  # progress goes to stderr
 
 
-def test_a_finished_run_is_not_run_again(cli: Cli, run: Path) -> None:
-    """The same command on a complete run changes nothing and succeeds."""
+def test_running_a_finished_run_changes_nothing(cli: Cli, run: Path) -> None:
     before = results(run)
     answer = cli("run", "toy", "--out", run, *CHOSEN, "-n", "0")
     assert answer.code == 0
@@ -167,8 +157,7 @@ def test_a_finished_run_is_not_run_again(cli: Cli, run: Path) -> None:
     assert results(run) == before
 
 
-def test_run_as_json(cli: Cli, run: Path) -> None:
-    """With --json, standard output holds only numbers and paths."""
+def test_with_json_a_run_prints_only_numbers_and_paths(cli: Cli, run: Path) -> None:
     answer = cli("run", "toy", "--out", run, *CHOSEN, "-n", "0", "--json").json
     assert (answer["planned"], answer["done"], answer["ran"]) == (12, 12, 0)
     assert sum(answer["outcomes"].values()) == 12
@@ -187,11 +176,8 @@ def wait_for(folder: Path, files: str) -> None:
         time.sleep(0.05)
 
 
-def test_an_interrupted_run_says_how_to_go_on(cli: Cli, root: Path) -> None:
-    """Ctrl-C exits with 130 and prints the progress and the command that resumes the run.
-
-    That command completes the run. While a command runs, a second one in the same folder is refused.
-    """
+def test_an_interrupted_run_prints_the_command_that_resumes_it(cli: Cli, root: Path) -> None:
+    """While a command runs, a second one in the same folder is refused."""
     words = ["run", "toy", "--out", "runs/cut", "-n", "0", "--limit", "6"]
     command = [sys.executable, "-m", "mutator", *words]
     environment = os.environ | {"MUTATOR_ROOT": str(root)}
@@ -217,8 +203,7 @@ def test_an_interrupted_run_says_how_to_go_on(cli: Cli, root: Path) -> None:
     assert "6 of 6 experiments done" in again.out
 
 
-def test_report_is_made_again_from_the_records(cli: Cli, run: Path) -> None:
-    """Deleted results and report are rebuilt byte for byte."""
+def test_report_rebuilds_results_byte_for_byte(cli: Cli, run: Path) -> None:
     files = [run / "results.csv", run / "report/REPORT.md", run / "report/index.html"]
     before = [file.read_bytes() for file in files]
     for file in files:
@@ -237,11 +222,10 @@ def test_report_of_a_folder_of_runs_is_their_history(cli: Cli, run: Path, tmp_pa
     assert "| first |" in Path(answer.json["markdown"]).read_text()
 
 
-def test_a_report_of_a_run_whose_proof_failed(cli: Cli, run: Path, tmp_path: Path, reseal: Reseal) -> None:
-    """If the proof failed, the report shows the failure at the top.
-
-    The command exits with 1 and names the experiment.
-    """
+def test_a_failed_proof_is_at_the_top_of_the_report(
+    cli: Cli, run: Path, tmp_path: Path, reseal: Reseal
+) -> None:
+    """The command exits with 1 and names the experiment."""
     run = Path(shutil.copytree(run, tmp_path / "run"))
     shutil.copytree(run / "records", run / "proof", dirs_exist_ok=True)
     path = next(path for path in sorted((run / "proof").iterdir()) if len(path.read_text().splitlines()) > 1)
@@ -265,8 +249,7 @@ def test_a_library_for_the_report_can_be_named(cli: Cli, run: Path, root: Path, 
     assert "fault_library" in answer.err
 
 
-def test_the_page_needs_nothing_from_elsewhere(run: Path) -> None:
-    """The page loads nothing from the network or from other files: links and figures are inside it."""
+def test_the_page_loads_nothing(run: Path) -> None:
     text = (run / "report" / "index.html").read_text()
     assert "http" not in text.replace("http://www.w3.org/2000/svg", "")
     links = re.findall(r'<[^>]* (?:href|src)="([^"]*)"', text)
@@ -274,8 +257,8 @@ def test_the_page_needs_nothing_from_elsewhere(run: Path) -> None:
     assert all(link.startswith(("#", "data:")) for link in links)
 
 
-def test_show_tells_everything_of_an_experiment(cli: Cli, run: Path) -> None:
-    """`show` prints diff, times and verdict and the path of its plot. The page can also draw one."""
+def test_show_prints_diff_times_verdict_and_plot(cli: Cli, run: Path) -> None:
+    """The page can also draw a plot."""
     name = experiment_with(run, "hazard")
     answer = cli("show", name)
     assert answer.code == 0
@@ -289,7 +272,7 @@ def test_show_tells_everything_of_an_experiment(cli: Cli, run: Path) -> None:
 
 
 def test_show_without_an_experiment_lists_the_worst(cli: Cli, run: Path) -> None:
-    """Hazards come first. A filter leaves out the results that do not match."""
+    """A filter leaves out the results that do not match."""
     listed = cli("show", "--json").json
     endings = [line["ending"] for line in listed["worst"]]
     assert endings == sorted(endings, key=lambda ending: ending != "hazard")
@@ -305,7 +288,7 @@ def test_show_without_an_experiment_lists_the_worst(cli: Cli, run: Path) -> None
 
 
 def test_show_takes_the_start_of_an_id(cli: Cli, run: Path) -> None:
-    """Any unique start of an id works. Without a named run, the newest one is used."""
+    """Without a named run, the newest one is used."""
     name = experiment_with(run, "hazard")
     answer = cli("show", name[:8], "--json", "--no-plot").json
     assert answer["experiment"] == name
@@ -317,15 +300,14 @@ def test_show_takes_the_start_of_an_id(cli: Cli, run: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["", "0123456789abcdef", "xyz"])
-def test_an_experiment_that_is_not_one_is_answered(cli: Cli, run: Path, name: str) -> None:
-    """An id that matches no experiment, or several, is wrong input."""
+def test_an_unknown_or_ambiguous_id_is_refused(cli: Cli, run: Path, name: str) -> None:
     answer = cli("show", name)
     assert answer.code == 2
     assert "Traceback" not in answer.err
 
 
 def test_show_before_the_run(cli: Cli, root: Path) -> None:
-    """`show` accepts a planned experiment and says that it has not run and how to run it."""
+    """`show` says how to run the experiment."""
     cli("plan", "toy", "--out", "runs/p", "--limit", "2")
     name = results_id(Path("runs/p/plan.csv"))
     answer = cli("show", name)
@@ -338,8 +320,8 @@ def results_id(table: Path) -> str:
     return table.read_text().splitlines()[1].split(",")[0]
 
 
-def test_rerun_gives_the_same_again(cli: Cli, run: Path) -> None:
-    """A rerun reproduces the record. Without --trace it leaves no files."""
+def test_rerun_reproduces_the_record(cli: Cli, run: Path) -> None:
+    """Without --trace no files are left."""
     name = experiment_with(run, "sdc")
     answer = cli("rerun", name)
     assert answer.code == 0
@@ -355,8 +337,7 @@ def test_rerun_keeps_a_trace(cli: Cli, run: Path) -> None:
     assert Path(answer["plot"]).is_file()
 
 
-def test_rerun_tells_a_difference(cli: Cli, run: Path, tmp_path: Path, reseal: Reseal) -> None:
-    """If a rerun differs from the record, the check fails."""
+def test_rerun_fails_if_the_record_differs(cli: Cli, run: Path, tmp_path: Path, reseal: Reseal) -> None:
     copy = tmp_path / "copy"
     shutil.copytree(run, copy)
     name = experiment_with(run, "hazard")
@@ -386,8 +367,8 @@ def test_clean_deletes_run_folders_only(cli: Cli, root: Path) -> None:
 KNOWN = {pattern.partition("/")[0] for pattern in CONTENT}  # names in a run folder
 
 
-def test_clean_knows_all_that_a_run_writes(cli: Cli, run: Path, tmp_path: Path) -> None:
-    """After every command that writes into a run folder, `clean` deletes the folder. It refuses a link."""
+def test_clean_deletes_all_that_a_run_writes(cli: Cli, run: Path, tmp_path: Path) -> None:
+    """Every command that writes into a run folder has run. A link is refused."""
     copy, other = tmp_path / "copy", tmp_path / "other"
     for folder in (copy, other):
         shutil.copytree(run, folder)

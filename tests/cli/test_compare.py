@@ -16,7 +16,7 @@ Write = Callable[..., Path]
 
 
 def worse(e: Experiment) -> dict[str, Any]:
-    """Return runs in which one fault becomes hazardous and the rest stays the same."""
+    """Return runs of which the second has a new hazard and no other change."""
     hazard = {"outcome": Outcome.HAZARD, "hazards": (("H1", 3.0),)}
     return hazard if e.fault.fault_type == "silence" and e.scenario == "A" else {}
 
@@ -28,8 +28,8 @@ def runs(root: Path, write_run: Write) -> tuple[Path, Path]:
     return write_run(workspace, Path("before")), write_run(workspace, Path("after"), worse)
 
 
-def test_compare_tells_and_writes(cli: Cli, runs: tuple[Path, Path]) -> None:
-    """The terminal shows the changes in tables, and the same is written next to the second run."""
+def test_compare_prints_and_writes_the_changes(cli: Cli, runs: tuple[Path, Path]) -> None:
+    """The files are next to the second run."""
     answer = cli("compare", *runs)
     assert answer.code == 0, answer.err
     for wanted in ("new-hazard", "sensor/silence", "In both runs: 24 experiments"):
@@ -38,8 +38,8 @@ def test_compare_tells_and_writes(cli: Cli, runs: tuple[Path, Path]) -> None:
         assert (Path("after") / "report" / "compare-before" / name).is_file()
 
 
-def test_unlike_parts_are_told_first(cli: Cli, root: Path, write_run: Write) -> None:
-    """One remark before any table says that one run has fewer experiments by choice. The page has it, too."""
+def test_a_different_selection_is_reported_before_any_table(cli: Cli, root: Path, write_run: Write) -> None:
+    """One run has fewer experiments by choice. The page has the remark, too."""
     workspace = Workspace.find(root)
     runs = write_run(workspace, Path("whole")), write_run(workspace, Path("part"), limit=6)
     said = "The runs are different parts of a campaign: whole has all of it, part has --limit 6."
@@ -56,7 +56,6 @@ def test_unlike_parts_are_told_first(cli: Cli, root: Path, write_run: Write) -> 
 def test_alerts_of_fault_free_runs_are_named(
     cli: Cli, runs: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Terminal, page and Markdown name the alerts of fault-free runs of either side."""
     note = "Not every alert is caused by a fault: fault-free runs raise fcw in A."
     monkeypatch.setattr(mutator.Run, "alerts_note", lambda run: note if run.path.name == "after" else "")
     answer = cli("compare", *runs, "--out", "c")
@@ -70,11 +69,8 @@ def test_alerts_of_fault_free_runs_are_named(
     assert "Not every alert" not in before._repr_html_()
 
 
-def test_a_gate_fails_and_names(cli: Cli, runs: tuple[Path, Path]) -> None:
-    """With --fail-on, a new hazard is named and the exit code is 1.
-
-    In the other direction the gate passes.
-    """
+def test_a_gate_fails_for_a_new_hazard(cli: Cli, runs: tuple[Path, Path]) -> None:
+    """In the other direction the gate passes."""
     failed = cli("compare", *runs, "--out", "c", "--fail-on", "new-hazard,unmatched")
     assert failed.code == 1
     assert "new-hazard: sensor/silence/no_data, A, guided" in failed.err
@@ -89,8 +85,8 @@ def test_a_run_with_itself(cli: Cli, runs: tuple[Path, Path]) -> None:
     assert (answer.json["pairs"], answer.json["changed"], answer.json["differs"]) == (24, 0, [])
 
 
-def test_a_gate_does_not_pass_what_has_no_result(cli: Cli, root: Path, write_run: Write) -> None:
-    """If results are missing, the gate exits with 3, because it cannot rule out a regression."""
+def test_a_gate_fails_if_results_are_missing(cli: Cli, root: Path, write_run: Write) -> None:
+    """A regression cannot be ruled out. The exit code is 3."""
     workspace = Workspace.find(root)
     whole = write_run(workspace, Path("whole"), campaign="small")
     part = write_run(
@@ -113,16 +109,17 @@ def test_a_gate_does_not_pass_what_has_no_result(cli: Cli, root: Path, write_run
         (["--only", "nonsense > 1"], "unknown column `nonsense`"),
     ],
 )
-def test_wrong_input(cli: Cli, runs: tuple[Path, Path], words: list[str], told: str) -> None:
-    """An unknown kind or filter is wrong input. The error lists the known ones."""
+def test_an_unknown_kind_or_filter_is_refused(
+    cli: Cli, runs: tuple[Path, Path], words: list[str], told: str
+) -> None:
     answer = cli("compare", *runs, *words)
     assert answer.code == 2
     assert told in answer.err
     assert "expected" in answer.err
 
 
-def test_export(cli: Cli, runs: tuple[Path, Path]) -> None:
-    """Each format is written to the given path, or into the run folder if no path is given."""
+def test_each_format_is_exported(cli: Cli, runs: tuple[Path, Path]) -> None:
+    """Without a path, the file is in the run folder."""
     _, after = runs
     answer = cli("export", after, "--format", "mutation-elements", "--out", "m.json")
     assert answer.code == 0, answer.err

@@ -15,7 +15,7 @@ Complete = Callable[..., list[str]]
 
 @pytest.fixture
 def complete(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch) -> Complete:
-    """Return the completions that a shell gets after these words, the last one being typed."""
+    """Return the completions after these words, of which the user is typing the last one."""
 
     def ask(*words: str) -> list[str]:
         monkeypatch.setenv("_MUTATOR_COMPLETE", "complete_bash")
@@ -43,8 +43,9 @@ def complete(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch) -> Complete:
         (["export", "runs/x", "--format", "mut"], ["mutation-elements"]),
     ],
 )
-def test_names_are_completed(complete: Complete, words: list[str], offered: list[str]) -> None:
-    """Verbs, campaigns, specs, scenarios, targets and formats are completed from their first letters."""
+def test_names_are_completed_from_their_first_letters(
+    complete: Complete, words: list[str], offered: list[str]
+) -> None:
     assert complete(*words) == offered
 
 
@@ -65,10 +66,10 @@ def test_run_folders_and_their_experiments_are_completed(complete: Complete, cli
     assert complete("rerun", "--run", "runs/old", "") == []
 
 
-def test_a_library_that_is_named_is_looked_into(
+def test_library_options_apply_to_completion(
     complete: Complete, root: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Library options before and after the verb count. Without them, the environment's library is used."""
+    """Without options, the environment's library is used."""
     monkeypatch.delenv("MUTATOR_ROOT")
     assert "small" not in complete("run", "")
     assert "small" in complete("--root", str(root), "run", "")
@@ -76,7 +77,6 @@ def test_a_library_that_is_named_is_looked_into(
 
 
 def test_the_script_for_a_shell_is_printed(cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
-    """`--show-completion` prints the shell's script for the command `mutator`."""
     monkeypatch.setattr("typer.completion._get_shell_name", lambda: "bash")
     answer = cli("--show-completion")
     assert answer.code == 0

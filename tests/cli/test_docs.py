@@ -1,9 +1,8 @@
 """README and docs show what the commands print, and their links work.
 
-The test follows a page as a reader does. It runs the commands in order, writes a block after a line with a
+The test follows a page as a reader does: it runs the commands in order, writes a block after a line with a
 file name (`` `late.yaml`: ``) to that file, and applies diffs. If your change alters the output, write it
-into the pages with `UPDATE_DOCS=1 pytest -m slow tests/cli/test_docs.py`. Read the difference before you keep
-it.
+into the pages with `UPDATE_DOCS=1 pytest -m slow tests/cli/test_docs.py`, and read the difference.
 """
 
 import json
@@ -130,10 +129,8 @@ def work_through(page: Path, folder: Path) -> list[tuple[str, str]]:
 
 
 def run(command: str, folder: Path) -> str:
-    """Run a command line that must succeed and return its standard output.
-
-    `mutator` is this interpreter's.
-    """
+    """Run a command line that must succeed and return its standard output. `mutator` is run by
+    this interpreter."""
     bin_folder = str(Path(sys.executable).parent)
     environment = os.environ | {"PATH": bin_folder + os.pathsep + os.environ["PATH"]}
     environment.pop("COLUMNS", None)  # pages show piped output
@@ -145,7 +142,6 @@ def run(command: str, folder: Path) -> str:
 
 
 def lines_of(output: str) -> list[str]:
-    """Return lines as a page shows them, without trailing blanks."""
     return [line.rstrip() for line in output.rstrip("\n").splitlines()]
 
 
@@ -170,7 +166,6 @@ def rewrite(page: Path, printed: list[tuple[str, str]]) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("page", WORKED_THROUGH, ids=name)
 def test_every_command_of_a_page_prints_what_the_page_says(page: Path, work: Path) -> None:
-    """The console sessions of a page, run in order, print exactly what the page shows."""
     found = sessions(page)
     assert len(found) >= 2
     if page in EXAMPLES:
@@ -197,8 +192,10 @@ def test_every_command_of_a_page_prints_what_the_page_says(page: Path, work: Pat
         if re.match(r"mutator (list|diff) [^|]*$", command)
     ],
 )
-def test_what_costs_little_is_always_tried(cli: Cli, command: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Lists and diffs in README and tutorial match the current library and target."""
+def test_lists_and_diffs_in_the_docs_are_current(
+    cli: Cli, command: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """README and tutorial are tested here, because these outputs cost little."""
     monkeypatch.setenv("MUTATOR_ROOT", str(CLONE))
     monkeypatch.delenv("COLUMNS")
     said = {command: said for page in (README, TUTORIAL) for command, said in sessions(page)}
@@ -220,7 +217,6 @@ def anchors(page: Path) -> set[str]:
 
 
 def links(page: Path) -> list[tuple[Path, str]]:
-    """Return the files and anchors that a page links, including its own anchors."""
     text = CODE.sub("", page.read_text(encoding="utf-8"))
     return [
         ((page.parent / target).resolve() if target else page, anchor)
@@ -230,27 +226,26 @@ def links(page: Path) -> list[tuple[Path, str]]:
 
 @pytest.mark.parametrize("page", PAGES, ids=name)
 def test_links_lead_somewhere(page: Path) -> None:
-    """Each relative link is a file of the clone, and each anchor is one of its headings."""
     for file, anchor in links(page):
         assert file.exists(), f"{name(page)}: {file}"
         assert not anchor or anchor in anchors(file), f"{name(page)}: {file.name}#{anchor}"
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name)
-def test_nobody_is_told_to_install_by_name(page: Path) -> None:
-    """Pages install from a clone or a file, because the name on the index belongs to another project."""
+def test_no_page_installs_by_name(page: Path) -> None:
+    """The name on the index belongs to another project."""
     assert not BY_NAME.search(page.read_text(encoding="utf-8"))
 
 
 @pytest.mark.parametrize("command", ["pip install mutator", "pip install 'mutator[dev]'", "uv add mutator"])
-def test_installing_by_name_would_be_noticed(command: str) -> None:
-    """The pattern finds installs by name and accepts installs from a folder or a file."""
+def test_the_pattern_finds_installs_by_name(command: str) -> None:
+    """Installs from a folder or a file are accepted."""
     assert BY_NAME.search(command)
     assert not BY_NAME.search("pip install dist/mutator-0.1.0.whl && .venv/bin/mutator list")
 
 
-def test_every_page_can_be_reached() -> None:
-    """The documentation's index names every page, except the pages that belong to a page it names."""
+def test_the_index_names_every_page() -> None:
+    """Pages that belong to a named page need no entry."""
     listed = {file for file, _ in links(INDEX)}
     pages = {page for page in PAGES if INDEX.parent in page.parents and page != INDEX}
     assert pages - listed == set()
@@ -264,14 +259,13 @@ def test_every_page_can_be_reached() -> None:
     assert rest - shown == set(), "no page shows or links these"
 
 
-def test_no_two_pages_differ_in_their_suffix_alone() -> None:
-    """A page and a notebook in one folder have different names, because the site drops the suffix."""
+def test_page_names_differ_in_more_than_their_suffix() -> None:
+    """The site drops the suffix of a page or notebook."""
     names = [file.with_suffix("") for kind in ("*.md", "*.ipynb") for file in INDEX.parent.rglob(kind)]
     assert len(set(names)) == len(names)
 
 
-def test_editors_are_told_of_every_schema() -> None:
-    """The settings in the guide map each schema to its files."""
+def test_the_guide_has_editor_settings_for_every_schema() -> None:
     page = (HOW_TO / "edit-with-completion.md").read_text(encoding="utf-8")
     [settings] = [json.loads(text) for _, kind, text in FENCE.findall(page) if kind == "json"]
     expected = {
@@ -288,7 +282,6 @@ def test_every_benchmark_is_told_of() -> None:
 
 
 def test_the_readme_has_both_command_lines() -> None:
-    """The README has one line that installs and runs and one that installs and tests, both ready to copy."""
     lines = [line for line in README.read_text().splitlines() if line.startswith("python3 -m venv ")]
     assert [("mutator run quickstart" in line, "pytest" in line) for line in lines] == [
         (True, False),

@@ -15,7 +15,7 @@ Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, jso
 
 
 def test_diff_shows_one_diff_for_each_variant(cli: Cli, root: Path) -> None:
-    """The values of a variant share one diff. It is shown once and leaves out the probe's file."""
+    """The diff leaves out the probe's file."""
     answer = cli("diff", "sensor/distance")
     assert answer.code == 0
     headings = [line for line in answer.out.splitlines() if line.startswith("# ")]
@@ -32,7 +32,8 @@ def test_a_value_of_ones_own_is_taken_exactly(cli: Cli, root: Path) -> None:
 
 
 def test_a_whole_diff_can_be_applied(cli: Cli, root: Path) -> None:
-    """With `--patch` the output is a patch for the target's root. It applies with or without its heading."""
+    """With `--patch` the output is a patch for the target's root, which applies with or without its
+    heading."""
     answer = cli("diff", "sensor/silence", "--trigger", "near", "--patch")
     tree = root / "tree"
     subprocess.run(["patch", "-p1", "-s"], input=answer.out, text=True, cwd=tree, check=True)
@@ -59,8 +60,7 @@ def test_a_spec_file_need_not_be_in_the_library(cli: Cli, root: Path) -> None:
         (["abcd"], "runs/"),
     ],
 )
-def test_wrong_choices_are_answered(cli: Cli, root: Path, words: list[str], said: str) -> None:
-    """An unknown choice exits with 2 and lists the known ones, without a traceback."""
+def test_an_unknown_choice_lists_the_known_ones(cli: Cli, root: Path, words: list[str], said: str) -> None:
     answer = cli("diff", *words)
     assert answer.code == 2
     assert said in answer.err
@@ -73,7 +73,7 @@ def read_index(out: Path) -> list[dict[str, str]]:
 
 
 def test_generate_writes_patches_that_apply(cli: Cli, root: Path) -> None:
-    """Every patch of the index applies to the pristine target, and un-splicing restores it."""
+    """Un-splicing restores the pristine target."""
     out = Path("mutants")
     assert cli("generate", "sensor/*", "--out", out).code == 0
     index = read_index(out)
@@ -90,11 +90,7 @@ def test_generate_writes_patches_that_apply(cli: Cli, root: Path) -> None:
         shutil.rmtree(tree)
 
 
-def test_generated_trees_are_the_patched_ones(cli: Cli, root: Path) -> None:
-    """With `--trees`, `generate` writes each mutant's whole tree next to its patch.
-
-    The tree equals the patched target.
-    """
+def test_a_generated_tree_equals_the_patched_target(cli: Cli, root: Path) -> None:
     out = Path("mutants")
     cli("generate", "sensor/distance", "--out", out, "--trees", "--trigger", "near", "--trigger", "3")
     for line in read_index(out):
@@ -107,8 +103,8 @@ def test_generated_trees_are_the_patched_ones(cli: Cli, root: Path) -> None:
         shutil.rmtree("tree")
 
 
-def test_generate_makes_mutants_of_operators(cli: Cli, root: Path) -> None:
-    """Without a spec, `generate` samples a function's mutants of operators, in executed lines."""
+def test_generate_samples_mutants_of_operators(cli: Cli, root: Path) -> None:
+    """Without a spec, the mutants are those of a function, in executed lines."""
     words = ("--operators", "arithmetic,branch", "--in", "toycar/*.py::Driver.drive", "--scenario", "A")
     answer = cli("generate", *words, "--sample", 5, "--seed", 3, "--out", "m")
     assert answer.code == 0 and "5 draws of " in answer.err
@@ -120,8 +116,7 @@ def test_generate_makes_mutants_of_operators(cli: Cli, root: Path) -> None:
     assert all(" -> " in line["value"] for line in index)
 
 
-def test_the_index_tells_what_each_mutant_is(cli: Cli, root: Path) -> None:
-    """`--json` gives the index: ids, fault, value, trigger, files."""
+def test_the_index_describes_each_mutant(cli: Cli, root: Path) -> None:
     [near] = cli("generate", "sensor/distance", "--out", "m", "--trigger", "near", "--json").json[:1]
     assert near["spec"] == "sensor/distance/longer"
     assert near["condition"] == "hwt <= 2.0"
@@ -130,7 +125,6 @@ def test_the_index_tells_what_each_mutant_is(cli: Cli, root: Path) -> None:
 
 
 def test_ids_are_stable(cli: Cli, root: Path) -> None:
-    """The same input gives the same mutants with the same ids, byte for byte."""
     for out in ("a", "b"):
         cli("generate", "sensor/distance", "--out", out)
     assert subprocess.run(["diff", "-r", "a", "b"], check=False).returncode == 0
@@ -148,15 +142,14 @@ def test_ids_are_stable(cli: Cli, root: Path) -> None:
         (["--operators", "branches", "--in", "toycar/driver.py", "--all-lines"], "did you mean 'branch'"),
     ],
 )
-def test_generate_refuses_what_it_cannot_do(cli: Cli, root: Path, words: list[str], said: str) -> None:
-    """`generate` refuses input that generates nothing and two sources at once."""
+def test_generate_refuses_two_sources_or_none(cli: Cli, root: Path, words: list[str], said: str) -> None:
+    """Input that generates nothing is refused as well."""
     answer = cli("generate", *words, "--out", "m")
     assert answer.code == 2
     assert said in answer.err
 
 
-def test_generate_does_not_mix_with_older_files(cli: Cli, root: Path) -> None:
-    """`generate` refuses a folder with content and leaves it unchanged."""
+def test_generate_refuses_a_folder_with_content(cli: Cli, root: Path) -> None:
     Path("m").mkdir()
     (Path("m") / "mine.txt").write_text("keep")
     answer = cli("generate", "sensor/distance", "--out", "m")

@@ -43,8 +43,8 @@ def name(finished: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     return next(line.split(",")[0] for line in lines if ",hazard," in line)
 
 
-def test_both_runs_are_shown_with_their_events(cli: Cli, name: str) -> None:
-    """The target's command receives both runs' films, the event times and the time of a still."""
+def test_the_film_command_receives_both_runs_and_their_events(cli: Cli, name: str) -> None:
+    """Its arguments include the time of a still."""
     answer = cli("show", name, "--no-plot", "--video", "out/a.json", "--still", "1.5=b.json", "--json").json
     assert answer["films"] == ["b.json", "out/a.json"]
     video, still = (json.loads(Path(path).read_text()) for path in ("out/a.json", "b.json"))
@@ -60,8 +60,8 @@ def test_both_runs_are_shown_with_their_events(cli: Cli, name: str) -> None:
     assert set(answer["hazards_s"]) <= set(events["names"])
 
 
-def test_a_film_leaves_nothing_else(cli: Cli, name: str) -> None:
-    """The run folder has the same files as before, and the record is still the campaign's byte for byte."""
+def test_a_film_adds_no_file_to_the_run(cli: Cli, name: str) -> None:
+    """The record is still the campaign's byte for byte."""
     before = sorted(Path("runs/a").rglob("*"))
     answer = cli("show", name, "--no-plot", "--video", "a.json")
     assert sorted(Path("runs/a").rglob("*")) == before
@@ -71,7 +71,7 @@ def test_a_film_leaves_nothing_else(cli: Cli, name: str) -> None:
 
 
 def test_a_still_without_a_file_is_in_the_report(cli: Cli, name: str) -> None:
-    """A still without a file name is stored next to the plots, and the page shows it with its time."""
+    """Without a file name, a still is stored next to the plots."""
     answer = cli("show", name, "--no-plot", "--still", "1.5", "--json").json
     assert [Path(path).name for path in answer["films"]] == [f"{name}-1.50s.jpg"]
     page = Path(cli("report", "runs/a", "--json").json["page"])
@@ -83,12 +83,11 @@ def test_a_still_without_a_file_is_in_the_report(cli: Cli, name: str) -> None:
 
 
 @pytest.mark.slow
-def test_a_run_takes_stills_of_its_worst(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A run takes stills of its worst experiments with visible changes, at activation and hazard.
-
-    Their number is in proportion to the plan. If the command is repeated, or with `--no-stills`, it takes
-    none.
-    """
+def test_a_run_takes_stills_of_its_worst_experiments(
+    cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Stills show activation and hazard, if they are visible. Their number is in proportion to the plan. If
+    the command is repeated, or with `--no-stills`, a run takes none."""
     manifest = root / "fault_library/targets/toycar.yaml"
     manifest.write_text(manifest.read_text().replace("still: [", "pictures: [alone]\n  still: ["))
     monkeypatch.setattr(stills, "ONE_IN", 2)
@@ -109,8 +108,8 @@ def test_a_run_takes_stills_of_its_worst(cli: Cli, root: Path, monkeypatch: pyte
     assert {path.name: path.stat().st_mtime_ns for path in Path("runs/a/plots").iterdir()} == taken
 
 
-def test_what_the_command_complains_of_is_told(cli: Cli, name: str) -> None:
-    """A format that the target cannot write is wrong input. The error quotes the target's message."""
+def test_an_error_of_the_film_command_is_quoted(cli: Cli, name: str) -> None:
+    """The target cannot write the requested format."""
     answer = cli("show", name, "--no-plot", "--video", "a.avi")
     assert answer.code == 2
     assert "a.avi: no .avi here" in answer.err
@@ -130,8 +129,8 @@ def test_a_target_without_films_says_so(cli: Cli, root: Path) -> None:
 
 
 @pytest.mark.parametrize("still", ["early", "early=a.json", "=a.json", "nan=a.json", "1.5="])
-def test_a_still_needs_a_time(cli: Cli, name: str, still: str) -> None:
-    """An invalid time, or a file without a time, is wrong input. The error shows the syntax."""
+def test_an_invalid_time_of_a_still_is_refused(cli: Cli, name: str, still: str) -> None:
+    """A still with a file but without a time is refused as well."""
     answer = cli("show", name, "--no-plot", "--still", still)
     assert answer.code == 2
     assert "14.5=early.png" in answer.err

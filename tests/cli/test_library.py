@@ -18,8 +18,8 @@ def test_list_shows_every_kind(cli: Cli, root: Path) -> None:
     assert "hwt <= 2.0" in answer.out
 
 
-def test_list_as_json_is_the_same_for_programs(cli: Cli, root: Path) -> None:
-    """`--json` prints one document with one entry for each kind, or only the requested kind."""
+def test_list_as_json_is_one_document(cli: Cli, root: Path) -> None:
+    """The document has one entry for each kind, or only the requested kind."""
     listed = cli("list", "--json").json
     assert set(listed) == {"specs", "scenarios", "campaigns", "models", "triggers", "targets"}
     assert [(s["name"], s["faults"]) for s in listed["specs"]] == [
@@ -31,29 +31,26 @@ def test_list_as_json_is_the_same_for_programs(cli: Cli, root: Path) -> None:
     assert all(one["about"] for one in listed["campaigns"])
 
 
-def test_a_kind_that_is_none_is_answered(cli: Cli, root: Path) -> None:
-    """An unknown kind is refused with the list of known kinds, in the project's own words."""
+def test_an_unknown_kind_lists_the_known_ones(cli: Cli, root: Path) -> None:
     answer = cli("list", "nothing")
     assert answer.code == 2
     assert "'nothing' is not one of 'specs', 'scenarios'" in answer.err
     assert "Value error" not in answer.err
 
 
-def test_a_piped_table_has_no_control_characters(cli: Cli, root: Path) -> None:
-    """Piped output is plain text: no colours, boxes or trailing blanks."""
+def test_a_piped_table_is_plain_text(cli: Cli, root: Path) -> None:
+    """Plain text has no colours, boxes or trailing blanks."""
     lines = cli("list").out.splitlines()
     assert all(line.isprintable() and line == line.rstrip() for line in lines)
 
 
-def test_check_says_all_is_well(cli: Cli, root: Path) -> None:
-    """For a library that fits its target, `check` exits with 0 and prints the counts."""
+def test_check_succeeds_if_the_library_fits_its_target(cli: Cli, root: Path) -> None:
     answer = cli("check")
     assert answer.code == 0
     assert "all well: 3 specs, 11 faults" in answer.out
 
 
-def test_check_tells_each_problem_with_its_place(cli: Cli, root: Path) -> None:
-    """An anchor that the target lacks fails the check, with file and line."""
+def test_check_reports_a_missing_anchor_with_its_line(cli: Cli, root: Path) -> None:
     spec = root / "fault_library" / "faults" / "sensor" / "distance.yaml"
     spec.write_text(spec.read_text().replace("after_assign: gap", "after_assign: pace"))
     answer = cli("check")
@@ -65,8 +62,8 @@ def test_check_tells_each_problem_with_its_place(cli: Cli, root: Path) -> None:
     assert all(p["file"] == str(spec) and p["line"] for p in problems)
 
 
-def test_check_says_what_prevents_the_fast_engines(cli: Cli, root: Path) -> None:
-    """`check` and `doctor` report a target with a thread, by name, before any campaign."""
+def test_check_and_doctor_name_a_thread(cli: Cli, root: Path) -> None:
+    """A target with threads cannot use the fast engines."""
     go = root / "tree" / "toycar" / "go.py"
     thread = "threading.Thread(target=threading.Event().wait, name='poll', daemon=True).start()"
     go.write_text(go.read_text().replace("class Drive", f"import threading\n\n{thread}\n\n\nclass Drive"))
@@ -81,8 +78,7 @@ def test_check_says_what_prevents_the_fast_engines(cli: Cli, root: Path) -> None
     assert (level, "'poll'" in found) == ("warning", True)
 
 
-def test_check_tells_a_draw_that_nothing_uses(cli: Cli, root: Path) -> None:
-    """If a variant's injections do not use its draw, the check gives the line of the draw."""
+def test_check_reports_an_unused_draw(cli: Cli, root: Path) -> None:
     spec = root / "fault_library" / "faults" / "sensor" / "lane.yaml"
     spec.write_text(spec.read_text().replace("by_m: offset", "by_m: 2.5"))
     answer = cli("check")
@@ -93,8 +89,8 @@ def test_check_tells_a_draw_that_nothing_uses(cli: Cli, root: Path) -> None:
     )
 
 
-def test_check_drive_tells_everything_that_it_looked_at(cli: Cli, root: Path) -> None:
-    """`--drive` also shows what passed. In JSON each finding has its level."""
+def test_check_drive_also_shows_what_passed(cli: Cli, root: Path) -> None:
+    """In JSON each finding has its level."""
     answer = cli("check", "--drive", "--scenario", "A")
     assert answer.code == 0
     for name in ("golden A: the same bytes twice", "fast engines: ", "statements: ", "triggers: ", "canary "):
@@ -104,7 +100,7 @@ def test_check_drive_tells_everything_that_it_looked_at(cli: Cli, root: Path) ->
 
 
 def test_check_drive_fails_for_a_clock(cli: Cli, root: Path) -> None:
-    """A non-deterministic target fails the check, which names the line that reads the clock."""
+    """The target is non-deterministic. The check names the line that reads the clock."""
     driver = root / "tree" / "toycar" / "driver.py"
     text = driver.read_text().replace("class Driver", "import time\n\n\nclass Driver")
     driver.write_text(text.replace("return gas,", "return gas + time.time() * 1e-12,"))
@@ -129,10 +125,10 @@ def test_doctor_is_content_with_this_machine(cli: Cli, root: Path) -> None:
     assert "target toycar" in answer.out
 
 
-def test_doctor_without_library_fails_and_helps(
+def test_doctor_without_a_library_checks_the_rest(
     cli: Cli, nowhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Without a library, `doctor` checks the rest, says what to do and exits with 1."""
+    """The exit code is 1."""
     monkeypatch.setenv("MUTATOR_ROOT", str(nowhere / "gone"))
     answer = cli("doctor")
     assert answer.code == 1

@@ -27,15 +27,14 @@ def mutator(place: Path, environment: dict[str, str], *words: str) -> "subproces
 
 @pytest.fixture
 def place(toy: Workspace) -> Path:
-    """The toy's root, with non-ASCII text in a spec."""
     root = toy.library.parent
     spec = toy.library / "faults" / "sensor" / "distance.yaml"
     spec.write_text(spec.read_text().replace("about: ", "about: Maß → ", 1), encoding="utf-8")
     return root
 
 
-def test_names_of_any_letters_in_a_plain_locale(place: Path) -> None:
-    """Under LC_ALL=C a campaign runs with non-ASCII names of library, target files and run folder."""
+def test_a_campaign_with_non_ascii_names_runs_in_the_c_locale(place: Path) -> None:
+    """Library, target files and run folder have such names."""
     (place / "tree" / "toycar" / "größe.py").write_text("SIZE = 1\n")
     root = place.rename(place.with_name("bücher"))
     answer = mutator(root, PLAIN, "run", "small", "--out", "läufe/1", "--limit", "1", "-n", "1")
@@ -44,8 +43,8 @@ def test_names_of_any_letters_in_a_plain_locale(place: Path) -> None:
     assert (root / "läufe" / "1" / "results.csv").exists()
 
 
-def test_texts_of_any_letters_in_a_narrow_environment(place: Path) -> None:
-    """If output must be ASCII, other characters are printed as escapes. JSON stays valid."""
+def test_non_ascii_output_is_escaped_in_an_ascii_environment(place: Path) -> None:
+    """JSON stays valid."""
     answer = mutator(place, NARROW, "list", "specs")
     assert (answer.returncode, "Ma\\xdf \\u2192" in answer.stdout) == (0, True)
     answer = mutator(place, NARROW, "list", "specs", "--json")
@@ -53,8 +52,8 @@ def test_texts_of_any_letters_in_a_narrow_environment(place: Path) -> None:
 
 
 @pytest.mark.parametrize("what", ["run folder", "library", "target file"])
-def test_names_that_are_no_text(place: Path, what: str) -> None:
-    """A name that the environment cannot decode is refused. The message says what to set."""
+def test_a_name_that_cannot_be_decoded_is_refused(place: Path, what: str) -> None:
+    """The message says what to set."""
     out = "run"
     if what == "run folder":
         out = "läufe"

@@ -32,7 +32,6 @@ def test_every_verb_is_in_the_help_under_a_heading(cli: Cli) -> None:
 
 @pytest.mark.parametrize("verb", VERBS)
 def test_each_verb_explains_itself(cli: Cli, verb: str) -> None:
-    """`mutator VERB --help` says what the verb does and how to call it."""
     answer = cli(verb, "--help")
     assert answer.code == 0
     assert answer.out.startswith(f"Usage: mutator {verb} ")
@@ -55,8 +54,8 @@ def test_help_needs_no_heavy_package() -> None:
     assert done.stdout.splitlines()[-1] == "[]"
 
 
-def test_listing_needs_neither_splicer_nor_plots_nor_tables() -> None:
-    """`list` reads only YAML, so it imports neither libcst nor matplotlib nor pandas."""
+def test_list_imports_no_heavy_packages() -> None:
+    """`list` reads only YAML."""
     code = (
         "import sys, mutator.cli.app as m; m.main(['list']);"
         "print([x for x in ('libcst', 'matplotlib', 'pandas', 'pyarrow') if x in sys.modules])"
@@ -84,8 +83,7 @@ def test_python_m_mutator_is_mutator() -> None:
         (["list", "cars"], "'cars'"),
     ],
 )
-def test_wrong_use_is_two_and_says_where_to_look(cli: Cli, words: list[str], said: str) -> None:
-    """A usage error exits with 2 and names the mistake and the help, without a traceback."""
+def test_a_usage_error_exits_with_2_and_names_the_help(cli: Cli, words: list[str], said: str) -> None:
     answer = cli(*words)
     assert answer.code == 2
     assert said in answer.err
@@ -93,15 +91,14 @@ def test_wrong_use_is_two_and_says_where_to_look(cli: Cli, words: list[str], sai
     assert "Traceback" not in answer.err
 
 
-def test_outside_a_clone_what_ships_is_there(cli: Cli, nowhere: Path) -> None:
-    """In an empty folder the verbs use the library that ships with the harness."""
+def test_an_empty_folder_uses_the_shipped_library(cli: Cli, nowhere: Path) -> None:
     answer = cli("list", "specs")
     assert answer.code == 0
     assert "radar/chaff" in answer.out
 
 
-def test_a_library_that_is_missing_is_told(cli: Cli, nowhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """If the environment names a missing folder, the error names the options and variables."""
+def test_a_missing_library_is_reported(cli: Cli, nowhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The error names the options and environment variables."""
     monkeypatch.setenv("MUTATOR_ROOT", str(nowhere / "gone"))
     answer = cli("list")
     assert answer.code == 2
@@ -128,7 +125,6 @@ def fail_with(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
 def test_an_error_shows_place_expectation_and_remedy(
     cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A MutatorError is printed in one block: file:line, finding, expectation, remedy."""
     here = Path.cwd() / "spec.yaml"
     fail_with(monkeypatch, MutatorError("[bold]x", where=here, line=7, expected="a number", remedy="mend it"))
     answer = cli("list", "specs")
@@ -147,14 +143,10 @@ def test_an_error_shows_place_expectation_and_remedy(
         (KeyboardInterrupt(), 130, "interrupted"),
     ],
 )
-def test_exit_codes(
+def test_errors_have_their_exit_codes(
     cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException, code: int, said: str
 ) -> None:
-    """The exit code is 1 for a failed check, 2 for an unreadable folder, 3 for a full disk and 130 for
-    Ctrl-C.
-
-    There is no traceback, whichever library raises the error.
-    """
+    """The code is 1 for a failed check, 2 for an unreadable folder, 3 for a full disk and 130 for Ctrl-C."""
     fail_with(monkeypatch, error)
     answer = cli("list", "specs")
     assert answer.code == code
@@ -162,8 +154,9 @@ def test_exit_codes(
     assert "Traceback" not in answer.err
 
 
-def test_a_defect_is_shown_in_full(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """An unexpected error is called a defect, keeps its traceback and exits with 3."""
+def test_an_unexpected_error_is_a_defect_with_a_traceback(
+    cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     fail_with(monkeypatch, ZeroDivisionError("oops"))
     answer = cli("list", "specs")
     assert answer.code == 3
@@ -173,7 +166,7 @@ def test_a_defect_is_shown_in_full(cli: Cli, root: Path, monkeypatch: pytest.Mon
 
 @pytest.mark.parametrize("words", ["list --json", "list targets", "--help"], ids=["long", "short", "help"])
 def test_a_closed_pipe_is_no_error(words: str) -> None:
-    """`mutator list | head` ends without an error when head closes the pipe, even before any output."""
+    """`mutator list | head` closes the pipe."""
     clone = Path(__file__).parents[2]
     command = f"{sys.executable} -m mutator {words} | true; exit ${{PIPESTATUS[0]}}"
     done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False, cwd=clone)
@@ -192,8 +185,8 @@ def test_main_returns_the_code_of_a_verb(root: Path) -> None:
         "os.dup2(os.open('/dev/full', os.O_RDWR), 2)",
     ],
 )
-def test_remarks_that_nobody_can_read(root: Path, tmp_path: Path, streams: str) -> None:
-    """If standard error is closed, full or unread, a command still works and returns the right exit code."""
+def test_a_command_works_without_standard_error(root: Path, tmp_path: Path, streams: str) -> None:
+    """Standard error is closed, full or unread."""
     words = ["plan", "small", "--out", str(tmp_path / "run"), "--root", str(root)]
     begin = f"import os, sys; {streams}; os.execv(sys.executable, [sys.executable, *sys.argv[1:]])"
     for code in (0, 2):

@@ -1,4 +1,4 @@
-"""`init` writes an editable copy of the library, or a first library for another controller."""
+"""`init` writes a copy of the library, or a first library for another controller."""
 
 import re
 from collections.abc import Callable
@@ -10,10 +10,9 @@ import pytest
 Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
 
 
-def test_init_writes_a_library_that_is_then_used(
+def test_init_writes_a_library_that_later_commands_use(
     cli: Cli, nowhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """After `init`, the verbs in that folder use the files edited there."""
     assert cli("init", "faults").out.startswith("faults: fault_library/, templates/ and a README.md")
     spec = nowhere / "faults/fault_library/faults/radar/chaff.yaml"
     spec.write_text(spec.read_text().replace("about: The radar", "about: My radar"))
@@ -60,8 +59,6 @@ MARK = re.compile(r"^ *# TODO\(init\):.*\n", re.MULTILINE)
 
 @pytest.fixture
 def tree(nowhere: Path) -> Callable[..., Path]:
-    """Create a source tree with these files."""
-
     def make(files: dict[str, str]) -> Path:
         folder = nowhere / "tree"
         folder.mkdir()
@@ -82,13 +79,10 @@ TREES: dict[str, tuple[dict[str, str], str, str]] = {
 
 
 @pytest.mark.parametrize("name", TREES)
-def test_a_first_library_runs_once_its_marks_are_gone(
+def test_a_first_library_runs_once_its_marks_are_deleted(
     name: str, cli: Cli, tree: Callable[..., Path], nowhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """For a controller with an ordinary step, the library is complete.
-
-    Once the marks are deleted, it passes the check, and the likeliest value is injected and run.
-    """
+    """The controller has an ordinary step. The likeliest value is injected."""
     files, manifest, place = TREES[name]
     cli("init", "faults", "--target", tree(files))
     (written,) = (nowhere / "faults/fault_library/targets").iterdir()
@@ -125,10 +119,7 @@ FOREIGN: dict[str, dict[str, str]] = {
 def test_check_lists_every_place_to_fill_in(
     name: str, cli: Cli, tree: Callable[..., Path], nowhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """`init` writes a library for any tree.
-
-    `check` lists each mark once, with file, line and what to fill in.
-    """
+    """`init` writes a library for any tree. Each mark is listed once, with file, line and what to fill in."""
     told = cli("init", "faults", "--target", tree(FOREIGN[name]), "--json").json
     assert (nowhere / "faults" / "README.md").exists()
     marks = [
@@ -159,8 +150,8 @@ NOTHING: dict[str, tuple[dict[str, str], str]] = {
 
 
 @pytest.mark.parametrize("name", NOTHING)
-def test_a_tree_without_a_controller_is_told(name: str, cli: Cli, tree: Callable[..., Path]) -> None:
-    """If no controller is found, the library is written with a warning that says why."""
+def test_a_tree_without_a_controller_gets_a_warning(name: str, cli: Cli, tree: Callable[..., Path]) -> None:
+    """The library is written nevertheless."""
     files, told = NOTHING[name]
     folder = tree(files)
     answer = cli("init", "faults", "--target", folder)
@@ -170,7 +161,7 @@ def test_a_tree_without_a_controller_is_told(name: str, cli: Cli, tree: Callable
 
 
 def test_a_tree_with_a_controller_has_no_warning(cli: Cli, tree: Callable[..., Path]) -> None:
-    """If a step is found, there is no warning, even if another file cannot be read."""
+    """Another file cannot be read."""
     assert cli("init", "faults", "--target", tree(FOREIGN["syntax errors"])).err == ""
 
 
@@ -178,7 +169,7 @@ def test_a_tree_with_a_controller_has_no_warning(cli: Cli, tree: Callable[..., P
 def test_a_tree_may_have_any_name(
     name: str, cli: Cli, nowhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A name with a special meaning in YAML is quoted, so the manifest finds the tree."""
+    """A name with a special meaning in YAML is quoted."""
     folder = nowhere / name
     folder.mkdir()
     for file in ("steer.py", "null.py"):
@@ -189,10 +180,9 @@ def test_a_tree_may_have_any_name(
     assert all("not filled in" in line for line in answer.out.splitlines()[:-1]), answer.out
 
 
-def test_marks_tell_all_that_their_comment_says(
+def test_check_prints_the_whole_comment_of_a_mark(
     cli: Cli, nowhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """`check` prints the whole comment of a mark, with its continuation lines, and no other comment."""
     cli("init", "faults", "--target", "installed:typer")
     path = nowhere / "faults/fault_library/scenarios/first.yaml"
     path.write_text("# TODO(init): the speed\n# in m/s\nspeed: 3\n# another\n")
@@ -201,7 +191,6 @@ def test_marks_tell_all_that_their_comment_says(
 
 
 def test_the_new_readme_names_commands_that_exist(cli: Cli, nowhere: Path) -> None:
-    """The README of a first library names existing verbs, options and library entries."""
     cli("init", "faults", "--target", "installed:typer")
     readme = (nowhere / "faults" / "README.md").read_text()
     block = readme.split("```sh\n")[1].split("```")[0]
@@ -214,7 +203,7 @@ def test_the_new_readme_names_commands_that_exist(cli: Cli, nowhere: Path) -> No
 
 
 def test_init_for_an_installed_package(cli: Cli, nowhere: Path) -> None:
-    """The manifest names the package and its requirement. Nothing of the shipped target is copied."""
+    """Nothing of the shipped target is copied."""
     assert "places to fill in" in cli("init", "faults", "--target", "installed:typer").out
     manifest = (nowhere / "faults/fault_library/targets/typer.yaml").read_text()
     assert "root: installed:typer\n" in manifest
@@ -226,8 +215,8 @@ def test_init_for_an_installed_package(cli: Cli, nowhere: Path) -> None:
     ("target", "told"),
     [("nowhere", "no folder nowhere"), ("installed:no.where", "no installed package 'no.where'")],
 )
-def test_init_refuses_a_target_that_is_not_there(target: str, told: str, cli: Cli, nowhere: Path) -> None:
-    """A missing folder or package is wrong input. The error names the option, and no library is written."""
+def test_init_refuses_a_missing_target(target: str, told: str, cli: Cli, nowhere: Path) -> None:
+    """No library is written."""
     answer = cli("init", "faults", "--target", target)
     assert answer.code == 2
     assert f"error: --target: {told}" in answer.err

@@ -15,8 +15,8 @@ def place(toy: Workspace) -> tuple[str, ...]:
     return ("--library", str(toy.library), "--templates", str(toy.templates))
 
 
-def test_lists_places(cli: Cli, toy: Workspace) -> None:
-    """The table has line, anchor and models. JSON has the same with the file, ready for a spec."""
+def test_places_are_listed_with_line_anchor_and_models(cli: Cli, toy: Workspace) -> None:
+    """JSON also has the file and is ready for a spec."""
     answer = cli("places", "toycar/sensing.py::Sensor.sense", *place(toy))
     assert answer.code == 0
     assert "{function: Sensor.sense, after_assign: gap}" in answer.out
@@ -36,8 +36,7 @@ def test_lists_places(cli: Cli, toy: Workspace) -> None:
         ("toycar/sensing.py::Sensor.sens", "no function 'Sensor.sens'"),
     ],
 )
-def test_refuses_other_files(cli: Cli, toy: Workspace, where: str, words: str) -> None:
-    """A missing or forbidden file or function is refused with a remedy."""
+def test_a_missing_or_forbidden_file_is_refused(cli: Cli, toy: Workspace, where: str, words: str) -> None:
     answer = cli("places", where, *place(toy))
     assert answer.code == 2
     assert words in answer.err

@@ -32,10 +32,8 @@ def driven(tmp_path_factory: pytest.TempPathFactory) -> list[Any]:
 
 @pytest.fixture
 def cut(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch, driven: list[Any]) -> Path:
-    """A run folder with finished experiments that the command did not complete.
-
-    It is run once, since each test has the same library.
-    """
+    """A run folder with finished experiments that the command did not complete. Each test has the same
+    library, so the command runs once."""
 
     def end(self: Session) -> None:
         raise MutatorError("the power is cut")
@@ -101,11 +99,8 @@ def test_records_are_synced_after_what_they_refer_to(
 
 
 @pytest.mark.parametrize("rest", ["cut off", "zeros"])
-def test_a_record_without_its_patch_is_told(cli: Cli, cut: Path, seal: str, rest: str) -> None:
-    """A folder with a record but without its patch is rejected with a remedy.
-
-    This holds however much of the block survives. The repaired run reaches the original result.
-    """
+def test_a_record_without_its_patch_is_refused(cli: Cli, cut: Path, seal: str, rest: str) -> None:
+    """Any part of the block may survive. The repaired run has the original result."""
     [path] = (cut / "patches").iterdir()
     data, name = path.read_bytes(), read_blocks(path).blocks[-1].key
     for length in range(last_block(path), len(data)):
@@ -126,11 +121,8 @@ def test_a_record_without_its_patch_is_told(cli: Cli, cut: Path, seal: str, rest
     assert cli("verify", "run").code == 0
 
 
-def test_a_record_without_its_series_has_none(cli: Cli, cut: Path) -> None:
-    """A lost series is not replaced, however much of its block survives.
-
-    The other experiments keep theirs, the run completes as usual, and a rerun restores the series.
-    """
+def test_a_lost_series_is_restored_by_a_rerun(cli: Cli, cut: Path) -> None:
+    """Any part of its block may survive. The run completes, and the other experiments keep their series."""
     [path] = segments(cut)
     data = path.read_bytes()
     names = [block.key.split()[0] for block in read_blocks(path).blocks if block.kind]

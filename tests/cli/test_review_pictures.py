@@ -7,13 +7,11 @@ from typing import Any
 from mutator.workspace import Workspace
 
 
-def test_pictures_are_written_and_named(
+def test_frames_are_written_and_named(
     cli: Callable[..., Any], root: Path, toy: Workspace, tmp_path: Path, give_eyes: Callable[..., None]
 ) -> None:
-    """The command writes one frame before the effect and one for each level.
-
-    For a group without an image effect it writes none and says so.
-    """
+    """There is one frame before the effect and one for each level. A group without an image effect has
+    none."""
     give_eyes(toy, values="[10, 50]")
     groups = {group["model"]: group["group"] for group in cli("review", "--json").json}
     light, silent = groups["image_effect"], groups["omission"]

@@ -1,4 +1,4 @@
-"""`review` lists, shows, decides, walks and writes a page. `run --require-reviewed` needs approvals."""
+"""The `review` command, and `run --require-reviewed`."""
 
 import base64
 import gzip
@@ -29,7 +29,7 @@ def ids(cli: Cli, *words: object) -> list[str]:
 def known(
     tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]
 ) -> dict[str, str]:
-    """The toy's groups by id with their subjects, listed while all are new."""
+    """The toy's groups by id, with their subjects."""
     toy = copy_toycar(tmp_path_factory.mktemp("known"))
     groups = of_library(toy, toy.manifest("toycar"), specs=["sensor/*"])
     return {group.id: group.what for group in groups}
@@ -39,11 +39,8 @@ def about(known: dict[str, str], words: str) -> str:
     return next(name for name, what in known.items() if words in what)
 
 
-def test_it_lists_what_is_new_or_changed_first(cli: Cli, root: Path, known: dict[str, str]) -> None:
-    """`review` alone lists the groups.
-
-    Approved ones are last, and those with a changed template come before them.
-    """
+def test_groups_without_approval_are_listed_first(cli: Cli, root: Path, known: dict[str, str]) -> None:
+    """Groups with a changed template come before approved ones."""
     first, *rest = known
     cli("review", "approve", first, *JANE)
     lines = cli("review").out.splitlines()
@@ -55,8 +52,8 @@ def test_it_lists_what_is_new_or_changed_first(cli: Cli, root: Path, known: dict
     assert states == ["new"] * 4 + ["changed"]
 
 
-def test_a_group_is_found_by_filter_and_start_of_its_id(cli: Cli, root: Path, known: dict[str, str]) -> None:
-    """Filters use the table's columns. A unique start of an id is enough."""
+def test_groups_are_found_by_filter_or_start_of_id(cli: Cli, root: Path, known: dict[str, str]) -> None:
+    """Filters use the table's columns."""
     silent = about(known, "omission()")
     only = 'model == "omission" and match(trigger, "*time*") and not flagged'
     assert ids(cli, "--only", only, "--exclude", "faults > 7") == [silent]
@@ -68,10 +65,7 @@ def test_a_group_is_found_by_filter_and_start_of_its_id(cli: Cli, root: Path, kn
 
 
 def test_a_group_is_shown_with_holes_and_values(cli: Cli, root: Path, known: dict[str, str]) -> None:
-    """A group shows its diff with holes, a row of values for each fault and the conditions.
-
-    JSON has the same.
-    """
+    """A group has a row of values for each fault."""
     longer = about(known, "offset(by, target=gap)")
     answer = cli("review", "show", longer)
     assert f"group {longer}: new" in answer.out
@@ -84,8 +78,8 @@ def test_a_group_is_shown_with_holes_and_values(cli: Cli, root: Path, known: dic
     assert len(group["values"]) == group["faults"] == 8  # four, in either reading
 
 
-def test_what_is_reviewed_can_be_chosen(cli: Cli, root: Path, known: dict[str, str]) -> None:
-    """A review covers the whole library, some specs or a campaign. For a campaign it counts the runs."""
+def test_a_review_covers_the_library_specs_or_a_campaign(cli: Cli, root: Path, known: dict[str, str]) -> None:
+    """For a campaign it counts the runs."""
     assert set(ids(cli, "--spec", "sensor/lane")) < known.keys()
     campaign = cli("review", "--campaign", "small", "--json").json
     assert {group["group"] for group in campaign} <= known.keys()
@@ -93,11 +87,8 @@ def test_what_is_reviewed_can_be_chosen(cli: Cli, root: Path, known: dict[str, s
     assert "--campaign together with --spec" in cli("review", "--campaign", "small", "--spec", "a").err
 
 
-def test_decisions_are_told_and_kept(cli: Cli, root: Path, known: dict[str, str]) -> None:
-    """Decisions keep the reviewer, the choice and the remark.
-
-    After a change, the command shows what changed.
-    """
+def test_decisions_are_stored(cli: Cli, root: Path, known: dict[str, str]) -> None:
+    """After a change, the command shows what changed."""
     group = about(known, "omission()")
     answer = cli("review", "reject", group[:6], *JANE, "--remark", "too much")
     assert re.fullmatch(rf"{group} rejected by Jane Doe on 20..-..-..", answer.out.splitlines()[0])
@@ -114,10 +105,10 @@ def test_decisions_are_told_and_kept(cli: Cli, root: Path, known: dict[str, str]
     assert cli("review", "approve", group, *JANE, "--json").json[0]["state"] == "approved"
 
 
-def test_no_name_is_no_decision(
+def test_a_decision_needs_a_reviewer(
     cli: Cli, root: Path, known: dict[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A decision needs a name, either the given one or git's user name."""
+    """Git's user name is the default."""
     monkeypatch.setenv("HOME", str(root))
     monkeypatch.delenv("XDG_CONFIG_HOME", raising=False)
     group = next(iter(known))
@@ -130,13 +121,10 @@ def test_no_name_is_no_decision(
     assert " approved by Git Smith on " in cli("review", "approve", group).out
 
 
-def test_all_that_a_filter_finds_is_decided_after_a_question(
+def test_deciding_about_a_filter_asks_first(
     cli: Cli, root: Path, known: dict[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The command states the number of groups and asks. Without a terminal it needs --yes.
-
-    It refuses ids together with a filter.
-    """
+    """Without a terminal --yes is required. Ids and a filter together are refused."""
     words = ("review", "approve", "--only", 'state == "new" and model == "offset"', *JANE)
     asked = cli(*words)
     assert (asked.code, "--only: 3 groups (3 new)" in asked.err) == (2, True)
@@ -152,8 +140,8 @@ def test_all_that_a_filter_finds_is_decided_after_a_question(
         assert "expected: either the ids of groups or --only" in cli("review", "reject", *wrong, *JANE).err
 
 
-def test_remarks_and_flags_are_kept_and_taken_back(cli: Cli, root: Path, known: dict[str, str]) -> None:
-    """Remarks and flags are shown with their authors and can be filtered. A cleared decision is gone."""
+def test_remarks_and_flags_are_stored_and_removed(cli: Cli, root: Path, known: dict[str, str]) -> None:
+    """Remarks and flags have authors and can be filtered."""
     first, second, *_ = known
     cli("review", "approve", first, *JANE)
     cli("review", "remark", first, second, *JANE, "--text", "why not\nbelow?")
@@ -170,8 +158,7 @@ def test_remarks_and_flags_are_kept_and_taken_back(cli: Cli, root: Path, known: 
     assert "--text: no text" in cli("review", "remark", first, *JANE, "--text", " ").err
 
 
-def test_the_status_says_what_is_left(cli: Cli, root: Path, known: dict[str, str]) -> None:
-    """The status shows counts, changes with reasons, flags, and what prevents a campaign from running."""
+def test_the_status_shows_what_is_left(cli: Cli, root: Path, known: dict[str, str]) -> None:
     gap = about(known, "offset(by, low, target=gap)")
     cli("review", "approve", *known, *JANE)
     cli("review", "flag", gap, *JANE)
@@ -193,11 +180,9 @@ def test_the_status_says_what_is_left(cli: Cli, root: Path, known: dict[str, str
     assert [one["group"] for one in facts["lacking"]] == [gap]
 
 
-def test_what_has_changed_is_shown_as_a_diff(cli: Cli, root: Path, known: dict[str, str]) -> None:
-    """A group that changed since its approval shows the diff.
-
-    For other groups the command says there is none.
-    """
+def test_a_changed_group_shows_the_diff_since_its_approval(
+    cli: Cli, root: Path, known: dict[str, str]
+) -> None:
     gap = about(known, "offset(by, target=gap)")
     assert "no decision yet" in cli("review", "show", gap, "--changes").out
     cli("review", "approve", gap, *JANE)
@@ -212,8 +197,10 @@ def test_what_has_changed_is_shown_as_a_diff(cli: Cli, root: Path, known: dict[s
     assert "the diff that the reviewer saw was not kept" in cli("review", "show", gap, "--changes").out
 
 
-def test_a_mistake_in_the_file_is_told_at_its_line(cli: Cli, root: Path, known: dict[str, str]) -> None:
-    """An unknown decision or missing reviewer in an edited file stops the command with the line."""
+def test_a_mistake_in_the_review_file_is_reported_at_its_line(
+    cli: Cli, root: Path, known: dict[str, str]
+) -> None:
+    """A user edited the file."""
     cli("review", "approve", next(iter(known)), *JANE)
     file = root / "fault_library/reviews/toycar.yaml"
     good = file.read_text()
@@ -223,8 +210,8 @@ def test_a_mistake_in_the_file_is_told_at_its_line(cli: Cli, root: Path, known: 
         assert (answer.code, f"toycar.yaml:{line}: " in answer.err) == (2, True)
 
 
-def test_walking_needs_a_terminal(cli: Cli, root: Path) -> None:
-    """Without a terminal, the command asks nothing. The error names the commands that need no terminal."""
+def test_a_walk_needs_a_terminal(cli: Cli, root: Path) -> None:
+    """The error names the commands that work without one."""
     answer = cli("review", "walk", *JANE)
     assert answer.code == 2
     assert "no terminal to ask in" in answer.err
@@ -233,7 +220,7 @@ def test_walking_needs_a_terminal(cli: Cli, root: Path) -> None:
 
 @pytest.fixture
 def keys(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
-    """Simulate a user who presses these keys at a terminal and types these remarks."""
+    """Simulate a user who presses these keys and types these remarks."""
 
     class Tty:
         def __init__(self, stream: Any) -> None:
@@ -255,13 +242,10 @@ def keys(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     return press
 
 
-def test_a_walk_asks_group_by_group(
+def test_a_walk_asks_about_each_group(
     cli: Cli, root: Path, keys: Callable[..., None], known: dict[str, str]
 ) -> None:
-    """The keys a, r, s and q do what they say, and any other key asks again.
-
-    Each decision is saved at once.
-    """
+    """Any key except a, r, s and q asks again. Each decision is saved at once."""
     first, second, third, *_ = known
     keys("axrsq", "good", "")
     answer = cli("review", "walk", *JANE)
@@ -274,10 +258,9 @@ def test_a_walk_asks_group_by_group(
     assert f"group {first}" not in again
 
 
-def test_a_walk_tells_what_somebody_else_says_meanwhile(
+def test_a_walk_asks_again_if_another_reviewer_decides(
     cli: Cli, root: Path, keys: Callable[..., None], known: dict[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """If another reviewer decides meanwhile, the group is shown again with that decision and asked again."""
     first, *_ = known
     keys("aaq", "", "")
     ask = typer.getchar
@@ -295,10 +278,10 @@ def test_a_walk_tells_what_somebody_else_says_meanwhile(
     assert cli("review", "show", first, "--json").json[0]["by"] == "Jane Doe"
 
 
-def test_a_walk_ends_with_the_input(
+def test_ctrl_d_ends_a_walk(
     cli: Cli, root: Path, keys: Callable[..., None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Ctrl-D works like q. Nothing is decided, and the exit code is 0."""
+    """Nothing is decided, and the exit code is 0."""
 
     def over() -> str:
         raise EOFError
@@ -310,11 +293,10 @@ def test_a_walk_ends_with_the_input(
     assert {group["state"] for group in cli("review", "--json").json} == {"new"}
 
 
-def test_the_page_holds_everything(cli: Cli, root: Path, tmp_path: Path, known: dict[str, str]) -> None:
-    """One self-contained file has all groups, states, diffs, values and options.
-
-    It has the same bytes each time.
-    """
+def test_the_page_is_one_self_contained_file(
+    cli: Cli, root: Path, tmp_path: Path, known: dict[str, str]
+) -> None:
+    """The page has the same bytes each time."""
     out = tmp_path / "review.html"
     first = next(iter(known))
     cli("review", "approve", first, *JANE)
@@ -337,11 +319,8 @@ def test_the_page_holds_everything(cli: Cli, root: Path, tmp_path: Path, known: 
 
 
 @pytest.mark.slow
-def test_only_what_is_approved_is_run(cli: Cli, root: Path, tmp_path: Path) -> None:
-    """A run is refused until all groups are approved. The error has names, numbers and commands.
-
-    A changed template is refused again.
-    """
+def test_only_approved_groups_run(cli: Cli, root: Path, tmp_path: Path) -> None:
+    """A changed template is refused again."""
     out = tmp_path / "run"
     words = ("run", "small", "--out", out, "--require-reviewed")
     refused = cli(*words)

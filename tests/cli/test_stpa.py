@@ -1,4 +1,4 @@
-"""The `stpa` command and hazard analyses in `check`."""
+"""The `stpa` command, and hazard analyses in `check`."""
 
 import shutil
 from collections.abc import Callable
@@ -12,7 +12,6 @@ Cli = Callable[..., Any]
 
 
 def test_the_analysis_is_printed_and_drawn(cli: Cli, nowhere: Path) -> None:
-    """`stpa` prints all parts of the shipped analysis with what was proved, and writes the diagram."""
     answer = cli("--root", CLONE, "stpa", "--svg", "structure.svg")
     assert answer.code == 0, answer.err
     for wanted in (
@@ -31,7 +30,6 @@ def test_the_analysis_is_printed_and_drawn(cli: Cli, nowhere: Path) -> None:
 
 
 def test_the_analysis_for_programs(cli: Cli, nowhere: Path) -> None:
-    """With `--json` the output is one document with the same parts and no problems."""
     answer = cli("--root", CLONE, "stpa", "--json")
     assert answer.json["problems"] == []
     assert answer.json["hazards"]["H3"]["leads_to"] == ["A1", "A3"]
@@ -43,15 +41,14 @@ def test_the_analysis_for_programs(cli: Cli, nowhere: Path) -> None:
 
 @pytest.fixture
 def library(tmp_path: Path) -> Path:
-    """A copy of the shipped library. Its target is the clone's."""
     library = tmp_path / "fault_library"
     shutil.copytree(CLONE / "fault_library", library)
     (tmp_path / "target").symlink_to(CLONE / "target")
     return library
 
 
-def test_a_problem_fails_the_check(cli: Cli, library: Path, nowhere: Path) -> None:
-    """A spec that no causal factor needs is reported with its file. The exit code is 1."""
+def test_a_problem_in_the_analysis_exits_with_1(cli: Cli, library: Path, nowhere: Path) -> None:
+    """No causal factor needs the spec."""
     factors = library / "stpa" / "causal_factors.yaml"
     factors.write_text(factors.read_text().replace(", vision_weather/lens_mud", ""))
     answer = cli("--root", CLONE, "--library", library, "stpa")
@@ -61,8 +58,7 @@ def test_a_problem_fails_the_check(cli: Cli, library: Path, nowhere: Path) -> No
     assert answer.out.splitlines()[-1] == "1 problem"
 
 
-def test_a_dangling_name_is_wrong_input(cli: Cli, library: Path, nowhere: Path) -> None:
-    """An unreadable analysis is refused with file and line. The exit code is 2."""
+def test_an_unreadable_analysis_exits_with_2(cli: Cli, library: Path, nowhere: Path) -> None:
     factors = library / "stpa" / "causal_factors.yaml"
     factors.write_text(factors.read_text().replace("[UCA2,", "[UCA22,", 1))
     answer = cli("--root", CLONE, "--library", library, "stpa")
@@ -70,8 +66,8 @@ def test_a_dangling_name_is_wrong_input(cli: Cli, library: Path, nowhere: Path) 
     assert "causal_factors.yaml:10: unsafe control action 'UCA22'" in answer.err
 
 
-def test_a_library_without_an_analysis(cli: Cli, root: Path) -> None:
-    """If the files are missing, the error names the missing one. Campaigns need none of them."""
+def test_the_error_names_a_missing_file_of_the_analysis(cli: Cli, root: Path) -> None:
+    """Campaigns need no analysis."""
     answer = cli("stpa")
     assert answer.code == 2
     assert "no control_structure.yaml" in answer.err
@@ -79,7 +75,6 @@ def test_a_library_without_an_analysis(cli: Cli, root: Path) -> None:
 
 
 def test_check_looks_at_the_analysis_too(cli: Cli, library: Path, nowhere: Path) -> None:
-    """`check` reports gaps in the hazard analysis among the library's other problems."""
     factors = library / "stpa" / "causal_factors.yaml"
     factors.write_text(factors.read_text().replace("[vision_input/blur]", "[vision_input/blurr]"))
     answer = cli("--root", CLONE, "--library", library, "check")
@@ -96,8 +91,8 @@ def test_check_looks_at_the_analysis_too(cli: Cli, library: Path, nowhere: Path)
         ("when: gap > near_s", "near_far.yaml:13: unknown name 'gap'"),
     ],
 )
-def test_no_campaign_on_a_wrong_table(cli: Cli, root: Path, new: str, said: str) -> None:
-    """A campaign is not planned if its contexts leave gaps, overlap or use unknown names."""
+def test_a_campaign_needs_correct_context_tables(cli: Cli, root: Path, new: str, said: str) -> None:
+    """The table has gaps, overlaps or unknown names."""
     table = root / "fault_library" / "stpa" / "contexts" / "near_far.yaml"
     table.write_text(table.read_text().replace("when: hwt > near_s", new))
     answer = cli("plan", "toy", "--out", "plan")
@@ -106,8 +101,7 @@ def test_no_campaign_on_a_wrong_table(cli: Cli, root: Path, new: str, said: str)
     assert not Path("plan").exists()
 
 
-def test_a_picture_that_cannot_be_written(cli: Cli, nowhere: Path) -> None:
-    """If the picture's folder is missing, the error names the file."""
+def test_a_diagram_that_cannot_be_written_is_reported(cli: Cli, nowhere: Path) -> None:
     answer = cli("--root", CLONE, "stpa", "--svg", "no/such/structure.svg")
     assert answer.code == 2
     assert "no/such/structure.svg: cannot write the file" in answer.err

@@ -1,4 +1,4 @@
-"""Terminal output beyond plain text: colours, tables, a progress bar."""
+"""Colours, tables and the progress bar of a terminal."""
 
 import re
 from collections import Counter
@@ -43,8 +43,8 @@ def terminal(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("NO_COLOR", raising=False)
 
 
-def test_a_diff_is_coloured_line_by_line(cli: Cli, root: Path, terminal: None) -> None:
-    """Inserted lines are green. Without colours, the diff equals the piped one."""
+def test_inserted_lines_of_a_diff_are_green(cli: Cli, root: Path, terminal: None) -> None:
+    """Without colours, the diff equals the piped one."""
     answer = cli("diff", "sensor/silence")
     assert re.search(r"\x1b\[32m\+ +if not _fi.active", answer.out)
     assert "+        if not _fi.active" in ANSI.sub("", answer.out)
@@ -61,7 +61,6 @@ def test_json_stays_plain_in_a_terminal(cli: Cli, root: Path, terminal: None) ->
 
 
 def notify_all(notify: Callable[[Progress], None]) -> None:
-    """Send the notifications of a campaign from beginning to end."""
     notify(Progress(stage="checks", done=1, total=7))
     counts = Counter(hazard=2, sdc=1)
     run = Progress(stage="experiments", total=60, outcomes=counts)
@@ -79,7 +78,6 @@ def test_progress_in_a_terminal(capsys: pytest.CaptureFixture[str], terminal: No
 
 
 def test_progress_in_a_log(capsys: pytest.CaptureFixture[str]) -> None:
-    """A log gets a line for each stage, and progress lines at intervals."""
     with campaign_progress(Terminal()) as notify:
         notify_all(notify)
     assert capsys.readouterr().err.splitlines() == [
@@ -96,16 +94,15 @@ def test_durations(seconds: float, words: str) -> None:
     assert duration(seconds) == words
 
 
-def test_a_diff_for_reading_leaves_the_probe_out() -> None:
-    """New files are left out and named. The rest stays unchanged."""
+def test_a_diff_for_reading_leaves_new_files_out() -> None:
+    """The new files are named."""
     text, note = readable(PATCH)
     assert text == PATCH[PATCH.index("diff --git a/p/a.py") :]
     assert "p/_fi.py" in note
     assert readable(text) == (text, "")
 
 
-def test_each_stage_has_its_name_and_its_own_remaining_time(capsys: pytest.CaptureFixture[str]) -> None:
-    """A log names each stage of a run as it begins, and estimates its remaining time separately."""
+def test_each_stage_has_its_own_remaining_time(capsys: pytest.CaptureFixture[str]) -> None:
     with campaign_progress(Terminal()) as notify:
         for stage in ("plan", "checks", "golden", "proof", "tables", "report"):
             timed = {"done": 7, "total": 23, "remaining_s": 8.0} if stage == "proof" else {}
@@ -132,8 +129,8 @@ COMMAND = "`mutator review approve 3b5103806ae0 a9281388d042 --campaign paper_sm
         ("", 8, [""]),
     ],
 )
-def test_lines_are_folded(text: str, width: int, lines: list[str]) -> None:
-    """Lines break between words, continue indented and lose no text. Commands and long words stay whole."""
+def test_long_lines_are_folded(text: str, width: int, lines: list[str]) -> None:
+    """Lines break between words and continue indented. Commands and long words stay whole."""
     assert folded(text, width).split("\n") == lines
 
 
@@ -141,10 +138,7 @@ def test_lines_are_folded(text: str, width: int, lines: list[str]) -> None:
 def test_a_pipe_gets_lines_of_100_columns(
     columns: str | None, width: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Results, remarks and errors are folded to 100 columns, or to COLUMNS.
-
-    Tables and text to copy are not.
-    """
+    """The width can be set with COLUMNS. Tables and text to copy are not folded."""
     monkeypatch.delenv("COLUMNS")
     if columns:
         monkeypatch.setenv("COLUMNS", columns)

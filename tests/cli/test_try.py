@@ -11,10 +11,7 @@ Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, jso
 
 
 def test_try_needs_no_campaign(cli: Cli, root: Path) -> None:
-    """`try` takes a fault from any file and shows diff, verdict, plot and traces.
-
-    It does not write to the library.
-    """
+    """`try` takes a fault from any file and does not write to the library."""
     shutil.move(root / "fault_library/faults/sensor/silence.yaml", "own.yaml")
     answer = cli("try", "own.yaml", "--scenario", "A", "--trigger", "2")
     assert answer.code == 0
@@ -31,8 +28,7 @@ def test_try_says_whether_an_alert_came_before_the_hazard(cli: Cli, root: Path) 
     assert "no alert before the hazard" in lane.splitlines()
 
 
-def test_try_tells_of_hazards_without_the_fault(cli: Cli, root: Path) -> None:
-    """If the fault-free run reaches a hazard, one line says so, and so does the JSON."""
+def test_try_reports_hazards_of_the_fault_free_run(cli: Cli, root: Path) -> None:
     words = ("try", "sensor/lane", "-s", "A", "--trigger", "1")
     said = "the fault-free run also reaches"
     assert said not in cli(*words).out
@@ -46,7 +42,7 @@ def test_try_tells_of_hazards_without_the_fault(cli: Cli, root: Path) -> None:
 
 
 def test_try_as_json(cli: Cli, root: Path) -> None:
-    """JSON has verdict, times and paths. The same fault always has the same id."""
+    """The same fault always has the same id."""
     words = ("try", "sensor/lane", "-s", "A", "--value", "2.4", "--trigger", "1", "--json")
     one, two = cli(*words).json, cli(*words).json
     assert one == two
@@ -63,15 +59,16 @@ def test_try_as_json(cli: Cli, root: Path) -> None:
         (["sensor/distance", "-s", "A", "--value", "many"], "--value"),
     ],
 )
-def test_what_cannot_be_tried_is_answered(cli: Cli, root: Path, words: list[str], said: str) -> None:
-    """A wrong scenario or value exits with 2 and lists the choices."""
+def test_a_wrong_scenario_or_value_lists_the_choices(
+    cli: Cli, root: Path, words: list[str], said: str
+) -> None:
     answer = cli("try", *words)
     assert answer.code == 2
     assert said in answer.err
 
 
-def test_generate_gives_the_mutants_of_a_campaign(cli: Cli, root: Path) -> None:
-    """Each mutant of the plan is written once, even if several scenarios share it."""
+def test_generate_writes_each_mutant_of_a_campaign_once(cli: Cli, root: Path) -> None:
+    """Scenarios may share a mutant."""
     index = cli("generate", "--campaign", "toy", "--out", "m", "--json").json
     assert 0 < len(index) <= 24
     assert len({line["mutant_id"] for line in index}) == len(index)

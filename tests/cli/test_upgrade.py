@@ -26,11 +26,8 @@ def changed(before: TargetManifest, after: TargetManifest) -> list[str]:
     return [name for name in same if getattr(before, name) != getattr(after, name)]
 
 
-def test_an_older_manifest_is_written_anew(cli, path: Path) -> None:
-    """The new manifest has the same meaning and keeps comments elsewhere.
-
-    Comments that it cannot keep are printed.
-    """
+def test_an_older_manifest_is_rewritten(cli, path: Path) -> None:
+    """Comments elsewhere are kept. Comments that cannot be kept are printed."""
     text = path.read_text().replace("step_s:", "# of the world\nstep_s:")
     text = text.replace("compare:", "compare:  # pedals").replace("target/1\n", "target/1\n\n")
     path.write_text(text.replace("t: now\n", 't: "now  # b"\n'))
@@ -47,8 +44,8 @@ def test_an_older_manifest_is_written_anew(cli, path: Path) -> None:
 
 
 @pytest.mark.parametrize("indent", [None, 1])
-def test_a_manifest_in_one_mapping_loses_nothing(cli, path: Path, indent: int | None) -> None:
-    """If keys share a line, the whole manifest is rewritten with the same meaning."""
+def test_a_manifest_on_one_line_keeps_its_meaning(cli, path: Path, indent: int | None) -> None:
+    """If keys share a line, the whole manifest is rewritten."""
     path.write_text(json.dumps(yaml.safe_load(path.read_text()), indent=indent) + "  # all of it\n")
     before = load_manifest(path)
     answer = cli("upgrade", path)
@@ -58,8 +55,8 @@ def test_a_manifest_in_one_mapping_loses_nothing(cli, path: Path, indent: int | 
     assert changed(before, load_manifest(path)) == []
 
 
-def test_what_is_compared_and_plotted_is_an_actuator(cli, path: Path) -> None:
-    """A channel in both sections keeps its settings for `compare`."""
+def test_a_compared_and_plotted_channel_becomes_an_actuator(cli, path: Path) -> None:
+    """The channel keeps its settings for `compare`."""
     path.write_text(path.read_text().replace("plot:\n", 'plot:\n  gas: {unit: "%"}\n'))
     loaded = load_manifest(path)
     assert cli("upgrade", path).code == 0
@@ -88,8 +85,7 @@ def test_line_breaks_and_links_stay(cli, path: Path) -> None:
         ("name: toycar\n", "name"),
     ],
 )
-def test_a_manifest_that_lacks_something_stays(cli, path: Path, line: str, message: str) -> None:
-    """A manifest that cannot be loaded is not rewritten: the error names what is missing."""
+def test_a_manifest_that_cannot_be_loaded_is_not_rewritten(cli, path: Path, line: str, message: str) -> None:
     path.write_text(path.read_text().replace(line, ""))
     before = path.read_bytes()
     answer = cli("upgrade", path)
@@ -98,16 +94,15 @@ def test_a_manifest_that_lacks_something_stays(cli, path: Path, line: str, messa
     assert path.read_bytes() == before
 
 
-def test_a_value_that_loads_nowhere_stays(cli, path: Path) -> None:
-    """Before it is written, the result is checked as it will be used, including formulas and placeholders."""
+def test_a_manifest_with_an_invalid_value_is_not_rewritten(cli, path: Path) -> None:
+    """Formulas and placeholders are checked as they will be used."""
     path.write_text(path.read_text().replace('"{out}", --number', '"{oot}", --number'))
     before = path.read_bytes()
     assert "{oot}" in cli("upgrade", path).err
     assert path.read_bytes() == before
 
 
-def test_what_is_no_manifest_is_left_alone(cli, tmp_path: Path) -> None:
-    """A file of another kind is a user's error and stays unchanged."""
+def test_a_file_of_another_kind_is_refused(cli, tmp_path: Path) -> None:
     path = tmp_path / "x.yaml"
     path.write_text("schema: campaign/1\n")
     answer = cli("upgrade", path)

@@ -22,10 +22,8 @@ def driven(tmp_path_factory: pytest.TempPathFactory) -> list[Any]:
 
 @pytest.fixture
 def sealed(cli: Cli, root: Path, driven: list[Any]) -> str:
-    """The seal of the run folder `run`, as `mutator run` prints it.
-
-    The test runs the folder once, because each test has the same library.
-    """
+    """The seal of the run folder `run`, as `mutator run` prints it. Each test has the same library, so the
+    folder is run once."""
     kept, *seals = driven
     if not seals:
         ran = cli("run", "small", "--out", "run", "-n", "0", "--limit", 4, "--engine", "fork")
@@ -39,8 +37,7 @@ def sealed(cli: Cli, root: Path, driven: list[Any]) -> str:
     return str(driven[1])
 
 
-def test_a_run_is_verified(cli: Cli, sealed: str) -> None:
-    """One page lists the checks, the versions, the drawn sample and the seal."""
+def test_an_audit_is_printed_on_one_page(cli: Cli, sealed: str) -> None:
     found = cli("verify", "run", "--rerun", 2, "--expect", sealed)
     assert (found.code, found.err) == (0, "")
     assert found.out.rstrip().endswith("no difference") and len(found.out.splitlines()) < 50
@@ -52,8 +49,8 @@ def test_a_run_is_verified(cli: Cli, sealed: str) -> None:
     assert sum(check["count"] for check in as_json["checks"]) > 20
 
 
-def test_the_seal_is_told_wherever_a_run_ends(cli: Cli, sealed: str) -> None:
-    """The seal is printed by `run`, also with nothing left to do, in JSON and in the report."""
+def test_the_seal_is_shown_wherever_a_run_ends(cli: Cli, sealed: str) -> None:
+    """`run` prints it even with nothing left to do, and so do JSON and report."""
     again = cli("run", "small", "--out", "run", "-n", "0", "--json")
     assert (again.code, again.json["ran"], again.json["seal"]) == (0, 0, sealed)
     assert f"| seal | {sealed} |" in Path("run/report/REPORT.md").read_text()
@@ -63,8 +60,7 @@ def test_the_seal_is_told_wherever_a_run_ends(cli: Cli, sealed: str) -> None:
     assert cli("verify", "planned", "--expect", sealed).code == 1
 
 
-def test_a_damaged_run_is_repaired_and_run_again(cli: Cli, sealed: str) -> None:
-    """The run's own command lists the damage, moves it aside and repairs it. The seal stays the same."""
+def test_verify_repairs_a_damaged_run_and_run_completes_it(cli: Cli, sealed: str) -> None:
     records, patch = next(Path("run/records").iterdir()), next(Path("run/patches").iterdir())
     golden = next(Path("run/golden").rglob("log.npz"))
     lines = records.read_bytes().splitlines(keepends=True)
@@ -96,21 +92,16 @@ def packed() -> Index:
 
 
 def chunks() -> dict[str, str]:
-    """Return the files of packed series: golden runs, experiments and the index."""
     (goldens, _), (experiments, _) = packed().chunks
     return {"goldens": f"{goldens}.js", "experiments": f"{experiments}.js", "index": "index.js"}
 
 
 @pytest.mark.parametrize("become", [flip, Path.unlink], ids=["damaged", "missing"])
 @pytest.mark.parametrize("what", ["goldens", "experiments", "index"])
-def test_damaged_series_are_told_put_aside_and_made_again(
+def test_rerun_restores_damaged_series(
     cli: Cli, sealed: str, what: str, become: Callable[[Path], None]
 ) -> None:
-    """An audit names the damaged file and the remedy.
-
-    `rerun --trace` restores the series, before and after a repair, and leaves no complaint. The golden runs'
-    chunk is rebuilt at once.
-    """
+    """An audit names the damaged file and the remedy. The golden runs' chunk is rebuilt at once."""
     before = {path.name: path.read_bytes() for path in Path("run/series").iterdir()}
     name, *others = packed().entries
     became = Path("run/series") / chunks()[what]
@@ -146,8 +137,8 @@ def test_damaged_series_are_told_put_aside_and_made_again(
         assert SeriesFolder(Path("run")).read(others[0]) is not None
 
 
-def test_a_damaged_series_of_one_experiment_is_told(cli: Cli, sealed: str) -> None:
-    """The audit names the command that restores the series. A drawn plot does not hide the damage."""
+def test_the_audit_names_the_command_that_restores_a_series(cli: Cli, sealed: str) -> None:
+    """A drawn plot does not hide the damage."""
     name = next(iter(packed().entries))
     assert cli("show", name, "--run", "run").code == 0
     kept = SeriesFolder(Path("run")).kept(name)
@@ -162,11 +153,8 @@ def test_a_damaged_series_of_one_experiment_is_told(cli: Cli, sealed: str) -> No
     assert cli("verify", "run").code == 0
 
 
-def test_damaged_blocks_of_patches_are_told(cli: Cli, sealed: str) -> None:
-    """Damage is reported even if every patch exists.
-
-    Here the first of two equal blocks is damaged.
-    """
+def test_damaged_blocks_of_patches_are_reported(cli: Cli, sealed: str) -> None:
+    """Every patch exists, because the damaged block is the first of two equal ones."""
     [patches] = Path("run/patches").iterdir()
     data = patches.read_bytes()
     patches.write_bytes(data[:40] + b"?" + data[41:] + data)
@@ -176,8 +164,8 @@ def test_damaged_blocks_of_patches_are_told(cli: Cli, sealed: str) -> None:
     assert cli("verify", "run", "--expect", sealed).code == 0
 
 
-def test_many_differences_are_a_page(cli: Cli, sealed: str, root: Path) -> None:
-    """The page lists some differences and counts the rest. JSON has all."""
+def test_the_page_lists_some_of_many_differences(cli: Cli, sealed: str, root: Path) -> None:
+    """JSON has all differences."""
     table = Path("run/results.csv")
     table.write_text("\n" * 60)
     found = cli("verify", "run")
@@ -187,8 +175,8 @@ def test_many_differences_are_a_page(cli: Cli, sealed: str, root: Path) -> None:
     assert len(tables["differences"]) > 50
 
 
-def test_other_sources_are_a_difference(cli: Cli, sealed: str, root: Path) -> None:
-    """If the target differs, no tree can be compared. The audit says so and does not pass."""
+def test_with_another_target_the_audit_does_not_pass(cli: Cli, sealed: str, root: Path) -> None:
+    """No tree can be compared."""
     with (root / "tree" / "toycar" / "driver.py").open("a") as file:
         file.write("\n")
     found = cli("verify", "run", "--expect", sealed)
@@ -197,8 +185,9 @@ def test_other_sources_are_a_difference(cli: Cli, sealed: str, root: Path) -> No
     assert "trees and patches" not in found.out.split("- ")[0]
 
 
-def test_a_folder_without_sources(cli: Cli, sealed: str, tmp_path: Path, monkeypatch: Any) -> None:
-    """If the library lacks the target, digests and tables are still compared."""
+def test_without_the_target_digests_and_tables_are_compared(
+    cli: Cli, sealed: str, tmp_path: Path, monkeypatch: Any
+) -> None:
     monkeypatch.delenv("MUTATOR_ROOT")
     found = cli("verify", "run", "--json")
     assert found.code == 1
@@ -214,7 +203,7 @@ def test_a_folder_without_sources(cli: Cli, sealed: str, tmp_path: Path, monkeyp
         (("verify", "run", "--rerun", "-1"), "--rerun"),
     ],
 )
-def test_wrong_input(cli: Cli, sealed: str, words: tuple[str, ...], told: str) -> None:
-    """A folder that is no run, or text that is no seal, gets a clear error."""
+def test_wrong_input_is_refused(cli: Cli, sealed: str, words: tuple[str, ...], told: str) -> None:
+    """The folder is no run, or the text is no seal."""
     found = cli(*words)
     assert found.code == 2 and told in found.err

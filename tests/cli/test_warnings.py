@@ -31,8 +31,10 @@ Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, jso
         (["sensor/lane"], []),
     ],
 )
-def test_a_chosen_value_is_judged(cli: Cli, root: Path, words: list[str], warnings: list[str]) -> None:
-    """A value without effect, or outside the declared range, gets a warning and the mutant is built."""
+def test_a_chosen_value_without_effect_gets_a_warning(
+    cli: Cli, root: Path, words: list[str], warnings: list[str]
+) -> None:
+    """The mutant is built nevertheless. A value outside the declared range gets a warning, too."""
     answer = cli("diff", *words)
     assert answer.code == 0
     assert "+" in answer.out
@@ -40,11 +42,8 @@ def test_a_chosen_value_is_judged(cli: Cli, root: Path, words: list[str], warnin
     assert lines == [f"warning: {text}" for text in warnings]
 
 
-def test_a_plan_warns_of_values_that_change_nothing(cli: Cli, root: Path) -> None:
-    """The plan counts experiments with values that change nothing and names the faults.
-
-    With a bound, the same value may have an effect.
-    """
+def test_a_plan_warns_of_values_without_effect(cli: Cli, root: Path) -> None:
+    """With a bound, the same value may have an effect."""
     spec = root / "fault_library" / "faults" / "sensor" / "lane.yaml"
     listed = spec.read_text().replace(
         "reals_from: {first: [0.0, 0.1], step: 0.8, last: [2.4, 2.5]}", "values: [0, 1]"
@@ -58,8 +57,7 @@ def test_a_plan_warns_of_values_that_change_nothing(cli: Cli, root: Path) -> Non
     assert "warning" not in cli(*words, "q").err
 
 
-def test_a_run_warns_of_triggers_that_never_come(cli: Cli, root: Path) -> None:
-    """Before the experiments, a run says which triggers never fire and how many there are."""
+def test_a_run_warns_of_triggers_that_never_fire(cli: Cli, root: Path) -> None:
     campaign = root / "fault_library" / "campaigns" / "small.yaml"
     text = campaign.read_text().replace("methods: [guided, random]", "methods: [guided]")
     campaign.write_text(text.replace("table: near_far", "list: [{at_s: 50}, {at_s: 2}]"))
