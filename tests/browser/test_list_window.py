@@ -29,7 +29,7 @@ def height(page: "Page") -> float:
     return float(page.page.evaluate(f"{WINDOW}.clientHeight"))
 
 
-def test_a_filter_that_leaves_few_rows_leaves_a_low_window(page: "Page") -> None:
+def test_the_window_is_low_if_few_rows_match(page: "Page") -> None:
     before = height(page)
     page.page.fill("#search", "crashed")
     page.page.wait_for_function("document.querySelectorAll('#grid tr[data-at]').length < 3")

@@ -35,7 +35,7 @@ def test_a_failed_experiment_shows_no_activation_and_no_replay_command(
     assert said in page.page.inner_text("#experiment .happened")
 
 
-def test_a_closed_experiment_leaves_nothing_behind(page: "Page") -> None:
+def test_a_closed_experiment_is_removed_from_the_page(page: "Page") -> None:
     page.page.click(FIRST)
     page.page.wait_for_selector("#experiment .again")
     page.page.keyboard.press("Escape")

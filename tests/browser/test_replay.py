@@ -248,7 +248,7 @@ def vivid(colours: set[tuple[int, ...]]) -> bool:
     return any(max(colour) - min(colour) > 60 for colour in colours)
 
 
-def test_after_the_end_of_the_drive_all_is_gray(replayed: Replayed) -> None:
+def test_everything_is_gray_after_the_end_of_the_drive(replayed: Replayed) -> None:
     seek(replayed, END)
     assert replayed.text(".state").endswith("H1: the car hits the one ahead")
     assert replayed.page.locator(".is-after").count() == 0
@@ -329,7 +329,7 @@ def test_a_target_without_a_scene_has_instruments_and_plots(replayed: Replayed) 
     assert replayed.page.locator(".plot-of").count() == 3
 
 
-def test_with_reduced_motion_it_shows_two_pictures_a_second(page: "Page") -> None:
+def test_with_reduced_motion_a_replay_shows_two_frames_a_second(page: "Page") -> None:
     page.page.evaluate(SHOW, [SERIES, FACTS])
     page.page.click(".replay-player .play")
     page.page.wait_for_function(f"{T} > 2")

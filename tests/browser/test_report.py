@@ -52,7 +52,9 @@ def test_filters_select_rows_and_are_in_the_address(page: "Page", rows: list[dic
     assert page.found == f"{COUNT} experiments"
 
 
-def test_a_click_on_a_head_sorts_and_what_is_empty_is_last(page: "Page", rows: list[dict[str, str]]) -> None:
+def test_a_click_on_a_column_title_sorts_with_empty_cells_last(
+    page: "Page", rows: list[dict[str, str]]
+) -> None:
     before = page.column("experiment_id")
     times = sorted(f"{float(row['t_activation']):.2f}" for row in rows if row["t_activation"])
     head = '#grid th[data-column="t_activation"]'

@@ -110,7 +110,7 @@ def test_paper_has_the_first_rows_after_a_late_redraw(scrolled: "Page", due: str
     assert scrolled.page.evaluate(printing) == list(range(5))
 
 
-def test_a_printed_page_has_all_its_rows_and_the_screen_gets_its_own_back(scrolled: "Page") -> None:
+def test_a_printed_page_has_all_rows_and_the_screen_is_restored(scrolled: "Page") -> None:
     page = scrolled.page
     page.evaluate("document.querySelector('#grid').hidden = true")
     others = rows_of(page.pdf(tagged=True))

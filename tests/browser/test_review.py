@@ -104,7 +104,7 @@ def test_similar_groups_are_folded(open_page: Callable[..., Any]) -> None:
     assert page.locator("[data-mark=approve][aria-pressed=true]:visible").count() == 2
 
 
-def test_all_that_a_filter_shows_are_marked_after_a_question(open_page: Callable[..., Any]) -> None:
+def test_all_filtered_groups_are_marked_after_a_question(open_page: Callable[..., Any]) -> None:
     page = open_page("q=gap")
     page.keyboard.press("Shift+R")
     assert page.inner_text("#ask-title") == "Reject 2 groups?"

@@ -48,7 +48,7 @@ def test_the_page_lists_the_worst_and_counts_all(
     assert page.found == "0 of 10 experiments listed, the worst of 24"
 
 
-def test_an_experiment_that_is_not_listed_is_told(
+def test_the_page_says_that_an_experiment_is_not_listed(
     run: Path, large: Path, open_report: "Callable[[Path], Page]"
 ) -> None:
     ids = open_report(run).page.evaluate(

@@ -37,7 +37,7 @@ def own(root: Path) -> Path:
     return own
 
 
-def test_the_spec_without_a_mistake_is_fine(cli: Cli, own: Path) -> None:
+def test_the_spec_without_a_mistake_is_valid(cli: Cli, own: Path) -> None:
     assert cli("diff", own).code == 0
 
 

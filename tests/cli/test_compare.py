@@ -78,7 +78,7 @@ def test_a_gate_fails_for_a_new_hazard(cli: Cli, runs: tuple[Path, Path]) -> Non
     assert cli("compare", *reversed(runs), "--fail-on", "lost-alert", "--fail-on", "new-hazard").code == 0
 
 
-def test_a_run_with_itself(cli: Cli, runs: tuple[Path, Path]) -> None:
+def test_a_run_equals_itself(cli: Cli, runs: tuple[Path, Path]) -> None:
     _, after = runs
     answer = cli("compare", after, after, "--json", "--fail-on", "new-hazard,worse,harness-error,unmatched")
     assert answer.code == 0

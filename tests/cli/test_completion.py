@@ -84,7 +84,7 @@ def test_the_script_for_a_shell_is_printed(cli: Cli, monkeypatch: pytest.MonkeyP
     assert answer.out.rstrip().endswith("-F _mutator_completion mutator")
 
 
-def test_completion_loads_little(root: Path) -> None:
+def test_completion_imports_few_modules(root: Path) -> None:
     code = (
         "import sys\nfrom mutator.cli.app import main\nassert main() == 0\n"
         "print(sorted({'jinja2', 'libcst', 'numpy', 'pandas', 'yaml', 'rich'} & set(sys.modules)))"

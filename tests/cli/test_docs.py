@@ -276,7 +276,7 @@ def test_the_guide_has_editor_settings_for_every_schema() -> None:
     assert settings["yaml.schemas"] == expected
 
 
-def test_every_benchmark_is_told_of() -> None:
+def test_every_benchmark_is_in_the_docs() -> None:
     told = re.findall(r"^\| `(\w+\.py)` ", BENCHMARKS.read_text(encoding="utf-8"), re.MULTILINE)
     assert sorted(told) == sorted(file.name for file in BENCHMARKS.parent.glob("*.py"))
 

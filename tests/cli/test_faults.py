@@ -25,7 +25,7 @@ def test_diff_shows_one_diff_for_each_variant(cli: Cli, root: Path) -> None:
     assert "not shown: toycar/_fi.py" in answer.err
 
 
-def test_a_value_of_ones_own_is_taken_exactly(cli: Cli, root: Path) -> None:
+def test_a_given_value_is_used_exactly(cli: Cli, root: Path) -> None:
     answer = cli("diff", "sensor/distance", "--variant", "longer", "--value", "12.5")
     assert "sensor/distance/longer 12.5 m\n" in answer.out
     assert "gap = gap + 12.5  # fi:" in answer.out

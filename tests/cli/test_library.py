@@ -113,12 +113,12 @@ def test_check_drive_fails_for_a_clock(cli: Cli, root: Path) -> None:
     assert (golden["level"], golden["places"][0]["line"]) == ("failed", line)
 
 
-def test_scenarios_are_for_drives(cli: Cli, root: Path) -> None:
+def test_check_with_a_scenario_needs_drive(cli: Cli, root: Path) -> None:
     assert "add --drive" in cli("check", "--scenario", "A").err
     assert cli("check", "--drive", "--scenario", "nowhere").code == 2
 
 
-def test_doctor_is_content_with_this_machine(cli: Cli, root: Path) -> None:
+def test_doctor_accepts_this_machine(cli: Cli, root: Path) -> None:
     answer = cli("doctor")
     assert answer.code == 0
     assert answer.out.endswith("ready\n")

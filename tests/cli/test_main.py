@@ -37,11 +37,11 @@ def test_each_verb_explains_itself(cli: Cli, verb: str) -> None:
     assert answer.out.startswith(f"Usage: mutator {verb} ")
 
 
-def test_no_word_at_all_is_a_call_for_help(cli: Cli) -> None:
+def test_without_arguments_the_help_is_printed(cli: Cli) -> None:
     assert cli() == cli("--help")
 
 
-def test_the_version_is_told(cli: Cli) -> None:
+def test_the_version_is_printed(cli: Cli) -> None:
     assert cli("--version").out == f"mutator {__version__}\n"
 
 

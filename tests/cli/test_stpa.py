@@ -29,7 +29,7 @@ def test_the_analysis_is_printed_and_drawn(cli: Cli, nowhere: Path) -> None:
     assert (nowhere / "structure.svg").read_text().startswith("<svg ")
 
 
-def test_the_analysis_for_programs(cli: Cli, nowhere: Path) -> None:
+def test_the_analysis_as_json(cli: Cli, nowhere: Path) -> None:
     answer = cli("--root", CLONE, "stpa", "--json")
     assert answer.json["problems"] == []
     assert answer.json["hazards"]["H3"]["leads_to"] == ["A1", "A3"]
@@ -74,7 +74,7 @@ def test_the_error_names_a_missing_file_of_the_analysis(cli: Cli, root: Path) ->
     assert cli("check").code == 0
 
 
-def test_check_looks_at_the_analysis_too(cli: Cli, library: Path, nowhere: Path) -> None:
+def test_check_covers_the_analysis(cli: Cli, library: Path, nowhere: Path) -> None:
     factors = library / "stpa" / "causal_factors.yaml"
     factors.write_text(factors.read_text().replace("[vision_input/blur]", "[vision_input/blurr]"))
     answer = cli("--root", CLONE, "--library", library, "check")

@@ -64,7 +64,7 @@ def of_method(plan: Plan, method: Method, key: Callable[[Experiment], object]) -
     return {key(e) for e in plan.experiments if e.method is method}
 
 
-def test_paper_is_table_three(paper: Plan) -> None:
+def test_the_paper_campaigns_have_the_counts_of_table_three(paper: Plan) -> None:
     for method in Method:
         counts = kinds(paper, method)
         assert counts == INJECTED

@@ -26,7 +26,7 @@ def workspace(tmp_path: Path) -> Workspace:
     return Workspace(library=library, templates=CLONE / "templates")
 
 
-def test_the_cited_numbers_that_ship_are_well(workspace: Workspace) -> None:
+def test_the_shipped_numbers_are_valid(workspace: Workspace) -> None:
     assert list(check_paper(workspace)) == []
 
 

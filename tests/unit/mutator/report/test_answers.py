@@ -258,7 +258,7 @@ def test_a_crash_is_not_tolerated(run: ReportedRun) -> None:
     )
 
 
-def test_one_is_singular(run: ReportedRun) -> None:
+def test_a_single_hazard_is_in_the_singular(run: ReportedRun) -> None:
     found = {answer.name: answer for answer in answers_of(part_of(run, {"0" * 16, "1" * 16}))}
     assert found["unwarned"].says.startswith("1 of 2 hazards (50 %) was silent")
     found = {answer.name: answer for answer in answers_of(part_of(run, {"0" * 16}))}

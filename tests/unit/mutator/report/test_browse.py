@@ -67,7 +67,7 @@ def test_columns_are_numbers_dictionaries_or_texts(name: str, values: list[str],
     assert column(name, values) == made
 
 
-def test_alerts_are_columns_only_of_a_target_that_has_some() -> None:
+def test_a_target_without_alerts_has_no_columns_of_alerts() -> None:
     line = {"experiment_id": "a", "alerts": "", "t_alert": "", "reaction_time": "", "detail": ""}
     names = [
         {made["name"] for made in table([row("a")], [line], alerts=has)["columns"]} for has in (True, False)

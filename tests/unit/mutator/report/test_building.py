@@ -61,7 +61,7 @@ def test_the_page_needs_no_other_file(run: Path) -> None:
     assert "http" not in written.page.read_text().replace("http://www.w3.org/2000/svg", "")
 
 
-def test_the_page_carries_results_diff_and_still_of_an_experiment(run: Path) -> None:
+def test_the_page_contains_results_diff_and_still_of_an_experiment(run: Path) -> None:
     page = building.write(run, None).page
     table = carried(page, "table")
     columns = {column["name"]: column for column in table["columns"]}

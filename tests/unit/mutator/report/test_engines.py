@@ -86,7 +86,7 @@ def summary(run: Path) -> engines.EngineSummary | None:
     return engines.engine_summary(folder, folder.records(), timings_of(folder))
 
 
-def test_each_way_is_counted_and_each_reason_told(finish: Finish) -> None:
+def test_each_way_of_running_is_counted_with_its_reasons(finish: Finish) -> None:
     told = summary(finish(4))
     assert told is not None
     ways = dict(told.table.rows)
@@ -95,7 +95,7 @@ def test_each_way_is_counted_and_each_reason_told(finish: Finish) -> None:
     assert any("cannot be forked: its golden run has <two> threads" in way for way in ways)
 
 
-def test_reasons_beyond_the_most_frequent_are_one_line(finish: Finish) -> None:
+def test_less_frequent_reasons_share_a_line(finish: Finish) -> None:
     run = finish(None)
     more = [timing(f"{i}") | {"engine": "reference", "why": f"crash {i:02}"} for i in range(30)]
     write(run / "timings/0002-main.jsonl", TIMINGS_SCHEMA, more)

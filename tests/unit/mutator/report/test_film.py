@@ -6,7 +6,7 @@ from mutator.report.film import hazards_in_words
 from mutator.workspace import Workspace
 
 
-def test_a_film_says_of_a_hazard_what_the_page_says() -> None:
+def test_a_film_describes_a_hazard_as_the_page_does() -> None:
     workspace = Workspace.find(root=Path(__file__).parents[4])
     manifest = workspace.manifest("openpilot")
     assert hazards_in_words(workspace, manifest) == {rule.name: rule.about for rule in manifest.rules}

@@ -42,7 +42,7 @@ def test_changes_between_runs_are_counted(folder: Path) -> None:
     assert "| 1970-01-01 02:00 | - | 3 of 3 | 1 of 3 activated | - | 1 of 1 |" in text
 
 
-def test_a_command_can_be_copied_whatever_a_run_is_called(folder: Path) -> None:
+def test_a_command_quotes_the_names_of_runs(folder: Path) -> None:
     (folder / "before").rename(folder / "the night before")
     written = write_history(folder)
     assert (
@@ -59,7 +59,7 @@ def test_a_folder_without_results_is_named(folder: Path) -> None:
     assert why in " ".join(Page(written.page.read_text()).texts)
 
 
-def test_the_page_links_to_reports_and_comparisons_that_are_there(folder: Path) -> None:
+def test_the_page_links_to_existing_reports_and_comparisons(folder: Path) -> None:
     for page in ("after/report/index.html", "after/report/compare-before/index.html"):
         (folder / page).parent.mkdir(parents=True, exist_ok=True)
         (folder / page).write_text("")

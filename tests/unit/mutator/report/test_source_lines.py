@@ -101,7 +101,7 @@ def test_the_score_equals_that_of_the_api(toycar: Workspace, run: Path) -> None:
     assert (line["hazard: count"], line["hazard: of"], line["new alert"]) == (6, 6, None)
 
 
-def test_a_target_that_has_changed_is_not_shown(toycar: Workspace, run: Path) -> None:
+def test_a_changed_target_is_not_shown(toycar: Workspace, run: Path) -> None:
     path = toycar.library.parent / "tree" / DRIVER
     path.write_text("# one more line\n" + path.read_text())
     reported = ReportedRun.open(

@@ -97,7 +97,7 @@ def test_the_id_of_a_shape_does_not_depend_on_its_members(toycar: Workspace) -> 
         "+x = 3.0  # fi:01234567",
     ],
 )
-def test_any_text_is_given_back(patch: str) -> None:
+def test_any_text_round_trips(patch: str) -> None:
     (shape,) = shapes([("a", "", patch), ("b", "", patch)])
     assert shape.patch(1) == patch
 

@@ -143,7 +143,7 @@ def test_an_image_that_cannot_be_drawn_is_reported(lit: Lit, picture: str, said:
         drawn(*lit(picture=picture))
 
 
-def test_a_place_that_no_run_comes_to(lit: Lit) -> None:
+def test_a_place_that_no_run_reaches(lit: Lit) -> None:
     workspace, _ = lit()
     sensing = workspace.library.parent / "tree/toycar/sensing.py"
     text = sensing.read_text()

@@ -148,7 +148,7 @@ def test_old_remarks_are_kept(old: Path) -> None:
     assert entry.decision is not None and entry.decision.by == "Jane Doe and Joe"
 
 
-def test_an_old_mistake_is_told_at_its_line(old: Path) -> None:
+def test_a_mistake_in_an_old_file_is_reported_at_its_line(old: Path) -> None:
     with pytest.raises(MutatorError, match=r"toycar\.yaml:8: 'aproved' for 'decision'"):
         edited(old, "08a4799889df", "approved", "aproved")
     old.write_text('schema: review/1\ntarget: "toycar"\ndecisions: 1.5\n')

@@ -56,7 +56,7 @@ def test_a_group_without_experiments_has_no_verdict(
     assert told == {("omission",)}
 
 
-def test_results_that_came_later_count(toycar: Workspace, tmp_path: Path, write_run: WriteRun) -> None:
+def test_later_results_are_counted(toycar: Workspace, tmp_path: Path, write_run: WriteRun) -> None:
     group = next(g for g in of_plan(toycar, make_plan(toycar, "toy", Choices())) if g.faults)
     write_run(toycar, tmp_path / "run", lambda e: None)
     with pytest.raises(MutatorError, match="no results here"):

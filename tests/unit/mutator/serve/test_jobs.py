@@ -130,7 +130,7 @@ def test_the_output_of_a_job_is_plain_text() -> None:
     assert len(made.message) == 500
 
 
-def test_progress_is_that_of_the_stage() -> None:
+def test_a_job_reports_the_progress_of_its_stage() -> None:
     made = job()
     made.hear(b"golden runs 1/4, 2.0 a second\n")
     assert made.progress == 0.25

@@ -146,7 +146,7 @@ def test_triggers_are_those_of_try(desk: Desk, trigger: str) -> None:
     assert f"--trigger={trigger}" in work(desk, **TRY, trigger=trigger).words
 
 
-def test_a_new_run_is_no_link(desk: Desk, tmp_path: Path) -> None:
+def test_a_new_run_cannot_be_a_link(desk: Desk, tmp_path: Path) -> None:
     (tmp_path / "runs" / "new").symlink_to(tmp_path)
     with pytest.raises(MutatorError, match="a link"):
         work(desk, **CAMPAIGN)

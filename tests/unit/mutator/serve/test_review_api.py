@@ -110,7 +110,7 @@ NO_DECISIONS: tuple[tuple[Any, int], ...] = (
 )
 
 
-def test_what_is_no_decision_is_refused(reviewed: tuple[Client, list[str]], toycar: Workspace) -> None:
+def test_an_invalid_decision_is_refused(reviewed: tuple[Client, list[str]], toycar: Workspace) -> None:
     client, (first, *_) = reviewed
     for body, status in NO_DECISIONS:
         sent = json.dumps(body).replace("ID", first)
@@ -141,7 +141,7 @@ def test_unknown_images_and_runs_are_not_found(reviewed: tuple[Client, list[str]
     assert client.get(f"{API}?{'spec=a&' * 101}").status == 400
 
 
-def test_a_review_file_is_no_link(reviewed: tuple[Client, list[str]], toycar: Workspace) -> None:
+def test_a_review_file_cannot_be_a_link(reviewed: tuple[Client, list[str]], toycar: Workspace) -> None:
     client, (first, *_) = reviewed
     other = client.place / "secret.txt"
     other.write_text(SECRET)

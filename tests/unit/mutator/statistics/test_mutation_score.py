@@ -42,7 +42,7 @@ def lines(sheet: Any) -> dict[tuple[str, str, str], dict[str, Any]]:
     return {line[:3]: dict(zip(sheet.heads, line, strict=True)) for line in sheet.lines}
 
 
-def test_a_mutant_counts_once_and_for_any_of_its_drives(faults: dict[str, Fault]) -> None:
+def test_a_mutant_counts_once_for_all_its_drives(faults: dict[str, Fault]) -> None:
     frame = results(drive("a", HIT), drive("a", ACTIVE), drive("b", CHANGED), drive("c", {}))
     found = lines(score_sheet(frame, faults, GOLDEN))
     total = found["all", "mutants", "permanent"]
@@ -106,7 +106,7 @@ def test_the_note_warns_of_several_draws(faults: dict[str, Fault]) -> None:
     assert "without weights" not in score_sheet(frame, faults, GOLDEN, [small]).note
 
 
-def test_by_operator(faults: dict[str, Fault]) -> None:
+def test_scores_by_operator(faults: dict[str, Fault]) -> None:
     frame = results(drive("a", HIT), drive("b", ACTIVE, fault_type="branch"), {"fault_id": "x"} | HIT)
     found = lines(score_sheet(frame, faults, GOLDEN))
     assert found["arithmetic", "mutants", "permanent"]["hazard"] == share(1, 1)
@@ -118,7 +118,7 @@ def test_a_run_without_operators_has_no_score(faults: dict[str, Fault]) -> None:
     assert not score_sheet(results(HIT), {"a": replace(faults["a"], module="radar")}, GOLDEN).lines
 
 
-def test_intervals_of_drives_are_between_mutants(faults: dict[str, Fault]) -> None:
+def test_intervals_of_drives_resample_mutants(faults: dict[str, Fault]) -> None:
     frame = results(*(drive(name, HIT if name == "a" else ACTIVE) for name in "ab" for _ in range(10)))
     found = lines(score_sheet(frame, faults, GOLDEN))["all", "drives", "permanent"]["hazard"]
     assert (found.low, found.high) == (0.0, 1.0)

@@ -92,7 +92,7 @@ def test_without_censoring_the_median_is_the_usual_one(size: int) -> None:
     assert reaction(sample).median == pytest.approx(np.median(drawn))
 
 
-def test_a_curve_that_ends_at_one_half_has_the_median_where_it_came_there() -> None:
+def test_a_curve_that_ends_at_one_half_has_its_median_at_that_step() -> None:
     assert reaction(LIFELINES["one half to the end"]).median == 2.0
 
 

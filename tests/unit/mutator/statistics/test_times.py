@@ -27,7 +27,7 @@ def test_times_count_from_activation() -> None:
     assert (found["alert to hazard"].n, found["alert to hazard"].mean) == (1, 2.0)
 
 
-def test_no_reaction_time_without_an_alert_that_came_first() -> None:
+def test_a_reaction_time_needs_an_earlier_alert() -> None:
     frame = results(run(9.0, 9.0), run(9.5, 9.0), run("", 9.0))
     assert times.propagation(frame)["alert to hazard"].n == 0
     found = times.reaction(frame, ENDS, DRIVER_S)
@@ -60,7 +60,7 @@ def test_censored_times_raise_the_median() -> None:
     assert many.survival == pytest.approx(0.9)
 
 
-def test_alerts_without_any_hazard_are_no_median() -> None:
+def test_alerts_without_any_hazard_have_no_median() -> None:
     found = times.reaction(results(run(10.0, "")), ENDS, DRIVER_S)
     assert (found.survival, found.at_risk, found.events) == (1.0, 1, 0)
     assert math.isnan(found.median)

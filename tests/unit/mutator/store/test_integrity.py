@@ -108,7 +108,7 @@ def test_missing_lines_are_counted(run: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["records/0002-a.jsonl", "proof/x.jsonl", "golden/A/more", "plan/old"])
-def test_a_stranger_in_a_finished_run_is_told(run: Path, name: str) -> None:
+def test_an_unknown_file_in_a_finished_run_is_reported(run: Path, name: str) -> None:
     (run / name).write_bytes(b"")
     assert str(problem(run)).startswith(f"{run / name}: not named in digests.json")
 
@@ -122,7 +122,7 @@ def test_files_outside_the_seal_are_not_checked(run: Path, name: str) -> None:
     assert RunFolder.open(run).finished
 
 
-def test_swapped_files_are_told(run: Path) -> None:
+def test_swapped_files_are_reported(run: Path) -> None:
     a, b = run / "golden" / "A" / "log.npz", run / "golden" / "A" / "said.json"
     content = a.read_bytes()
     a.write_bytes(b.read_bytes())
@@ -156,7 +156,7 @@ def test_a_segment_of_another_run_is_refused(run: Path) -> None:
     assert str(problem(run)).startswith(f"{path}:1: records of plan 0000000000000000")
 
 
-def test_a_record_of_nothing_planned_is_told(run: Path) -> None:
+def test_a_record_outside_the_plan_is_reported(run: Path) -> None:
     path = unsealed(run, {"experiment_id": "0" * 16, "status": "ok"})
     assert str(problem(run)).startswith(f"{path}:2: a record of {'0' * 16}, which is not planned")
 

@@ -85,7 +85,7 @@ def test_only_damaged_lines_are_lost(path: Path, change: str) -> None:
 
 
 @pytest.mark.parametrize("keep", [1, 20, -1, -2])
-def test_a_torn_last_line_is_no_damage(path: Path, keep: int) -> None:
+def test_an_incomplete_last_line_is_no_damage(path: Path, keep: int) -> None:
     lines = path.read_bytes().splitlines(keepends=True)
     path.write_bytes(b"".join(lines[:-1]) + lines[-1][:keep])
     segment = read_segment(path)

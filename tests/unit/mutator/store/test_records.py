@@ -38,7 +38,7 @@ def test_records_are_read_as_written(tmp_path: Path, record: MakeRecord) -> None
     assert read_records(tmp_path) == {"a" * 16: first, "b" * 16: second}
 
 
-def test_a_line_has_what_asdict_gives(record: MakeRecord) -> None:
+def test_a_line_equals_asdict(record: MakeRecord) -> None:
     activation = Activation(first=1.0, last=2.0, count=3)
     error = RunError(kind="ValueError", message="no", place="a.py:3")
     for one in (record(), replace(record(), activation=activation), replace(record(), error=error)):
@@ -56,7 +56,7 @@ def test_a_record_without_an_error_has_no_such_key(tmp_path: Path, record: MakeR
 
 
 @pytest.mark.parametrize("keep", [1, 20, -1, -2])
-def test_a_torn_last_line_is_skipped(tmp_path: Path, record: MakeRecord, keep: int) -> None:
+def test_an_incomplete_last_line_is_skipped(tmp_path: Path, record: MakeRecord, keep: int) -> None:
     path = write(tmp_path, "0001-gw0.jsonl", record("a" * 16), record("b" * 16))
     lines = path.read_bytes().splitlines(keepends=True)
     path.write_bytes(b"".join(lines[:-1]) + lines[-1][:keep])
@@ -64,13 +64,13 @@ def test_a_torn_last_line_is_skipped(tmp_path: Path, record: MakeRecord, keep: i
 
 
 @pytest.mark.parametrize("content", [b"", b'{"sche'])
-def test_a_file_killed_at_birth_is_empty(tmp_path: Path, content: bytes) -> None:
+def test_a_file_without_its_head_is_empty(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "records").mkdir()
     (tmp_path / "records" / "0001-gw0.jsonl").write_bytes(content)
     assert read_records(tmp_path) == {}
 
 
-def test_a_line_that_is_no_record_is_told(tmp_path: Path) -> None:
+def test_an_invalid_record_is_reported(tmp_path: Path) -> None:
     writer = LineWriter(tmp_path / "records" / "0001-gw0.jsonl", HEAD)
     writer.append({"experiment_id": 3})
     writer.close()

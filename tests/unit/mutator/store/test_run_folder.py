@@ -61,7 +61,7 @@ def test_a_newer_schema_is_refused(folder: RunFolder) -> None:
         RunFolder.open(folder.path)
 
 
-def test_no_run_folder(tmp_path: Path) -> None:
+def test_a_folder_that_is_no_run_is_refused(tmp_path: Path) -> None:
     with pytest.raises(MutatorError, match="not a run folder"):
         RunFolder.open(tmp_path)
 
@@ -87,7 +87,7 @@ def test_a_run_folder_has_one_owner(folder: RunFolder) -> None:
         assert (folder.path / "owner.lock").read_text().strip().isdigit()
 
 
-def test_workers_of_a_dead_command_are_waited_for(folder: RunFolder) -> None:
+def test_a_new_owner_waits_for_workers_of_a_dead_command(folder: RunFolder) -> None:
     process = holder(folder, "worker", "1")
     assert locks.living_workers(folder.path) == [process.pid]
     with pytest.raises(MutatorError, match=rf"workers of an earlier run .* {process.pid}\)"):

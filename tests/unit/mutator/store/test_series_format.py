@@ -45,7 +45,7 @@ def test_values_equal_to_golden_take_no_space() -> None:
     assert len(encode(golden, golden)) < 100
 
 
-def test_points_come_back() -> None:
+def test_points_round_trip() -> None:
     single = np.array([np.inf], dtype="<f4")
     points = Points(channel=np.array([2]), t=np.array([0.013]), golden=single, faulty=-single)
     values = np.zeros((3, 6), dtype="<f4")

@@ -95,7 +95,7 @@ def test_the_budget_keeps_the_best_series_however_often_they_are_packed(tmp_path
     assert files(runs[0]) == files(runs[1])
 
 
-def test_series_of_shards_make_those_of_one_run(tmp_path: Path, packed: Path) -> None:
+def test_merged_series_of_shards_equal_those_of_one_run(tmp_path: Path, packed: Path) -> None:
     shards = [tmp_path / name for name in "ab"]
     for shard, part in zip(shards, (IDS[:25], IDS[25:]), strict=True):
         append(shard, "0001-main", part)
@@ -118,7 +118,7 @@ def test_equal_golden_runs_stay_separate(tmp_path: Path) -> None:
     assert {*index.golden_of.values()} == {"A", "B+alone"}
 
 
-def test_a_torn_end_loses_what_was_in_flight_alone(tmp_path: Path) -> None:
+def test_a_truncated_segment_loses_only_its_last_series(tmp_path: Path) -> None:
     append(tmp_path, "0001-main", IDS[:3])
     [segment] = segments(tmp_path)
     segment.write_bytes(segment.read_bytes()[:-100])

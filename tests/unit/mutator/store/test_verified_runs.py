@@ -90,7 +90,7 @@ def test_a_change_after_verification_is_found(made: tuple[Workspace, Path], cach
     RunFolder.open(run)
 
 
-def test_a_damaged_entry_vouches_for_nothing(made: tuple[Workspace, Path], cache: Path) -> None:
+def test_a_damaged_entry_is_not_used(made: tuple[Workspace, Path], cache: Path) -> None:
     run = made[1]
     RunFolder.open(run)
     key = integrity.content_key(run)

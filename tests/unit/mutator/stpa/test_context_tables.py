@@ -90,7 +90,7 @@ def test_the_shipped_table_covers_everything_once(clone: Workspace) -> None:
     }
 
 
-def test_the_safe_headway_is_data(clone: Workspace, tmp_path: Path) -> None:
+def test_the_safe_headway_is_read_from_the_table(clone: Workspace, tmp_path: Path) -> None:
     text = (clone.library / "stpa" / "contexts" / "accelerate_decelerate.yaml").read_text()
     path = tmp_path / "wide.yaml"
     path.write_text(text.replace("safe_hwt_s: 2.0", "safe_hwt_s: 3"))

@@ -30,7 +30,7 @@ def meets(box: Box, start: Point, end: Point) -> bool:
     return x1 < box.x + box.width and x2 > box.x and y1 < box.bottom and y2 > box.y
 
 
-def test_boxes_stand_apart_and_inside(layout: Layout) -> None:
+def test_boxes_do_not_overlap_and_are_inside(layout: Layout) -> None:
     for one, other in combinations(layout.boxes.values(), 2):
         assert not meets(one, (other.x, other.y), (other.x + other.width, other.bottom))
     for box in layout.boxes.values():
@@ -47,7 +47,7 @@ def test_arrows_join_their_boxes_and_cross_no_other(analysis: Analysis, layout: 
             assert not any(meets(box, start, end) for start, end in pairwise(points)), name
 
 
-def test_no_two_arrows_lie_on_each_other(layout: Layout) -> None:
+def test_arrows_do_not_overlap(layout: Layout) -> None:
     for (one, first), (other, second) in combinations(layout.arrows.items(), 2):
         for a, b in pairwise(first.points):
             for c, d in pairwise(second.points):
@@ -59,7 +59,7 @@ def test_no_two_arrows_lie_on_each_other(layout: Layout) -> None:
                         assert not together or abs(a[1 - i] - c[1 - i]) >= APART - 8, (one, other)
 
 
-def test_labels_are_clear_of_boxes_arrows_and_each_other(analysis: Analysis, layout: Layout) -> None:
+def test_labels_overlap_nothing(analysis: Analysis, layout: Layout) -> None:
     areas = {}
     for name, link in analysis.structure.links.items():
         arrow, width = layout.arrows[name], 7.0 * len(link.label)

@@ -26,7 +26,7 @@ def test_a_manifest_is_read(toy: Workspace) -> None:
     assert dict(manifest.observation.expressions)["v_lead"] == "now.lead_speed"
 
 
-def test_actuators_are_exact_and_rounding_counts_for_no_other_channel(toy: Workspace) -> None:
+def test_actuators_have_no_default_tolerance(toy: Workspace) -> None:
     path = toy.library / "targets" / "toy.yaml"
     kept = "{unit: m/s, role: actuator, tolerance: 0.5}"
     more = ("pedal: {unit: '-', role: actuator}", "wish: {unit: m}", "gap: {unit: m, tolerance: 0}")

@@ -100,7 +100,7 @@ def test_the_manifest_is_valid_without_the_mistakes(path: Path) -> None:
         ("  least:", "  t_hit least:", "'t_hit least'", "letters"),
         ("follow: cart", "follow: car", "'car'", "cart"),
         ('{y: "0"}', "{points_m: [[1, 2], [3]]}", "[3.0]", "[x, y]"),
-        ("alerts: [beep]", "alerts: [beep, Beep]", "'Beep'", "once"),
+        ("alerts: [beep]", "alerts: [beep, Beep]", "'Beep'", "unique name"),
     ],
 )
 def test_a_mistake_is_reported_with_a_remedy(

@@ -82,7 +82,7 @@ def test_a_file_of_both_overlay_and_root_is_refused(pole: Workspace, name: str) 
         _ = pole.manifest("pole").tree
 
 
-def test_the_probes_name_in_an_overlay(pole: Workspace) -> None:
+def test_an_overlay_cannot_have_the_probes_name(pole: Workspace) -> None:
     (pole.library / "overlays" / "pole" / "_fi.py").write_text("x = 1\n")
     with pytest.raises(MutatorError, match=r"the target has a file _fi.py; expected no file of this name"):
         build(pole.manifest("pole"), pole.fault_models(), None, always())

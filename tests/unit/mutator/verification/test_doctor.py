@@ -11,7 +11,7 @@ from mutator.verification.doctor import Level
 NO_LIBRARY = MutatorError("no fault library", remedy="say --root")
 
 
-def test_this_machine_can_run_campaigns_but_for_the_library() -> None:
+def test_on_this_machine_only_the_library_fails() -> None:
     findings = doctor.examine(NO_LIBRARY)
     failed = [f for f in findings if f.level is Level.FAIL]
     assert [(f.name, f.found, f.remedy) for f in failed] == [("library", "no fault library", "say --root")]

@@ -230,7 +230,7 @@ def test_a_trigger_that_no_scenario_reaches_is_reported(toy: Workspace) -> None:
     }
 
 
-def test_a_canary_that_does_no_harm_is_told_with_all_values(toy: Workspace) -> None:
+def test_a_harmless_canary_is_reported_with_all_values(toy: Workspace) -> None:
     change(toy, "fault_library/campaigns/small.yaml", "at_s: 1.0", "at_s: 5.9")
     toy.campaign("toy").unlink()
     found = driven(toy)["canary small"]

@@ -53,7 +53,7 @@ def test_a_sound_target_passes(toycar: Workspace, tmp_path: Path, monkeypatch: p
     assert run_checks(toycar, folder) == results
 
 
-def test_a_damaged_golden_run_is_made_again(toycar: Workspace, tmp_path: Path) -> None:
+def test_a_damaged_golden_run_is_replaced(toycar: Workspace, tmp_path: Path) -> None:
     folder = frozen(toycar, tmp_path)
     run_checks(toycar, folder)
     trace = folder.golden("A") / "log.npz"
@@ -140,7 +140,7 @@ def test_a_missing_anchor_is_reported_before_any_run(
         run_checks(toycar, folder)
 
 
-def test_other_golden_runs_than_before_are_refused(
+def test_changed_golden_runs_are_refused(
     toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = frozen(toycar, tmp_path)

@@ -79,7 +79,7 @@ def test_a_segment_with_forged_checksums_loses_all_lines(run: Path) -> None:
     assert folder.records() == {}
 
 
-def test_lines_that_were_added_by_such_a_hand_go(run: Path, made: Path) -> None:
+def test_added_lines_with_forged_checksums_are_removed(run: Path, made: Path) -> None:
     head, *lines = [json.loads(line) for line in (run / RECORDS).read_text().splitlines()]
     values = [{k: v for k, v in line.items() if k != "sum"} for line in [*lines, lines[0]]]
     (run / RECORDS).write_bytes(written(run / RECORDS, {k: head[k] for k in ("schema", "plan")}, values))
@@ -87,7 +87,7 @@ def test_lines_that_were_added_by_such_a_hand_go(run: Path, made: Path) -> None:
     assert folder.records() == RunFolder.open(made).records()
 
 
-def test_a_segment_that_is_gone_is_forgotten(run: Path) -> None:
+def test_a_missing_segment_loses_its_records(run: Path) -> None:
     (run / RECORDS).unlink()
     said, folder = repaired(run)
     assert folder.records() == {} and said == [f"{RECORDS} is gone"]
@@ -216,7 +216,7 @@ def test_a_folder_or_link_in_place_of_a_file_is_moved_aside(run: Path, name: str
     assert aside.is_symlink() if is_link else (aside / "thesis.tex").read_text() == "mine"
 
 
-def test_a_file_of_patches_that_is_a_link_is_put_aside(run: Path, put_patches: Callable[..., None]) -> None:
+def test_a_link_in_place_of_a_patch_file_is_moved_aside(run: Path, put_patches: Callable[..., None]) -> None:
     name = next(plan_file.ids(run))
     put_patches(run, {name: b"not the patch of the record"})
     [file] = Patches(run).files()

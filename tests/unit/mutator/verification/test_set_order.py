@@ -42,7 +42,7 @@ def test_code_that_depends_on_the_order_of_a_set_is_found(line: str) -> None:
         "this is no Python",
     ],
 )
-def test_what_needs_no_order_is_not(line: str) -> None:
+def test_code_that_needs_no_order_is_not_reported(line: str) -> None:
     assert places(line.encode()) == []
 
 

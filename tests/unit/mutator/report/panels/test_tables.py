@@ -60,7 +60,7 @@ def test_tables_are_written_byte_for_byte_again(run: RunFolder) -> None:
     assert contents[0] == contents[1]
 
 
-def test_a_table_that_counts_alerts_tells_of_those_without_a_fault(run: RunFolder) -> None:
+def test_a_table_of_alerts_notes_those_of_fault_free_runs(run: RunFolder) -> None:
     golden = run.path / "golden" / "S1"
     drive = {name: np.ones(3000) for name in ("d_rel", "v_ego", "v_lead", "a_ego", "hwt")}
     drive |= {"t": np.arange(3000) / 100, "lateral_offset": np.linspace(-0.25, 0.5, 3000)}
@@ -76,7 +76,7 @@ def test_a_table_that_counts_alerts_tells_of_those_without_a_fault(run: RunFolde
 
 
 @pytest.mark.parametrize("alerts", [["fcw"], []])
-def test_alerts_are_told_only_of_a_target_that_has_some(run: RunFolder, alerts: list[str]) -> None:
+def test_a_target_without_alerts_has_no_tables_of_alerts(run: RunFolder, alerts: list[str]) -> None:
     head = json.loads((run.path / "run.json").read_text()) | {"alerts": alerts}
     (run.path / "run.json").write_text(json.dumps(head))
     markdown = tables_panel(ReportedRun.open(RunFolder.unverified(run.path), HERE)).markdown
