@@ -1,4 +1,4 @@
-"""Campaigns on a foreign target, from the first command to the table, as a user runs them."""
+"""Campaigns on a foreign target, from the first command to the table."""
 
 import csv
 import os
@@ -68,15 +68,12 @@ def finished_once(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToy
 
 @pytest.fixture
 def finished(finished_once: Finished, tmp_path: Path) -> Path:
-    """The run folder of a small finished campaign."""
     return Path(shutil.copytree(finished_once.run, tmp_path / "finished"))
 
 
 def test_bad_ends_are_results(toy: Workspace, tmp_path: Path) -> None:
-    """A mutant that ends badly has a status and is not a harness error.
-
-    The cases are loops, crashes, exits, exhausted memory and mutants that do not compile.
-    """
+    """Loops, crashes, exits, exhausted memory and mutants that do not compile are statuses, not harness
+    errors."""
     summary = run_campaign(toy, "hostile", tmp_path / "run")
     assert (summary.exit_code, summary.harness_errors, summary.problem) == (0, (), "")
     found = {row["fault_type"]: (row["status"], row["outcome"]) for row in rows_of(tmp_path / "run")}
@@ -91,10 +88,7 @@ def test_bad_ends_are_results(toy: Workspace, tmp_path: Path) -> None:
     }
 
 
-def test_a_run_leaves_what_it_should(finished_once: Finished) -> None:
-    """A run leaves plan, goldens, patches, records and tables, no scratch files, and an unchanged target
-    tree.
-    """
+def test_a_run_leaves_its_results_and_no_scratch_files(finished_once: Finished) -> None:
     out, summary, told = finished_once.run, finished_once.summary, finished_once.told
     assert finished_once.after == finished_once.before
     assert {stage.stage for stage in told} == {"plan", "checks", "golden", "experiments", "tables"}
@@ -126,8 +120,8 @@ def test_a_run_leaves_what_it_should(finished_once: Finished) -> None:
         assert (Patches(out).read(name) or b"").startswith(b"diff --git a/")
 
 
-def test_what_a_kill_left_half_written_is_cleared(toy: Workspace, finished: Path) -> None:
-    """The next command deletes half-written files wherever the harness writes, and no other file."""
+def test_the_next_command_deletes_half_written_files(toy: Workspace, finished: Path) -> None:
+    """No other file is deleted."""
     places = (".run.json.7", "plan/.faults.jsonl.7", "report/tables/.a.csv.7", "series/.index.js.7")
     left = [finished / place for place in places]
     mine = finished / "report" / "tables" / ".notes"
@@ -139,8 +133,7 @@ def test_what_a_kill_left_half_written_is_cleared(toy: Workspace, finished: Path
 
 
 @pytest.mark.skipif(shutil.which("patch") is None, reason="needs the program patch")
-def test_a_patch_is_the_mutant(toy: Workspace, finished: Path, tmp_path: Path) -> None:
-    """A stored patch applied to the target gives the files of the mutant that ran, byte for byte."""
+def test_a_stored_patch_produces_the_mutant(toy: Workspace, finished: Path, tmp_path: Path) -> None:
     row = next(row for row in rows_of(finished) if row["outcome"] == "sdc")
     name = row["experiment_id"]
     tree = tmp_path / "patched"
@@ -157,7 +150,7 @@ def test_a_patch_is_the_mutant(toy: Workspace, finished: Path, tmp_path: Path) -
 def test_rerun_gives_the_same_record_and_a_trace(
     toy: Workspace, finished: Path, reseal: Callable[[Path], None]
 ) -> None:
-    """A rerun reproduces any experiment exactly and can keep its trace. It notices a changed record."""
+    """A changed record is noticed."""
     for row in rows_of(finished)[:3]:
         single, same = rerun(toy, finished, row["experiment_id"][:8])
         assert same
@@ -172,7 +165,6 @@ def test_rerun_gives_the_same_record_and_a_trace(
 
 
 def test_one_experiment_without_a_campaign(toy: Workspace, finished: Path, tmp_path: Path) -> None:
-    """A workspace alone can run an experiment and its golden run."""
     experiment = plan_file.read_all(finished)[0]
     single = run_single(toy, toy.manifest("toycar"), experiment, tmp_path / "alone")
     assert single.record.status is Status.OK
@@ -188,10 +180,7 @@ def test_one_experiment_without_a_campaign(toy: Workspace, finished: Path, tmp_p
         run_single(toy, toy.manifest("toycar"), experiment, tmp_path / "broken")
 
 
-def test_harness_errors_are_tried_again(
-    toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Harness errors have exit code 3 and no outcome. The same command repeats only those experiments."""
+def test_harness_errors_run_again(toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     execute, hit = ReferenceEngine.execute, []
 
     def flaky(self: ReferenceEngine, job: Job, folder: Path) -> Execution:
@@ -214,10 +203,10 @@ def test_harness_errors_are_tried_again(
     assert run_campaign(toy, "small", out).ran == 0
 
 
-def test_a_defect_in_a_worker_is_told(
+def test_a_defect_in_a_worker_is_reported(
     toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """If a harness defect ends a chunk, the defect is reported and the other chunks complete."""
+    """The other chunks complete."""
     run, seen = Worker.run, []
 
     def broken(self: Worker, pending: Pending) -> list[tuple[str, str]]:
@@ -233,10 +222,10 @@ def test_a_defect_in_a_worker_is_told(
     assert "ZeroDivisionError: seven" in summary.problem
 
 
-def test_the_users_pytest_is_another_matter(
+def test_pytest_settings_of_the_user_do_not_reach_the_campaign(
     toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The user's pytest settings do not reach the campaign and remain in the environment."""
+    """The settings remain in the environment."""
     told = {"PYTEST_ADDOPTS": "--no-such-option", "PYTEST_PLUGINS": "no_such_plugin"}
     for name, value in told.items():
         monkeypatch.setenv(name, value)
@@ -254,8 +243,7 @@ def test_scenarios_in_a_folder_of_the_library(toy: Workspace, tmp_path: Path) ->
     assert (summary.exit_code, summary.done) == (0, 2)
 
 
-def test_what_cannot_be_planned_leaves_no_folder(toy: Workspace, tmp_path: Path) -> None:
-    """A mistake in the campaign, or a missing approval, creates no folder. An existing folder stays."""
+def test_a_campaign_that_cannot_be_planned_leaves_no_folder(toy: Workspace, tmp_path: Path) -> None:
     (tmp_path / "old").mkdir()
     for out in (tmp_path / "new", tmp_path / "old"):
         with pytest.raises(MutatorError, match="no campaign"):
@@ -265,7 +253,7 @@ def test_what_cannot_be_planned_leaves_no_folder(toy: Workspace, tmp_path: Path)
     assert [path.name for path in tmp_path.iterdir() if path.name in ("new", "old")] == ["old"]
 
 
-def test_choices_are_frozen(toy: Workspace, finished: Path) -> None:
+def test_a_run_keeps_its_options(toy: Workspace, finished: Path) -> None:
     """A run resumes without its options repeated. Other options or texts are refused."""
     assert run_campaign(toy, "small", finished, choices=Choices(seed=3)).exit_code == 0
     for choices in (
@@ -322,12 +310,9 @@ os.write(1, (out / "results.csv").read_bytes())
 
 
 @pytest.mark.parametrize("workers", [pytest.param(0, marks=pytest.mark.slow), 2])
-def test_a_full_disk(toy: Workspace, finished: Path, tmp_path: Path, workers: int) -> None:
-    """A full disk stops the campaign with a clear error.
-
-    Once there is space, the same command completes the run with the same table and repeats no finished
-    experiment.
-    """
+def test_a_campaign_resumes_after_a_full_disk(
+    toy: Workspace, finished: Path, tmp_path: Path, workers: int
+) -> None:
     disk = tmp_path / "disk"
     disk.mkdir()
     script = f'mount -t tmpfs -o size=6m none "{disk}" && exec "$0" -c "$1" "$2" "{disk}" {workers}'

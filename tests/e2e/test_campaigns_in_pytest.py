@@ -1,4 +1,4 @@
-"""Campaigns as pytest sessions, as a user of pytest runs them."""
+"""Campaigns as pytest sessions."""
 
 import json
 import os
@@ -18,7 +18,6 @@ from mutator.workspace import Workspace
 
 
 def pytest_campaign(toy: Workspace, *words: object) -> "subprocess.CompletedProcess[str]":
-    """Run pytest as a user would, in the toy's folder."""
     plain = ["-m", "pytest", "-p", "no:cacheprovider", "-p", "no:hypothesispytest", "--assert=plain"]
     return subprocess.run(
         [sys.executable, *plain, *map(str, words)],
@@ -44,8 +43,9 @@ def pytest_campaign(toy: Workspace, *words: object) -> "subprocess.CompletedProc
         (["--campaign", "unarmed", "--campaign-out", "out", "-n", "2"], 1, "canary: did not reach H3"),
     ],
 )
-def test_pytest_answers_wrong_input(toy: Workspace, words: list[str], code: int, told: str) -> None:
-    """Under pytest, a mistake has a clear error and the exit code of its kind, without a traceback."""
+def test_mistakes_under_pytest_have_clear_errors(
+    toy: Workspace, words: list[str], code: int, told: str
+) -> None:
     root = toy.library.parent
     (root / "newer").mkdir()
     (root / "newer" / "run.json").write_text(json.dumps({"schema": "run/99"}))
@@ -58,7 +58,7 @@ def test_pytest_answers_wrong_input(toy: Workspace, words: list[str], code: int,
 
 
 def test_pytest_without_a_campaign_is_untouched(toy: Workspace) -> None:
-    """Unless a campaign is requested, the plugin does nothing and imports no other part of the harness."""
+    """The plugin imports no other part of the harness."""
     test = "import sys\n\ndef test_it():\n    assert 'mutator.execution.session' not in sys.modules\n"
     (toy.library.parent / "test_it.py").write_text(test)
     answer = pytest_campaign(toy, "test_it.py")
@@ -68,10 +68,7 @@ def test_pytest_without_a_campaign_is_untouched(toy: Workspace) -> None:
 
 @pytest.mark.slow
 def test_pytest_in_one_process(toy: Workspace, tmp_path: Path) -> None:
-    """Without xdist, the same items run in the command's process.
-
-    For a finished run there is nothing to do.
-    """
+    """The items are the same as with xdist."""
     words = ("--campaign", "small", "--campaign-out", tmp_path / "run")
     answer = pytest_campaign(toy, *words)
     assert answer.returncode == 0, answer.stdout
@@ -85,8 +82,8 @@ def test_pytest_in_one_process(toy: Workspace, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("given", "used"), [("loadfile", "load"), ("load", "load"), ("no", "no")])
-def test_work_is_dealt_out_piece_by_piece(tmp_path: Path, given: str, used: str) -> None:
-    """All chunks belong to one file, but `--dist loadfile` does not give all of them to one worker."""
+def test_loadfile_distributes_chunks_over_all_workers(tmp_path: Path, given: str, used: str) -> None:
+    """All chunks belong to one file."""
     registered: list[object] = []
     manager = SimpleNamespace(get_plugins=lambda: (), register=registered.append)
     config: Any = SimpleNamespace(option=SimpleNamespace(dist=given), pluginmanager=manager)
@@ -96,8 +93,6 @@ def test_work_is_dealt_out_piece_by_piece(tmp_path: Path, given: str, used: str)
 
 
 class Counting:
-    """Pytest plugin that records what was collected, and when."""
-
     def __init__(self) -> None:
         self.items = 0
         self.seconds = 0.0
@@ -109,7 +104,7 @@ class Counting:
 
 
 def test_collecting_50000_experiments_is_cheap(toy: Workspace, tmp_path: Path) -> None:
-    """Collecting 2,500 chunks is fast and opens neither plan nor target nor library."""
+    """Collecting 2,500 chunks opens neither plan nor target nor library."""
     begun: Any = SimpleNamespace(
         folder=SimpleNamespace(path=tmp_path / "nowhere"),
         workspace=Workspace(library=tmp_path / "nowhere", templates=tmp_path / "nowhere"),

@@ -40,7 +40,6 @@ def workspace(example: str) -> Workspace:
 
 @pytest.fixture(scope="module")
 def run(workspace: Workspace, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of the example's first campaign."""
     out = tmp_path_factory.mktemp("examples") / "run"
     assert run_campaign(workspace, "first", out, workers=2).exit_code == 0
     return out
@@ -50,16 +49,12 @@ def rows(run: Path) -> list[dict[str, str]]:
     return list(csv.DictReader((run / "results.csv").open()))
 
 
-def test_nothing_is_left_to_do(workspace: Workspace) -> None:
-    """`mutator check` reports nothing: every placeholder is filled, and each fault finds its statement."""
+def test_check_finds_nothing_to_fix(workspace: Workspace) -> None:
     assert mutator.check_library(workspace) == []
 
 
 def test_every_experiment_ends_well(run: Path) -> None:
-    """No experiment is a harness error or timeout, and crashes are the controller's.
-
-    Some faults do harm and some do not.
-    """
+    """Crashes of the controller are results. Some faults do harm and some do not."""
     statuses = Counter(row["status"] for row in rows(run))
     assert sum(statuses.values()) >= 40
     assert set(statuses) <= {"ok", "crashed"}
@@ -67,7 +62,6 @@ def test_every_experiment_ends_well(run: Path) -> None:
 
 
 def test_only_a_contact_has_a_contact_speed(run: Path) -> None:
-    """A car that leaves the road without a contact has neither contact speed nor delta-v."""
     contacts = [(row.get("contact_speed", ""), row.get("delta_v", "")) for row in rows(run)]
     assert all(bool(speed) == bool(delta_v) for speed, delta_v in contacts)
 
@@ -80,17 +74,12 @@ def test_nearly_all_are_forked(run: Path) -> None:
 
 
 def test_engines_agree(run: Path, workspace: Workspace, tmp_path: Path) -> None:
-    """The reference engine, with a fresh interpreter for each experiment, gives the same bytes.
-
-    The campaign's own equivalence check agrees.
-    """
     assert run_campaign(workspace, "first", tmp_path / "run", workers=2, engine="reference").exit_code == 0
     for name in ("results.csv", "plan.csv"):
         assert (tmp_path / "run" / name).read_bytes() == (run / name).read_bytes()
 
 
 def own_lines(folder: Path, suffix: str) -> Counter[str]:
-    """Return the lines of the files of a kind, without comments and empty lines."""
     return counted("\n".join(path.read_text() for path in sorted(folder.rglob(f"*{suffix}"))))
 
 
@@ -107,10 +96,6 @@ def counted(text: str) -> Counter[str]:
 
 @pytest.mark.parametrize(("suffix", "most"), [(".py", MOST_GLUE), (".yaml", MOST_YAML)])
 def test_few_lines_are_written_by_hand(example: str, suffix: str, most: int, tmp_path: Path) -> None:
-    """An example adds few lines to those that `mutator init` writes.
-
-    The scene, which does not affect results, is short as well.
-    """
     mutator.init_library(tmp_path / "new", target=f"installed:{INSTALLED[example]}")
     own = own_lines(EXAMPLES / example, suffix) - own_lines(tmp_path / "new", suffix)
     if suffix == ".yaml":
@@ -121,7 +106,7 @@ def test_few_lines_are_written_by_hand(example: str, suffix: str, most: int, tmp
 
 
 def test_the_extra_has_what_the_examples_need() -> None:
-    """On Pythons that opendbc supports, one extra installs the packages of all examples."""
+    """The extra needs a Python that opendbc supports."""
     text = (EXAMPLES.parent / "pyproject.toml").read_text(encoding="utf-8")
     (line,) = [line for line in text.splitlines() if line.startswith("examples = ")]
     for package in ("gymnasium", "highway-env", "opendbc", "simple-pid"):

@@ -1,4 +1,4 @@
-"""A foreign tree of flat modules with glue in an overlay and no hazard analysis, from `run` to `verify`."""
+"""A target of flat modules with glue in an overlay and no hazard analysis, from `run` to `verify`."""
 
 import json
 from collections.abc import Callable
@@ -14,7 +14,6 @@ Cli = Callable[..., tuple[int, str]]
 
 @pytest.fixture
 def cli(pole: Workspace, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Cli:
-    """Run `mutator WORDS...` on the pole and return the exit code and output."""
     monkeypatch.setenv("MUTATOR_LIBRARY", str(pole.library))
     monkeypatch.setenv("MUTATOR_TEMPLATES", str(pole.templates))
 
@@ -27,11 +26,8 @@ def cli(pole: Workspace, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureF
 
 
 @pytest.mark.slow
-def test_a_foreign_tree_by_both_engines(cli: Cli, pole: Workspace, tmp_path: Path) -> None:
-    """Both engines give the same table, and the equivalence check covers every experiment.
-
-    The folder verifies, a rerun gives the same record, and the report shows only what the target has.
-    """
+def test_both_engines_give_the_same_table(cli: Cli, pole: Workspace, tmp_path: Path) -> None:
+    """The equivalence check covers every experiment, and the report shows only what the target has."""
     tables = {}
     for engine in ("reference", "fork"):
         code, said = cli("run", "upright", "--out", tmp_path / engine, "-n", "0", "--engine", engine)

@@ -1,7 +1,5 @@
-"""Ten forgeries of a finished run, each with stale digests and with every digest recomputed.
-
-Every reader finds a forgery with stale digests. Only the seal reveals the other kind.
-"""
+"""Ten forgeries of a finished run, with stale digests and with recomputed ones. Every reader finds the first
+kind. Only the seal reveals the second."""
 
 import json
 import re
@@ -44,7 +42,6 @@ def genuine(
     tmp_path_factory: pytest.TempPathFactory,
     copy_toycar: Callable[[Path], Workspace],
 ) -> tuple[Workspace, Path]:
-    """A finished campaign on the fork engine with its equivalence check. No test writes into it."""
     place = tmp_path_factory.mktemp("genuine")
     is_toy = request.param == "toy"
     workspace = copy_toycar(place) if is_toy else Workspace.find(root=CLONE)
@@ -56,12 +53,11 @@ def genuine(
 
 @pytest.fixture
 def run(genuine: tuple[Workspace, Path], tmp_path: Path) -> Path:
-    """A copy of the run for a forgery. It has a plot, so `show` runs nothing."""
+    """A copy of the run to forge. It has a plot, so `show` runs nothing."""
     return Path(shutil.copytree(genuine[1], tmp_path / "run"))
 
 
 def hazardous(run: Path) -> tuple[Path, int, dict[str, Any]]:
-    """Return the record of a hazard: its segment, its line (from 0) and its content."""
     for path in sorted((run / "records").iterdir()):
         for place, line in enumerate(path.read_text().splitlines()):
             record = json.loads(line)
@@ -71,20 +67,18 @@ def hazardous(run: Path) -> tuple[Path, int, dict[str, Any]]:
 
 
 def rewrite(path: Path, place: int, *lines: str) -> None:
-    """Replace a line by the given lines."""
     old = path.read_text().splitlines()
     path.write_text("".join(f"{line}\n" for line in [*old[:place], *lines, *old[place + 1 :]]))
 
 
 def change(run: Path, **values: Any) -> str:
-    """Change fields of the record of a hazard and return its id."""
     path, place, record = hazardous(run)
     rewrite(path, place, canonical(record | values))
     return str(record["experiment_id"])
 
 
-# The forgeries, each made with an editor. `deep` is what else must change for all digests and ids to match,
-# except those that `reseal` computes.
+# Forgeries that an editor can make. With `deep`, all digests and ids match, except those that `reseal`
+# computes.
 
 
 def an_outcome(run: Path, deep: bool) -> None:
@@ -174,7 +168,6 @@ def a_plan_condition(run: Path, deep: bool) -> None:
 
 
 def replan(run: Path, changed: Callable[[list[Experiment]], list[Experiment]]) -> None:
-    """Replace the plan by a plan of other experiments, with matching run.json and plan.csv."""
     plan = load_plan(RunFolder.unverified(run))
     old = list(plan.experiments)
     new = tuple(changed(old))
@@ -237,7 +230,6 @@ forged = pytest.mark.parametrize("forge", FORGERIES, ids=lambda forge: forge.__n
 def cli(
     genuine: tuple[Workspace, Path], monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> Callable[..., tuple[int, str]]:
-    """Run `mutator WORDS...` in the genuine run's workspace and return exit code and errors."""
     monkeypatch.setenv("MUTATOR_ROOT", str(genuine[0].library.parent))
 
     def answer(*words: object) -> tuple[int, str]:
@@ -253,7 +245,6 @@ EDITED = "results.csv: does not match plan and records; rebuilt"
 
 
 def readers(run: Path, genuine: Path) -> dict[str, tuple[object, ...]]:
-    """Return command lines that read a run folder."""
     campaign = RunFolder.unverified(genuine).head["campaign"]
     name = hazardous(genuine)[2]["experiment_id"]
     out = run.parent
@@ -275,13 +266,10 @@ BLIND = {the_table: ("show", "rerun", "compare", "merge")}
 
 
 @forged
-def test_a_plain_forgery_is_found_by_every_reader(
+def test_every_reader_finds_a_plain_forgery(
     genuine: tuple[Workspace, Path], run: Path, cli: Cli, forge: Callable[[Path, bool], None]
 ) -> None:
-    """Each reader exits with an error that names the forged file.
-
-    If only the table is forged, it is rebuilt with a warning.
-    """
+    """A forged table is rebuilt with a warning."""
     forge(run, False)
     for reader, words in readers(run, genuine[1]).items():
         if reader in BLIND.get(forge, ()):
@@ -297,10 +285,9 @@ def test_a_plain_forgery_is_found_by_every_reader(
 
 
 @forged
-def test_a_plain_forgery_is_found_by_the_api(
+def test_the_api_finds_a_plain_forgery(
     genuine: tuple[Workspace, Path], run: Path, forge: Callable[[Path, bool], None]
 ) -> None:
-    """The Python API finds the forgery, too. A change in the table alone does not reach the frame."""
     name = hazardous(genuine[1])[2]["experiment_id"]
     forge(run, False)
     if forge is the_table:
@@ -315,7 +302,7 @@ def test_a_plain_forgery_is_found_by_the_api(
 
 
 def test_the_genuine_run_passes(genuine: tuple[Workspace, Path], run: Path, cli: Cli, tmp_path: Path) -> None:
-    """The genuine run passes, also as a read-only copy elsewhere. Its seal is the printed one."""
+    """The run is also tried as a read-only copy elsewhere."""
     known = seal_of(RunFolder.open(genuine[1]))
     for path in [run, *run.rglob("*")]:
         path.chmod(0o555 if path.is_dir() else 0o444)
@@ -327,7 +314,7 @@ def test_the_genuine_run_passes(genuine: tuple[Workspace, Path], run: Path, cli:
 
 
 @forged
-def test_a_forgery_whose_digests_all_fit_is_found_by_the_seal(
+def test_the_seal_reveals_a_forgery_with_consistent_digests(
     genuine: tuple[Workspace, Path],
     run: Path,
     reseal: Reseal,
@@ -335,10 +322,7 @@ def test_a_forgery_whose_digests_all_fit_is_found_by_the_seal(
     cli: Cli,
     forge: Callable[[Path, bool], None],
 ) -> None:
-    """A consistent forgery opens like any other run, but its seal differs from the printed one.
-
-    An edited table does not match the records.
-    """
+    """An edited table does not match the records."""
     known = seal_of(RunFolder.open(genuine[1]))
     forge(run, True)
     if forge is not the_table:

@@ -24,8 +24,6 @@ CAMPAIGN = {"kind": "campaign", "campaign": "toy", "name": "new", "limit": 6, "w
 
 @dataclass
 class Server:
-    """`mutator serve` as a separate process."""
-
     folder: Path
     root: Path
     process: subprocess.Popen[str]
@@ -36,7 +34,6 @@ class Server:
         return cls(folder, root, *started(folder, root))
 
     def restart(self) -> None:
-        """Start another server once this one has ended."""
         self.process, self.address = started(self.folder, self.root)
 
     @property
@@ -48,7 +45,6 @@ class Server:
         return self.address.partition("token=")[2]
 
     def ask(self, path: str, body: Any = None) -> Any:
-        """Return the server's response for one of its own pages."""
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=30)
         headers = {"Cookie": f"mutator-{self.port}={self.token}", "Content-Type": "application/json"}
         headers |= {"Origin": f"http://127.0.0.1:{self.port}"}
@@ -59,7 +55,6 @@ class Server:
         return json.loads(answer)
 
     def wait_for(self, what: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
-        """Wait until the condition holds for the newest job."""
         deadline = time.monotonic() + 120
         while time.monotonic() < deadline:
             [job, *_] = self.ask("/api/jobs")["jobs"]
@@ -70,7 +65,6 @@ class Server:
 
 
 def started(folder: Path, root: Path) -> tuple[subprocess.Popen[str], str]:
-    """Start a server and return it with the address that it prints."""
     with (folder / "stderr").open("a") as errors:
         process = subprocess.Popen(
             [sys.executable, "-m", "mutator", "serve", "runs", "--no-browser", "--root", str(root)],
@@ -98,7 +92,6 @@ def descendants(pid: int) -> set[int]:
 
 
 def living(pids: set[int]) -> set[int]:
-    """Return the processes that are still alive."""
     return {pid for pid in pids if Path(f"/proc/{pid}").exists() and _state(pid) != "Z"}
 
 
@@ -117,13 +110,11 @@ def wait_until_gone(pids: set[int], within_s: float) -> None:
 
 
 def mutator(server: Server, *words: str) -> subprocess.CompletedProcess[str]:
-    """Run a command on the server's library."""
     command = [sys.executable, "-m", "mutator", *words, "--root", str(server.root)]
     return subprocess.run(command, cwd=server.folder, capture_output=True, text=True, check=False)
 
 
 def check_left(server: Server, run: str) -> None:
-    """Check that no file of the run folder is half-written and that the whole folder verifies."""
     folder = server.folder / "runs" / run
     assert not [path for path in folder.rglob("*") if is_half_written(path.name)]
     if (folder / "digests.json").exists():
@@ -132,10 +123,7 @@ def check_left(server: Server, run: str) -> None:
 
 
 def kill(server: Server, number: int) -> int:
-    """End the server by a signal and wait until the processes of its jobs are gone.
-
-    Return the number of these processes.
-    """
+    """End the server by a signal and wait until the processes of its jobs are gone. Return their number."""
     pids = descendants(server.process.pid)
     server.process.send_signal(number)
     server.process.wait()
@@ -169,15 +157,14 @@ def test_a_campaign_ends_with_the_server(server: Server, stage: str, number: int
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["plot", "film", "still", "report", "rerun"])
-def test_what_is_made_of_a_run_is_whole_or_missing(server: Server, kind: str) -> None:
-    """If the server is killed during such a job, the run folder stays unchanged or is complete."""
+def test_a_killed_job_leaves_the_run_folder_unchanged_or_complete(server: Server, kind: str) -> None:
     done = mutator(server, "run", "toy", "--out", "runs/new", "--limit", "6", "-n", "2")
     assert done.returncode == 0, done.stdout + done.stderr
     ids = [line.split(",")[0] for line in (server.folder / "runs/new/plan.csv").read_text().splitlines()[1:]]
     order = {"kind": kind, "run": "new"}
     order |= {} if kind == "report" else {"experiment": ids[0]}
     order |= {"t": 2.0} if kind == "still" else {}
-    for _ in range(2):  # the second run has warm caches, as the killed ones do
+    for _ in range(2):  # the second run has warm caches, like the killed ones
         began = time.monotonic()
         server.ask("/api/jobs", order)
         ended = server.wait_for(lambda job: bool(job["ended"]))
@@ -194,7 +181,7 @@ def test_what_is_made_of_a_run_is_whole_or_missing(server: Server, kind: str) ->
 
 @pytest.mark.slow
 def test_a_cancelled_job_leaves_nothing_running(server: Server) -> None:
-    """All processes of a cancelled job are gone before it is reported as ended. The next job then runs."""
+    """The next job runs."""
     server.ask("/api/jobs", CAMPAIGN)
     server.wait_for(lambda job: job["message"].startswith("experiments"))
     pids = descendants(server.process.pid)

@@ -1,7 +1,4 @@
-"""A command that is killed between two writes leaves a folder that opens.
-
-The same command finishes the run.
-"""
+"""A command killed between two writes leaves a folder that opens and resumes."""
 
 import shutil
 from collections.abc import Callable
@@ -22,14 +19,12 @@ RENAMES = ((Path, "replace"), (Path, "rename"), (shutil, "rmtree"))
 
 
 class Killed(BaseException):
-    """Raised in place of the end of the process."""
+    """Raised instead of ending the process."""
 
 
 class Death:
-    """Allow this many renames in a run folder and fail all later ones. Files appear by being renamed.
-
-    Renames of scratch files do not count.
-    """
+    """Allow this many renames in a run folder and fail all later ones. Each file appears by a rename. Renames
+    of scratch files do not count."""
 
     def __init__(self, run: Path, after: int, patch: pytest.MonkeyPatch) -> None:
         self.left, self._run = after, run
@@ -50,7 +45,6 @@ class Death:
 
 
 def run(workspace: Workspace, out: Path) -> str | None:
-    """Run two experiments of the toy campaign, or resume them, and return the seal."""
     summary = run_campaign(workspace, "small", out, choices=CHOICES, engine="reference")
     assert summary.exit_code == 0
     return summary.seal
@@ -78,10 +72,9 @@ def undisturbed(toy: Workspace, tmp_path: Path) -> tuple[str | None, bytes]:
 
 
 @pytest.mark.slow
-def test_every_kill_between_two_writes(
+def test_a_kill_between_any_two_writes_does_no_harm(
     toy: Workspace, tmp_path: Path, undisturbed: tuple[str | None, bytes]
 ) -> None:
-    """Kills before the first write, before the second and so on do no harm."""
     after = 0
     while check_kill(toy, tmp_path / str(after), after, undisturbed):
         after += 1

@@ -12,7 +12,6 @@ RESEARCH = TUTORIALS / "question-to-figure.ipynb"
 
 
 def run(path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[str, int]:
-    """Run every cell in `folder` and return the text shown and the number of plots."""
     monkeypatch.setenv("MUTATOR_ROOT", str(TUTORIALS.parents[1]))
     monkeypatch.setenv("TMPDIR", str(folder))
     notebook = nbformat.read(path, as_version=4)
@@ -34,7 +33,6 @@ def test_notebooks_are_kept_without_outputs(path: Path) -> None:
 
 @pytest.mark.slow
 def test_the_comparison_notebook_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every cell runs, from fault to comparison. Plots are images, and all experiments have a result."""
     shown, plots = run(COMPARISON, tmp_path, monkeypatch)
     assert plots == 2
     assert "8 of 8 experiments of paper, as_described" in shown
@@ -45,7 +43,7 @@ def test_the_comparison_notebook_runs(tmp_path: Path, monkeypatch: pytest.Monkey
 def test_the_research_notebook_gives_the_answer_of_its_page(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The notebook shows the effect and interval that the tour prints. Its audit finds no difference."""
+    """The effect and the interval are those of the research tour."""
     shown, plots = run(RESEARCH, tmp_path, monkeypatch)
     assert plots == 2
     page = (TUTORIALS / "tour-researcher.md").read_text(encoding="utf-8")

@@ -1,7 +1,5 @@
-"""Run folders of earlier versions open, compare, export, report and show, but do not resume.
-
-tests/fixtures/ has one folder for each run-folder schema, with the library and target that made it.
-"""
+"""Run folders of earlier versions can be read but not resumed. tests/fixtures/ has one for each run-folder
+schema, with the library and target that made it."""
 
 import json
 import random
@@ -36,7 +34,6 @@ def fixture(request: pytest.FixtureRequest) -> Path:
 
 @pytest.fixture(scope="module")
 def place(fixture: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A copy of a fixture, `toy/` and the run folder `small/`. Tests may add files to it."""
     return shutil.copytree(fixture, tmp_path_factory.mktemp("old") / fixture.name)
 
 
@@ -51,7 +48,6 @@ def fresh(place: Path) -> Path:
 
 @pytest.fixture
 def cli(place: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Cli:
-    """Run `mutator WORDS...` with the fixture's library and return exit code, output and errors."""
     monkeypatch.chdir(place)
     monkeypatch.setenv("MUTATOR_ROOT", str(place / "toy"))
 
@@ -67,10 +63,7 @@ LATER = {"fault_tolerant_time", "manifest_to_hazard"}  # columns that old runs l
 
 
 def assert_same_cells(new: Path, old: Path) -> None:
-    """Check that tables are equal.
-
-    Newer columns do not count, nor do the car columns that version 0.1 left empty for this target.
-    """
+    """Ignore newer columns, and the car columns that version 0.1 left empty for this target."""
     today, then = (pd.read_csv(path, dtype=str, keep_default_na=False) for path in (new, old))
     assert {*today.columns} - {*then.columns} <= LATER
     shared = [column for column in today.columns if column in then.columns or column not in LATER]
@@ -85,8 +78,7 @@ def test_there_is_one_for_each_schema() -> None:
     assert schemas == [f"run/{number}" for number in range(1, len(schemas) + 1)] and schemas[-1] == SCHEMA
 
 
-def test_it_opens_and_its_ids_are_those_of_today(place: Path) -> None:
-    """Plan, records, results and patches can be read. Each id still follows from its content."""
+def test_an_old_run_opens_and_its_ids_still_follow_from_its_content(place: Path) -> None:
     run = load_run(place / "small", workspace=place / "toy")
     assert [*run.experiments] == [*plan_file.ids(run.path)]
     assert {e.fault.id for e in run.experiments.values()} == {*run.faults}
@@ -96,8 +88,7 @@ def test_it_opens_and_its_ids_are_those_of_today(place: Path) -> None:
     assert len(run.golden("A")) == len(run.experiment(KEPT).traces().faulty) > 100
 
 
-def test_a_fresh_run_is_the_same(place: Path, fresh: Path) -> None:
-    """The current code gives the same plan, ids, result rows and trace digests."""
+def test_a_fresh_run_has_the_same_plan_and_results(place: Path, fresh: Path) -> None:
     old, new = RunFolder.open(place / "small"), RunFolder.open(fresh)
     assert new.head["plan"] == old.head["plan"]
     assert [*plan_file.ids(new.path)] == [*plan_file.ids(old.path)]
@@ -107,8 +98,7 @@ def test_a_fresh_run_is_the_same(place: Path, fresh: Path) -> None:
     }
 
 
-def test_it_says_whether_it_can_be_verified(cli: Cli, place: Path) -> None:
-    """Runs from before digests are marked wherever they are shown. Later ones have a seal."""
+def test_runs_without_digests_are_marked_as_not_verifiable(cli: Cli, place: Path) -> None:
     old = is_old(place / "small")
     run = load_run(place / "small")
     assert (run.verifiable, run.seal is None, "not verifiable" in repr(run)) == (not old, old, old)
@@ -126,8 +116,7 @@ def is_old(run: Path) -> bool:
     return json.loads((run / "run.json").read_text())["schema"] == "run/1"
 
 
-def test_it_compares(cli: Cli, fresh: Path) -> None:
-    """Compared with itself or with a fresh run, in either order, nothing has changed."""
+def test_an_old_run_compares_with_itself_and_a_fresh_one(cli: Cli, fresh: Path) -> None:
     for one, other in (("small", "small"), ("small", "fresh"), ("fresh", "small")):
         code, out, err = cli("compare", one, other, "--fail-on", "worse,new-hazard,unmatched")
         assert code == 0, err
@@ -135,8 +124,8 @@ def test_it_compares(cli: Cli, fresh: Path) -> None:
 
 
 @pytest.mark.parametrize("format", list(Format))
-def test_it_exports(cli: Cli, place: Path, fixture: Path, format: Format) -> None:
-    """Every format contains every experiment. MCAP contains those that have series or traces."""
+def test_an_old_run_exports_in_every_format(cli: Cli, place: Path, fixture: Path, format: Format) -> None:
+    """MCAP contains the experiments that have series or traces."""
     file = place / f"export-{format.value}"
     code, _, err = cli("export", "small", "--format", format.value, "--out", file)
     assert code == 0, err
@@ -155,8 +144,7 @@ def test_it_exports(cli: Cli, place: Path, fixture: Path, format: Format) -> Non
         assert {mutant["status"] for mutant in mutants} >= {"Killed", "Survived"}
 
 
-def test_it_is_reported(cli: Cli, place: Path, fixture: Path) -> None:
-    """The report is written. The results rebuilt from the records are equal, cell for cell."""
+def test_an_old_run_is_reported_with_the_same_results(cli: Cli, place: Path, fixture: Path) -> None:
     shutil.copytree(place / "small", copy := place / "reported")
     for derived in ("results.csv", "results.parquet", "timings.parquet"):
         (copy / derived).unlink()
@@ -167,8 +155,7 @@ def test_it_is_reported(cli: Cli, place: Path, fixture: Path) -> None:
     assert_same_cells(copy / "results.csv", fixture / "small" / "results.csv")
 
 
-def test_an_experiment_is_shown(cli: Cli, place: Path) -> None:
-    """Diff, verdict and plot are the stored ones, and nothing is run."""
+def test_show_runs_nothing_in_an_old_run(cli: Cli, place: Path) -> None:
     code, out, err = cli("show", KEPT, "--run", "small", "--json")
     assert code == 0, err
     shown = json.loads(out)
@@ -176,16 +163,16 @@ def test_an_experiment_is_shown(cli: Cli, place: Path) -> None:
     assert Path(shown["plot"]).is_file() and not (place / "small" / "work").exists()
 
 
-def test_its_approvals_are_read(cli: Cli, place: Path) -> None:
-    """The old decisions, three of them in two groups each, still approve what is injected."""
+def test_approvals_of_an_old_run_still_apply(cli: Cli, place: Path) -> None:
+    """Three of the four decisions are in two groups each."""
     code, out, err = cli("review", "list", "--campaign", "small", "--json")
     assert code == 0, err
     approved = json.loads((place / "small" / "reviewed.json").read_text())["groups"]
     assert (out.count('"approved"'), len(approved)) == (4, 7)
 
 
-def test_it_is_not_run_on(cli: Cli, place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Another mutator version or other sources are refused by name. Nothing is written."""
+def test_an_old_run_is_not_resumed(cli: Cli, place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another mutator version or changed sources are refused by name."""
     shutil.copytree(place / "small", copy := place / "resumed")
     shutil.copytree(place / "toy", library := place / "changed")
     before = sorted((path, path.stat().st_mtime_ns) for path in copy.rglob("*") if path.name != "owner.lock")
@@ -208,7 +195,6 @@ def test_it_is_not_run_on(cli: Cli, place: Path, monkeypatch: pytest.MonkeyPatch
 
 
 def damages(data: bytes, draw: random.Random) -> Iterator[bytes]:
-    """Return damages to a file: a flipped bit, a lost end, zero bytes, dropped, doubled or swapped lines."""
     place = draw.randrange(len(data) or 1)
     yield data[:place] + bytes([(data[place] if data else 0) ^ 1 << draw.randrange(8)]) + data[place + 1 :]
     yield data[:place]
@@ -225,8 +211,7 @@ def damages(data: bytes, draw: random.Random) -> Iterator[bytes]:
 READ = ("*.json", "*.jsonl", "*.yaml", "*.csv", "*.parquet", "*.npz", "*.patch", "*.blocks")
 
 
-def test_a_damaged_one_never_ends_in_a_traceback(cli: Cli, place: Path) -> None:
-    """For a damaged folder, readers give a clear error or correct output, never a traceback."""
+def test_damage_to_an_old_run_never_causes_a_traceback(cli: Cli, place: Path) -> None:
     shutil.copytree(place / "small", copy := place / "damaged")
     draw = random.Random(place.name)
     files = sorted({path for pattern in READ for path in copy.rglob(pattern) if "report" not in path.parts})

@@ -25,7 +25,6 @@ def workspace() -> Workspace:
 
 @pytest.fixture(scope="module")
 def quickstart(workspace: Workspace, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The run folder of the quickstart, run with two workers."""
     out = tmp_path_factory.mktemp("quickstart") / "run"
     summary = run_campaign(workspace, "quickstart", out, workers=2)
     assert (summary.exit_code, summary.done) == (0, 60)
@@ -38,10 +37,8 @@ def rows(quickstart: Path) -> list[Row]:
 
 
 def test_every_run_ends_well_and_every_outcome_is_seen(rows: list[Row]) -> None:
-    """All 60 runs are ok.
-
-    They show hazards of all three kinds, silent corruption, and faults that are masked or never activated.
-    """
+    """There are hazards of all three kinds, silent corruption, and faults that are masked or never
+    activated."""
     assert Counter(row["status"] for row in rows) == {"ok": 60}
     assert {row["outcome"] for row in rows} == {"hazard", "sdc", "masked", "not_activated"}
     assert all(any(row[name] == "1" for row in rows) for name in ("h1", "h2", "h3"))
@@ -51,8 +48,9 @@ def test_every_run_ends_well_and_every_outcome_is_seen(rows: list[Row]) -> None:
     ("fault_type", "alerts"),
     [("jamming", {"can_error", "radar_error"}), ("camera_unavailable", {"model_error"})],
 )
-def test_lost_data_are_noticed_at_once(rows: list[Row], fault_type: str, alerts: set[str]) -> None:
-    """Without radar or camera data, the controller raises an alert within 0.6 s of activation."""
+def test_lost_radar_or_camera_data_raise_an_alert_within_0_6_s(
+    rows: list[Row], fault_type: str, alerts: set[str]
+) -> None:
     active = [row for row in rows if row["fault_type"] == fault_type and row["activated"] == "1"]
     assert active
     for row in active:
@@ -60,11 +58,9 @@ def test_lost_data_are_noticed_at_once(rows: list[Row], fault_type: str, alerts:
         assert float(row["t_alert"]) - float(row["t_activation"]) <= 0.6
 
 
-def test_distance_in_the_camera_alone_changes_little(rows: list[Row]) -> None:
-    """A wrong radar distance reaches the actuators. A wrong camera distance alone does not.
-
-    `test_published_faults` compares the number of hazards with the original's, value by value.
-    """
+def test_a_wrong_camera_distance_alone_changes_little(rows: list[Row]) -> None:
+    """A wrong radar distance reaches the actuators. `test_published_faults` compares the number of hazards
+    with the original's, value by value."""
 
     def manifested(module: str, fault_type: str) -> list[str]:
         return [
@@ -86,8 +82,9 @@ def test_times_are_in_order(rows: list[Row]) -> None:
 
 
 @pytest.mark.parametrize("scenario", sorted(CONTEXTS))
-def test_contexts_that_fault_free_runs_reach(quickstart: Path, workspace: Workspace, scenario: str) -> None:
-    """The golden runs reach as many contexts of the table as the original's runs."""
+def test_golden_runs_reach_the_contexts_of_the_original(
+    quickstart: Path, workspace: Workspace, scenario: str
+) -> None:
     manifest = workspace.manifest("openpilot")
     trace = load_trace(manifest, quickstart / "golden" / scenario)
     table = workspace.context_table("accelerate_decelerate")

@@ -34,7 +34,6 @@ def root(tmp_path: Path) -> Path:
 
 
 def gate(root: Path, base: str, new: str) -> subprocess.CompletedProcess[str]:
-    """Run the script on two trees, with this interpreter's `mutator`."""
     folder = root / "bin"
     folder.mkdir(exist_ok=True)
     command = folder / "mutator"
@@ -53,7 +52,7 @@ def gate(root: Path, base: str, new: str) -> subprocess.CompletedProcess[str]:
 
 
 def test_a_worse_version_is_refused(root: Path) -> None:
-    """The gate names the faults that became hazardous and exits with 1. The same version passes."""
+    """The gate names the faults that became hazardous."""
     refused = gate(root, "tree", "worse")
     assert refused.returncode == 1, refused.stderr
     named = [line for line in refused.stderr.splitlines() if line.startswith("error: ")]

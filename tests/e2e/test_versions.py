@@ -31,7 +31,7 @@ PYTHONS = "CPython 3.11.7, here CPython 3.12.1"
 
 
 class OnePiece:
-    """A distributor that is interrupted after one piece of work."""
+    """A distributor that stops after one piece of work."""
 
     def run(self, session: Session) -> None:
         name = session.worker_name("mine")
@@ -45,7 +45,6 @@ class OnePiece:
 
 @pytest.fixture
 def cli(toy: Workspace, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Cli:
-    """Run `mutator WORDS...` and return exit code, output and errors."""
     monkeypatch.setenv("MUTATOR_ROOT", str(toy.library.parent))
 
     def run(*words: object) -> tuple[int, str, str]:
@@ -73,7 +72,6 @@ def python(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
 
 @pytest.fixture
 def driven(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Return the names of the fault-free runs that are run."""
     names: list[str] = []
     execute = ReferenceEngine.execute
 
@@ -87,7 +85,7 @@ def driven(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 def other_digits(execute: Execute) -> Execute:
-    """Make each of the target's records end in a blank, as if this machine computed differently."""
+    """Simulate a machine that computes differently: each record of the target ends in a blank."""
 
     def run(self: ReferenceEngine, job: Job, folder: Path) -> Execution:
         done = execute(self, job, folder)
@@ -103,7 +101,6 @@ def contents(folder: Path) -> dict[Path, bytes]:
 
 
 def test_another_python_is_refused(cli: Cli, half: Path) -> None:
-    """The exit code is 2, with both versions and the remedy. Nothing is run or written."""
     before = contents(half)
     code, _, err = cli("run", "small", "--out", half, "-n", "0")
     assert code == 2
@@ -112,14 +109,10 @@ def test_another_python_is_refused(cli: Cli, half: Path) -> None:
 
 
 @pytest.mark.slow
-def test_another_python_is_accepted_and_noted(
+def test_another_python_can_be_accepted_and_is_noted(
     cli: Cli, toy: Workspace, driven: list[str], half: Path, tmp_path: Path
 ) -> None:
-    """With the option, the fault-free runs are repeated and agree, and the results equal an undisturbed
-    run's.
-
-    run.json, the report and `show` say which version ran what.
-    """
+    """The fault-free runs are repeated. run.json, the report and `show` say which version ran what."""
     before = len(driven)
     code, _, err = cli("run", "small", "--out", half, "-n", "0", "--accept-versions")
     assert code == 0, err
@@ -141,7 +134,7 @@ def test_another_python_is_accepted_and_noted(
 
 
 def test_accepted_versions_must_compute_alike(cli: Cli, half: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """If the fault-free runs differ, the option has no effect and nothing is written."""
+    """If the fault-free runs differ, nothing is written."""
     before = contents(half)
     monkeypatch.setattr(ReferenceEngine, "execute", other_digits(ReferenceEngine.execute))
     code, _, err = cli("run", "small", "--out", half, "-n", "0", "--accept-versions")
@@ -149,10 +142,9 @@ def test_accepted_versions_must_compute_alike(cli: Cli, half: Path, monkeypatch:
     assert contents(half) == before
 
 
-def test_pytest_refuses_and_accepts_as_the_command_does(
+def test_pytest_refuses_and_accepts_versions_like_the_command(
     toy: Workspace, half: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    """Under pytest, a session has the same option and exit code."""
     monkeypatch.setenv("MUTATOR_ROOT", str(toy.library.parent))
     plain = ["-c", os.devnull, "-p", "no:cacheprovider", "--noconftest", "--rootdir", str(half)]
     words = [*plain, "--disable-plugin-autoload", "-p", "mutator"]
@@ -164,15 +156,15 @@ def test_pytest_refuses_and_accepts_as_the_command_does(
 
 
 @pytest.mark.slow
-def test_another_machine_drives_the_golden_runs_again(
+def test_another_machine_repeats_the_golden_runs(
     toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, driven: list[str]
 ) -> None:
-    """On another processor a run resumes silently if the fault-free runs agree, and is refused otherwise."""
+    """A difference is refused."""
     out = tmp_path / "run"
     run_campaign(toy, "small", out, distributor=OnePiece())
     assert sorted(driven) == ["a-A", "a-A+alone", "b-A", "b-A+alone"]
     run_campaign(toy, "small", out, distributor=OnePiece())
-    assert len(driven) == 4  # the same machine: known
+    assert len(driven) == 4  # this machine is already checked
     monkeypatch.setattr(machine, "cpu", lambda: "another")
     assert run_campaign(toy, "small", out, distributor=OnePiece()).done == 6
     assert len(driven) == 8
@@ -193,8 +185,6 @@ Shard = Callable[..., Path]
 def shard(
     toy: Workspace, tmp_path: Path, python: Callable[[str], None], monkeypatch: pytest.MonkeyPatch
 ) -> Shard:
-    """Run one of two shards on a separate machine with a Python of this version."""
-
     def run(number: int, version: str = "3.11.7") -> Path:
         python(version)
         monkeypatch.setattr(machine, "cpu", lambda: f"machine {number}")
@@ -207,10 +197,7 @@ def shard(
 
 @pytest.mark.slow
 def test_shards_of_other_versions_are_merged_only_if_accepted(cli: Cli, shard: Shard, tmp_path: Path) -> None:
-    """Without the option, the exit code is 2 and the versions are listed.
-
-    With the option, the merged run keeps and lists the stretches of both.
-    """
+    """The merged run keeps and lists the stretches of both."""
     words = ("merge", shard(1, "3.11.7"), shard(2, "3.12.1"), "--out", tmp_path / "out")
     code, _, err = cli(*words)
     assert code == 2 and "part2: not run as " in err and PYTHONS in err and "--accept-versions" in err
@@ -226,10 +213,9 @@ def test_shards_of_other_versions_are_merged_only_if_accepted(cli: Cli, shard: S
 
 
 @pytest.mark.slow
-def test_shards_of_other_machines_are_merged(
+def test_shards_of_other_machines_merge_if_their_golden_runs_agree(
     cli: Cli, shard: Shard, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Shards from different processors merge if their fault-free runs agree. A difference is an error."""
     one = shard(1)
     assert cli("merge", one, shard(2), "--out", tmp_path / "out")[0] == 0
     shutil.rmtree(tmp_path / "part2")
@@ -240,7 +226,6 @@ def test_shards_of_other_machines_are_merged(
 
 
 def _other_pythons() -> Iterator[str]:
-    """Return interpreters of another minor version that can run mutator."""
     places = [*map(Path, os.environ["PATH"].split(os.pathsep)), *Path.home().glob(".pyenv/versions/*/bin")]
     for minor in (11, 12, 13):
         name = f"python3.{minor}"
@@ -250,8 +235,7 @@ def _other_pythons() -> Iterator[str]:
 
 
 @pytest.mark.slow
-def test_two_real_pythons(toy: Workspace, tmp_path: Path) -> None:
-    """Another Python refuses the folder with a list of differences and resumes the run if accepted."""
+def test_another_installed_python_resumes_only_if_accepted(toy: Workspace, tmp_path: Path) -> None:
     python = next(_other_pythons(), None)
     if python is None:
         pytest.skip("there is no second Python")

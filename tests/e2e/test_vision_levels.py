@@ -23,10 +23,7 @@ def workspace() -> Workspace:
 
 
 def departures(workspace: Workspace, out: Path, detector: str) -> Counter[str]:
-    """Return the number of levels of each fault type at which the car left its lane.
-
-    Every run must have ended well.
-    """
+    """Return the number of levels of each fault type at which the car left its lane."""
     summary = run_campaign(workspace, f"vision_levels_{detector}", out, workers=2)
     assert (summary.exit_code, summary.done) == (0, 69)
     rows = list(csv.DictReader((out / "results.csv").open()))
@@ -34,11 +31,9 @@ def departures(workspace: Workspace, out: Path, detector: str) -> Counter[str]:
     return Counter(row["fault_type"] for row in rows if row["h3"] == "1")
 
 
-def test_levels(workspace: Workspace, tmp_path: Path) -> None:
-    """Rain, snow and contrast mislead the published detector, and fog and blur do not.
-
-    The other detector is more robust.
-    """
+def test_lane_departures_of_each_effect_and_detector(workspace: Workspace, tmp_path: Path) -> None:
+    """Rain, snow and contrast mislead the published detector, and fog and blur do not. The other detector is
+    more robust."""
     paper = departures(workspace, tmp_path / "paper", "paper")
     robust = departures(workspace, tmp_path / "robust", "robust")
     assert all(paper[name] > 0 for name in ("rain", "snow", "contrast"))
@@ -47,10 +42,9 @@ def test_levels(workspace: Workspace, tmp_path: Path) -> None:
     assert robust["rain"] + robust["snow"] + robust["occlusion"] == 0
 
 
-def test_the_cache_of_pictures_changes_nothing(
+def test_the_frame_cache_changes_no_byte(
     workspace: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A campaign gives the same bytes with an empty and a filled cache of frames."""
     cache = tmp_path / "cache"
     monkeypatch.setenv("XDG_CACHE_HOME", str(cache))
     runs = [tmp_path / "cold", tmp_path / "warm"]

@@ -23,7 +23,6 @@ CHAFF = ("radar/chaff", "--scenario", "S1", "--trigger", "C2", "--value", "40")
 
 
 def call(*words: object, here: Path) -> str:
-    """Run a command in a folder and return its output. A failure's message includes the output."""
     settings = ("MUTATOR_", "PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV")
     kept = {name: value for name, value in os.environ.items() if not name.startswith(settings)}
     done = subprocess.run(
@@ -65,7 +64,6 @@ def wheel(built: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def python(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The interpreter of a fresh environment with the wheel and its requirements."""
     home = tmp_path_factory.mktemp("environment")
     call(sys.executable, "-m", "venv", home, here=home)
     python = home / "bin" / "python"
@@ -75,15 +73,12 @@ def python(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def elsewhere(tmp_path: Path) -> Path:
-    """An empty folder outside any clone."""
     assert not any((folder / "fault_library").exists() for folder in tmp_path.parents)
     return tmp_path
 
 
-def test_a_wheel_from_the_clone_is_the_one_from_the_sdist(
-    clone: Path, built: Path, wheel: Path, tmp_path: Path
-) -> None:
-    """The sdist has everything that a wheel needs. Leftovers of earlier builds stay out of it."""
+def test_clone_and_sdist_build_the_same_wheel(clone: Path, built: Path, wheel: Path, tmp_path: Path) -> None:
+    """Leftovers of earlier builds stay out of the wheel."""
     stale = clone / "build" / "lib" / "mutator" / "stale.py"
     stale.parent.mkdir(parents=True, exist_ok=True)
     stale.touch()
@@ -100,10 +95,7 @@ def test_a_wheel_from_the_clone_is_the_one_from_the_sdist(
     } <= names
 
 
-def test_a_wheel_holds_the_harness_and_what_ships_with_it(wheel: Path) -> None:
-    """The wheel has the package, its data and the archive, but no tests, bytecode or importable
-    controller.
-    """
+def test_the_wheel_contains_only_the_package_its_data_and_the_archive(wheel: Path) -> None:
     found = files(wheel)
     tops = {name.partition("/")[0] for name in found}
     assert tops == {"mutator", *(top for top in tops if top.endswith(".dist-info"))}
@@ -119,7 +111,6 @@ def test_a_wheel_holds_the_harness_and_what_ships_with_it(wheel: Path) -> None:
 
 
 def test_the_controller_is_neither_importable_nor_compiled(python: Path, elsewhere: Path) -> None:
-    """With the wheel installed, `import selfdrive` fails, and use leaves no bytecode of the controller."""
     code = "import importlib.util; print(importlib.util.find_spec('selfdrive'))"
     assert call(python, "-c", code, here=elsewhere) == "None\n"
     mutator = python.with_name("mutator")
@@ -131,10 +122,7 @@ def test_the_controller_is_neither_importable_nor_compiled(python: Path, elsewhe
 
 
 def test_the_first_commands_in_an_empty_folder(python: Path, elsewhere: Path) -> None:
-    """In an empty folder, the library is listed and one fault is tried.
-
-    A campaign runs the same experiments as in the clone.
-    """
+    """The campaign runs the same experiments as in the clone."""
     mutator, workspace = python.with_name("mutator"), Workspace.find(CLONE)
     listed = json.loads(call(mutator, "list", "--json", here=elsewhere))
     assert [spec["name"] for spec in listed["specs"]] == [spec.name for spec in workspace.specs()]
@@ -151,8 +139,7 @@ def test_the_first_commands_in_an_empty_folder(python: Path, elsewhere: Path) ->
     assert "60 experiments" in (elsewhere / "runs/q/report/REPORT.md").read_text()
 
 
-def test_what_is_edited_in_a_new_library_is_what_runs(python: Path, elsewhere: Path) -> None:
-    """After `mutator init`, `mutator try` shows and runs the edited template and spec."""
+def test_edits_in_a_new_library_take_effect(python: Path, elsewhere: Path) -> None:
     mutator = python.with_name("mutator")
     call(mutator, "init", "mine", here=elsewhere)
     mine = elsewhere / "mine"
