@@ -26,7 +26,7 @@ class Spot:
 
 
 def spots(tree: ast.Module) -> Iterator[Spot]:
-    """Return every anchor. Statements of one kind and name are numbered as `nth` numbers them."""
+    """Return every anchor. Statements of one kind and name are numbered like `nth`."""
     functions: dict[str, list[_Function]] = {}
     for name, function in _functions(tree, ""):
         functions.setdefault(name, []).append(function)
@@ -58,7 +58,6 @@ def _functions(node: ast.AST, scope: str) -> Iterator[tuple[str, _Function]]:
 
 
 def _statements(body: list[ast.stmt]) -> Iterator[ast.stmt]:
-    """Statements in source order, without those of inner functions and classes."""
     for statement in body:
         yield statement
         if isinstance(statement, _Function | ast.ClassDef):
@@ -72,7 +71,6 @@ def _statements(body: list[ast.stmt]) -> Iterator[ast.stmt]:
 
 
 def _effects(statement: ast.stmt) -> Iterator[tuple[str, str]]:
-    """Return (verb, name) of everything that a statement assigns, calls and returns."""
     called = None
     if isinstance(statement, ast.Assign | ast.AugAssign | ast.AnnAssign | ast.Expr | ast.Return):
         value = statement.value

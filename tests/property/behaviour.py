@@ -12,7 +12,6 @@ MOST_STEPS = 1000
 
 
 def behaviour(data: bytes) -> object:
-    """Return what a module does with a probe that is never active: trace, output, ending and variables."""
     run = _Run()
     names: dict[str, Any] = {
         "T": run.trace,
@@ -39,7 +38,7 @@ def behaviour(data: bytes) -> object:
 
 @dataclass(slots=True)
 class _Run:
-    """The trace of a run and its length so far, which bounds every run."""
+    """The trace of a run, and its number of steps, which is limited."""
 
     seen: list[Any] = field(default_factory=list)
     steps: int = 0
@@ -50,7 +49,6 @@ class _Run:
         return value
 
     def call(self, made: Any, *args: Any) -> int:
-        """Call a function, or every method of a class, and record how it ended."""
         self._count(10)
         try:
             if isinstance(made, type):
@@ -96,8 +94,6 @@ class Box:
 
 @dataclass(frozen=True, slots=True)
 class _Decorator:
-    """A decorator, plain or with arguments, that returns the decorated object."""
-
     seen: list[Any]
 
     def __call__(self, made: Any) -> Any:
@@ -110,8 +106,6 @@ class _Decorator:
 
 @dataclass(frozen=True, slots=True)
 class _Context:
-    """A context manager, asynchronous or not."""
-
     seen: list[Any]
 
     def __call__(self) -> "_Context":
@@ -132,8 +126,6 @@ class _Context:
 
 
 class _Later:
-    """Awaited values and asynchronous loops."""
-
     async def __call__(self, value: Any) -> Any:
         return value
 
@@ -143,7 +135,6 @@ class _Later:
 
 
 def _ended(result: Any) -> Any:
-    """Return the outcome of a call: a coroutine's result or a generator's first values."""
     if isinstance(result, types.CoroutineType):
         try:
             result.send(None)
@@ -163,7 +154,6 @@ async def _next(values: Any) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    """Return a value that can be compared between runs."""
     if isinstance(value, int | float | str | bytes | None):
         return value
     if isinstance(value, list | tuple):

@@ -1,8 +1,5 @@
-"""Generated modules of every shape that Python allows. They run, terminate and trace what they did.
-
-A seed determines the module. Modules need the names that `behaviour` provides, such as `T`, which records and
-returns a value, and `call`.
-"""
+"""Generated modules of every shape that Python allows, which terminate and trace what they did. They need the
+names that `behaviour` provides, such as `T`, which records and returns a value, and `call`."""
 
 import sys
 from collections.abc import Callable, Sequence
@@ -41,7 +38,7 @@ _Maker = Callable[[Scope, str], list[str]]
 
 
 class ModuleWriter(StatementWriter):
-    """Writes one module: the same bytes for the same seed on one version of Python."""
+    """Writes one module: the same bytes for the same seed and Python version."""
 
     def module(self) -> bytes:
         encoding = self._drawn(_ENCODINGS)
@@ -62,7 +59,6 @@ class ModuleWriter(StatementWriter):
         return self.rng.choices(list(ways), list(ways.values()))[0]
 
     def _head(self, encoding: str) -> list[str]:
-        """The lines before the first statement, and imports from `__future__`."""
         lines = self.rng.choice([[], [], ["#!/usr/bin/env python"], ["# head", ""], ["", ""]])
         if encoding not in ("utf-8", "bom"):
             cookie = self.rng.choice(["# -*- coding: {} -*-", "# vim: set fileencoding={} :"])
@@ -267,7 +263,7 @@ class ModuleWriter(StatementWriter):
         return lines
 
     def _variables(self, level: int) -> list[str]:
-        """Return variable names. Inner functions use different ones, except for private names."""
+        """Return variable names, which differ in inner functions, except for private ones."""
         names = self.rng.sample(_VARIABLES, 4)
         return [name if level == 1 or name[0] == "_" else f"{name}{level}" for name in names]
 
@@ -298,7 +294,6 @@ class ModuleWriter(StatementWriter):
 
 
 def _top_level(lines: Sequence[str]) -> list[str]:
-    """The functions and classes of the module, by name."""
     names = []
     for line in lines:
         words = line.replace("(", " ").replace("[", " ").replace(":", " ").split(" ")

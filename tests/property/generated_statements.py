@@ -28,7 +28,7 @@ _TEXTS = (
 
 @dataclass(frozen=True, kw_only=True)
 class Scope:
-    """Where a statement is: the variables that it may read (`known`) and set, and what else is allowed."""
+    """The variables that a statement may read (`known`) and set, and what else is allowed at its place."""
 
     level: int  # of functions
     kind: str  # module, class, function, or nested: in a lambda or a comprehension
@@ -46,8 +46,6 @@ class Scope:
 
 
 class StatementWriter:
-    """Writes expressions and simple statements. The seed determines what it draws."""
-
     def __init__(self, seed: int) -> None:
         self.rng = random.Random(seed)
         self.count = 0
@@ -59,12 +57,10 @@ class StatementWriter:
         return self.rng.choice(["0", "1", "2", "3", "0x10", "1_0", "-1"])
 
     def fresh(self, prefix: str) -> str:
-        """A name that occurs nowhere else."""
         self.count += 1
         return f"{prefix}{self.count}"
 
     def gap(self, indent: str) -> list[str]:
-        """Lines that may stand between two statements."""
         ways: list[tuple[list[str], float]] = [
             ([], 60),
             ([""], 12),
@@ -78,14 +74,13 @@ class StatementWriter:
         return self.rng.choices([way for way, _ in ways], [weight for _, weight in ways])[0]
 
     def tail(self) -> str:
-        """Text that may follow a simple statement on its line."""
         ways = ["", "  # why", ";", " ; # why", "  ", "\t", " \\\n", "; \\\n"]
         return self.rng.choices(ways, [70, 9, 5, 3, 5, 2, 2, 1])[0]
 
     # Expressions; the value is a number
 
     def expression(self, scope: Scope, depth: int = 2) -> str:
-        """An expression, which may span lines, in brackets, strings or after a backslash."""
+        """An expression, which may span several lines."""
         if depth <= 0 or self.chance(0.3):
             return self.rng.choice([self.number(), self.number(), *self.rng.choices(scope.known, k=3)])
         e, f = (self.expression(scope, depth - 1) for _ in "ef")
@@ -126,7 +121,6 @@ class StatementWriter:
     # Simple statements: lines at a depth
 
     def target(self, scope: Scope) -> str:
-        """A variable to set, which is known from then on."""
         name = self.rng.choice([*scope.pool, *scope.writable])
         if name not in scope.known:
             scope.known.append(name)

@@ -10,8 +10,6 @@ from mutator.mutants.injected_lines import tag_of
 
 @dataclass(frozen=True, slots=True)
 class Lines:
-    """Which lines of a mutant are injected (from 1), and the original number of each other line."""
-
     injected: frozenset[int]
     original: tuple[int, ...]
 
@@ -38,10 +36,7 @@ class Beside:
 
 
 def take_out(node: ast.AST, injected: Container[int], found: dict[str, Beside]) -> None:
-    """Remove injected statements from a tree and record each one's neighbours.
-
-    A guard leaves its statement.
-    """
+    """Remove injected statements from a tree and record each one's neighbours. A guarded statement stays."""
     for _, body in ast.iter_fields(node):
         if not isinstance(body, list) or not body or not isinstance(body[0], ast.AST):
             continue

@@ -9,7 +9,7 @@ from .injected_statements import Lines
 
 
 def keeps_names(source: bytes, mutant: bytes) -> bool:
-    """Whether every name in the bytecode of each function is as local, free or global as before."""
+    """Whether every name in the bytecode of each function is still local, free or global."""
     lines = Lines.of(mutant)
     try:
         after = dict(_homes(compile(mutant, "m.py", "exec", dont_inherit=True), lines))
@@ -20,17 +20,14 @@ def keeps_names(source: bytes, mutant: bytes) -> bool:
 
 
 def is_carried_out(source: bytes, function: str, name: str) -> bool:
-    """Whether bytecode contains a name for a function with this name: unreachable code has no bytecode."""
+    """Whether the function's bytecode contains the name: unreachable code has no bytecode."""
     code = compile(source, "m.py", "exec", dont_inherit=True)
     found = _homes(code, Lines.of(source))
     return any(key[0].rpartition(".")[2] == function and name in homes for key, homes in found)
 
 
 def _homes(code: types.CodeType, lines: Lines) -> Iterator[tuple[tuple[str, int, int], dict[str, str]]]:
-    """Return the names of each function that is not injected.
-
-    Functions are identified by name, line and number.
-    """
+    """Yield name, line and number of each function that is not injected, with its names."""
     stack, counts = [code], Counter[tuple[str, int]]()
     while stack:
         one = stack.pop()

@@ -1,8 +1,4 @@
-"""What must hold for mutants of any source, proved by `ast`, bytecode and execution, without LibCST.
-
-`prove` splices at every anchor of a source and counts tries and refusals by reason. It raises Wrong if a
-property fails or a refusal is unnecessary.
-"""
+"""What must hold for mutants of any source, proved by `ast`, bytecode and execution, without LibCST."""
 
 import ast
 import contextlib
@@ -44,13 +40,11 @@ _INJECTIONS: tuple[tuple[str, dict[str, Any]], ...] = (
 
 
 class Wrong(AssertionError):
-    """A mutant violates a property."""
+    pass
 
 
 @dataclass(slots=True)
 class Figures:
-    """How many modules, anchors and variable-setting injections were tried, with their outcomes."""
-
     modules: Counter[str] = field(default_factory=Counter)
     anchors: Counter[str] = field(default_factory=Counter)
     variables: Counter[str] = field(default_factory=Counter)
@@ -67,23 +61,18 @@ class Figures:
 
 @dataclass(frozen=True, slots=True)
 class _Placed:
-    """An edit and its intended spot."""
-
     spot: Spot
     edit: splicing.Edit
     guard: bool = False
 
     @property
     def name(self) -> str:
-        """The id in its lines."""
         return self.edit.lines[0].decode("latin-1").split('"')[1]
 
 
 def prove(data: bytes, figures: Figures, run: Run | None = None, variables: int = 3) -> None:
-    """Splice at every anchor of a source. Raise Wrong if a mutant violates a property.
-
-    At `variables` of the anchors, drawn from the source itself, variables are set, too.
-    """
+    """Splice at every anchor of a source and count the outcomes. Raise Wrong if a mutant violates a property
+    or a refusal is unnecessary. At `variables` randomly drawn anchors, variables are set, too."""
     tree = _tree(data)
     try:
         file = parse_file("m.py", data, Path("root"))
@@ -120,7 +109,7 @@ def _expect(holds: bool, what: str, mutant: bytes = b"") -> None:
 
 
 def _reason(error: MutatorError) -> str:
-    """Return the reason of a refusal without what differs between cases. It must name the file."""
+    """Return the reason of a refusal without file names and numbers. The error must name the file."""
     _expect(error.where is not None, f"no file: {error}")
     text = re.sub(
         r"'[^']*'|`[^`]*`|\d+", "_", re.sub(r"(error: [a-z ]+).*", r"\1", error.got, flags=re.DOTALL)
@@ -132,7 +121,6 @@ def _reason(error: MutatorError) -> str:
 
 
 def _groups(file: ParsedFile, tree: ast.Module, figures: Figures) -> dict[str, list[_Placed]]:
-    """Edits at all anchors, in groups that each make one mutant."""
     groups: dict[str, list[_Placed]] = {}
     for i, spot in enumerate(spots(tree)):
         name = f"{i:08x}"
@@ -182,12 +170,11 @@ def _crowded(file: ParsedFile, spot: Spot) -> bool:
 
 
 def _line(file: ParsedFile, number: int) -> bytes:
-    """A line with `ast`'s count of columns."""
+    """Return a line without byte order mark, in UTF-8, because `ast` counts columns in it."""
     return file.lines[number - 1].decode(file.encoding).removeprefix("\ufeff").encode()
 
 
 def _check_site(file: ParsedFile, site: Site, spot: Spot) -> None:
-    """Check that the lines of the site are those where `ast` sees the statement."""
     end = spot.node.end_lineno or 0
     if spot.kind in AFTER:
         between = b"".join(file.lines[end : site.last]).strip(b" \t\f\r\n\\;")
@@ -210,10 +197,7 @@ def _spliced(file: ParsedFile, group: Sequence[_Placed]) -> bytes:
 
 
 def _check_tree(original: str, mutant: bytes, group: Sequence[_Placed]) -> None:
-    """Check that each injected statement is next to its anchored one.
-
-    Without the injected statements, the tree's dump equals the original's.
-    """
+    """Check that each injected statement is next to its anchored one and that nothing else has changed."""
     lines, changed = Lines.of(mutant), ast.parse(mutant)
     found: dict[str, Beside] = {}
     take_out(changed, lines.injected, found)
@@ -240,10 +224,8 @@ def _check_tree(original: str, mutant: bytes, group: Sequence[_Placed]) -> None:
 
 
 def _with_variable_set(file: ParsedFile, spot: Spot, figures: Figures) -> bytes:
-    """Return the mutant in which a variable is set at an anchor, with unchanged scopes of its names.
-
-    Return empty bytes if the splicer refuses.
-    """
+    """Return the mutant in which a variable is set at an anchor, with unchanged scopes of its names. Return
+    empty bytes if the splicer refuses."""
     chosen = random.Random(f"{spot.location}")
     known = sorted(
         {n.id for n in ast.walk(spot.within) if isinstance(n, ast.Name)} - {"int"} | {"max", "new"}
@@ -273,7 +255,6 @@ def _with_variable_set(file: ParsedFile, spot: Spot, figures: Figures) -> bytes:
 
 
 def _forced(file: ParsedFile, spot: Spot, model: str, params: dict[str, Any]) -> bytes:
-    """Return the mutant that was refused."""
     site, code = file.resolve(spot.location), snippet(_MODELS.get(model), params, "abcd0123")
     make = splicing.guard if _MODELS.get(model).kind is SnippetKind.GUARD else splicing.insertion
     return splicing.joined(splicing.apply_edits(file, [make(file, site, code, "abcd0123")]))

@@ -1,4 +1,4 @@
-"""Each condition has one canonical text and decides every observation."""
+"""Each condition has one canonical text and is true or false for every observation."""
 
 import ast
 import re
@@ -37,7 +37,6 @@ OBSERVED = st.fixed_dictionaries({name: st.floats(allow_nan=True, allow_infinity
 @settings(max_examples=200, deadline=None)
 @given(CONDITIONS, OBSERVED)
 def test_canonical_text_means_the_same(text: str, values: dict[str, float]) -> None:
-    """The canonical text is stable and decides exactly like the original text."""
     try:
         canonical = check_condition(text)
     except MutatorError as error:
@@ -51,7 +50,7 @@ def test_canonical_text_means_the_same(text: str, values: dict[str, float]) -> N
 @settings(max_examples=200, deadline=None)
 @given(CONDITIONS, TERMS, TERMS, OBSERVED)
 def test_no_observation_raises(text: str, a: str, b: str, values: dict[str, float]) -> None:
-    """Division by zero, infinities and NaN give True or False, never an exception."""
+    """Division by zero, infinities and NaN are included."""
     try:
         canonical = check_condition(f"({text}) and ({a}) / ({b}) > 1")
     except MutatorError as error:
@@ -75,7 +74,6 @@ def test_any_text_is_answered(text: str) -> None:
 @settings(max_examples=200, deadline=None)
 @given(CONDITIONS, st.lists(OBSERVED, min_size=1, max_size=6))
 def test_a_trace_is_decided_as_its_steps_are(text: str, steps: list[dict[str, float]]) -> None:
-    """Over a whole trace, a condition holds in exactly the steps in which it holds for the single step."""
     try:
         canonical = check_condition(text, variables=VARIABLES)
     except MutatorError as error:
@@ -87,7 +85,7 @@ def test_a_trace_is_decided_as_its_steps_are(text: str, steps: list[dict[str, fl
 
 
 def test_formulas_over_a_trace() -> None:
-    """Formulas over a trace equal numbers computed by hand: a choice, division by 0, the rate of change."""
+    """The formulas are a choice, a division by 0, and a rate of change."""
     trace = {
         "t": np.array([0.0, 0.5, 1.5]),
         "gap": np.array([3.0, 2.0, -1.0]),

@@ -35,7 +35,7 @@ def library(seed: int, reading: str) -> list[Fault]:
 def test_draws_lie_in_their_ranges(
     seed: int, key: str, ranges: tuple[tuple[float, float], ...], kind: str, cap: int | None
 ) -> None:
-    """Each range has one value, up to the cap. It is an integer if the range is, and the same every time."""
+    """Each range has one value, up to the cap. It is an integer if the range is."""
     draw = Draw(key=key, name="x", unit="m", kind=kind, ranges=ranges, decimals=None, cap=cap)
     values = draw_values(draw, seed)
     assert len(values) == len(ranges)
@@ -49,7 +49,6 @@ def test_draws_lie_in_their_ranges(
 @settings(max_examples=100, deadline=None)
 @given(SEEDS, st.integers(1, 4))
 def test_no_value_twice_and_no_zero(seed: int, decimals: int) -> None:
-    """If overlapping ranges hold enough values, the values are distinct and none is 0."""
     ranges = tuple((-2.5 + 0.5 * i, -1.5 + 0.5 * i) for i in range(10))
     draw = Draw(key="k", name="x", unit="m", kind="reals", ranges=ranges, decimals=decimals)
     values = draw_values(draw, seed)
@@ -69,7 +68,7 @@ def test_more_ranges_leave_earlier_values_alone(
 @settings(max_examples=20, deadline=None)
 @given(SEEDS)
 def test_readings_are_matched(seed: int) -> None:
-    """For any seed, both readings have the same specs and values in the same order, and unique ids."""
+    """Both readings have the same specs and values in the same order, and unique ids."""
     described, coded = library(seed, "as_described"), library(seed, "as_coded")
     assert [(f.spec, f.value, f.unit) for f in described] == [(f.spec, f.value, f.unit) for f in coded]
     assert len({f.id for f in (*described, *coded)}) == 2 * sum(spec.count for spec in SPECS)

@@ -28,7 +28,7 @@ MORE += ("tkinter.constants", "token", "xmlrpc.client")
 
 
 def locations(file: ParsedFile) -> list[tuple[FixedValue, FaultLocation]]:
-    """Every settable value of a file, and the anchor that leads to it."""
+    """Yield every settable value of a file, and the anchor that leads to it."""
     found = []
     for one in file.fixed:
         if one.reason is None:
@@ -49,8 +49,6 @@ def mutant(file: ParsedFile, cases: Sequence[tuple[FixedValue, FaultLocation]]) 
 
 
 class WithoutProbe(ast.NodeTransformer):
-    """Removes the lines that import the probe and set values through it."""
-
     def visit_Import(self, node: ast.Import) -> ast.AST | None:
         return None if node.names[0].name == "_fi" else node
 
@@ -69,7 +67,7 @@ def probe(ids: Sequence[str]) -> Any:
 
 
 def read(names: types.ModuleType, one: FixedValue) -> Any:
-    """The value that the program has: under its name, or in the signature as Python reports it."""
+    """The value under its name, or in the signature as Python reports it."""
     *path, last = one.path.split(".")
     found: Any = names
     for name in path:
@@ -83,7 +81,7 @@ def read(names: types.ModuleType, one: FixedValue) -> Any:
 def readable(
     names: types.ModuleType, cases: Sequence[tuple[FixedValue, FaultLocation]]
 ) -> Iterator[FixedValue]:
-    """The values that exist on this system: some are defined only on others."""
+    """The values that exist on this system. Some are defined only on others."""
     for one, _ in cases:
         try:
             read(names, one)
@@ -94,9 +92,7 @@ def readable(
 
 def check(file: ParsedFile, cases: Sequence[tuple[FixedValue, FaultLocation]], *, run: bool) -> None:
     """Check that a mutant compiles, un-splices, and equals the module except for the lines that set values.
-
-    If it is `run`, each value differs only in an active step and is restored afterwards.
-    """
+    If `run` is set, each value must differ only in an active step and be restored afterwards."""
     data = mutant(file, cases)
     tree = ast.parse(data)
     compile(tree, "<mutant>", "exec", dont_inherit=True)
@@ -125,7 +121,7 @@ def check(file: ParsedFile, cases: Sequence[tuple[FixedValue, FaultLocation]], *
 
 
 def checked(names: Sequence[str], count: int, *, run: bool) -> int:
-    """Check many cases drawn from the modules with these names, and return their number."""
+    """Check many cases drawn from these modules, and return their number."""
     files = [file for name in names if (file := module(name))]
     cases = [(file, pair) for file in files for pair in locations(file)]
     chosen = random.Random(1).sample(cases, min(count, len(cases)))
@@ -136,15 +132,13 @@ def checked(names: Sequence[str], count: int, *, run: bool) -> int:
     return len(chosen)
 
 
-def test_what_the_probe_sets_is_put_back() -> None:
-    """A mutant compiles, un-splices to every byte, and differs only by lines that set values through the
-    probe; each value differs while the fault is active, and is the same object again afterwards.
-    """
+def test_values_that_the_probe_sets_are_restored() -> None:
+    """After a fault, each value is the same object again."""
     assert checked(FEW, 200, run=True) == 200
 
 
 @pytest.mark.slow
-def test_what_the_probe_sets_is_put_back_at_large() -> None:
-    """The same holds for thousands of values. Modules with side effects at import are not run."""
+def test_thousands_of_values_that_the_probe_sets_are_restored() -> None:
+    """Modules with side effects at import are not run."""
     assert checked(FEW, 2000, run=True) > 250
     assert checked((*MANY, *MORE), 3000, run=False) == 3000

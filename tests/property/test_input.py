@@ -49,7 +49,7 @@ def test_any_bytes(tmp_path: Path, data: bytes) -> None:
 @settings(max_examples=100, deadline=None, suppress_health_check=QUIET)
 @given(PLAIN)
 def test_plain_data_survives(tmp_path: Path, value: object) -> None:
-    """Plain data written by a YAML writer is read back unchanged, with a line for each part."""
+    """Plain data keep their values, and each part has a line."""
     path = tmp_path / "x.yaml"
     path.write_text(yaml.safe_dump(value, allow_unicode=True, default_style='"'), encoding="utf-8")
     text = path.read_text(encoding="utf-8")
@@ -63,7 +63,6 @@ def test_plain_data_survives(tmp_path: Path, value: object) -> None:
 @settings(max_examples=150, deadline=None, suppress_health_check=QUIET)
 @given(st.data())
 def test_a_damaged_spec(tmp_path: Path, data: st.DataObject) -> None:
-    """A spec with a dropped, doubled or garbled line is read, or refused with a MutatorError."""
     lines = SPEC.read_text().splitlines()
     i = data.draw(st.integers(0, len(lines) - 1))
     how = data.draw(st.sampled_from(["drop", "double", "garble", "indent"]))
@@ -109,7 +108,7 @@ def test_numbers_survive_rendering(value: float) -> None:
 
 @given(st.floats(), st.floats(allow_nan=False), st.sampled_from(["float", "np.float64", "np.float32"]))
 def test_a_term_without_a_point_adds_the_same(variable: float, value: float, kind: str) -> None:
-    """Adding a whole number written as an integer to a float, of numpy or not, gives the same bits."""
+    """A whole number written as an integer adds to a float, of numpy or not, with the same bits."""
     sign = "-" if math.copysign(1.0, value) < 0 else "+"
     with np.errstate(all="ignore"):
         texts = (f"{kind}(x) {signed(value)}", f"{kind}(x) {sign} {literal(abs(value))}")
@@ -119,7 +118,6 @@ def test_a_term_without_a_point_adds_the_same(variable: float, value: float, kin
 
 @pytest.mark.parametrize("value", [[1], {"a": 1}, object()])
 def test_only_numbers_and_names_are_rendered(value: object) -> None:
-    """Anything other than a number or a name in a template is an error."""
     with pytest.raises(MutatorError):
         literal(value)
 
@@ -143,8 +141,8 @@ SHAPES = {
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_a_shape_that_would_take_long(tmp_path: Path, shape: str) -> None:
-    """A file that takes long to read, or ends the interpreter, is refused at once with its line."""
+def test_input_that_takes_long_to_parse_is_refused_at_once(tmp_path: Path, shape: str) -> None:
+    """The error names the line."""
     path = tmp_path / "x.yaml"
     path.write_text(SHAPES[shape], encoding="utf-8")
     began = time.process_time()
@@ -186,10 +184,7 @@ NESTED = {
 
 @pytest.mark.parametrize("nested", NESTED)
 def test_nested_expressions(nested: str) -> None:
-    """Conditions and filters of any depth and length are read or refused quickly.
-
-    Those that are read can be evaluated.
-    """
+    """Expressions of any depth are read or refused quickly. Those that are read can be evaluated."""
     began = time.process_time()
     with suppress(MutatorError):
         evaluate(check_condition(NESTED[nested]), {"t": 1.0})
@@ -198,8 +193,7 @@ def test_nested_expressions(nested: str) -> None:
     assert time.process_time() - began < 1.0
 
 
-def test_deep_json(tmp_path: Path) -> None:
-    """A JSON file with too deep nesting is reported as damaged."""
+def test_json_with_too_deep_nesting_is_damaged(tmp_path: Path) -> None:
     (tmp_path / "x.json").write_text("[" * 100_000)
     with pytest.raises(MutatorError, match=r"x\.json: not JSON"):
         read_json(tmp_path / "x.json", "x/1")

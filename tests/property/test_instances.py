@@ -44,8 +44,6 @@ def statements(file: ParsedFile) -> Iterator[FaultLocation]:
 
 
 class Inactive(ast.NodeTransformer):
-    """What a module does while no fault is active."""
-
     def __init__(self) -> None:
         self.asked = 0
 
@@ -66,7 +64,6 @@ class Inactive(ast.NodeTransformer):
 
 
 def limited(random_: random.Random, file: ParsedFile, location: FaultLocation) -> Injection:
-    """An injection at the place, limited to an instance among the function's names, or to some executions."""
     value = location.anchor.kind is not AnchorKind.BEFORE_ASSIGN
     made = Injection(
         location=location,
@@ -82,9 +79,8 @@ def limited(random_: random.Random, file: ParsedFile, location: FaultLocation) -
 
 
 def check(file: ParsedFile, injection: Injection) -> None:
-    """Check that a mutant compiles, un-splices, and equals the module while no fault is active, and that the
-    line of its probe call is known.
-    """
+    """Check that a mutant compiles, un-splices and equals the inactive module, and that the line of its probe
+    call is known."""
     edit = injection_edit(file, models(), injection, "0a1b2c3d")
     data = joined(apply_edits(file, in_lines(file, [edit])))
     assert unsplice(data) == file.data, injection
@@ -97,7 +93,7 @@ def check(file: ParsedFile, injection: Injection) -> None:
 
 
 def checked(names: Sequence[str], count: int) -> int:
-    """Check many cases drawn from the modules with these names, and return their number."""
+    """Check many cases drawn from these modules, and return their number."""
     files = [file for name in names if (file := module(name))]
     cases = [(file, location) for file in files for _, location in anchors(file)]
     guarded = [(file, location) for file in files for location in statements(file)]
@@ -109,14 +105,10 @@ def checked(names: Sequence[str], count: int) -> int:
     return len(chosen)
 
 
-def test_an_instance_is_all_that_differs() -> None:
-    """A limited mutant compiles, un-splices to every byte, calls the probe once, and acts like the module
-    while no fault is active.
-    """
+def test_a_limited_mutant_differs_only_in_its_injection() -> None:
     assert checked(FEW[:2], 130) == 130
 
 
 @pytest.mark.slow
-def test_an_instance_is_all_that_differs_at_large() -> None:
-    """The same holds for thousands of cases."""
+def test_thousands_of_limited_mutants_differ_only_in_their_injection() -> None:
     assert checked((*FEW, *MANY[:20]), 4000) == 4000

@@ -1,4 +1,4 @@
-"""Mutants from reused changes equal spliced ones byte for byte, for the faults of the paper and others."""
+"""Mutants from reused changes equal spliced ones byte for byte."""
 
 import math
 from dataclasses import replace
@@ -63,7 +63,7 @@ def triggers(draw: st.DrawFn) -> Trigger:
 
 @st.composite
 def varied(draw: st.DrawFn) -> Fault:
-    """Return a fault of the library with other numbers in it."""
+    """Return a fault of the library with other numbers."""
     fault = draw(st.sampled_from(faults()))
     injections = []
     for injection in fault.injections:
@@ -105,7 +105,6 @@ def values(param: ParamSchema, names: list[str]) -> st.SearchStrategy[Value]:
 
 
 def made(way: object, fault: Fault, trigger: Trigger) -> Mutant | tuple[type, str]:
-    """Return the mutant or the reason for its refusal."""
     try:
         return way(*paper(), fault, trigger)
     except MutatorError as error:
@@ -115,15 +114,14 @@ def made(way: object, fault: Fault, trigger: Trigger) -> Mutant | tuple[type, st
 @settings(max_examples=50, deadline=None)
 @given(varied() | others(), triggers())
 def test_reused_changes_give_what_splicing_gives(fault: Fault, trigger: Trigger) -> None:
-    """Files, patch, ids, digest and errors are the same for all numbers, models and triggers."""
+    """Files, patch, ids, digest and errors are the same."""
     made(build, fault, trigger)  # leaves a reusable change if it is the first of its kind
     assert made(build, fault, trigger) == made(build_directly, fault, trigger)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("reading", READINGS)
-def test_the_whole_library(reading: str) -> None:
-    """Every mutant of the paper's campaign equals the spliced one."""
+def test_mutants_of_the_papers_campaign_equal_spliced_ones(reading: str) -> None:
     plan = make_plan(Workspace.find(root=ROOT), "paper", Choices(reading=reading))
     pairs = {(e.fault.id, e.trigger): e for e in plan.experiments}
     assert len(pairs) > 6000

@@ -22,7 +22,6 @@ CONDITIONS = ["hwt <= 2.0 and rs > 0.0", "not hwt / 2.0 > 1.0", "abs(d_rel) < ma
 
 @cache
 def setting() -> tuple[object, object, list[Fault]]:
-    """Target, models, and one fault of each variant in both readings."""
     manifest, models = WORKSPACE.manifest("openpilot"), WORKSPACE.fault_models()
     found = {}
     for reading in WORKSPACE.readings().names:
@@ -34,7 +33,6 @@ def setting() -> tuple[object, object, list[Fault]]:
 
 @st.composite
 def alike(draw: st.DrawFn) -> list[tuple[Fault, Trigger]]:
-    """Copies of a fault with other numbers, under contexts."""
     fault = draw(st.sampled_from(setting()[2]))
     found = []
     for _ in range(draw(st.integers(1, 4))):
@@ -52,7 +50,7 @@ def alike(draw: st.DrawFn) -> list[tuple[Fault, Trigger]]:
 @settings(max_examples=15, deadline=None)
 @given(st.lists(alike(), min_size=1, max_size=3))
 def test_every_patch_is_given_back(families: list[list[tuple[Fault, Trigger]]]) -> None:
-    """The diff with holes, filled with a member's values, is that member's patch, byte for byte."""
+    """The diff with holes, filled with a member's values, is that member's patch."""
     manifest, models, _ = setting()
     made = {}
     for family in families:

@@ -38,7 +38,6 @@ def sources(draw: st.DrawFn) -> tuple[bytes, list[str]]:
 
 @st.composite
 def blocks(draw: st.DrawFn, indent: str, unit: str, names: list[str], depth: int) -> list[str]:
-    """Lines of a block: assignments of every form, comments, blank lines, and nested blocks."""
     lines: list[str] = []
     for _ in range(draw(st.integers(1, 3))):
         kinds = ["plain", "multi", "text", "slash", "ann", "tuple", "last"]
@@ -71,7 +70,7 @@ def site(name: str, kind: AnchorKind) -> FaultLocation:
 
 
 class Direct(cst.CSTTransformer):
-    """The same mutation in LibCST's tree: insert statements after, or around, the one that assigns `name`."""
+    """The same mutation in LibCST's tree."""
 
     def __init__(self, after: set[str], guarded: set[str]) -> None:
         super().__init__()
@@ -120,14 +119,13 @@ def mutate(data: bytes, after: Sequence[str], guarded: Sequence[str]) -> tuple[s
 
 
 def can_guard(data: bytes, name: str) -> bool:
-    """False if the statement shares its line."""
     return f"; {name} = ".encode() not in data
 
 
 @settings(max_examples=150, deadline=None)
 @given(st.data())
 def test_every_byte_comes_back(data: st.DataObject) -> None:
-    """A mutated source compiles, differs only by tagged lines (and guarded statements), and un-splices."""
+    """A mutant compiles and differs only by tagged lines (and guarded statements)."""
     source, names = data.draw(sources())
     chosen = data.draw(st.lists(st.sampled_from(names), unique=True)) if names else []
     guarded = [n for n in data.draw(st.permutations(names))[: len(names) // 2] if can_guard(source, n)]
@@ -145,7 +143,7 @@ def test_every_byte_comes_back(data: st.DataObject) -> None:
 @settings(max_examples=100, deadline=None)
 @given(st.data())
 def test_the_same_as_inserting_into_the_tree(data: st.DataObject) -> None:
-    """Line-wise splicing and LibCST's insertion of parsed statements give the same program."""
+    """Inserting parsed statements with LibCST gives the same program."""
     source, names = data.draw(sources())
     chosen = data.draw(st.lists(st.sampled_from(names), unique=True)) if names else []
     guarded = [n for n in names if n not in chosen and can_guard(source, n)][:2]

@@ -1,7 +1,5 @@
-"""On thousands of sources, every mutant that the splicer does not refuse is correct.
-
-`pytest -m slow -n 2 -rP tests/property/test_splicer_at_large.py` tries all and prints the figures.
-"""
+"""On thousands of sources, every mutant that the splicer does not refuse is correct. `pytest -m slow -n 2 -rP
+tests/property/test_splicer_at_large.py` tries all and prints the figures."""
 
 import random
 import sysconfig
@@ -26,14 +24,12 @@ KINDS = ("entry", "after_assign", "before_assign", "after_call", "before_call", 
 
 @pytest.fixture(autouse=True)
 def _quiet() -> Iterator[None]:
-    """Ignore the warnings of the sources."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         yield
 
 
 def proved(sources: Iterable[tuple[object, bytes]], run: Run | None, variables: int = 3) -> Figures:
-    """Return what was tried with these sources. Failures are named."""
     figures = Figures()
     for name, data in sources:
         try:
@@ -51,8 +47,8 @@ PARTS = 8  # of what takes long, for as many workers
     ("first", "count"),
     [(0, 6), *(pytest.param(2500 * part, 2500, marks=pytest.mark.slow) for part in range(PARTS))],
 )
-def test_generated_modules(first: int, count: int) -> None:
-    """At every anchor of generated modules a mutant is correct by `ast`, and acts like the original."""
+def test_mutants_of_generated_modules_are_correct(first: int, count: int) -> None:
+    """The mutants also act like the original."""
     seeds = range(first, first + count)
     figures = proved(((seed, ModuleWriter(seed).module()) for seed in seeds), behaviour)
     assert not figures.wrong
@@ -61,8 +57,8 @@ def test_generated_modules(first: int, count: int) -> None:
 
 
 @pytest.mark.parametrize("part", [None, *(pytest.param(n, marks=pytest.mark.slow) for n in range(PARTS))])
-def test_the_standard_library(part: int | None) -> None:
-    """At every anchor of the installed standard library and its tests a mutant is correct by `ast`."""
+def test_mutants_of_the_standard_library_are_correct(part: int | None) -> None:
+    """The library's own tests are included."""
     paths = sorted(path for path in LIBRARY.rglob("*.py") if "site-packages" not in path.parts)
     chosen = random.Random(4).sample(paths, 4) if part is None else paths[part::PARTS]
     figures = proved(((path, path.read_bytes()) for path in chosen), None)

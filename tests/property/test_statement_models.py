@@ -36,7 +36,6 @@ class _Inactive(ast.NodeTransformer):
 
 
 def locations(file: ParsedFile) -> Iterator[FaultLocation]:
-    """Each statement of each function, by the first thing that it does."""
     for function, found in file.functions.items():
         seen: Counter[tuple[str, str]] = Counter()
         for statement in (s for one in found for s in one.statements if s.reason is None and s.opens is None):
@@ -52,11 +51,10 @@ def locations(file: ParsedFile) -> Iterator[FaultLocation]:
     ("files", "least"), [(FEW, 20), pytest.param(ALL, 400, marks=pytest.mark.slow)], ids=["few", "all"]
 )
 @pytest.mark.parametrize("model", ["reordering", "repetition"])
-def test_statements_of_the_controller(model: str, files: list[Path], least: int) -> None:
-    """Wherever statements are exchanged or repeated, the file compiles and un-splices to its bytes.
-
-    Without the active branch, it equals the original to `ast`. Refusals have a reason.
-    """
+def test_statements_of_the_controller_are_repeated_and_exchanged(
+    model: str, files: list[Path], least: int
+) -> None:
+    """Without the active branch, the file equals the original to `ast`. Refusals have a reason."""
     models, made = Workspace.find(root=CLONE).fault_models(), 0
     for path in files:
         file = parse_file(path.name, path.read_bytes(), TARGET)

@@ -20,7 +20,6 @@ HEADINGS = re.compile(r"\"h[123]\"|\bh[123](?=[ ,:{])")  # in scripts and style 
 
 
 def words(tree: ast.AST) -> Iterator[tuple[int, str]]:
-    """Return line and text of each identifier and string."""
     for node in ast.walk(tree):
         line = getattr(node, "lineno", 0)
         for field in ("id", "attr", "arg", "name", "asname", "module", "value"):
@@ -30,7 +29,6 @@ def words(tree: ast.AST) -> Iterator[tuple[int, str]]:
 
 
 def found(code: str, suffix: str = ".py") -> list[tuple[int, str]]:
-    """Car names in Python identifiers and strings, except help examples, and anywhere in other files."""
     if suffix == ".py":
         texts = [(line, text) for line, text in words(ast.parse(code)) if "\nExamples:" not in text]
     else:
@@ -51,18 +49,17 @@ def found(code: str, suffix: str = ".py") -> list[tuple[int, str]]:
         "x = 'at Camera.aRADARPoint'",
     ],
 )
-def test_a_name_of_a_car_is_found(code: str) -> None:
-    """The check finds car names of any spelling in identifiers and strings."""
+def test_car_names_of_any_spelling_are_found(code: str) -> None:
     assert found(code)
 
 
 @pytest.mark.parametrize("line", ["// #kind=radar%2Fchaff", "<p>no lane</p>", "const gasMax = 1;"])
-def test_a_name_of_a_car_is_found_in_other_files(line: str) -> None:
-    """Pages, scripts and templates are checked as a whole, including comments."""
+def test_car_names_are_found_in_pages_scripts_and_templates(line: str) -> None:
+    """Comments are checked, too."""
     assert found(line, ".js")
 
 
-def test_the_harness_has_no_names_of_a_car() -> None:
+def test_the_harness_has_no_car_names() -> None:
     """Only the manifest says what a target observes, records and judges."""
     paths = [
         path

@@ -21,7 +21,6 @@ def modules(root: Path) -> Iterator[Path]:
 
 
 def imports(path: Path, root: Path) -> Iterator[tuple[str, bool]]:
-    """Return (imported module, whether inside a function) pairs, including imports under TYPE_CHECKING."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
     functions = [n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef | ast.AsyncFunctionDef)]
     inside = {node for function in functions for node in ast.walk(function)}
@@ -36,7 +35,6 @@ def imports(path: Path, root: Path) -> Iterator[tuple[str, bool]]:
 
 
 def source(name: str, root: Path) -> Path | None:
-    """Return the file of a module of the harness."""
     base = root / name.replace(".", "/")
     return next((p for p in (base.with_suffix(".py"), base / "__init__.py") if p.is_file()), None)
 
@@ -46,7 +44,6 @@ def top_modules(root: Path) -> list[str]:
 
 
 def hidden_imports(root: Path) -> list[str]:
-    """Return disallowed imports of the harness inside functions."""
     return [
         f"{path.relative_to(root)}: {name}"
         for path in modules(root)
@@ -58,7 +55,6 @@ def hidden_imports(root: Path) -> list[str]:
 
 
 def cycle(root: Path) -> list[str]:
-    """Return the modules of an import cycle, or nothing if there is none."""
     edges: dict[str, set[str]] = {str(path.relative_to(root)): set() for path in modules(root)}
     for path in modules(root):
         for name, _ in imports(path, root):
@@ -72,9 +68,8 @@ def cycle(root: Path) -> list[str]:
 
 
 def strangers_in_target(root: Path) -> list[str]:
-    """Imports of anything except the standard library and numpy in code that runs inside a target's
-    process.
-    """
+    """Return imports of anything except the standard library and numpy in code that runs inside a target's
+    process."""
     allowed = {*sys.stdlib_module_names, "numpy"}
     package = root / "mutator"
     return [
@@ -86,7 +81,6 @@ def strangers_in_target(root: Path) -> list[str]:
 
 
 def namesakes(root: Path) -> list[str]:
-    """Return modules that define a function or class with the module's name."""
     return [
         str(path.relative_to(root))
         for path in modules(root)
@@ -104,19 +98,18 @@ def lint(root: Path) -> subprocess.CompletedProcess[str]:
 
 
 def is_clean(root: Path) -> bool:
-    """Whether a tree passes all checks of this file."""
     found = (hidden_imports(root), cycle(root), strangers_in_target(root), namesakes(root))
     return not any(found) and len(top_modules(root)) <= TOP_MODULES and lint(root).returncode == 0
 
 
-def test_contracts_hold() -> None:
-    """Packages import in one direction, without cycles. Harness and target do not import each other."""
+def test_packages_import_in_one_direction() -> None:
+    """Harness and target do not import each other."""
     done = lint(CLONE)
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_shape_of_the_house() -> None:
-    """Few modules lie at the top, no modules import in a circle, and no function hides an import."""
+def test_modules_have_no_import_cycles_or_hidden_imports() -> None:
+    """Few modules lie at the top."""
     top, hidden, circle = top_modules(CLONE), hidden_imports(CLONE), cycle(CLONE)
     print(
         f"modules at the top: {len(top)}, cycles: {bool(circle):d}, imports inside functions: {len(hidden)}"
@@ -126,8 +119,7 @@ def test_shape_of_the_house() -> None:
     assert not circle
 
 
-def test_what_runs_inside_a_target_needs_little() -> None:
-    """Modules that run in a target's process import the standard library and numpy only."""
+def test_code_inside_a_target_imports_only_numpy_and_the_standard_library() -> None:
     assert not strangers_in_target(CLONE)
 
 
@@ -193,7 +185,7 @@ SHOWN_BY_THE_COMMAND_LINE = {
 
 
 def test_the_command_line_calls_the_api() -> None:
-    """Verbs call the public API, and the command line imports no package behind it."""
+    """The command line imports no package behind the public API."""
     own = ("mutator.api.", "mutator.cli", "mutator._common.", "mutator.errors")
     for path in (CLONE / "mutator" / "cli").glob("*.py"):
         tree = ast.parse(path.read_text(encoding="utf-8"))
