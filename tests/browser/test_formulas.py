@@ -39,7 +39,6 @@ def formula(rng: random.Random) -> str:
 
 @pytest.fixture
 def values() -> dict[str, np.ndarray]:
-    """Return forty steps of each variable, including special values."""
     rng = np.random.default_rng(1)
     made = {name: rng.normal(0.0, 5.0, 40) for name in NAMES}
     for name in NAMES[1:]:

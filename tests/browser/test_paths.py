@@ -96,8 +96,7 @@ def test_an_experiment_opens_with_its_path(opened: "Page") -> None:
     assert opened.texts(".path-box.is-ahead strong") == ["World"]
 
 
-def test_a_masked_fault_names_the_component_that_stopped_it(opened: "Page") -> None:
-    """A fault that was never activated says so."""
+def test_the_path_names_the_component_that_stopped_a_masked_fault(opened: "Page") -> None:
     opened.choose("kind", "sensor/distance")
     opened.page.click("#grid tr[data-at] >> nth=0")
     opened.page.wait_for_selector(".path-box.is-held")

@@ -152,7 +152,7 @@ def test_a_replay_starts_paused_shortly_before_the_activation(browser: Any, repl
 
 
 def test_keys_move_the_replay(replayed: Replayed) -> None:
-    """An arrow key moves by a sample, or by a second with Shift. The page's events follow."""
+    """An arrow key moves by a sample, or by a second with Shift. End jumps to the end."""
     seek(replayed, 1.0)
     replayed.press("ArrowRight")
     assert replayed.t == 1.05
@@ -219,7 +219,6 @@ def test_a_moment_of_huge_values_does_not_flatten_the_plot(
 
 
 def test_marks_close_together_have_separate_buttons(replayed: Replayed) -> None:
-    """The marks may share a time."""
     marks = [["alert", 2.5 + i / 1000, f"alert_{i}"] for i in range(6)]
     replayed.show(FACTS, SERIES | {"marks": marks})
     script = "all => all.map((e) => { const { x, y } = e.getBoundingClientRect(); return `${x} ${y}`; })"
@@ -228,7 +227,6 @@ def test_marks_close_together_have_separate_buttons(replayed: Replayed) -> None:
 
 
 def test_plots_are_selected_and_zoomed(replayed: Replayed) -> None:
-    """An instrument switches its plot on and off."""
     replayed.page.click(".gauge:has-text('calm')")
     assert replayed.page.locator('.plot-of[data-channel="calm"]').count() == 1
     assert replayed.page.get_attribute(".gauge:has-text('calm')", "aria-pressed") == "true"
@@ -275,8 +273,7 @@ def test_a_ghost_too_far_to_draw_is_named_with_its_distance(replayed: Replayed) 
     replayed.show(FACTS)
 
 
-def test_a_replay_pauses_at_the_end_of_the_drive(replayed: Replayed) -> None:
-    """The user can continue it. The frame rate is shown."""
+def test_a_replay_pauses_at_the_end_of_the_drive_and_can_continue(replayed: Replayed) -> None:
     replayed.show(FACTS)
     seek(replayed, 2.2)
     replayed.press(" ")
@@ -340,7 +337,6 @@ def test_with_reduced_motion_a_replay_shows_two_frames_a_second(page: "Page") ->
 
 
 def test_a_closed_replay_draws_nothing(replayed: Replayed) -> None:
-    """Any number of replays may have been opened before."""
     for _ in range(3):
         replayed.show(FACTS)
         replayed.page.click(".replay-player .play")

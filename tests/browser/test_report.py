@@ -70,7 +70,7 @@ def test_a_click_on_a_column_title_sorts_with_empty_cells_last(
 
 
 def test_an_opened_experiment_shows_its_diff_spec_and_commands(page: "Page", run: Path) -> None:
-    """Commands contain the opened folder. Back closes the experiment."""
+    """Commands contain the opened folder."""
     page.page.click("#grid tr[data-at] >> nth=0")
     page.page.wait_for_selector("#experiment .diff")
     name = page.fragment.removeprefix("e=")
@@ -138,7 +138,6 @@ def test_answers_link_to_their_experiments(page: "Page", rows: list[dict[str, st
 
 
 def test_the_list_starts_with_the_worst(page: "Page") -> None:
-    """If the user has chosen no order, hazards come first."""
     endings = page.column("ending")
     assert endings == sorted(
         endings, key=["hazard", "crashed", "sdc", "not activated", "harness error"].index
@@ -222,8 +221,7 @@ def test_a_damaged_series_is_shown_with_the_command_that_restores_it(page: "Page
 
 
 def test_a_cell_of_the_heat_map_filters(page: "Page", rows: list[dict[str, str]]) -> None:
-    """A cell's text is its counts, which filters for results do not change. A second press removes the
-    filter."""
+    """Filters for results do not change the counts. A second press removes the filter."""
     cell = '#heat button[aria-label^="sensor/lane in B:"]'
     here = [row for row in rows if (row["fault_type"], row["scenario"]) == ("lane", "B")]
     used = [row for row in here if row["status"] != "harness_error"]
@@ -265,8 +263,7 @@ def test_the_map_shows_the_median_of_a_metric(page: "Page", rows: list[dict[str,
     assert options[-2:] == ["median t activation [s]", "worst t activation [s]"]
 
 
-def test_columns_can_be_chosen_and_values_searched(page: "Page", rows: list[dict[str, str]]) -> None:
-    """A chosen column can be sorted and is in the address."""
+def test_columns_and_searches_are_in_the_address(page: "Page", rows: list[dict[str, str]]) -> None:
     page.page.click("summary:has-text('Columns')")
     page.page.check(".option:has-text('max dev gas') input")
     page.page.uncheck(".option:has-text('variant') input")

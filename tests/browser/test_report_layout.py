@@ -15,7 +15,7 @@ EXPERIMENTS = 24  # of the run
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_a_narrow_screen_does_not_scroll_sideways(browser: Any, run: Path, scheme: str) -> None:
-    """At 400 pixels only tables are wider than the screen. An experiment fills the screen."""
+    """At 400 pixels only tables are wider than the screen."""
     context = browser.new_context(viewport={"width": 400, "height": 800}, color_scheme=scheme)
     page = context.new_page()
     page.goto((run / "report" / "index.html").as_uri())
@@ -61,7 +61,6 @@ def test_axe_finds_no_serious_fault(
 
 
 def test_column_titles_are_not_cut_off(page: "Page") -> None:
-    """Below the last row of a short table there is almost no space."""
     cut = "all => all.filter((b) => b.scrollWidth > b.clientWidth).map((b) => b.textContent)"
     assert page.page.eval_on_selector_all("#grid thead button", cut) == []
     page.page.evaluate("document.querySelector('#grid').style.setProperty('--rows', 3)")
@@ -86,7 +85,7 @@ def scrolled(page: "Page") -> Iterator["Page"]:
 
 
 def test_paper_has_the_filtered_rows(page: "Page") -> None:
-    """The number of rows has a stated limit. Parts that are only for screens are left out."""
+    """There is a stated limit. Parts that are only for screens are left out."""
     page.page.emulate_media(media="print")
     page.page.evaluate("dispatchEvent(new Event('beforeprint'))")
     assert len(page.column("experiment_id")) == EXPERIMENTS

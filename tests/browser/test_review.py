@@ -89,7 +89,7 @@ def test_marks_become_commands(open_page: Callable[..., Any]) -> None:
 
 
 def test_similar_groups_are_folded(open_page: Callable[..., Any]) -> None:
-    """One key unfolds them. Another marks all of them after a question."""
+    """One key unfolds similar groups, and another marks all of them after a question."""
     page = open_page("q=gap")
     assert shown(page) == 1
     assert page.inner_text("[data-do=unfold]:visible") == "1 more like this"

@@ -125,7 +125,6 @@ def test_reviewers_do_not_overwrite_each_other_unseen(review: Callable[..., Any]
 
 
 def test_remarks_of_two_reviewers_are_both_kept(review: Callable[..., Any], library: Workspace) -> None:
-    """No remark overwrites another, so nobody needs to look again."""
     pages = [review(name) for name in ("Jane", "Jim")]
     for page in pages:
         page.keyboard.press("j")
@@ -137,7 +136,6 @@ def test_remarks_of_two_reviewers_are_both_kept(review: Callable[..., Any], libr
 
 
 def test_all_filtered_groups_are_approved_at_once(review: Callable[..., Any], library: Workspace) -> None:
-    """One question states number and states."""
     page = review("Jane", "q=gap")
     page.keyboard.press("Shift+A")
     assert page.inner_text("#ask-title") == "Approve 2 groups?"
@@ -148,7 +146,6 @@ def test_all_filtered_groups_are_approved_at_once(review: Callable[..., Any], li
 
 
 def test_an_image_effect_has_images(review: Callable[..., Any]) -> None:
-    """The page shows the frame before the effect and at three levels, each with its value."""
     page = review("Jane", "q=light")
     page.wait_for_selector(".pictures figure:nth-child(4)")
     pictures = page.locator(".pictures img")

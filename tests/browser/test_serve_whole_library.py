@@ -55,7 +55,7 @@ def opened(context: Any, address: str) -> Any:
 
 
 def marked(page: Any, count: int) -> dict[str, str]:
-    """Mark the next groups by keys and return group -> keys."""
+    """Mark the next groups by keys. Return group -> keys."""
     made = {}
     for at in range(count):
         page.keyboard.press("j")
@@ -73,7 +73,7 @@ def shown(page: Any, group: str) -> str:
 
 
 def test_twenty_marks_survive_reloads_and_killed_servers(browser: Any, root: Path) -> None:
-    """Ten come before the reload, five during the kill and five after the restart."""
+    """Ten marks come before the reload, five during the kill and five after the restart."""
     context = browser.new_context(reduced_motion="reduce")
     context.set_default_timeout(90_000)
     marks: dict[str, str] = {}

@@ -78,7 +78,7 @@ def test_every_page_works_from_its_file(site: Path, visited: Any, width: int) ->
 
 
 def test_index_html_leads_to_the_readme(site: Path, visited: Any) -> None:
-    """The sidebar of that page lists every page of the site."""
+    """The first page's sidebar lists every page of the site."""
     visited.goto((site / "index.html").as_uri())
     visited.wait_for_url("**/docs/README.html")
     links = "all => all.map((a) => new URL(a.href).pathname)"
@@ -92,7 +92,6 @@ def test_index_html_leads_to_the_readme(site: Path, visited: Any) -> None:
 def test_pages_are_accessible(
     site: Path, browser: Any, page: str, scheme: str, serious_faults: Callable[[Any], list[str]]
 ) -> None:
-    """The pages are of each kind, light and dark."""
     shown = browser.new_page(color_scheme=scheme, reduced_motion="reduce")
     shown.goto((site / f"{page}.html").as_uri())
     assert serious_faults(shown) == []

@@ -44,7 +44,7 @@ def report(
 def test_a_mark_lists_its_experiments(
     report: Path, open_report: "Callable[[Path], Page]", serious_faults: Callable[[Any], list[str]]
 ) -> None:
-    """A line's number lists its permanent and its transient experiments. Colours and roles are accessible."""
+    """The number of a line lists its permanent and its transient experiments."""
     page = open_report(report)
     assert serious_faults(page.page) == []
     line = page.page.locator(".source tr", has_text="gas = min")

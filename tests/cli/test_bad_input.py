@@ -64,7 +64,6 @@ def test_the_spec_without_a_mistake_is_valid(cli: Cli, own: Path) -> None:
 def test_a_mistake_in_a_spec_is_reported_with_its_line(
     cli: Cli, own: Path, right: str, wrong: str, line: int, said: str
 ) -> None:
-    """There is no traceback."""
     assert right in SPEC
     own.write_text(SPEC.replace(right, wrong))
     answer = cli("diff", own)
@@ -75,7 +74,6 @@ def test_a_mistake_in_a_spec_is_reported_with_its_line(
 
 
 def test_a_value_out_of_range_is_refused(cli: Cli, own: Path) -> None:
-    """The error shows the range of the parameter's model."""
     flip = SPEC.replace("model: offset", "model: bit_flip").replace("          unit: m\n", "")
     own.write_text(flip.replace("by_m: error", "bit: 64"))
     answer = cli("diff", own)
@@ -85,7 +83,6 @@ def test_a_value_out_of_range_is_refused(cli: Cli, own: Path) -> None:
 
 
 def test_a_template_that_does_not_parse_is_reported_with_its_line(cli: Cli, own: Path, root: Path) -> None:
-    """Any spec may use the template."""
     template = root / "templates" / "offset.py.j2"
     template.write_text(template.read_text() + "{% if %}\n")
     for words in (["diff", own], ["check"]):
@@ -95,8 +92,7 @@ def test_a_template_that_does_not_parse_is_reported_with_its_line(cli: Cli, own:
         assert "Traceback" not in answer.err
 
 
-def test_a_mutant_that_does_not_compile_is_a_users_error(cli: Cli, own: Path, root: Path) -> None:
-    """Nothing is run."""
+def test_a_mutant_that_does_not_compile_is_not_run(cli: Cli, own: Path, root: Path) -> None:
     template = root / "templates" / "offset.py.j2"
     template.write_text("if _fi.active('{{ fi }}'):\n    {{ target }} = = {{ by }}\n")
     answer = cli("try", own, "-s", "A")

@@ -24,7 +24,6 @@ def filled() -> Path:
 
 
 def test_cached_files_are_listed(cli: Cli, filled: Path) -> None:
-    """No library is needed."""
     answer = cli("cache")
     assert answer.code == 0, answer.err
     assert [line.split() for line in answer.out.splitlines()[:3]] == [
@@ -40,7 +39,7 @@ def test_cached_files_are_listed(cli: Cli, filled: Path) -> None:
 
 
 def test_path_prints_only_the_folder(cli: Cli) -> None:
-    """Other commands can use the path. The folder may be missing."""
+    """The folder may be missing."""
     assert cli("cache", "--path").out == f"{caches.folder()}\n"
 
 
@@ -49,7 +48,6 @@ def test_path_prints_only_the_folder(cli: Cli) -> None:
     [(("--max", "25kB"), 2), (("--max", "0"), 0), (("--max", "2 GB"), 3), (("--clear",), 0)],
 )
 def test_max_and_clear_delete_files(cli: Cli, filled: Path, words: tuple[str, ...], left: int) -> None:
-    """Both options report how much they deleted."""
     answer = cli("cache", *words, "--json")
     assert (answer.code, len(answer.json["kept"]), len(answer.json["deleted"])) == (0, left, 3 - left)
     assert len(list(filled.iterdir())) == left
@@ -66,7 +64,6 @@ def test_max_and_clear_delete_files(cli: Cli, filled: Path, words: tuple[str, ..
     ],
 )
 def test_invalid_options_delete_nothing(cli: Cli, filled: Path, words: tuple[str, ...], said: str) -> None:
-    """The cases are an invalid size, and both options at once."""
     answer = cli("cache", *words)
     assert answer.code == 2 and said in answer.err
     assert len(list(filled.iterdir())) == 3

@@ -62,7 +62,7 @@ def experiment_with(run: Path, word: str) -> str:
 
 
 def test_plan_writes_the_plan_and_runs_nothing(cli: Cli, root: Path) -> None:
-    """The output has the expected time and disk space and the command that runs the plan."""
+    """The output has the expected time and disk space."""
     answer = cli("plan", "toy", "--out", "p", "--only", 'fault_type == "distance"', "-n", "4")
     assert answer.code == 0
     for wanted in ("sensor/distance", "guided", "random", "total", "with 4 workers", "MB of disk"):
@@ -73,8 +73,9 @@ def test_plan_writes_the_plan_and_runs_nothing(cli: Cli, root: Path) -> None:
     assert not (Path("p") / "records").exists()
 
 
-def test_a_run_has_a_worker_for_each_core(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Only usable cores count, and `plan` expects the same number."""
+def test_a_run_has_a_worker_for_each_usable_core(
+    cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(campaigns, "usable_cores", lambda: 3)
     started: list[int] = []
 
@@ -93,7 +94,7 @@ def test_a_run_has_a_worker_for_each_core(cli: Cli, root: Path, monkeypatch: pyt
 
 @pytest.mark.parametrize("engine", ["reference", "warm", "fork"])
 def test_a_fault_that_hides_a_name_is_refused_before_any_run(cli: Cli, root: Path, engine: str) -> None:
-    """The fault would make a module's name local."""
+    """Such a fault makes a module's name local."""
     driver = root / "tree" / "toycar" / "driver.py"
     driver.write_text("HEADWAY_S = 1.5\n" + driver.read_text().replace("1.5 * speed", "HEADWAY_S * speed"))
     spec = root / "fault_library" / "faults" / "sensor" / "lane.yaml"
@@ -258,7 +259,6 @@ def test_the_page_loads_nothing(run: Path) -> None:
 
 
 def test_show_prints_diff_times_verdict_and_plot(cli: Cli, run: Path) -> None:
-    """The page can also draw a plot."""
     name = experiment_with(run, "hazard")
     answer = cli("show", name)
     assert answer.code == 0
@@ -272,7 +272,6 @@ def test_show_prints_diff_times_verdict_and_plot(cli: Cli, run: Path) -> None:
 
 
 def test_show_without_an_experiment_lists_the_worst(cli: Cli, run: Path) -> None:
-    """A filter leaves out the results that do not match."""
     listed = cli("show", "--json").json
     endings = [line["ending"] for line in listed["worst"]]
     assert endings == sorted(endings, key=lambda ending: ending != "hazard")
@@ -306,8 +305,7 @@ def test_an_unknown_or_ambiguous_id_is_refused(cli: Cli, run: Path, name: str) -
     assert "Traceback" not in answer.err
 
 
-def test_show_before_the_run(cli: Cli, root: Path) -> None:
-    """`show` says how to run the experiment."""
+def test_show_says_that_an_experiment_has_not_run_yet(cli: Cli, root: Path) -> None:
     cli("plan", "toy", "--out", "runs/p", "--limit", "2")
     name = results_id(Path("runs/p/plan.csv"))
     answer = cli("show", name)
@@ -320,8 +318,7 @@ def results_id(table: Path) -> str:
     return table.read_text().splitlines()[1].split(",")[0]
 
 
-def test_rerun_reproduces_the_record(cli: Cli, run: Path) -> None:
-    """Without --trace no files are left."""
+def test_rerun_reproduces_the_record_and_leaves_no_files(cli: Cli, run: Path) -> None:
     name = experiment_with(run, "sdc")
     answer = cli("rerun", name)
     assert answer.code == 0
@@ -367,8 +364,7 @@ def test_clean_deletes_run_folders_only(cli: Cli, root: Path) -> None:
 KNOWN = {pattern.partition("/")[0] for pattern in CONTENT}  # names in a run folder
 
 
-def test_clean_deletes_all_that_a_run_writes(cli: Cli, run: Path, tmp_path: Path) -> None:
-    """Every command that writes into a run folder has run. A link is refused."""
+def test_clean_deletes_all_that_commands_write_into_a_run(cli: Cli, run: Path, tmp_path: Path) -> None:
     copy, other = tmp_path / "copy", tmp_path / "other"
     for folder in (copy, other):
         shutil.copytree(run, folder)

@@ -29,7 +29,7 @@ def runs(root: Path, write_run: Write) -> tuple[Path, Path]:
 
 
 def test_compare_prints_and_writes_the_changes(cli: Cli, runs: tuple[Path, Path]) -> None:
-    """The files are next to the second run."""
+    """The files are written next to the second run."""
     answer = cli("compare", *runs)
     assert answer.code == 0, answer.err
     for wanted in ("new-hazard", "sensor/silence", "In both runs: 24 experiments"):
@@ -39,7 +39,7 @@ def test_compare_prints_and_writes_the_changes(cli: Cli, runs: tuple[Path, Path]
 
 
 def test_a_different_selection_is_reported_before_any_table(cli: Cli, root: Path, write_run: Write) -> None:
-    """One run has fewer experiments by choice. The page has the remark, too."""
+    """The page has the remark, too."""
     workspace = Workspace.find(root)
     runs = write_run(workspace, Path("whole")), write_run(workspace, Path("part"), limit=6)
     said = "The runs are different parts of a campaign: whole has all of it, part has --limit 6."
@@ -86,7 +86,7 @@ def test_a_run_equals_itself(cli: Cli, runs: tuple[Path, Path]) -> None:
 
 
 def test_a_gate_fails_if_results_are_missing(cli: Cli, root: Path, write_run: Write) -> None:
-    """A regression cannot be ruled out. The exit code is 3."""
+    """A regression cannot be ruled out, so the exit code is 3."""
     workspace = Workspace.find(root)
     whole = write_run(workspace, Path("whole"), campaign="small")
     part = write_run(

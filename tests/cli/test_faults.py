@@ -73,7 +73,7 @@ def read_index(out: Path) -> list[dict[str, str]]:
 
 
 def test_generate_writes_patches_that_apply(cli: Cli, root: Path) -> None:
-    """Un-splicing restores the pristine target."""
+    """Un-splicing a patched file restores the pristine target."""
     out = Path("mutants")
     assert cli("generate", "sensor/*", "--out", out).code == 0
     index = read_index(out)
@@ -104,7 +104,6 @@ def test_a_generated_tree_equals_the_patched_target(cli: Cli, root: Path) -> Non
 
 
 def test_generate_samples_mutants_of_operators(cli: Cli, root: Path) -> None:
-    """Without a spec, the mutants are those of a function, in executed lines."""
     words = ("--operators", "arithmetic,branch", "--in", "toycar/*.py::Driver.drive", "--scenario", "A")
     answer = cli("generate", *words, "--sample", 5, "--seed", 3, "--out", "m")
     assert answer.code == 0 and "5 draws of " in answer.err
@@ -143,7 +142,6 @@ def test_ids_are_stable(cli: Cli, root: Path) -> None:
     ],
 )
 def test_generate_refuses_two_sources_or_none(cli: Cli, root: Path, words: list[str], said: str) -> None:
-    """Input that generates nothing is refused as well."""
     answer = cli("generate", *words, "--out", "m")
     assert answer.code == 2
     assert said in answer.err

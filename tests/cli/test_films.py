@@ -44,7 +44,6 @@ def name(finished: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 
 
 def test_the_film_command_receives_both_runs_and_their_events(cli: Cli, name: str) -> None:
-    """Its arguments include the time of a still."""
     answer = cli("show", name, "--no-plot", "--video", "out/a.json", "--still", "1.5=b.json", "--json").json
     assert answer["films"] == ["b.json", "out/a.json"]
     video, still = (json.loads(Path(path).read_text()) for path in ("out/a.json", "b.json"))
@@ -61,7 +60,6 @@ def test_the_film_command_receives_both_runs_and_their_events(cli: Cli, name: st
 
 
 def test_a_film_adds_no_file_to_the_run(cli: Cli, name: str) -> None:
-    """The record is still the campaign's byte for byte."""
     before = sorted(Path("runs/a").rglob("*"))
     answer = cli("show", name, "--no-plot", "--video", "a.json")
     assert sorted(Path("runs/a").rglob("*")) == before
@@ -86,8 +84,7 @@ def test_a_still_without_a_file_is_in_the_report(cli: Cli, name: str) -> None:
 def test_a_run_takes_stills_of_its_worst_experiments(
     cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Stills show activation and hazard, if they are visible. Their number is in proportion to the plan. If
-    the command is repeated, or with `--no-stills`, a run takes none."""
+    """Stills show activation and hazard, if they are visible. Their number is in proportion to the plan."""
     manifest = root / "fault_library/targets/toycar.yaml"
     manifest.write_text(manifest.read_text().replace("still: [", "pictures: [alone]\n  still: ["))
     monkeypatch.setattr(stills, "ONE_IN", 2)
@@ -130,7 +127,7 @@ def test_a_target_without_films_says_so(cli: Cli, root: Path) -> None:
 
 @pytest.mark.parametrize("still", ["early", "early=a.json", "=a.json", "nan=a.json", "1.5="])
 def test_an_invalid_time_of_a_still_is_refused(cli: Cli, name: str, still: str) -> None:
-    """A still with a file but without a time is refused as well."""
+    """A file name without a time is refused as well."""
     answer = cli("show", name, "--no-plot", "--still", still)
     assert answer.code == 2
     assert "14.5=early.png" in answer.err

@@ -34,7 +34,6 @@ def place(toy: Workspace) -> Path:
 
 
 def test_a_campaign_with_non_ascii_names_runs_in_the_c_locale(place: Path) -> None:
-    """Library, target files and run folder have such names."""
     (place / "tree" / "toycar" / "größe.py").write_text("SIZE = 1\n")
     root = place.rename(place.with_name("bücher"))
     answer = mutator(root, PLAIN, "run", "small", "--out", "läufe/1", "--limit", "1", "-n", "1")
@@ -44,7 +43,6 @@ def test_a_campaign_with_non_ascii_names_runs_in_the_c_locale(place: Path) -> No
 
 
 def test_non_ascii_output_is_escaped_in_an_ascii_environment(place: Path) -> None:
-    """JSON stays valid."""
     answer = mutator(place, NARROW, "list", "specs")
     assert (answer.returncode, "Ma\\xdf \\u2192" in answer.stdout) == (0, True)
     answer = mutator(place, NARROW, "list", "specs", "--json")
@@ -53,7 +51,7 @@ def test_non_ascii_output_is_escaped_in_an_ascii_environment(place: Path) -> Non
 
 @pytest.mark.parametrize("what", ["run folder", "library", "target file"])
 def test_a_name_that_cannot_be_decoded_is_refused(place: Path, what: str) -> None:
-    """The message says what to set."""
+    """The message suggests LC_ALL=C.UTF-8."""
     out = "run"
     if what == "run folder":
         out = "läufe"

@@ -82,7 +82,6 @@ TREES: dict[str, tuple[dict[str, str], str, str]] = {
 def test_a_first_library_runs_once_its_marks_are_deleted(
     name: str, cli: Cli, tree: Callable[..., Path], nowhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The controller has an ordinary step. The likeliest value is injected."""
     files, manifest, place = TREES[name]
     cli("init", "faults", "--target", tree(files))
     (written,) = (nowhere / "faults/fault_library/targets").iterdir()
@@ -119,7 +118,6 @@ FOREIGN: dict[str, dict[str, str]] = {
 def test_check_lists_every_place_to_fill_in(
     name: str, cli: Cli, tree: Callable[..., Path], nowhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """`init` writes a library for any tree. Each mark is listed once, with file, line and what to fill in."""
     told = cli("init", "faults", "--target", tree(FOREIGN[name]), "--json").json
     assert (nowhere / "faults" / "README.md").exists()
     marks = [
@@ -150,8 +148,9 @@ NOTHING: dict[str, tuple[dict[str, str], str]] = {
 
 
 @pytest.mark.parametrize("name", NOTHING)
-def test_a_tree_without_a_controller_gets_a_warning(name: str, cli: Cli, tree: Callable[..., Path]) -> None:
-    """The library is written nevertheless."""
+def test_a_library_for_a_tree_without_a_controller_has_a_warning(
+    name: str, cli: Cli, tree: Callable[..., Path]
+) -> None:
     files, told = NOTHING[name]
     folder = tree(files)
     answer = cli("init", "faults", "--target", folder)
@@ -160,8 +159,9 @@ def test_a_tree_without_a_controller_gets_a_warning(name: str, cli: Cli, tree: C
     assert told in answer.err
 
 
-def test_a_tree_with_a_controller_has_no_warning(cli: Cli, tree: Callable[..., Path]) -> None:
-    """Another file cannot be read."""
+def test_a_tree_with_a_controller_and_an_unreadable_file_has_no_warning(
+    cli: Cli, tree: Callable[..., Path]
+) -> None:
     assert cli("init", "faults", "--target", tree(FOREIGN["syntax errors"])).err == ""
 
 
@@ -203,7 +203,6 @@ def test_the_new_readme_names_commands_that_exist(cli: Cli, nowhere: Path) -> No
 
 
 def test_init_for_an_installed_package(cli: Cli, nowhere: Path) -> None:
-    """Nothing of the shipped target is copied."""
     assert "places to fill in" in cli("init", "faults", "--target", "installed:typer").out
     manifest = (nowhere / "faults/fault_library/targets/typer.yaml").read_text()
     assert "root: installed:typer\n" in manifest
@@ -215,8 +214,9 @@ def test_init_for_an_installed_package(cli: Cli, nowhere: Path) -> None:
     ("target", "told"),
     [("nowhere", "no folder nowhere"), ("installed:no.where", "no installed package 'no.where'")],
 )
-def test_init_refuses_a_missing_target(target: str, told: str, cli: Cli, nowhere: Path) -> None:
-    """No library is written."""
+def test_init_refuses_a_missing_target_and_writes_nothing(
+    target: str, told: str, cli: Cli, nowhere: Path
+) -> None:
     answer = cli("init", "faults", "--target", target)
     assert answer.code == 2
     assert f"error: --target: {told}" in answer.err

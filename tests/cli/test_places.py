@@ -16,7 +16,6 @@ def place(toy: Workspace) -> tuple[str, ...]:
 
 
 def test_places_are_listed_with_line_anchor_and_models(cli: Cli, toy: Workspace) -> None:
-    """JSON also has the file and is ready for a spec."""
     answer = cli("places", "toycar/sensing.py::Sensor.sense", *place(toy))
     assert answer.code == 0
     assert "{function: Sensor.sense, after_assign: gap}" in answer.out

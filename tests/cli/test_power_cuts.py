@@ -100,7 +100,7 @@ def test_records_are_synced_after_what_they_refer_to(
 
 @pytest.mark.parametrize("rest", ["cut off", "zeros"])
 def test_a_record_without_its_patch_is_refused(cli: Cli, cut: Path, seal: str, rest: str) -> None:
-    """Any part of the block may survive. The repaired run has the original result."""
+    """Any part of the patch's block may survive. The repaired run has the original result."""
     [path] = (cut / "patches").iterdir()
     data, name = path.read_bytes(), read_blocks(path).blocks[-1].key
     for length in range(last_block(path), len(data)):
@@ -122,7 +122,7 @@ def test_a_record_without_its_patch_is_refused(cli: Cli, cut: Path, seal: str, r
 
 
 def test_a_lost_series_is_restored_by_a_rerun(cli: Cli, cut: Path) -> None:
-    """Any part of its block may survive. The run completes, and the other experiments keep their series."""
+    """Any part of the series' block may survive. The run completes."""
     [path] = segments(cut)
     data = path.read_bytes()
     names = [block.key.split()[0] for block in read_blocks(path).blocks if block.kind]

@@ -79,7 +79,6 @@ def test_a_group_is_shown_with_holes_and_values(cli: Cli, root: Path, known: dic
 
 
 def test_a_review_covers_the_library_specs_or_a_campaign(cli: Cli, root: Path, known: dict[str, str]) -> None:
-    """For a campaign it counts the runs."""
     assert set(ids(cli, "--spec", "sensor/lane")) < known.keys()
     campaign = cli("review", "--campaign", "small", "--json").json
     assert {group["group"] for group in campaign} <= known.keys()
@@ -88,7 +87,6 @@ def test_a_review_covers_the_library_specs_or_a_campaign(cli: Cli, root: Path, k
 
 
 def test_decisions_are_stored(cli: Cli, root: Path, known: dict[str, str]) -> None:
-    """After a change, the command shows what changed."""
     group = about(known, "omission()")
     answer = cli("review", "reject", group[:6], *JANE, "--remark", "too much")
     assert re.fullmatch(rf"{group} rejected by Jane Doe on 20..-..-..", answer.out.splitlines()[0])
@@ -200,7 +198,6 @@ def test_a_changed_group_shows_the_diff_since_its_approval(
 def test_a_mistake_in_the_review_file_is_reported_at_its_line(
     cli: Cli, root: Path, known: dict[str, str]
 ) -> None:
-    """A user edited the file."""
     cli("review", "approve", next(iter(known)), *JANE)
     file = root / "fault_library/reviews/toycar.yaml"
     good = file.read_text()
@@ -245,7 +242,7 @@ def keys(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
 def test_a_walk_asks_about_each_group(
     cli: Cli, root: Path, keys: Callable[..., None], known: dict[str, str]
 ) -> None:
-    """Any key except a, r, s and q asks again. Each decision is saved at once."""
+    """Any key except a, r, s and q asks again."""
     first, second, third, *_ = known
     keys("axrsq", "good", "")
     answer = cli("review", "walk", *JANE)
@@ -278,11 +275,9 @@ def test_a_walk_asks_again_if_another_reviewer_decides(
     assert cli("review", "show", first, "--json").json[0]["by"] == "Jane Doe"
 
 
-def test_ctrl_d_ends_a_walk(
+def test_ctrl_d_ends_a_walk_without_a_decision(
     cli: Cli, root: Path, keys: Callable[..., None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Nothing is decided, and the exit code is 0."""
-
     def over() -> str:
         raise EOFError
 
@@ -296,7 +291,6 @@ def test_ctrl_d_ends_a_walk(
 def test_the_page_is_one_self_contained_file(
     cli: Cli, root: Path, tmp_path: Path, known: dict[str, str]
 ) -> None:
-    """The page has the same bytes each time."""
     out = tmp_path / "review.html"
     first = next(iter(known))
     cli("review", "approve", first, *JANE)

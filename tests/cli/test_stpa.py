@@ -47,8 +47,7 @@ def library(tmp_path: Path) -> Path:
     return library
 
 
-def test_a_problem_in_the_analysis_exits_with_1(cli: Cli, library: Path, nowhere: Path) -> None:
-    """No causal factor needs the spec."""
+def test_a_spec_that_no_causal_factor_needs_exits_with_1(cli: Cli, library: Path, nowhere: Path) -> None:
     factors = library / "stpa" / "causal_factors.yaml"
     factors.write_text(factors.read_text().replace(", vision_weather/lens_mud", ""))
     answer = cli("--root", CLONE, "--library", library, "stpa")
@@ -92,7 +91,6 @@ def test_check_covers_the_analysis(cli: Cli, library: Path, nowhere: Path) -> No
     ],
 )
 def test_a_campaign_needs_correct_context_tables(cli: Cli, root: Path, new: str, said: str) -> None:
-    """The table has gaps, overlaps or unknown names."""
     table = root / "fault_library" / "stpa" / "contexts" / "near_far.yaml"
     table.write_text(table.read_text().replace("when: hwt > near_s", new))
     answer = cli("plan", "toy", "--out", "plan")

@@ -95,7 +95,6 @@ def test_durations(seconds: float, words: str) -> None:
 
 
 def test_a_diff_for_reading_leaves_new_files_out() -> None:
-    """The new files are named."""
     text, note = readable(PATCH)
     assert text == PATCH[PATCH.index("diff --git a/p/a.py") :]
     assert "p/_fi.py" in note

@@ -27,7 +27,7 @@ def changed(before: TargetManifest, after: TargetManifest) -> list[str]:
 
 
 def test_an_older_manifest_is_rewritten(cli, path: Path) -> None:
-    """Comments elsewhere are kept. Comments that cannot be kept are printed."""
+    """Comments that cannot be kept are printed."""
     text = path.read_text().replace("step_s:", "# of the world\nstep_s:")
     text = text.replace("compare:", "compare:  # pedals").replace("target/1\n", "target/1\n\n")
     path.write_text(text.replace("t: now\n", 't: "now  # b"\n'))

@@ -50,7 +50,7 @@ def test_an_audit_is_printed_on_one_page(cli: Cli, sealed: str) -> None:
 
 
 def test_the_seal_is_shown_wherever_a_run_ends(cli: Cli, sealed: str) -> None:
-    """`run` prints it even with nothing left to do, and so do JSON and report."""
+    """`run` prints the seal even with nothing left to do, and so do JSON and report."""
     again = cli("run", "small", "--out", "run", "-n", "0", "--json")
     assert (again.code, again.json["ran"], again.json["seal"]) == (0, 0, sealed)
     assert f"| seal | {sealed} |" in Path("run/report/REPORT.md").read_text()
@@ -101,7 +101,7 @@ def chunks() -> dict[str, str]:
 def test_rerun_restores_damaged_series(
     cli: Cli, sealed: str, what: str, become: Callable[[Path], None]
 ) -> None:
-    """An audit names the damaged file and the remedy. The golden runs' chunk is rebuilt at once."""
+    """The golden runs' chunk is rebuilt at once."""
     before = {path.name: path.read_bytes() for path in Path("run/series").iterdir()}
     name, *others = packed().entries
     became = Path("run/series") / chunks()[what]
@@ -165,7 +165,6 @@ def test_damaged_blocks_of_patches_are_reported(cli: Cli, sealed: str) -> None:
 
 
 def test_the_page_lists_some_of_many_differences(cli: Cli, sealed: str, root: Path) -> None:
-    """JSON has all differences."""
     table = Path("run/results.csv")
     table.write_text("\n" * 60)
     found = cli("verify", "run")
@@ -175,8 +174,7 @@ def test_the_page_lists_some_of_many_differences(cli: Cli, sealed: str, root: Pa
     assert len(tables["differences"]) > 50
 
 
-def test_with_another_target_the_audit_does_not_pass(cli: Cli, sealed: str, root: Path) -> None:
-    """No tree can be compared."""
+def test_an_audit_with_another_target_does_not_pass(cli: Cli, sealed: str, root: Path) -> None:
     with (root / "tree" / "toycar" / "driver.py").open("a") as file:
         file.write("\n")
     found = cli("verify", "run", "--expect", sealed)
@@ -204,6 +202,5 @@ def test_without_the_target_digests_and_tables_are_compared(
     ],
 )
 def test_wrong_input_is_refused(cli: Cli, sealed: str, words: tuple[str, ...], told: str) -> None:
-    """The folder is no run, or the text is no seal."""
     found = cli(*words)
     assert found.code == 2 and told in found.err

@@ -62,8 +62,7 @@ def edit_target(place: Path) -> None:
         file.write("\n# edited\n")
 
 
-def test_an_experiment_is_found_and_drawn(driven: Path) -> None:
-    """No experiment is run."""
+def test_an_experiment_is_found_and_drawn_without_a_run(driven: Path) -> None:
     drawing = drawn(driven, BRAKE)
     [name] = [name for name in RunFolder.open(driven / "run").records() if name in drawing.note]
     assert [code for _, code in drawing.codes] == [BRAKE.query, f"mutator show {name} --run DIR"]

@@ -96,8 +96,8 @@ def test_a_query_finds_the_published_counts_of_table_3(table_3: dict[str, Judged
     assert one.answers[0].found.text == published.text
 
 
-def test_the_papers_counts_support_it_only_per_activated_fault(table_3: dict[str, JudgedClaim]) -> None:
-    """Guided faults trail per injected fault. The resampling draws faults within each fault type."""
+def test_guided_faults_lead_only_per_activated_fault(table_3: dict[str, JudgedClaim]) -> None:
+    """The resampling draws faults within each fault type."""
     assert table_3["4.4"].verdict is HOLDS
     assert table_3["4.5"].verdict is FAILS
     assert table_3["4.5"].paper is FAILS

@@ -61,7 +61,7 @@ def test_the_guided_advantage_reverses_per_injected_fault(paper: Paper) -> None:
 
 
 def test_our_counts_are_below_the_papers(paper: Paper) -> None:
-    """Cells that the paper does not have are empty."""
+    """Cells without a published count are empty."""
     frame = results(HIT, HIT | {"alerts": "fcw", "t_alert": 9}, {}, {"scenario": "S9", "t_activation": 2})
     lines = summary_sheet("guided", by_scenario(frame), paper.published()).table().rows
     hazards = [line[2:] for line in lines if line[:2] == ["hazards", "activated"]]

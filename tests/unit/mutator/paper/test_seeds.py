@@ -45,7 +45,6 @@ def frame() -> pd.DataFrame:
 
 
 def test_how_many_seeds_show_each_observation(tmp_path: Path) -> None:
-    """Seeds are sorted as numbers."""
     file = tmp_path / "observations.yaml"
     file.write_text(OBSERVATIONS)
     found = judge_by_seed(file, frame(), lambda runs: [])

@@ -116,7 +116,7 @@ def test_an_alert_after_the_hazard_is_no_warning(said: dict[str, Answer]) -> Non
     ]
 
 
-def test_without_severity_fix_first_the_type_with_most_silent_hazards(said: dict[str, Answer]) -> None:
+def test_without_severity_the_number_of_silent_hazards_decides(said: dict[str, Answer]) -> None:
     """The shortest time to a hazard decides ties."""
     answer = said["first"]
     assert answer.says.startswith("Start with car/speed: 2 of 3 silent hazards (67 %). The rule: ")
@@ -169,7 +169,7 @@ def course(by: str = "", stopped_at: tuple[str, ...] = ()) -> Course:
 
 
 def test_the_component_that_let_most_faults_through_is_named() -> None:
-    """Faults without a path are in neither number."""
+    """Faults without a path are not counted."""
     courses = (course("feet"), course("hands"), course(stopped_at=("eyes",)))
     structure = {"label": {"feet": "Feet", "eyes": "Eyes"}.__getitem__, "courses": courses}
     frame = hazards(*[("a/b", "S1", 1.0)] * 4).assign(course=[0, 0, 1, -1])
@@ -185,8 +185,7 @@ def test_the_component_that_let_most_faults_through_is_named() -> None:
     )
 
 
-def test_contacts_and_other_hazards_are_listed_separately() -> None:
-    """Of many, six contacts and four other hazards are listed."""
+def test_six_contacts_and_four_other_hazards_are_listed() -> None:
     frame = hazards(*[("a/hit", "S1", 1.0)] * 12, *[("b/miss", "", 1.0)] * 12)
     hit, missed, _ = dangerous(frame, [["margin_h1", "m", "", "lower"]], has_alerts=True).listings
     assert (len(hit.lines), len(missed.lines)) == (6, 4)

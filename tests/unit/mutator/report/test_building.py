@@ -79,7 +79,6 @@ def test_the_page_contains_results_diff_and_still_of_an_experiment(run: Path) ->
 
 
 def test_many_failed_runs_are_a_link_to_all(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The page has 100,000 crashes."""
     monkeypatch.setattr(failed, "PAGE_LISTED", 1)
     text = building.write(run, None).page.read_text()
     assert "1 more: " in text

@@ -142,10 +142,10 @@ def test_complete_partial_and_missing_proofs_are_distinguished(
     assert not told.failed
 
 
-def test_forking_is_not_called_useless_for_many_experiments(
+def test_forking_is_not_called_useless_if_experiments_are_many(
     finish: Finish, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The harness chose the reference engine for them."""
+    """The harness chose the reference engine for the experiments."""
     monkeypatch.setattr(engines, "WORTH_IT", 4)
     told = summary(finish(None))
     assert told is not None
@@ -175,7 +175,7 @@ def test_new_results_of_the_proof_make_a_report_out_of_date(finish: Finish) -> N
 def test_a_changed_trace_digest_makes_a_report_out_of_date(
     finish: Finish, reseal: Callable[[Path], None]
 ) -> None:
-    """The results do not contain these digests."""
+    """The results do not contain the digests of traces."""
     run = finish(4)
     build(run)
     results, before = (run / "results.csv").read_bytes(), stamp.made_from(RunFolder.open(run), None)
@@ -194,5 +194,5 @@ def test_a_failed_proof_is_reported_without_timings(finish: Finish) -> None:
 
 
 def test_without_an_engine_in_the_timings_the_report_names_none(finish: Finish) -> None:
-    """Older versions did not record it."""
+    """Older versions did not record the engine."""
     assert summary(finish(None, ways=())) is None

@@ -132,7 +132,7 @@ def test_only_injected_lines_call() -> None:
 
 
 def test_only_the_new_value_of_a_changed_line_calls() -> None:
-    """The rest is the target's."""
+    """The unchanged part of the line is the target's."""
     line = 'picture = cut(picture) + (helper() if _fi.active("01234567") else Mist())'
     was = f"{TAG} was:        picture = cut(picture) + Mist()"
     assert set(called(line, was)) == {"car/eye.py helper", "car/eye.py LEVEL"}

@@ -27,7 +27,7 @@ def groups(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path
 
 
 def test_variants_are_grouped_by_place_model_and_arguments(groups: Groups) -> None:
-    """The trigger does not matter."""
+    """Triggers make no difference."""
     sense = "toycar/sensing.py Sensor.sense"
     assert {group.what: (group.trigger, group.hold) for group in groups.values()} == {
         f"{sense} after_assign gap: offset(by, low, target=gap)": ("state or time", "to_end or while"),
@@ -104,7 +104,7 @@ def test_drawn_values_are_not_bound(toycar: Workspace, groups: Groups) -> None:
 
 
 def test_a_drawn_choice_has_a_diff_for_each_choice(toycar: Workspace) -> None:
-    """A decision covers all of them."""
+    """A decision covers all of these diffs."""
     template = toycar.templates / "offset.py.j2"
     text = template.read_text()
     template.write_text(text + "{% if by > 30 %}\n    {{ target }} = {{ target }}\n{% endif %}\n")

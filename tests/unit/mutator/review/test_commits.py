@@ -72,7 +72,6 @@ def test_the_last_author_cannot_approve(toycar: Workspace, root: Path) -> None:
 
 @pytest.mark.parametrize("path", [LANE, OFFSET, "templates/offset.yaml"])
 def test_earlier_authors_may_approve(toycar: Workspace, root: Path, path: str) -> None:
-    """Other files are ignored."""
     sha = commit(root, path, "Jane Doe <jane@example.org>")
     commit(root, "fault_library/faults/sensor/distance.yaml", "Joe <joe@example.org>")
     with pytest.raises(MutatorError, match=sha[:12]):

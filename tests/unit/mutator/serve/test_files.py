@@ -111,7 +111,7 @@ def test_a_link_to_a_file_is_not_followed(client: Client, linked: Path, name: st
 
 @pytest.mark.parametrize("name", ["plots", "report", "series"])
 def test_linked_folders_are_not_followed(client: Client, linked: Path, name: str) -> None:
-    """No report is built and no job is started that would write there."""
+    """A report or a job would write into the linked folder."""
     outside = client.place / "outside"
     outside.mkdir(exist_ok=True)
     for kind in ("a.svg", "a.html", "index.js"):
@@ -186,7 +186,7 @@ def test_series_are_served_as_they_are(client: Client) -> None:
 
 
 def test_a_report_with_a_forged_stamp_gets_a_strict_policy(client: Client, linked: Path) -> None:
-    """The policy allows none of its scripts."""
+    """The policy allows none of the report's scripts."""
     assert client.get("/runs/linked/report/index.html").status == 200
     page = linked / "report" / "index.html"
     page.write_text(
@@ -241,5 +241,4 @@ def test_text_of_runs_is_escaped(client: Client) -> None:
     ],
 )
 def test_only_the_last_part_of_a_path_is_shown(text: str, told: str) -> None:
-    """Slashes that belong to no absolute path stay."""
     assert without_places(text) == told

@@ -76,7 +76,6 @@ def test_an_exact_plot_is_stored_where_rerun_stores_it(busy: Client) -> None:
 
 @pytest.mark.slow
 def test_a_try_is_stored_next_to_the_runs(busy: Client) -> None:
-    """The job links to its plot."""
     order = {"kind": "try", "spec": "sensor/lane", "scenario": "A", "trigger": "2", "value": 2.4}
     job = busy.ended(busy.post("/api/jobs", order).json["id"])
     assert job["state"] == "done", busy.get(f"/api/jobs/{job['id']}/log").json
@@ -85,8 +84,7 @@ def test_a_try_is_stored_next_to_the_runs(busy: Client) -> None:
     assert [run["key"] for run in busy.get("/api/runs").json["runs"]] == ["first"]
 
 
-def test_jobs_wait_and_are_cancelled(busy: Client) -> None:
-    """No process is left."""
+def test_jobs_wait_and_are_cancelled_without_leaving_a_process(busy: Client) -> None:
     order = {"kind": "campaign", "campaign": "toy", "name": "second", "limit": 20, "workers": 2}
     first, second = (busy.post("/api/jobs", order).json["id"] for _ in range(2))
     states = {job["id"]: job["state"] for job in busy.get("/api/jobs").json["jobs"]}
@@ -119,7 +117,7 @@ def job(**given: Any) -> Job:
 
 
 def test_the_output_of_a_job_is_plain_text() -> None:
-    """If it is too long, its beginning is cut."""
+    """If the output is too long, its beginning is cut."""
     made = job()
     made.hear(f"\x1b[31m/srv/data/{HOSTILE}\x07\u202e\n".encode())
     made.hear(b"\xff\xfe\n")

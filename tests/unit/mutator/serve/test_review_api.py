@@ -120,7 +120,6 @@ def test_an_invalid_decision_is_refused(reviewed: tuple[Client, list[str]], toyc
 
 
 def test_remarks_are_text(reviewed: tuple[Client, list[str]]) -> None:
-    """The data of the page are packed."""
     client, (first, *_) = reviewed
     assert decided(client, (first, "approve"), by=HOSTILE, text=f"</script>{HOSTILE}").status == 200
     answer = client.get(f"{API}?spec=sensor/*")

@@ -19,7 +19,7 @@ ASKED = ("/", "/api/jobs", "/runs/night/report/index.html", "/assets/base.css", 
 )
 @pytest.mark.parametrize("path", ASKED)
 def test_another_host_is_refused(client: Client, path: str, host: str | None) -> None:
-    """Another name may resolve to this machine, so that the browser sends requests to this server."""
+    """Another name may resolve to this machine."""
     answer = client.get(path, Host=host and host.format(port=client.port))
     assert answer.status in (400, 403)
     assert "<" not in answer.text
@@ -31,8 +31,7 @@ def test_the_host_may_be_localhost(client: Client) -> None:
 
 @pytest.mark.parametrize("origin", ["http://evil.example", "null", "http://127.0.0.1:1", "https://{own}", ""])
 @pytest.mark.parametrize("method", ["GET", "POST"])
-def test_another_origin_is_refused(client: Client, method: str, origin: str) -> None:
-    """No header makes a difference."""
+def test_another_origin_is_refused_whatever_its_headers(client: Client, method: str, origin: str) -> None:
     own = origin.format(own=f"127.0.0.1:{client.port}")
     answer = client.ask(method, "/api/jobs", {"Origin": own}, b"{}" if method == "POST" else None)
     assert answer.status == 403
@@ -85,15 +84,13 @@ def test_other_methods_are_refused(client: Client, method: str) -> None:
 
 
 @pytest.mark.parametrize("chunked", [False, True])
-def test_a_long_body_is_refused(client: Client, chunked: bool) -> None:
-    """The length may be stated or not."""
+def test_a_long_body_is_refused_with_and_without_a_length(client: Client, chunked: bool) -> None:
     body = b'{"kind": "' + b"x" * (MOST_BYTES + 10) + b'"}'
     assert client.ask("POST", "/api/jobs", body=body, chunked=chunked).status == 413
 
 
 @pytest.mark.parametrize("length", ["99999999999999999999999", "1000001"])
-def test_a_request_with_a_long_stated_length_is_refused_at_once(client: Client, length: str) -> None:
-    """The body has not arrived."""
+def test_a_long_stated_length_is_refused_before_the_body_arrives(client: Client, length: str) -> None:
     answer = client.ask("POST", "/api/jobs", {"Content-Length": length}, b"{}")
     assert answer.status in (400, 413)
 

@@ -21,7 +21,7 @@ _ROW = {
 
 
 def results(*rows: dict[str, Any]) -> pd.DataFrame:
-    """A frame of guided chaff runs in S1 that were not activated, each with its differences from that."""
+    """A frame of runs. Each row changes some values of a guided chaff run in S1 that was not activated."""
     texts = [
         _ROW | {"experiment_id": str(i)} | {name: str(value) for name, value in row.items()}
         for i, row in enumerate(rows)

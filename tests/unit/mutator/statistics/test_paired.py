@@ -30,7 +30,7 @@ def test_equal_flags_have_a_p_value_of_one_and_no_interval() -> None:
 
 
 def test_whole_faults_are_resampled() -> None:
-    """The interval is as wide as for few faults, even if each has ten equal pairs."""
+    """Ten equal pairs of each fault do not make the interval narrower."""
     first, second = flags("0" * 40), flags("1" * 10 + "0" * 30)
     alike = rate_difference(first, second, pd.Series([i // 10 for i in range(40)]))
     apart = rate_difference(first, second, pd.Series(range(40)))

@@ -30,7 +30,7 @@ def test_one_seed_has_no_spread() -> None:
 
 
 def test_the_lowest_and_the_highest_seed_are_shown() -> None:
-    """In a tie, this is the seed with the lower number. Seeds sort as numbers."""
+    """In a tie, the seed with the lower number is shown. Seeds sort as numbers."""
     frame = results(*seed(10, 1), *seed(9, 6, runs=20), *seed(2, 5), *seed(30, 1))
     assert seeds_of(frame) == ["2", "9", "10", "30"]
     found = cells(seeds_sheet(frame), "all", "hazards", "activated")

@@ -112,7 +112,7 @@ def test_guided_against_random(made: Campaign) -> None:
 
 
 def test_resampled_difference_of_rates(made: Campaign) -> None:
-    """The interval agrees as closely as another resampling of whole faults can."""
+    """Two resamplings of whole faults agree only approximately."""
     for line, whole in zip(made.lines("guided_against_random"), WHOLES, strict=True):
         rows = [row for row in made.rows if whole == "injected" or "t_activation" in row]
         faults = {row["fault_id"] for row in rows}

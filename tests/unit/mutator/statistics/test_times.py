@@ -52,7 +52,7 @@ def test_kaplan_meier_of_a_textbook_sample() -> None:
 
 
 def test_censored_times_raise_the_median() -> None:
-    """Here the median is beyond the observed times, so it is not reached."""
+    """Here the curve never reaches one half, so there is no median."""
     few = [run(10.0, 11.0 + i) for i in range(3)]
     assert times.reaction(results(*few), ENDS, DRIVER_S).median == pytest.approx(2.0)
     many = times.reaction(results(*few, *[run(10.0, "")] * 7), ENDS, DRIVER_S)
@@ -67,7 +67,7 @@ def test_alerts_without_any_hazard_have_no_median() -> None:
 
 
 def test_crashed_runs_are_left_out_of_censored_times() -> None:
-    """Nobody knows how long they would have been observed."""
+    """How long they would have been observed is unknown."""
     assert times.reaction(results(run(10.0, "", status="crashed")), ENDS, DRIVER_S).at_risk == 0
 
 

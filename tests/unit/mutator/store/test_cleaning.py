@@ -126,7 +126,7 @@ def test_links_are_not_followed(run: Path, tmp_path: Path) -> None:
 
 
 def test_a_deleted_folder_is_not_created_again(run: Path) -> None:
-    """Another command is writing a report while the folder is deleted."""
+    """Another command writes a report while the folder is deleted."""
     assert not finish_deletion(run)
     clean(run)
     assert finish_deletion(run)

@@ -118,7 +118,7 @@ def test_after_a_kill_a_file_is_old_or_new(run: Path, monkeypatch: pytest.Monkey
 
 
 def test_a_file_announced_for_deletion_may_be_missing(run: Path) -> None:
-    """After that, it is unknown."""
+    """After the announcement, the file is not listed."""
     with digests.rewriting(run, {"a": None}):
         assert accepted(run)
         (run / "a").unlink()
@@ -127,7 +127,7 @@ def test_a_file_announced_for_deletion_may_be_missing(run: Path) -> None:
 
 
 def test_segments_are_entered_when_they_are_closed(run: Path) -> None:
-    """An incomplete last line is cut, and later additions are found."""
+    """An incomplete last line is cut."""
     path = segment(run, "records/0001-gw0.jsonl", 1, 2)
     whole = path.read_bytes()
     path.write_bytes(whole + b'{"sum":"0123')

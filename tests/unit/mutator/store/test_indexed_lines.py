@@ -38,7 +38,7 @@ def test_the_newest_line_replaces_the_first(tmp_path: Path) -> None:
 
 
 def test_a_damaged_line_is_reported_before_any_is_read(tmp_path: Path) -> None:
-    """A line that a kill cut off at the end is no error."""
+    """An incomplete last line, as a kill leaves it, is no error."""
     things(tmp_path, a=[{"experiment_id": "aa", "n": 10}, {"experiment_id": "bb", "n": 20}])
     path = tmp_path / "a.jsonl"
     data = path.read_bytes()
@@ -50,8 +50,7 @@ def test_a_damaged_line_is_reported_before_any_is_read(tmp_path: Path) -> None:
 
 
 def test_an_invalid_line_is_reported_with_file_and_line(tmp_path: Path) -> None:
-    """Without an experiment, the error comes immediately. With invalid content, it comes when the line is
-    read."""
+    """A line without an experiment is reported immediately, and one with invalid content when it is read."""
     path = tmp_path / "a.jsonl"
     lines = LineWriter(path, {"schema": SCHEMA})
     lines.append({"experiment_id": "aa"})

@@ -98,7 +98,6 @@ def test_a_changed_line_is_reported_with_its_number(run: Path, name: str) -> Non
 
 
 def test_missing_lines_are_counted(run: Path) -> None:
-    """The segment ends too early, at the end of a line."""
     path = run / "records" / "0001-a.jsonl"
     lines = path.read_bytes().splitlines(keepends=True)
     path.write_bytes(b"".join(lines[:-2]))
@@ -170,7 +169,6 @@ def test_a_second_record_is_reported(run: Path) -> None:
 
 
 def test_a_missing_record_of_a_finished_run_is_reported(run: Path, reseal: Callable[[Path], None]) -> None:
-    """All digests were recomputed."""
     path = run / "records" / "0001-a.jsonl"
     lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join([*lines[:4], *lines[5:]]))
@@ -178,8 +176,9 @@ def test_a_missing_record_of_a_finished_run_is_reported(run: Path, reseal: Calla
     assert f"no record of {json.loads(lines[4])['experiment_id']}" in str(problem(run))
 
 
-def test_a_plan_with_a_duplicate_experiment_is_refused(run: Path, reseal: Callable[[Path], None]) -> None:
-    """A plan whose chunks have different numbers of experiments is refused as well."""
+def test_a_plan_with_duplicates_or_missing_experiments_is_refused(
+    run: Path, reseal: Callable[[Path], None]
+) -> None:
     path = run / plan_file.EXPERIMENTS
     lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join([*lines[:-1], lines[0]]))
@@ -190,8 +189,7 @@ def test_a_plan_with_a_duplicate_experiment_is_refused(run: Path, reseal: Callab
     assert f"{path}: 23 experiments; expected 24" in str(problem(run))
 
 
-def test_a_folder_without_its_digests_is_refused(run: Path) -> None:
-    """The folder was made to look like one of an older version."""
+def test_a_folder_disguised_as_an_older_version_is_refused(run: Path) -> None:
     head = run / "run.json"
     head.write_text(head.read_text().replace('"run/3"', '"run/1"'))
     assert "run/1 in a folder with digests.json" in str(problem(run))

@@ -50,7 +50,7 @@ def test_every_line_is_json_that_begins_with_its_checksum(path: Path) -> None:
 
 @pytest.mark.parametrize("bit", range(8))
 def test_a_flipped_bit_is_reported_with_its_line(path: Path, bit: int) -> None:
-    """In the file's last byte, it makes the last line incomplete."""
+    """A flipped bit in the last byte makes the last line incomplete."""
     data = path.read_bytes()
     for place in range(len(data)):
         path.write_bytes(data[:place] + bytes([data[place] ^ 1 << bit]) + data[place + 1 :])
@@ -74,7 +74,6 @@ CHANGES: dict[str, tuple[Callable[[list[bytes]], list[bytes]], tuple[int, ...]]]
 
 @pytest.mark.parametrize("change", CHANGES)
 def test_only_damaged_lines_are_lost(path: Path, change: str) -> None:
-    """Later lines are still verified."""
     lines = path.read_bytes().splitlines(keepends=True)
     make, damaged = CHANGES[change]
     path.write_bytes(b"".join(make(lines)))
@@ -103,7 +102,6 @@ def test_a_renamed_file_is_reported(path: Path) -> None:
 def test_a_line_that_a_full_disk_cut_off_is_removed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, written: int
 ) -> None:
-    """Only that line is lost, and an error is raised."""
     writer = LineWriter(tmp_path / "records" / "a.jsonl", HEAD)
     writer.append({"value": 1})
     real, calls = os.write, []
@@ -150,8 +148,8 @@ def test_a_file_is_never_shared(tmp_path: Path) -> None:
         LineWriter(tmp_path / "a.jsonl", HEAD)
 
 
-def test_a_folder_or_pipe_in_place_of_a_segment_is_refused(tmp_path: Path) -> None:
-    """Opening a pipe would wait."""
+def test_a_folder_or_pipe_is_refused_as_a_segment(tmp_path: Path) -> None:
+    """Opening a pipe would wait for a writer."""
     os.mkfifo(tmp_path / "pipe.jsonl")
     (tmp_path / "folder.jsonl").mkdir()
     for name in ("pipe.jsonl", "folder.jsonl"):

@@ -31,7 +31,7 @@ def test_a_plan_is_read_as_written(experiment: Make, tmp_path: Path) -> None:
 
 
 def test_a_line_in_the_usual_format_is_read_fast(experiment: Make) -> None:
-    """A line with another format or a wrong id is left to the slow path."""
+    """Any other line takes the slow path."""
     for planned in (
         experiment(),
         experiment(2.5, changes=("no_lead",)),
@@ -64,7 +64,7 @@ def test_a_missing_field_of_an_older_plan_has_its_default(experiment: Make) -> N
 
 
 def test_a_pipe_in_place_of_a_plan_is_refused(tmp_path: Path) -> None:
-    """Opening it would wait for a writer for ever."""
+    """Opening a pipe would wait for a writer for ever."""
     (tmp_path / "plan").mkdir()
     os.mkfifo(tmp_path / plan_file.EXPERIMENTS)
     with pytest.raises(MutatorError, match=r"experiments\.jsonl: cannot be read"):

@@ -46,7 +46,7 @@ def test_a_line_equals_asdict(record: MakeRecord) -> None:
 
 
 def test_a_record_without_an_error_has_no_such_key(tmp_path: Path, record: MakeRecord) -> None:
-    """The line equals that of older versions."""
+    """Such a line equals that of older versions."""
     writer = LineWriter(tmp_path / "records" / "0001-gw0.jsonl", HEAD)
     writer.append(record())
     writer.close()
@@ -86,7 +86,6 @@ def test_newer_schema_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("error_first", [True, False])
 def test_any_record_replaces_a_harness_error(tmp_path: Path, record: MakeRecord, error_first: bool) -> None:
-    """The file that it is in makes no difference."""
     wrong = record(status=Status.HARNESS_ERROR, outcome=None, detail="killed from outside")
     good = record()
     write(tmp_path, "0001-gw0.jsonl", wrong if error_first else good)
@@ -124,7 +123,6 @@ def test_records_of_the_earlier_schema_are_read(tmp_path: Path, record: MakeReco
 
 
 def test_progress_counts_complete_lines_as_they_arrive(tmp_path: Path, record: MakeRecord) -> None:
-    """Each experiment is counted once."""
     write(tmp_path, "0001-gw0.jsonl", record("a" * 16))
     tail = Tail("experiments", tmp_path / "records", 4)
     assert (tail.poll().done, tail.poll().per_s, tail.poll().remaining_s) == (1, None, None)

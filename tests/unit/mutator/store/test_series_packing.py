@@ -129,7 +129,7 @@ def test_a_truncated_segment_loses_only_its_last_series(tmp_path: Path) -> None:
 
 
 def test_experiments_of_a_damaged_chunk_can_be_rerun(tmp_path: Path) -> None:
-    """A rerun stores each series in a separate file. The same holds for a damaged index."""
+    """The rerun stores a series in a separate file."""
     append(tmp_path, "0001-main", IDS[:3])
     pack(tmp_path, "p", WORTH, 500)
     index = SeriesFolder(tmp_path).index

@@ -57,7 +57,6 @@ def test_a_run_of_several_seeds_equals_a_run_of_each_seed(
 def test_a_verified_run_is_only_compared_byte_for_byte(
     made: tuple[Workspace, Path], cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """An audit still checks everything."""
     workspace, run = made
     first = run_campaign(workspace, "small", run)
     assert ended_before(RunFolder.open(run)) is not None

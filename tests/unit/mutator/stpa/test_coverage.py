@@ -62,7 +62,7 @@ def test_other_comparisons_are_not_provable(condition: str) -> None:
 
 
 def test_a_table_with_too_many_cells_is_not_provable() -> None:
-    """The limit bounds the time."""
+    """The limit bounds the time of the proof."""
     names = ("t", "d_rel", "v_ego", "v_lead", "hwt", "rs")
     found = prove(" and ".join(f"{name} != {i}" for name in names for i in range(4)), "True")
     assert found.beyond is not None and "531441 cells" in found.beyond

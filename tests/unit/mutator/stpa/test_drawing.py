@@ -77,7 +77,6 @@ def test_labels_overlap_nothing(analysis: Analysis, layout: Layout) -> None:
 
 
 def test_only_places_with_faults_have_their_colour(analysis: Analysis) -> None:
-    """The diagram is well-formed and reproducible."""
     text = draw(analysis)
     assert text == draw(analysis)
     root = ElementTree.fromstring(text)

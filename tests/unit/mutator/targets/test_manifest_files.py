@@ -109,7 +109,7 @@ def test_the_cache_is_the_same_in_every_run(toy: Workspace) -> None:
 
 
 def test_a_film_adds_arguments(toy: Workspace) -> None:
-    """The module of its command is checked like other modules."""
+    """The module of the film command is checked like other modules."""
     with pytest.raises(MutatorError, match=r"target toy cannot be filmed; expected `film` in its manifest"):
         toy.manifest("toy").filming()
     path = toy.library / "targets" / "toy.yaml"
@@ -139,7 +139,7 @@ def test_the_root_can_be_given(toy: Workspace, tmp_path: Path) -> None:
 
 
 def test_the_root_may_be_the_shipped_controller(toy: Workspace) -> None:
-    """`shipped:target` is its name, wherever the manifest is stored."""
+    """The root `shipped:target` can be named in any manifest."""
     path = toy.library / "targets" / "toy.yaml"
     text = path.read_text()
     line = next(line for line in text.splitlines() if line.startswith("root:"))
@@ -230,7 +230,7 @@ def test_a_mistake_in_a_manifest_is_reported(toy: Workspace, old: str, new: str,
 def test_the_probe_is_in_the_only_package(
     toy: Workspace, packages: str, package: str | None, names: tuple[str, ...]
 ) -> None:
-    """With several packages or a plain module, it is outside."""
+    """With several packages or a plain module, the probe is outside the packages."""
     path = toy.library / "targets" / "toy.yaml"
     text = path.read_text().replace("package: toycar", packages)
     path.write_text(text.replace('"toycar/**/*.py"', '"**/*.py"'))

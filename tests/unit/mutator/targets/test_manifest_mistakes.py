@@ -106,7 +106,6 @@ def test_the_manifest_is_valid_without_the_mistakes(path: Path) -> None:
 def test_a_mistake_is_reported_with_a_remedy(
     path: Path, right: str, wrong: str, got: str, known: str
 ) -> None:
-    """Every error has file and line, the value, and the expectation."""
     assert right in WHOLE
     path.write_text(WHOLE.replace(right, wrong, 1))
     with pytest.raises(MutatorError) as caught:

@@ -25,7 +25,7 @@ def edit(path: Path, old: str, new: str) -> None:
 
 
 def test_an_overlay_is_part_of_the_tree(pole: Workspace) -> None:
-    """A run must import its modules from the tree."""
+    """A run must import the overlay's modules from the tree."""
     before = pole.manifest("pole")
     assert before.tree.overlaid == {"drive.py", "glue_parts/scenario.py"}
     assert before.overlay == (pole.library / "overlays" / "pole").resolve()
@@ -50,7 +50,7 @@ def test_an_overlay_is_searched_in_the_library_too(pole: Workspace) -> None:
 
 
 def test_a_tree_with_an_overlay_is_run(pole: Workspace) -> None:
-    """The entry module and the observation are in the overlay. Faults in the foreign modules take effect."""
+    """Faults in the foreign modules take effect."""
     trial = try_fault("sensor/angle", "tilted", 1.0, value=60, workspace=pole)
     assert trial.record.outcome is Outcome.HAZARD
     assert trial.record.activation is not None and trial.record.activation.first == 1.0

@@ -63,7 +63,6 @@ def test_equal_conditions_have_one_canonical_text(text: str, canonical: str) -> 
     ],
 )
 def test_only_comparisons_of_observed_values_are_conditions(text: str, piece: str) -> None:
-    """The error shows the invalid text."""
     with pytest.raises(MutatorError) as caught:
         check_condition(text, variables=FOLLOWING)
     assert piece in str(caught.value)
@@ -86,8 +85,9 @@ def test_no_comparison_of_a_missing_value_holds() -> None:
         ("-abs(rs)", "-abs(rs)", "-abs(rs)"),
     ],
 )
-def test_formulas_have_a_canonical_text_and_code(text: str, canonical: str, code: str) -> None:
-    """The code cannot raise."""
+def test_formulas_have_a_canonical_text_and_code_that_cannot_raise(
+    text: str, canonical: str, code: str
+) -> None:
     assert check_formula(text, FOLLOWING) == check_formula(canonical, FOLLOWING) == canonical
     assert to_code(canonical, number=True) == code
 

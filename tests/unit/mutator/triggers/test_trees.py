@@ -37,5 +37,4 @@ def test_a_formula_becomes_a_tree_of_operators(text: str, made: object) -> None:
     ],
 )
 def test_a_chain_of_comparisons_becomes_a_conjunction(text: str, made: object) -> None:
-    """Truth values are unchanged."""
     assert tree(check_condition(text, variables=KNOWN, over_time=True), {}) == made

@@ -40,7 +40,6 @@ def driven(toy: Workspace) -> dict[str, Finding]:
 
 
 def test_a_sound_target_passes_every_check(toy: Workspace) -> None:
-    """The canary of each campaign runs once."""
     found = driven(toy)
     assert {name: one.level for name, one in found.items()} == dict.fromkeys(
         ["golden A", "fast engines", "statements", "triggers", "canary small"], Level.OK
@@ -78,7 +77,6 @@ SETS = (
 def test_a_nondeterministic_line_is_reported(
     toy: Workspace, edits: list[tuple[str, str]], imports: str, line: str, told: str
 ) -> None:
-    """The finding has channel, step, time and both values."""
     for old, new in edits:
         change(toy, "driver.py", old, new)
     change(toy, "driver.py", "class Driver", f"{imports}\n\n\nclass Driver")
@@ -240,7 +238,6 @@ def test_a_harmless_canary_is_reported_with_all_values(toy: Workspace) -> None:
 
 
 def test_a_crashing_or_hazardous_target_is_reported(toy: Workspace) -> None:
-    """The reasons are those of the checks before a campaign."""
     change(toy, "driver.py", "        gap, closing", "        1 / 0\n        gap, closing")
     found = driven(toy)["golden A"]
     assert (found.level, "crashed: ZeroDivisionError" in found.found) == (Level.FAIL, True)

@@ -113,7 +113,6 @@ def sharing(toycar: Workspace, tmp_path: Path) -> Workspace:
 def test_an_error_that_runs_share_fails_the_campaign(
     sharing: Workspace, tmp_path: Path, kept: str, told: str
 ) -> None:
-    """The error appears before or after the fault begins."""
     (tmp_path / "kept").write_text(kept)
     out = tmp_path / "run"
     try:
@@ -178,7 +177,7 @@ def test_the_summary_says_that_a_campaign_is_too_small_to_fork(
 
 @pytest.mark.slow
 def test_runs_of_an_unneeded_check_are_deleted(threaded: Workspace, tmp_path: Path) -> None:
-    """With these runs, the seal would depend on timing."""
+    """If these runs stayed, the seal would depend on timing."""
     run = tmp_path / "run"
     seal = run_campaign(threaded, "small", run, engine="fork", choices=Choices(limit=2)).seal
     folder = RunFolder.open(run)

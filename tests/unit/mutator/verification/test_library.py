@@ -190,7 +190,7 @@ def test_two_effects_act_in_the_order_of_the_spec(
 
 
 def test_code_that_draws_or_reads_frames_cannot_have_faults(clone: Workspace) -> None:
-    """Runs share its output."""
+    """All runs share the output of such code."""
     manifest = clone.manifest("openpilot")
     todo, closed = ["selfdrive/sim/road_renderer.py", "selfdrive/sim/image_folder.py"], set()
     while todo:

@@ -106,7 +106,7 @@ def test_an_observation_that_is_not_reached_is_refused(toycar: Workspace, tmp_pa
 
 
 def test_a_harmless_canary_is_refused(toycar: Workspace, tmp_path: Path) -> None:
-    """A campaign without hazards might have missed them. The values tried are listed."""
+    """If a campaign has no hazard, the harness might have missed it."""
     path = toycar.campaign("small")
     path.write_text(path.read_text().replace("at_s: 1.0", "at_s: 5.9"))
     folder = frozen(toycar, tmp_path)
@@ -168,8 +168,7 @@ def test_changed_golden_runs_are_refused(
     assert {path: path.read_bytes() for path in folder.path.rglob("*") if path.is_file()} == before
 
 
-def test_a_canary_whose_run_was_killed_is_run_again(toycar: Workspace, tmp_path: Path) -> None:
-    """A run is repeated only once."""
+def test_a_canary_whose_run_was_killed_is_run_again_once(toycar: Workspace, tmp_path: Path) -> None:
     canary = frozen(toycar, tmp_path).canary
     fine = CheckRun(problem="", hazards=(("H3", 1.0),))
     runs = iter([CheckRun(problem="crashed: killed by SIGHUP"), fine])

@@ -58,7 +58,7 @@ LOSSES: dict[str, tuple[Callable[[list[bytes]], list[bytes]], int]] = {
 
 @pytest.mark.parametrize("loss", LOSSES)
 def test_only_damaged_lines_of_a_segment_are_lost(run: Path, made: Path, loss: str) -> None:
-    """The damaged file is kept unchanged in another folder."""
+    """The damaged file is kept in another folder."""
     change, lost = LOSSES[loss]
     edit(run / RECORDS, change)
     damaged = (run / RECORDS).read_bytes()
@@ -94,7 +94,7 @@ def test_a_missing_segment_loses_its_records(run: Path) -> None:
 
 
 def test_a_lost_patch_removes_its_record(run: Path, put_patches: Callable[..., None]) -> None:
-    """Running the experiment again restores both."""
+    """Running the experiment again restores patch and record."""
     one, other = list(plan_file.ids(run))[:2]
     [file] = Patches(run).files()
     put_patches(run, {one: b"other", other: None})
@@ -130,8 +130,7 @@ def test_what_run_can_rebuild_is_moved_aside(run: Path, name: str) -> None:
     assert (run / "damaged" / f"{name}.2").read_bytes() == b"again"
 
 
-def test_plan_csv_is_written_again(run: Path, made: Path) -> None:
-    """The run stays finished."""
+def test_plan_csv_is_written_again_and_the_run_stays_finished(run: Path, made: Path) -> None:
     (run / "plan.csv").unlink()
     said, folder = repaired(run)
     assert said == ["plan.csv rebuilt from the plan"] and folder.finished
@@ -155,7 +154,7 @@ def test_damaged_timings_are_removed(run: Path) -> None:
 
 @pytest.mark.parametrize("content", [None, b"{", b"{}"])
 def test_a_damaged_ledger_is_rebuilt_from_the_files(run: Path, content: bytes | None) -> None:
-    """Only a seal that was known before can vouch for it. The output says so."""
+    """Only a seal that was known before can vouch for the rebuilt ledger."""
     path = run / digests.FILE
     path.unlink() if content is None else path.write_bytes(content)
     said, folder = repaired(run)
@@ -164,7 +163,7 @@ def test_a_damaged_ledger_is_rebuilt_from_the_files(run: Path, content: bytes | 
 
 
 def test_a_damaged_campaign_file_or_plan_stays(run: Path) -> None:
-    """A copy can replace it."""
+    """A user can replace the file by a copy."""
     (run / "campaign.yaml").write_text("other")
     assert repair(RunFolder.unverified(run)) == []
     assert (run / "campaign.yaml").read_text() == "other"
@@ -180,7 +179,7 @@ def test_an_intact_run_is_not_changed(run: Path) -> None:
 
 
 def test_a_run_resumes_after_a_killed_repair(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The kill comes at any point after something was moved."""
+    """The kill comes at any point after something was moved aside."""
     edit(run / RECORDS, lambda x: [*x[:3], x[3].replace(b"ok", b"no"), *x[4:]])
     with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
         patched.setattr(digests, "close_segments", kill)

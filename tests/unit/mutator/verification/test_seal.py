@@ -116,7 +116,7 @@ def test_an_unfinished_run_has_no_seal(run: Path) -> None:
 
 
 def test_the_seal_covers_records_as_they_were_written(made: Path, run: Path) -> None:
-    """A field that is added to records later does not change it."""
+    """A field that a later version adds to records does not change the seal of an old run."""
     path = run / "records" / "0001-a.jsonl"
     lines = path.read_text().splitlines()
     assert canonical(json.loads(lines[1])) != lines[1]  # the checksum is the first key

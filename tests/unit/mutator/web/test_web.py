@@ -32,7 +32,7 @@ def test_plain_data_cannot_end_their_element() -> None:
 
 
 def test_nan_is_refused() -> None:
-    """Callers must write it as something else, because a page cannot read it."""
+    """A page cannot read NaN in JSON."""
     with pytest.raises(ValueError, match="JSON"):
         web.packed([float("nan")])
 
