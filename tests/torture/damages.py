@@ -1,4 +1,4 @@
-"""Damage to files on a disk. Each damage is a function of the file, its neighbours and chance."""
+"""Damage to files on a disk, as a function of the file, its neighbours and chance."""
 
 import json
 import os
@@ -111,13 +111,12 @@ def become_a_folder(path: Path, others: Sequence[Path], chance: Chance) -> None:
 
 
 def become_a_link(path: Path, others: Sequence[Path], chance: Chance) -> None:
-    """Replace the file by a link to nowhere, to itself, or to another file or folder."""
     path.unlink()
     path.symlink_to(chance.choice([path.with_name("nowhere"), path, path.parent, *others]))
 
 
 def become_a_pipe(path: Path, others: Sequence[Path], chance: Chance) -> None:
-    """Replace the file by a pipe or a socket. A reader must not wait for data that never comes."""
+    """Replace the file by a pipe or a socket, where a reader must not wait for data."""
     path.unlink()
     if chance.random() < 0.7:
         os.mkfifo(path)
@@ -129,7 +128,6 @@ def become_a_pipe(path: Path, others: Sequence[Path], chance: Chance) -> None:
 
 
 def change_json(path: Path, others: Sequence[Path], chance: Chance) -> None:
-    """Change, delete or duplicate a value of a JSON text, or of one of its lines."""
     data = path.read_bytes()
     as_lines = path.suffix == ".jsonl"
     texts = data.splitlines() if as_lines else [data]
@@ -182,10 +180,8 @@ def contents(folder: Path) -> dict[str, bytes | str]:
 def damage(
     folder: Path, names: Sequence[str], chance: Chance, damages: Sequence[str]
 ) -> tuple[str, list[str]]:
-    """Damage one of these files in one of these ways until it differs.
-
-    Return the way and the names of all changed files.
-    """
+    """Damage one of these files in one of these ways until it differs. Return the way and the names of all
+    changed files."""
     before = contents(folder)
     while True:
         name, how = chance.choice(names), chance.choice(damages)

@@ -35,7 +35,6 @@ def change_a_value(text: str, chance: Chance) -> str:
 
 
 def insert_a_shape(text: str, chance: Chance) -> str:
-    """Insert something that is hard to parse at the end of a word."""
     places = [place for place, letter in enumerate(text) if letter in " \n"] or [0]
     place = chance.choice(places)
     return text[: place + 1] + chance.choice(SHAPES) + text[place + 1 :]

@@ -92,10 +92,8 @@ chunk: 2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Misdeed:
-    """A misdeed: what a mutant does when its fault is first active, and the statuses that are allowed.
-
-    It also says whether the fault model declares that it raises.
-    """
+    """What a mutant does when its fault is first active, the statuses that are allowed, and whether the fault
+    model declares that it raises."""
 
     name: str
     lines: tuple[str, ...]
@@ -107,7 +105,6 @@ class Misdeed:
         return self.name.replace(" ", "_").lower()
 
     def write(self, workspace: Workspace) -> None:
-        """Write the misdeed's fault model and fault spec."""
         imports = [f"import {name}" for name in MODULES]
         body = ["    " + line for line in (*imports, *self.lines)]
         # what looks like Jinja2 in them is Python
@@ -135,10 +132,8 @@ def misdeeds() -> dict[str, Misdeed]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Came:
-    """The result of a campaign: exit code, output and what is wrong with the files it left.
-
-    It has the lines of results.csv by experiment, and those of misdeeds by fault type.
-    """
+    """The result of a campaign: exit code, output, and what is wrong with its files. `rows` has the lines of
+    results.csv by experiment, `bad` those of misdeeds by fault type."""
 
     code: int
     said: str
@@ -150,8 +145,6 @@ class Came:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drawn:
-    """A campaign as drawn: its engine, its workers, its trigger method and its misdeeds."""
-
     engine: str
     workers: int
     method: str
@@ -159,8 +152,6 @@ class Drawn:
 
 
 class Misbehaving:
-    """Campaigns of the toy, one for each seed, and the results of their misdeeds."""
-
     def __init__(self, workspace: Workspace, at: Path, seeds: Sequence[int]) -> None:
         self.workspace, self.at = workspace, at
         self.misdeeds = misdeeds()
@@ -180,7 +171,7 @@ class Misbehaving:
         return Drawn(engine=engine, workers=workers, method=method, names=tuple(names))
 
     def cases(self, seed: int) -> Sequence[Case]:
-        """Run a campaign with some misdeeds on some engine. Each misdeed is a case."""
+        """Run a campaign on some engine. Each of its misdeeds is a case."""
         drawn = self.drawn[seed]
         came = self._came(drawn, LONGEST_S)
         problem = self._problem(came, drawn.method)
@@ -195,7 +186,7 @@ class Misbehaving:
         return Case(kind=misdeed.name, damage=str(status), reader=reader, end=end, story=story)
 
     def _problem(self, came: Came, method: str) -> str:
-        """Return what is wrong with a campaign, whatever its misdeeds, or an empty text."""
+        """Return what is wrong with a campaign, apart from its misdeeds, or an empty text."""
         if came.left:
             return came.left
         if "Traceback" in came.said or "defect of mutator" in came.said:
@@ -219,7 +210,6 @@ class Misbehaving:
         return "" if row == right else f"{row}, not {right} as on the reference engine"
 
     def _reference(self, method: str) -> Came:
-        """Return the results of all drawn misdeeds in one campaign on the reference engine."""
         if method not in self._right:
             drawn = [one for one in self.drawn.values() if one.method == method]
             names = sorted({name for one in drawn for name in one.names})
@@ -277,7 +267,6 @@ class Misbehaving:
         return "" if contents(self.tree) == self.before else "the tree of the user is another one"
 
     def table(self) -> str:
-        """Return the verdicts of each misdeed on each engine."""
         names = sorted({name for name, _ in self.verdicts})
         rows = [
             (name, *(", ".join(sorted(self.verdicts[name, one])) or "-" for one in ENGINES)) for name in names

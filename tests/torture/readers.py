@@ -34,8 +34,6 @@ HOW = re.compile(  # of a report
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Told:
-    """A reader's exit code, its messages, and the result that must equal that of the undamaged folder."""
-
     code: int
     said: str
     result: Any = None
@@ -43,8 +41,6 @@ class Told:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Place:
-    """A copy of a run folder that may be damaged, and what its readers need to know about it."""
-
     folder: Path  # holds all of it
     genuine: Path = Path()  # the undamaged one, elsewhere
     campaign: tuple[str, ...] = ()  # the words that ran it, without `--out`
@@ -60,7 +56,6 @@ Reader = Callable[[Place], Told]
 
 
 def cli(*words: object) -> tuple[int, str, str]:
-    """Return exit code, output and errors of `mutator WORDS...`."""
     out, err = (io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True) for _ in range(2))
     with redirect_stdout(out), redirect_stderr(err):
         code = main([str(word) for word in words])
@@ -73,7 +68,6 @@ def _text(stream: io.TextIOWrapper) -> str:
 
 
 def _told(words: tuple[object, ...], *files: Path, printed: bool = False) -> Told:
-    """Return a command's result, including its output and its files."""
     code, out, err = cli(*words)
     written = [path.read_bytes() for path in files] if code == 0 else []
     return Told(code=code, said=out + err, result=[out if printed else "", *written])
@@ -89,13 +83,12 @@ def run(place: Place) -> Told:
 
 
 def repair(place: Place) -> Told:
-    """Use `verify --repair`, then `run`, which treats the repaired folder like any other."""
     code, out, err = cli("verify", place.run, "--repair")
     return run(place) if code in (0, 1) else Told(code=code, said=out + err)
 
 
 def report(place: Place) -> Told:
-    """Use the report without its timings, because they are not part of a result."""
+    """Leave out the report's timings, which differ between runs."""
     words = ("report", place.run)
     told = _told(words, *(sorted((place.run / "report" / "tables").glob("*.csv"))), printed=True)
     if told.code != 0:
@@ -114,7 +107,6 @@ def show(place: Place) -> Told:
 
 
 def show_plot(place: Place) -> Told:
-    """Draw the plot from a kept trace, or from one that is run again."""
     return _told(("show", place.experiment, "--run", place.run), printed=True)
 
 
@@ -148,7 +140,7 @@ def _export(format: str) -> Reader:
 
 
 def verify(place: Place) -> Told:
-    """An audit without findings vouches for every file that it checks."""
+    """Return every file that a passing audit vouches for."""
     code, out, err = cli("verify", place.run)
     found, genuine = contents(place.run) if code == 0 else {}, contents(place.genuine)
     ledger = json.loads(genuine["digests.json"])
@@ -168,13 +160,11 @@ def _table(path: Path, genuine: Path) -> str | bytes:
 
 
 def expect(place: Place, seal: str) -> Told:
-    """Audit the folder as a user who knows the seal."""
     code, out, err = cli("verify", place.run, "--expect", seal)
     return Told(code=code, said=out + err)
 
 
 def api(place: Place) -> Told:
-    """Return results, endings, seal, and an experiment with its patch, in Python."""
     try:
         found = mutator.load_run(place.run)
         told = [found.results.to_csv(), found.endings, found.seal, found.experiment(place.experiment).patch]
@@ -184,10 +174,8 @@ def api(place: Place) -> Told:
 
 
 def rows(place: Place) -> Told:
-    """Return rows of the results that the undamaged folder lacks. There must be none.
-
-    A killed run may have lost some, because the same command runs them again.
-    """
+    """Return rows of the results that the undamaged folder lacks. There must be none. A killed run may lack
+    some, because the same command runs them again."""
     told = api(place)
     if told.code != 0:
         return told

@@ -22,7 +22,6 @@ QUICK = ("api", "compare", "show", "verify", "export csv", "export mutation-elem
 
 
 def finished(home: Path, at: Path) -> World:
-    """A run of the toy with proof, plot, trace, report, comparison and exports."""
     words = (*SMALL, "--engine", "fork")
     done("run", *words, "-n", "0", "--out", home / "run")
     name = hazardous(home / "run")
@@ -34,7 +33,7 @@ def finished(home: Path, at: Path) -> World:
 
 
 def forged(home: Path, at: Path) -> World:
-    """A run of the toy in which a forger damaged files and recomputed all digests."""
+    """A run of the toy with damaged files and recomputed digests."""
     words = (*SMALL, "--engine", "fork")
     done("run", *words, "-n", "0", "--out", home / "run")
     shutil.rmtree(home / "run" / "report")
@@ -43,12 +42,10 @@ def forged(home: Path, at: Path) -> World:
 
 
 def half(home: Path, at: Path) -> World:
-    """A run of the toy, killed with most of its experiments finished."""
     return _killed(home, at, (*SMALL, *REFERENCE), 4)
 
 
 def shards(home: Path, at: Path) -> World:
-    """Two halves of a run of the toy, to be merged."""
     for number in (1, 2):
         out = home / f"shard{number}"
         done("run", *SMALL, *REFERENCE, "-n", "0", "--shard", f"{number}/2", "--out", out)
@@ -57,7 +54,7 @@ def shards(home: Path, at: Path) -> World:
 
 
 def shipped(home: Path, at: Path) -> World:
-    """A run on the shipped controller, read without running anything."""
+    """A run on the shipped controller that is only read."""
     words = (*SHIPPED, *REFERENCE)
     done("run", *words, "-n", "0", "--out", home / "run")
     place = _place(home, at, words, next(iter(RunFolder.open(home / "run").records())))
@@ -65,7 +62,6 @@ def shipped(home: Path, at: Path) -> World:
 
 
 def shipped_half(home: Path, at: Path) -> World:
-    """A run on the shipped controller, killed with half of its experiments finished."""
     return _killed(home, at, (*SHIPPED, *REFERENCE), 2)
 
 
@@ -75,13 +71,11 @@ BUILDERS: dict[str, Callable[[Path, Path], World]] = {
 
 
 def done(*words: object) -> None:
-    """Run a command that must succeed."""
     code, _, said = cli(*words)
     assert code == 0, said
 
 
 def hazardous(run: Path) -> str:
-    """Return the first experiment of a run that reached a hazard."""
     return next(name for name, record in RunFolder.open(run).records().items() if record.hazards)
 
 

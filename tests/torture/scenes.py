@@ -32,8 +32,6 @@ KILLS = 3  # of one command, at most
 
 @dataclass(slots=True, kw_only=True)
 class Scene:
-    """A command, the folder where it begins, and the folder's required final state."""
-
     name: str
     workspace: Workspace
     at: Path  # the folder of everything that happens
@@ -45,10 +43,8 @@ class Scene:
     takes_s: float = math.inf  # the command's shortest duration
 
     def cases(self, right: Told, seed: int) -> Sequence[Case]:
-        """Kill the command, repeat it, kill it again and so on, then let it complete.
-
-        Yield a case for each kill that came in time.
-        """
+        """Kill the command and repeat it several times, then let it complete. Return a case for each kill
+        that came in time."""
         chance = random.Random(seed)
         self._begin()
         kills = []
@@ -69,15 +65,11 @@ class Scene:
         ]
 
     def _is_done(self, command: Command) -> bool:
-        """Whether no other command is needed.
-
-        A merge killed after its last write counts as done, because the next one would not overwrite a run.
-        """
+        """A merge killed after its last write is done, because the next one would not overwrite a run."""
         merged = self.name == "merge" and RunFolder.exists(self.at / "run")
         return command.process.returncode == 0 or merged
 
     def undisturbed(self) -> Told:
-        """Return the command's result when it is not killed."""
         if self.home is None and not self.fresh_cache:  # the duration of later runs, with cached checks
             self._begin()
             self._command().end()
@@ -108,9 +100,6 @@ class Scene:
 
 
 def scenes(workspace: Workspace, homes: Path, at: Path) -> Iterator[Scene]:
-    """A run with and without its checks, one of the shipped controller, a report, a repair of a damaged run,
-    a merge.
-    """
     words, shards = (*SMALL, "--engine", "fork"), (at / "shard1", at / "shard2")
     place, scene = Place(folder=at, campaign=words), partial(Scene, workspace=workspace, at=at)
     running, again = ("run", *words, "-n", "2", "--out", place.run), partial(run, place)
@@ -137,7 +126,6 @@ def scenes(workspace: Workspace, homes: Path, at: Path) -> Iterator[Scene]:
 
 
 def _damaged(home: Path) -> Path:
-    """Return the run with a lost record line and a changed golden run and patch."""
     run = home / "run"
     records = next((run / "records").iterdir())
     records.write_bytes(records.read_bytes()[:-1] + b"x\n")
@@ -161,9 +149,7 @@ def struck(
     command: Command, chance: Chance, victims: Sequence[str], takes_s: float
 ) -> tuple[str, signal.Signals] | None:
     """Send a signal to one process of a command, or to all of them, at a random moment of its duration.
-
-    Return the receiver and the signal, or None if no process was left.
-    """
+    Return the receiver and the signal, or None if no process was left."""
     number, victim = chance.choice(SIGNALS), chance.choice(victims)
     with suppress(subprocess.TimeoutExpired):
         command.process.wait(chance.uniform(0.0, takes_s))
@@ -177,7 +163,7 @@ def struck(
 
 
 def _mutants(command: Command) -> list[int]:
-    """The running mutants, fork servers, and everything else it started except its workers."""
+    """Return all processes of the command except its workers: mutants, fork servers and others."""
     workers = command.workers()
     return [pid for pid, _ in command.others() if pid not in workers]
 

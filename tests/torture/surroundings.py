@@ -1,8 +1,5 @@
-"""Surroundings of a command: other locales and clocks, few resources and closed streams.
-
-The resources are disk, memory and file handles. Each surrounding is a context manager that takes chance and
-the case's folder. The command starts within it.
-"""
+"""Surroundings of a command: locales and clocks, little disk, memory or file handles, and closed streams.
+Each is a context manager that takes chance and the case's folder. The command starts within it."""
 
 import os
 import subprocess
@@ -31,9 +28,8 @@ NOBODY_READS = "import os\nread, write = os.pipe()\nos.close(read)\nfor fd in {f
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Surrounding:
-    """What differs for a command: its environment, what its process does before it becomes the command, and
-    the run's folder. `ease` removes the difficulty; `is_heard` says whether its messages can be read.
-    """
+    """The environment of a command, code that its process runs first, and the run's folder. `ease` removes
+    the difficulty. `is_heard` says whether its messages can be read."""
 
     run_in: Path
     how: str
@@ -62,7 +58,6 @@ def words(chance: Chance, at: Path) -> Iterator[Surrounding]:
 
 @contextmanager
 def clock(chance: Chance, at: Path) -> Iterator[Surrounding]:
-    """A wall clock that jumps by days, in the command and in its workers."""
     (at / "sitecustomize.py").write_text(CLOCK)
     given = {"PYTHONPATH": str(at), "JUMPS": str(chance.random())}
     yield Surrounding(run_in=at, how="jumps", environment=given)
@@ -80,7 +75,6 @@ def _limit(name: str, least: int, most: int) -> Callable[..., AbstractContextMan
 
 @contextmanager
 def disk(chance: Chance, at: Path) -> Iterator[Surrounding]:
-    """A disk with little space, or few inodes, for the run, for scratch files or for the cache."""
     role, place = chance.choice(["run", "run", "TMPDIR", "XDG_CACHE_HOME"]), at / "disk"
     size, inodes = f"size={int(2 ** chance.uniform(13, 22))}", f"nr_inodes={int(2 ** chance.uniform(1, 9))}"
     small = chance.choice([size, size, inodes])
@@ -95,7 +89,6 @@ def disk(chance: Chance, at: Path) -> Iterator[Surrounding]:
 
 @contextmanager
 def read_only(chance: Chance, at: Path) -> Iterator[Surrounding]:
-    """A cache, home, scratch or run folder without write permission."""
     role, place = chance.choice(["run", "TMPDIR", "XDG_CACHE_HOME", "HOME"]), at / "disk"
     given = {} if role == "run" else {role: str(place)}
     if role == "HOME":
@@ -111,7 +104,6 @@ def read_only(chance: Chance, at: Path) -> Iterator[Surrounding]:
 
 @contextmanager
 def streams(chance: Chance, at: Path) -> Iterator[Surrounding]:
-    """Standard streams that are closed, that nobody reads, or that lead to a full device."""
     fds = chance.choice([[0], [1], [2], [1, 2], [0, 1, 2]])
     how = chance.choice(["closed", "nobody reads", "full"])
     if how == "closed":

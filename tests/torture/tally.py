@@ -19,9 +19,8 @@ class End(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
-    """One try: what was tortured, how, what then read or resumed it, how that ended, and the details of a
-    failure.
-    """
+    """One try: what was damaged and how, what read or resumed it, how that ended, and the details of a
+    failure."""
 
     kind: str
     damage: str
@@ -32,7 +31,7 @@ class Case:
 
 @dataclass(slots=True)
 class Tally:
-    """The cases of one torture test with their seeds. `--seed` repeats one case."""
+    """The cases of one torture test. `--seed` repeats one case."""
 
     title: str
     cases: list[tuple[int, Case]] = field(default_factory=list)
@@ -55,7 +54,6 @@ class Tally:
         ]
 
     def __str__(self) -> str:
-        """Return a table for each grouping of the cases, and the failures."""
         heads = [field.name for field in fields(Case)[:3]]
         tables = [self._table(head) for head in heads]
         return "\n\n".join([f"{self.title}: {len(self.cases)} cases", *tables, *self.wrong])

@@ -46,20 +46,15 @@ spacing_m: {SPACING}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cache:
-    """A filled cache that stays unchanged, a place for its copy, and a command that uses the copy.
-
-    The command runs in a new folder.
-    """
+    """A filled cache that stays unchanged, a place for its copy, and a command that uses the copy."""
 
     home: Path
     at: Path
     use: Callable[[Path], Mapping[str, bytes | str]]
 
     def cases(self, seed: int) -> Sequence[Case]:
-        """Damage a file of the cache, then use the cache twice.
-
-        The second use finds what the first one left.
-        """
+        """Damage a file of the cache, then use the cache twice. The second use finds what the first one
+        left."""
         chance = random.Random(seed)
         shutil.copytree(self.home, self.at)
         try:
@@ -93,7 +88,6 @@ class Cache:
 
 
 def contents_of(run: Path) -> dict[str, bytes]:
-    """Return the relevant content of a run folder or of a run's output."""
     names = ("results.csv", "trace.npz", "record.json", "golden", "seal")
     found = [path for name in names for path in (run, *run.glob(name)) if path.name == name]
     files = [path for one in found for path in ([one] if one.is_file() else sorted(one.rglob("*.*")))]
@@ -101,8 +95,6 @@ def contents_of(run: Path) -> dict[str, bytes]:
 
 
 def checks(toy: Workspace, folder: Path) -> Cache:
-    """The checks of two campaigns, with their golden runs."""
-
     def use(out: Path, seed: int = 3) -> Mapping[str, bytes]:
         choices = mutator.Choices(limit=2, seed=seed)
         made = mutator.run("small", out, choices=choices, engine="reference", workspace=toy)
@@ -141,7 +133,7 @@ CACHES = {one.__name__: one for one in (checks, pictures)}
 
 
 @pytest.mark.parametrize("name", CACHES)
-def test_caches(
+def test_a_damaged_cache_changes_no_result(
     name: str,
     toy: Workspace,
     tmp_path: Path,
@@ -149,7 +141,6 @@ def test_caches(
     print_tally: Callable[[Tally], None],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A damaged cache gives the same results as an intact one."""
     monkeypatch.setattr(detection_memory, "BUCKETS", 16)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     cache = CACHES[name](toy, tmp_path)

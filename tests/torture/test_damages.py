@@ -1,7 +1,5 @@
-"""A reader of a damaged run folder never returns a wrong result or a traceback.
-
-It returns the right result, or an error that names the file and the remedy.
-"""
+"""A reader of a damaged run folder returns the right result, or an error that names the file and the
+remedy."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -21,7 +19,7 @@ TRIES = {"finished": 500, "forged": 150, "half": 150, "shards": 120, "shipped": 
 
 
 @pytest.mark.parametrize("name", TRIES)
-def test_damages(
+def test_no_damage_misleads_a_reader(
     name: str,
     toy: Workspace,
     tmp_path: Path,
@@ -31,7 +29,6 @@ def test_damages(
     reseal: Callable[..., None],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """No damage misleads a reader."""
     monkeypatch.setenv("MUTATOR_ROOT", str(CLONE if name.startswith("shipped") else toy.library.parent))
     monkeypatch.chdir(tmp_path)
     (tmp_path / "home").mkdir()

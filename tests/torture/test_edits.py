@@ -1,7 +1,5 @@
-"""After an edit between a killed run and its resume, the command gives no wrong result.
-
-It gives the right result or names the change. Once the change is undone, it gives the right result.
-"""
+"""After an edit between a killed run and its resume, the command gives the right result or names the change.
+Once the change is undone, it completes."""
 
 import os
 import random
@@ -39,10 +37,8 @@ CHOICES = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Edits:
-    """A command that is killed, and the changes made before it is repeated.
-
-    `root` has the library, templates and target in a separate git clone.
-    """
+    """A command that is killed, and the changes made before it is repeated. `root` has the library, templates
+    and target in a separate git clone."""
 
     workspace: Workspace
     root: Path
@@ -51,7 +47,6 @@ class Edits:
     right: Told
 
     def cases(self, seed: int) -> Sequence[Case]:
-        """Kill the command, change something, repeat it, undo the change, and repeat it."""
         chance = random.Random(seed)
         kind = chance.choice([*FILES] * 2 + ["choice"] * 10 + ["commit", "older folder"] * 2)
         shutil.rmtree(self.place.folder, ignore_errors=True)
@@ -77,7 +72,7 @@ class Edits:
         return [Case(kind=kind, damage=what.split(" of ")[0], reader="run", end=end, story=story)]
 
     def _kill(self, chance: Chance) -> None:
-        """Start the command and kill it at a random moment after it wrote its plan."""
+        """Kill the command at a random moment after it wrote its plan."""
         run = self.place.run
         words = map(str, ("run", *WORDS, "-n", "2", "--out", run))
         command = Command(self.workspace, run, "-m", "mutator", *words)
@@ -89,10 +84,8 @@ class Edits:
 
     @contextmanager
     def _edited(self, kind: str, chance: Chance) -> Iterator[tuple[str, tuple[str, ...]]]:
-        """Apply an edit for the duration of the context.
-
-        Yield its name and additional words for the command.
-        """
+        """Apply an edit for the duration of the context. Yield its name and additional words for the
+        command."""
         if kind == "choice":
             words = chance.choice(CHOICES)
             yield words[0], words
@@ -141,7 +134,7 @@ def make_edits(toy: Workspace, folder: Path) -> Edits:
     return Edits(workspace=toy, root=root, place=place, takes_s=takes_s, right=right)
 
 
-def test_edits(
+def test_an_edit_gives_no_wrong_result(
     toy: Workspace,
     tmp_path: Path,
     kept_checks: None,
@@ -149,10 +142,6 @@ def test_edits(
     print_tally: Callable[[Tally], None],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """After a kill and a change, the command gives the right result or refuses.
-
-    Without the change it completes.
-    """
     monkeypatch.setenv("MUTATOR_ROOT", str(toy.library.parent))
     monkeypatch.chdir(tmp_path)
     edits = make_edits(toy, tmp_path)

@@ -47,8 +47,6 @@ PATTERNS = {
 
 
 class Inputs:
-    """A library with templates and target. Each case has one malformed file."""
-
     def __init__(self, root: Path) -> None:
         self.root, self.home = root, root.with_name("genuine")
         shutil.copytree(root, self.home)
@@ -74,7 +72,6 @@ class Inputs:
         return [Case(kind=kind, damage=how, reader=verb, end=end, story=story)]
 
     def _told(self, verb: str) -> tuple[Told, float]:
-        """Return a verb's output and its CPU time in s."""
         began = time.process_time()
         with limited(LONGEST_S):
             code, out, err = cli(*VERBS[verb])
@@ -87,14 +84,13 @@ def approve() -> None:
     done("review", "approve", *(group["group"] for group in json.loads(out)), "--by", "nobody")
 
 
-def test_inputs(
+def test_malformed_files_are_read_or_refused_by_name(
     toy: Workspace,
     tmp_path: Path,
     seeds: Callable[[int], Sequence[int]],
     print_tally: Callable[[Tally], None],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A verb reads a malformed file or refuses it by name."""
     root = toy.library.parent
     monkeypatch.setenv("MUTATOR_ROOT", str(root))
     monkeypatch.chdir(tmp_path)

@@ -24,7 +24,7 @@ TRIES = {
 
 
 @pytest.mark.parametrize("name", TRIES)
-def test_kills(
+def test_a_command_killed_at_any_moment_completes(
     name: str,
     toy: Workspace,
     tmp_path: Path,
@@ -33,7 +33,6 @@ def test_kills(
     print_tally: Callable[[Tally], None],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """After any kills, the command completes with the undisturbed result."""
     monkeypatch.setenv("MUTATOR_ROOT", str(CLONE if name == SHIPPED_RUN else toy.library.parent))
     monkeypatch.chdir(tmp_path)
     scene = next(one for one in scenes(toy, tmp_path / "homes", tmp_path / "case") if one.name == name)

@@ -1,7 +1,5 @@
-"""With any misbehaving mutants, the command ends in time and leaves nothing behind.
-
-Ordinary experiments have their results, and every engine gives the same verdict.
-"""
+"""With any misbehaving mutants, the command ends in time and leaves nothing behind. Ordinary experiments have
+their results, and every engine gives the same verdict."""
 
 import resource
 from collections.abc import Callable, Sequence
@@ -21,7 +19,7 @@ TRIES = 80  # campaigns, of up to three misdeeds each
 MOST_MEMORY = 8 << 30  # of any process, to protect the machine
 
 
-def test_misbehaving(
+def test_misdeeds_do_not_disturb_ordinary_faults(
     toy: Workspace,
     tmp_path: Path,
     kept_checks: None,
@@ -29,7 +27,6 @@ def test_misbehaving(
     print_tally: Callable[[Tally | str], None],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Misdeeds do not disturb the ordinary faults in the same campaign, on any engine."""
     monkeypatch.chdir(tmp_path)
     limits = resource.getrlimit(resource.RLIMIT_AS)
     wanted = seeds(TRIES)

@@ -1,7 +1,5 @@
-"""In any surroundings a campaign gives the same bytes or is refused with a remedy.
-
-After the remedy, the same command gives these bytes.
-"""
+"""In any surroundings a campaign gives the same bytes or is refused with a remedy. After the remedy, the same
+command gives these bytes."""
 
 import random
 import shutil
@@ -31,8 +29,6 @@ REMEDIES = ("to do: ", "expected: ", "resume: ", "the same command")
 
 @dataclass(slots=True, kw_only=True)
 class Elsewhere:
-    """The command in one kind of surroundings, and its result in ordinary ones."""
-
     name: str
     workspace: Workspace
     at: Path
@@ -44,7 +40,6 @@ class Elsewhere:
         assert self.right.code == 0, self.right.said
 
     def cases(self, seed: int) -> Sequence[Case]:
-        """Run the command there, then the same command in the same folder in ordinary surroundings."""
         chance = random.Random(seed)
         shutil.rmtree(self.at)
         self.at.mkdir()
@@ -85,7 +80,7 @@ class Elsewhere:
 
 
 @pytest.mark.parametrize("name", SURROUNDINGS)
-def test_surroundings(
+def test_a_command_completes_what_it_began_in_any_surroundings(
     name: str,
     toy: Workspace,
     tmp_path: Path,
@@ -94,7 +89,6 @@ def test_surroundings(
     print_tally: Callable[[Tally], None],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The command in ordinary surroundings completes what it began elsewhere."""
     if name in MOUNTED and not may_mount(tmp_path):
         pytest.skip("needs the right to mount a disk")
     monkeypatch.setenv("MUTATOR_ROOT", str(toy.library.parent))

@@ -1,7 +1,5 @@
-"""A second command in the folder of a running campaign does no harm.
-
-Each command gives the right result or is refused because the folder is in use. The folder ends up complete.
-"""
+"""A second command in the folder of a running campaign does no harm. It gives the right result or is refused
+because the folder is in use."""
 
 import random
 import shutil
@@ -33,8 +31,6 @@ BUSY = ("in use", "run under way", "deleted by another command")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pair:
-    """The command, others that may start next to it, and the folder's final state."""
-
     workspace: Workspace
     place: Place
     takes_s: float
@@ -42,7 +38,6 @@ class Pair:
 
     @property
     def others(self) -> dict[str, tuple[object, ...]]:
-        """Commands that use the folder."""
         run, genuine, out = self.place.run, self.place.genuine, self.place.folder / "written"
         experiment = ("--run", run, "--no-plot")
         return {
@@ -62,7 +57,7 @@ class Pair:
         }
 
     def cases(self, seed: int) -> Sequence[Case]:
-        """One command begins, then the other. Sometimes a signal hits one. Then the command runs alone."""
+        """Start one command, then the other. Sometimes send one a signal. Then run the command alone."""
         chance = random.Random(seed)
         name = chance.choice(sorted(self.others))
         shutil.rmtree(self.place.folder, ignore_errors=True)
@@ -108,7 +103,7 @@ class Pair:
         return Command(self.workspace, self.place.run, "-m", "mutator", *map(str, words))
 
 
-def test_two_at_once(
+def test_two_commands_at_once_do_no_harm(
     toy: Workspace,
     tmp_path: Path,
     kept_checks: None,
@@ -116,7 +111,6 @@ def test_two_at_once(
     print_tally: Callable[[Tally], None],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Two commands at once do no harm, and the first then completes alone."""
     monkeypatch.setenv("MUTATOR_ROOT", str(toy.library.parent))
     monkeypatch.chdir(tmp_path)
     pair = make_pair(toy, tmp_path)

@@ -35,7 +35,6 @@ class World:
     right: dict[str, Told] = field(default_factory=dict)  # the readers' output for the undamaged folder
 
     def cases(self, seed: int) -> list[Case]:
-        """Damage a file of some kind in some way, and let some reader read the folder."""
         chance = random.Random(seed)
         reader = chance.choice(sorted(self.readers))
         right = self._right(reader)
@@ -54,10 +53,8 @@ class World:
         return [Case(kind=kind, damage=how, reader=reader, end=end, story=story)]
 
     def _resealed(self, reader: str) -> Told:
-        """Return a reader's output for a folder with recomputed digests, if the damage allows that.
-
-        Only the seal reveals a changed result.
-        """
+        """Return a reader's output for a folder with recomputed digests, if the damage allows that. Only the
+        seal reveals a changed result."""
         assert self.reseal
         with suppress(MutatorError, AttributeError, KeyError, TypeError, ValueError):
             self.reseal(self.place.run)
@@ -98,7 +95,6 @@ def kinds_of(home: Path) -> dict[str, list[str]]:
 
 
 def judged(told: Told, right: Told, touched: Iterable[str]) -> tuple[End, str]:
-    """Whether a reader returned the right result, or refused the damaged folder properly."""
     if "Traceback" in told.said or "defect of mutator" in told.said:
         return End.WRONG, "a traceback"
     if told.code == 0:
@@ -124,23 +120,17 @@ def _difference(told: Told, right: Told) -> str:
 
 
 def _first(told: object, right: object) -> str:
-    """Return the first line in which two texts differ."""
     lines = zip(str(told).splitlines(), str(right).splitlines(), strict=False)
     one, other = next((pair for pair in lines if pair[0] != pair[1]), (told, right))
     return f"{one!s:.500}, not {other!s:.500}"
 
 
 class TooLong(Exception):
-    """A time limit is exceeded.
-
-    This is not a TimeoutError, because that is an OSError, which readers expect.
-    """
+    """A time limit is exceeded. This is not a TimeoutError, which is an OSError: readers expect OSErrors."""
 
 
 @contextmanager
 def limited(seconds: float) -> Iterator[None]:
-    """Raise TooLong if the body takes longer."""
-
     def end(number: int, frame: FrameType | None) -> None:
         raise TooLong(f"took more than {seconds} s")
 
