@@ -41,7 +41,7 @@ class BuildWithShipped(build_py):
 
 
 class WheelOfOneMachine(bdist_wheel):
-    """A wheel for any Python 3 but, where helpers were compiled, for this kind of machine alone."""
+    """A wheel for any Python 3, but for this kind of machine alone if helpers were compiled."""
 
     def get_tag(self) -> tuple[str, str, str]:
         if not any(FOLDER.glob(f"*{compiled.SUFFIX}")):

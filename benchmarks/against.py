@@ -3,8 +3,8 @@
 `python benchmarks/against.py CLONE [--campaign NAME]`. CLONE is a checkout of the older commit, installed
 into its .venv as its README says. Both versions run alternately, each time with an empty cache. Code that an
 old version compiles with a separate command is compiled before its clock starts. CPU time covers all
-processes. Wall time needs otherwise idle cores. The parts are the stages that the command reports. Idle is
-the time of cores without work. The exit code is 1 if a run fails.
+processes. Wall time needs otherwise idle cores. Idle is the time of cores without work. The exit code is 1 if
+a run fails.
 """
 
 import argparse
@@ -31,7 +31,7 @@ def run(clone: Path, campaign: str, workers: int, more: list[str]) -> Parts:
     """Run a campaign with the version of `clone` and no caches. Return the time of each part."""
     python = sys.executable if clone == ROOT else str(clone / ".venv" / "bin" / "python")
     with tempfile.TemporaryDirectory() as place:
-        # older versions keep frames, detections and helpers in ~/.cache, whatever XDG_CACHE_HOME says
+        # older versions ignore XDG_CACHE_HOME for frames, detections and helpers
         env = os.environ | {"HOME": place, "XDG_CACHE_HOME": f"{place}/.cache"}
         if clone != ROOT:
             compile_helpers(python, clone, env)
@@ -49,7 +49,7 @@ def compile_helpers(python: str, clone: Path, env: dict[str, str]) -> None:
 
 
 def followed(command: list[str], folder: Path, env: dict[str, str]) -> Parts:
-    """Return the time of each stage of a command, from the line that names it to the next stage's line."""
+    """Return the time of each stage, from the line that names it to the next stage's line."""
     parts = {stage: {"wall_s": 0.0, "cpu_s": 0.0} for stage in STAGES}
     stage, line, since, used = STAGES[0], "", time.monotonic(), 0.0
 
@@ -99,7 +99,6 @@ def cpu_of(root: int) -> float:
 
 
 def show(parts: dict[str, Parts], workers: int) -> None:
-    """Print the time of each part in both versions and how long cores were idle."""
     print(f"{'':14}" + "".join(f"{name:>9} wall s    CPU s   idle s" for name in parts) + "     CPU ratio")
     for stage in (*STAGES, WHOLE):
         cells = ""
@@ -111,7 +110,6 @@ def show(parts: dict[str, Parts], workers: int) -> None:
 
 
 def main() -> int:
-    """Measure and print."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("clone", type=Path, help="checkout of the older commit")
     parser.add_argument("--campaign", default="paper_sample")

@@ -1,9 +1,8 @@
 """Measure whole campaigns with one worker and with two.
 
-`python benchmarks/campaigns.py [--campaign paper_smoke]`. The user's command runs checks, experiments,
-equivalence check, tables and report. CPU time covers all processes. A run that does not count first fills the
-caches (frames, detections, passed checks). Then one worker and two alternate. Wall time needs otherwise idle
-cores. The exit code is 1 if a run fails or the results differ in a byte.
+`python benchmarks/campaigns.py [--campaign paper_smoke]`. A first run, which is not measured, fills the
+caches (frames, detections, passed checks). Then one worker and two alternate. CPU time covers all processes.
+Wall time needs otherwise idle cores. The exit code is 1 if a run fails or the results differ in a byte.
 """
 
 import argparse
@@ -22,7 +21,6 @@ WORKERS = (1, 2)
 
 
 def run(campaign: str, workers: int, out: Path, more: Sequence[str]) -> dict[str, float]:
-    """Run a campaign into the new folder `out` and return wall and CPU seconds."""
     command = [sys.executable, "-m", "mutator", "run", campaign, "--out", str(out), "-n", str(workers)]
     before, began = _cpu(), time.monotonic()
     subprocess.run([*command, *more], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
@@ -36,7 +34,6 @@ def _cpu() -> float:
 
 
 def summary_of(name: str, took: dict[str, float], count: int) -> None:
-    """Print a line of the table."""
     print(
         f"{name:24}{took['wall_s']:9.1f} s wall {took['cpu_s']:9.1f} s CPU  {count / took['wall_s']:7.2f} "
         f"experiments a second, {1e3 * took['cpu_s'] / count:8.1f} ms of CPU each",
@@ -45,7 +42,6 @@ def summary_of(name: str, took: dict[str, float], count: int) -> None:
 
 
 def main() -> int:
-    """Measure and print."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--campaign", default="paper_smoke")
     parser.add_argument("--limit", metavar="N", help="so many of its experiments")

@@ -1,8 +1,8 @@
 """Measure the CPU time of `mutator check --drive` beyond that of three golden runs.
 
 `python benchmarks/check_drive.py [--rounds N]`. Each round measures the command for one scenario of the
-shipped target. It then measures three golden runs, each in its own process. Times are the CPU times of the
-children. The exit code is 1 if the smallest difference is above the goal.
+shipped target, then three golden runs, each in its own process. The exit code is 1 if the smallest difference
+is above the goal.
 """
 
 import argparse
@@ -23,7 +23,6 @@ SCENARIO = "S1"
 
 
 def cpu_s(*command: str, env: dict[str, str] | None = None) -> float:
-    """Return the CPU time of a command and all its children, in s."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run(command, env=env, check=True, stdout=subprocess.DEVNULL)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)

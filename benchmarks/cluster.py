@@ -3,9 +3,9 @@
 `python benchmarks/cluster.py [overhead] [intake] [ends] [--campaign NAME]`. Without a name, it measures all
 three. `overhead` is the CPU time of all processes for a campaign on two Dask workers of this machine and on
 two local workers, alternately and with warm caches. `intake` is the number of results a second that the
-command takes from two workers. Their engine takes no time, and patches and series have their usual size.
-`ends` simulates 64 workers that run 10,000 experiments with a campaign's durations. It compares the end of
-the last worker with the mean.
+command takes from two workers, whose engine takes no time. Patches and series have their usual size. `ends`
+simulates 64 workers that run 10,000 experiments with a campaign's durations, and compares the end of the last
+worker with the mean.
 """
 
 import argparse
@@ -64,7 +64,7 @@ PR_SET_CHILD_SUBREAPER = 36  # of prctl: orphans become children of this process
 
 
 def overhead(campaign: str, rounds: int) -> None:
-    """CPU time on a cluster of this machine, compared with local workers."""
+    """Compare CPU time on a cluster of this machine with local workers."""
     took: dict[str, list[float]] = {"local": [], "cluster": []}
     options = {"local": ["-n", "2"], "cluster": ["-n", "2", "--cluster", "local:2"]}
     with tempfile.TemporaryDirectory() as place:
@@ -84,7 +84,8 @@ def overhead(campaign: str, rounds: int) -> None:
 
 
 def cpu_s(command: list[str], env: dict[str, str]) -> float:
-    """CPU time (s) of a command and all its descendants, including those that outlive their parent."""
+    """Return the CPU time (s) of a command and all its descendants, including those that outlive their
+    parent."""
     ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run(command, cwd=ROOT, env=env, capture_output=True, check=True)
@@ -127,7 +128,6 @@ def leave(run: str) -> None:
 
 
 def work(run: str, data: bytes) -> bytes:
-    """Return the synthetic result of a piece of work."""
     piece = Piece.of(data)
     line = json.dumps({"experiment_id": "@"} | RECORD, separators=(",", ":")).encode()
     timing = b'{"cpu_s":0.3,"engine":"fork","experiment_id":"@","host":"here","wall_s":0.3,"worker":"w"}'
@@ -145,7 +145,7 @@ def work(run: str, data: bytes) -> bytes:
 
 
 def intake() -> None:
-    """Measure the results a second that the command takes in."""
+    """Measure how many results a second the command takes in."""
     for fake in (facts, deliver, attend, leave, work):
         setattr(dask_side, fake.__name__, fake)
     with planned() as (workspace, folder, left):
@@ -188,7 +188,6 @@ def intake() -> None:
 
 
 def ends(seed: int) -> None:
-    """Simulate when the workers finish."""
     with planned() as (_, folder, left):
         some, count = [], 0
         for one in left:
@@ -234,7 +233,6 @@ def simulated(
 
 
 def main() -> int:
-    """Measure and print."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("what", nargs="*", default=["ends", "intake", "overhead"])
     parser.add_argument("--campaign", default="paper_sample")

@@ -1,8 +1,8 @@
 """Measure what compiled helpers save in runs of 30 s.
 
-`python benchmarks/compiled.py [--rounds N] [--json FILE]`. It first compiles the helpers into a separate
-folder. Runs without and with helpers alternate and must have identical traces. Times are CPU times of this
-process in one thread. It prints medians and their ratio. The exit code is 1 if a trace differs.
+`python benchmarks/compiled.py [--rounds N] [--json FILE]`. Runs without and with helpers alternate. Times are
+CPU times of this process in one thread. It prints medians and their ratio. The exit code is 1 if a trace
+differs.
 """
 
 import argparse
@@ -40,7 +40,6 @@ def run(kind: str | None, cache: Path, helpers: Path | None) -> tuple[float, byt
 
 
 def main() -> int:
-    """The command."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--json", type=Path, help="file for the figures")

@@ -1,11 +1,10 @@
 """Estimate what a campaign could save by ending runs that have become equal to the golden run.
 
-`python benchmarks/converged.py RUN [--json FILE]`. If a fork's state equals the golden run's after the fault
-is over, the fork could end there and take the rest from the golden run. This prints an upper bound of the
-saving, as a share of the CPU of all runs. If a trace has the golden run's bytes, everything after the last
-activation counts as saved. Otherwise, everything counts that follows the last difference from golden in any
-channel of the series (six digits, 20 values a second). Equal channels are necessary for equal states, but not
-sufficient. While a fault may act again, its past does not predict its future.
+`python benchmarks/converged.py RUN [--json FILE]`. A fork whose state equals the golden run's after the fault
+is over could end there and take the rest from the golden run. This prints an upper bound of the saving, as a
+share of the CPU of all runs. If a trace has the golden run's bytes, everything after the last activation
+counts as saved; otherwise, everything after the last difference from golden in any channel of the series (six
+digits, 20 values a second). Equal channels are necessary for equal states, but not sufficient.
 """
 
 import argparse
@@ -38,8 +37,6 @@ _LAST_S = (
 
 @dataclass
 class Saved:
-    """Runs, and the CPU (s) that could be saved, by the kind of run."""
-
     runs: Counter[str] = field(default_factory=Counter)
     cpu_s: Counter[str] = field(default_factory=Counter)
 
@@ -80,7 +77,6 @@ def bound(folder: RunFolder, workspace: Workspace) -> tuple[Saved, float]:
 
 
 def _saved(record: Record, golden: str, series: SeriesFolder) -> tuple[str, float]:
-    """Return the kind of a run and the share of its simulation that could be saved."""
     found, active = series.read(record.experiment_id), record.activation
     if found is None or active is None:
         return "without a series", 0.0

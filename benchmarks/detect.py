@@ -2,9 +2,8 @@
 
 `python benchmarks/detect.py [--repeat N]`. It prints the median CPU time (ms, one thread) of a detection,
 compiled and in Python, and of the steps in Python. The frames show the rendered road, clean and with rain,
-snow and noise that fill it with edges. A run of 30 s makes 600 detections. The last column divides the time
-of the detection that a run uses by its goal. A run uses the compiled one, or Python's if nothing is compiled.
-The exit code is 1 if a detection misses its goal.
+snow and noise. A run of 30 s makes 600 detections. The last column divides the time of the detection that a
+run uses (the compiled one, if it exists) by its goal. The exit code is 1 if a detection misses its goal.
 """
 
 import argparse
@@ -42,10 +41,6 @@ COLUMNS = "compiled", "Python", "hog", "edges", "dbscan", "lines", "edge pixels"
 
 
 def median_ms(work: Callable[[], object], repeat: int) -> float:
-    """Return the median CPU time of `work` over many repeats.
-
-    Other work on the machine does not affect it.
-    """
     times = []
     for _ in range(repeat):
         start = time.thread_time()
@@ -55,7 +50,6 @@ def median_ms(work: Callable[[], object], repeat: int) -> float:
 
 
 def pictures(model: CameraModel) -> dict[str, np.ndarray]:
-    """Return frames of the same moment on the road, in fair weather and foul."""
     clean = RoadRenderer(model, "solid", 0).grey(3.0)
     moment = SimpleNamespace(t=2.0, position=3.0, v_ego=26.8)
     found = {"clean": clean}
@@ -68,9 +62,8 @@ def pictures(model: CameraModel) -> dict[str, np.ndarray]:
 
 
 def measure(model: CameraModel, picture: np.ndarray, repeat: int) -> list[float]:
-    """Medians (ms) of the detection, compiled (NaN if it is not) and in Python, and of the latter's steps
-    with every steep edge; the number of edge pixels.
-    """
+    """Return medians (ms) of the detection, compiled (NaN if it is not) and in Python, and of the latter's
+    steps with every steep edge; also the number of edge pixels."""
     fast, plain, region = build_paper_detector(model), PaperDetector(model), RoadRegion(model)
     view = CameraView(0.0, 0.0, 0.0, (), 0.0, picture)
     hog, lines = Hog(*region.shape), EdgeLines(model, region)
@@ -89,7 +82,6 @@ def measure(model: CameraModel, picture: np.ndarray, repeat: int) -> list[float]
 
 
 def main() -> int:
-    """Print the table. Return 1 if a detection exceeds its goal."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--repeat", type=int, default=300, help="detections for each median")
     repeat = parser.parse_args().repeat

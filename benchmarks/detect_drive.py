@@ -1,9 +1,8 @@
 """Measure the geometric and the as-coded detector's time for a frame, as medians over a run.
 
 `python benchmarks/detect_drive.py [--repeat N] [--plain]`, on one core, in clear and in bad weather. It uses
-compiled code unless given `--plain`. The last column says whether it did. Times are CPU times of this
-process, so other work on the machine has little effect, except through shared caches. The exit code is 1 if a
-median is above its goal.
+compiled code unless given `--plain`; the last column says whether it did. Times are CPU times of this
+process. The exit code is 1 if a median is above its goal.
 """
 
 import argparse
@@ -41,8 +40,6 @@ DIFFERENT = 40  # frames of a drive
 
 
 class Moment(NamedTuple):
-    """What effects know about the world."""
-
     t: float
     position: float
     v_ego: float
@@ -63,7 +60,7 @@ def drive(marks: str, weather: str | None, amount: float) -> list[np.ndarray]:
 
 
 def times(detector: RobustDetector | CodedDetector, pictures: list[np.ndarray], repeat: int) -> list[float]:
-    """Return the CPU time (ms) of each detection. Only the very first has no history."""
+    """Return the CPU time (ms) of each detection. Only the first has no history."""
     found = []
     for k in range(repeat):
         view = CameraView(
@@ -81,7 +78,6 @@ def times(detector: RobustDetector | CodedDetector, pictures: list[np.ndarray], 
 
 
 def main() -> int:
-    """The command."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--repeat", type=int, default=300, help="pictures for each median")
     parser.add_argument("--plain", action="store_true", help="without compiled code")

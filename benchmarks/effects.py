@@ -1,9 +1,8 @@
 """Measure the image effects' time for a frame, as medians over a run.
 
 `python benchmarks/effects.py [EFFECT ...] [--repeat N] [--plain]`, on one core, for mild and strong effects
-and the default camera. It uses compiled code unless given `--plain`. The last column says for each effect
-whether it used any. Times are CPU times of this process, so other work on the machine has little effect,
-except through shared caches. The exit code is 1 if a median is above 3 ms.
+and the default camera. It uses compiled code unless given `--plain`; the last column says for each effect
+whether it used any. Times are CPU times of this process. The exit code is 1 if a median is above 3 ms.
 """
 
 import argparse
@@ -30,22 +29,18 @@ GOAL = 3.0  # ms a frame
 
 
 class Moment(NamedTuple):
-    """What effects know about the world."""
-
     t: float
     position: float
     v_ego: float
 
 
 def milliseconds(work: Callable[[], object]) -> float:
-    """Return the CPU time of one call."""
     start = process_time()
     work()
     return 1000.0 * (process_time() - start)
 
 
 def main() -> int:
-    """The command."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("effects", nargs="*", help="names of effects; all of them if none is given")
     parser.add_argument("--repeat", type=int, default=100, help="pictures for each median")

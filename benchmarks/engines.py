@@ -38,8 +38,6 @@ GOAL_OF_REFERENCE = 1 / 3
 
 @dataclass
 class Measured:
-    """An engine's CPU time (s) and its records."""
-
     cpu_s: float = 0.0
     children_s: float = 0.0  # the part for the runs themselves
     steps: int = 0  # steps that the runs simulated
@@ -49,8 +47,6 @@ class Measured:
 
 
 class Bench:
-    """Golden runs and engines in a scratch folder."""
-
     def __init__(self, plan: Plan, workspace: Workspace, folder: Path) -> None:
         self.workspace, self.folder = workspace, folder
         self.manifest = workspace.manifest(plan.campaign.target)
@@ -98,7 +94,7 @@ class Bench:
         before = _cpu()
         for key in firsts:
             list(runner.run([key]))
-        engine.close()  # its processes are counted only after that
+        engine.close()  # only then are its processes counted
         first_s = _cpu() - before
         before, measured = _cpu(), Measured()
         for finished in runner.run(sorted(experiments, key=lambda e: (e.scenario, e.changes, e.method))):
@@ -117,7 +113,6 @@ class Bench:
 
 
 def _cpu() -> float:
-    """Return the CPU time (s) of this process and its finished children."""
     used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return sum(one.ru_utime + one.ru_stime for one in used)
 
@@ -136,7 +131,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         bench = Bench(plan, workspace, Path(folder))
         found: dict[str, Measured] = {}
         facts: dict[str, object] = {"campaign": options.campaign, "experiments": len(plan.experiments)}
-        bench.measure("fork", plan.experiments)  # what a target remembers between runs is then there for all
+        bench.measure("fork", plan.experiments)  # warms the target's caches for all engines
         for name in bench.engines:
             if name not in options.skip:
                 found[name], first_s = bench.measure(name, plan.experiments)

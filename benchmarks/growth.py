@@ -1,9 +1,9 @@
 """Measure how time and memory grow with the campaign.
 
 `python benchmarks/growth.py [--json FILE]`. It measures plans of 1,000 to 50,000 experiments, a table of
-100,000 and opening the paper's 11,280. Each size runs in its own process, because the peak memory of a
-process is measured. The process plans and freezes, or does a worker's work before and after each run (read
-the chunk, build the mutant, append the record). Times are CPU times. The exit code is 1 if a goal is missed.
+100,000 and opening the paper's 11,280. Each size runs in its own process, which plans and freezes, or does a
+worker's work before and after each run (read the chunk, build the mutant, append the record). Times are CPU
+times. The exit code is 1 if a goal is missed.
 """
 
 import argparse
@@ -38,8 +38,8 @@ ROOT = Path(__file__).resolve().parents[1]
 SIZES = (1_000, 5_000, 20_000, 50_000)
 TABLE, LOAD_GOAL_S = 100_000, 2.0
 PAPER, OPEN_GOAL_S = 11_280, 1.0
-GOLDEN_BYTES = 650_000  # of a golden run
-PATCH_BYTES = 7200  # of a stored patch
+GOLDEN_BYTES = 650_000  # a golden run
+PATCH_BYTES = 7200  # a stored patch
 CHUNK = 20
 MORE_MEMORY_MB = 5.0  # of a worker, between 1,000 and 50,000 experiments
 
@@ -84,19 +84,17 @@ def _channels() -> tuple[str, ...]:
 
 
 def _left(number: int) -> tuple[tuple[str, float, float], ...]:
-    """Return divergences in which almost every channel has left golden, each at another time."""
+    """Return divergences of almost every channel, each at another time."""
     start = 2.05 + number % 997 / 100
     names = [name for place, name in enumerate(_channels()) if (number + place) % 7]
     return tuple((name, start + place / 100, number / (7 + place)) for place, name in enumerate(names))
 
 
 def most_mb() -> float:
-    """Return the peak memory of this process."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
 def planning(size: int, out: Path) -> dict[str, float]:
-    """Plan and freeze."""
     workspace = Workspace.find(root=ROOT)
     began = process_time()
     plan = plan_of(workspace, size)
@@ -107,7 +105,6 @@ def planning(size: int, out: Path) -> dict[str, float]:
 
 
 def working(size: int, out: Path) -> dict[str, float]:
-    """Do a worker's work around its runs for a whole frozen plan of `size`."""
     workspace = Workspace.find(root=ROOT)
     folder = RunFolder.open(out)
     manifest, models = workspace.manifest(folder.head["target"]), workspace.fault_models()
@@ -144,10 +141,8 @@ def written_run(size: int, out: Path, patch: bytes = b"") -> RunFolder:
 
 
 def opening(size: int, out: Path) -> dict[str, float]:
-    """Open a finished run of that many experiments and compare all digests, checksums and ids.
-
-    Return its seal.
-    """
+    """Open a finished run of that many experiments and compare all digests, checksums and ids. Return its
+    seal."""
     folder = written_run(size, out, bytes(PATCH_BYTES))
     head, data = folder.head, bytes(GOLDEN_BYTES)
     goldens = [folder.golden(scenario, tuple(changes)) for scenario, changes in head["goldens"]]
@@ -172,7 +167,6 @@ def opening(size: int, out: Path) -> dict[str, float]:
 
 
 def table(size: int, out: Path) -> dict[str, float]:
-    """Build tables of that many records and read the results."""
     written_run(size, out)
     began = process_time()
     path = results.build(out)
@@ -187,14 +181,12 @@ def table(size: int, out: Path) -> dict[str, float]:
 
 
 def apart(work: str, size: int, out: Path) -> dict[str, float]:
-    """Run a piece of work in its own process."""
     command = [sys.executable, __file__, "--work", work, str(size), str(out)]
     done = subprocess.run(command, check=True, capture_output=True, text=True)
     return dict(json.loads(done.stdout))
 
 
 def main() -> None:
-    """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--sizes", type=int, nargs="+", default=list(SIZES))
     parser.add_argument("--json", type=Path, help="file for the figures")

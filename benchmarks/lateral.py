@@ -43,10 +43,9 @@ def drive(name: str, step: float) -> Trace:
 
 
 def measure(trace: Trace, start: float, band: float) -> tuple[float, ...]:
-    """Largest offset and the largest to the other side (m), time to settle (s), steady error (m).
-
-    Then the largest torque, and the time (s) at full torque. Settled: within `band` of the steady offset.
-    """
+    """Return the largest offset and the largest to the other side (m), the settling time (s), the steady
+    error (m), the largest torque, and the time (s) at full torque. Settled means within `band` of the steady
+    offset."""
     t, offset = trace["t"], trace["lateral_offset"]
     steady = offset[-100:].mean()
     side = np.sign(offset[np.abs(offset).argmax()])
@@ -86,7 +85,6 @@ def figure(traces: Mapping[str, Trace], path: Path) -> None:
 
 
 def main() -> int:
-    """Print the table. Plot on request."""
     parser = argparse.ArgumentParser(description="Measure the lateral behaviour of the controlled car.")
     parser.add_argument("--figure", type=Path, metavar="FILE", help="draw the runs into this SVG file")
     options = parser.parse_args()

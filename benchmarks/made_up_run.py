@@ -2,8 +2,8 @@
 
 `python benchmarks/made_up_run.py SIZE OUT`. The experiments are those of the paper's campaign without frames,
 with as many seeds as needed. Golden runs are simulated. Records, patches, timings and series are a few
-hundred real or synthetic ones, repeated under other ids. Checksums and digests match a run of this size, so
-the folder opens and has a seal.
+hundred real or synthetic ones, repeated under other ids. Checksums and digests match, so the folder opens and
+has a seal.
 """
 
 import argparse
@@ -50,7 +50,7 @@ from mutator.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[1]
 SEED = 11_280  # experiments of a seed
-KINDS = 480  # different records, which experiments use alternately
+KINDS = 480  # different records, used in turn
 PATCHES = 240  # different patches
 SERIES, SERIES_MOST = 48, 150_000  # different series, and experiments with a series, to fit 500 MB
 WORKERS, PIECE = 2, 20  # files, and consecutive experiments in one of them
@@ -102,7 +102,6 @@ def campaign(folder: Path, size: int) -> Path:
 
 
 def planned(workspace: Workspace, size: int, out: Path) -> RunFolder:
-    """Return the plan of at least that many experiments, frozen in `out`."""
     with TemporaryDirectory() as place:
         return freeze(Planning(workspace, campaign(Path(place), size)), out, workspace)
 
@@ -114,9 +113,8 @@ def _experiments(folder: RunFolder) -> Iterator[Experiment]:
 
 
 def goldens(workspace: Workspace, folder: RunFolder, experiments: Sequence[Experiment]) -> None:
-    """Simulate the golden runs of the first seed, copy them for the others, and record the checks
-    as passed.
-    """
+    """Simulate the golden runs of the first seed, copy them for the others, and record the checks as
+    passed."""
     manifest, run = workspace.manifest(folder.head["target"]), folder.path
     known, driven = {}, dict[GoldenRun, Path]()
     for one in folder.goldens:
@@ -142,7 +140,6 @@ def goldens(workspace: Workspace, folder: RunFolder, experiments: Sequence[Exper
 
 
 def patches_of(workspace: Workspace, experiments: Sequence[Experiment]) -> list[bytes]:
-    """Return the patches of the mutants of some of the experiments."""
     manifest, models = workspace.manifest("openpilot"), workspace.fault_models()
     some = experiments[:: max(1, len(experiments) // PATCHES)][:PATCHES]
     return [build(manifest, models, one.fault, one.trigger).patch_bytes for one in some]
@@ -171,7 +168,6 @@ class Lines:
         self.write(canonical({**head, "file": f"{path.parent.name}/{path.name}"}).encode()[1:])
 
     def write(self, body: bytes) -> None:
-        """Write a line without its first brace."""
         self._last = sha256(self._last + body).hexdigest()[:16].encode()
         self._file.write(b'{"sum":"%b",%b\n' % (self._last, body))
 
@@ -207,7 +203,7 @@ def write_segments(
 
 
 def _patch_of(count: int, patches: int) -> int:
-    """Return the number of the patch of a file's experiment. It is the first one where it is stored whole."""
+    """Return the number of an experiment's patch: 0, the first, wherever a file stores a patch whole."""
     return count % patches if count % _WHOLE_EVERY else 0
 
 
@@ -218,7 +214,6 @@ def _blocks(patches: Sequence[bytes]) -> list[tuple[int, bytes]]:
 
 
 def _bodies(records: Sequence[Record], patches: Sequence[bytes]) -> list[Callable[[str, int], bytes]]:
-    """Return, for each kind of record, the line of an experiment with a patch."""
     named = [digest(patch).encode() for patch in patches]
 
     def body(one: Record) -> Callable[[str, int], bytes]:

@@ -2,11 +2,11 @@
 
 `python benchmarks/million.py [--sizes N ...] [--keep DIR]`. It measures plan, tables, resume, report and page
 at three sizes. The runs are synthetic (`made_up_run.py`) and kept in DIR for the next time. Each row is a
-separate process. It has CPU and wall seconds and the peak memory of the process and its children together.
+separate process, with CPU and wall seconds and the peak memory of the process and its children together.
 Shared pages count once, and memory is sampled twice a second. The page opens in the system's Chromium,
 headless. Its wall time is from the navigation until its list is usable. Growth is the CPU time per experiment
 relative to that of the smallest size. `new here` means a machine that has not seen the run before and
-verifies all of it. Afterwards only its bytes are compared.
+verifies all of it; afterwards only its bytes are compared.
 """
 
 import argparse
@@ -43,13 +43,11 @@ GOALS = {  # maximum wall s and MB for GOAL_SIZE
 
 
 def plan(size: int, run: Path) -> None:
-    """Plan into a new folder, like `mutator plan`."""
     with tempfile.TemporaryDirectory(dir=run.parent) as place:
         made_up_run.planned(Workspace.find(root=made_up_run.ROOT), size, Path(place) / "run")
 
 
 def opened(size: int, run: Path) -> None:
-    """Open a finished run and verify all its content."""
     RunFolder.open(run)
 
 
@@ -61,12 +59,10 @@ def resume(size: int, run: Path) -> None:
 
 
 def table(size: int, run: Path) -> None:
-    """Build the tables."""
     results.build(run)
 
 
 def report(size: int, run: Path) -> None:
-    """Write the report of the existing tables."""
     written = building.write(run, Workspace.find(root=made_up_run.ROOT))
     if written.rows < size:
         raise SystemExit(f"a report of {written.rows}")
@@ -90,7 +86,6 @@ ROWS: dict[str, Callable[[int, Path], float | None]] = {
 
 
 def apart(row: str, size: int, run: Path) -> dict[str, float]:
-    """Measure a row in a separate process."""
     command = [sys.executable, __file__, "--row", row, str(size), str(run)]
     cache = run.parent / "cache"
     if row == "open, new here":
@@ -109,7 +104,6 @@ def apart(row: str, size: int, run: Path) -> dict[str, float]:
 
 
 def family(pid: int) -> list[int]:
-    """Return a process and all its descendants."""
     try:
         told = [path.read_text() for path in Path(f"/proc/{pid}/task").glob("*/children")]
     except OSError:  # it has ended
@@ -127,7 +121,7 @@ def memory_mb(pid: int) -> float:
 
 
 def measured(row: str, size: int, run: Path) -> dict[str, float]:
-    """Do a row's work and return the seconds and the peak memory (MB) of one process."""
+    """Do a row's work and return the seconds and the peak memory (MB) of its process."""
     began = perf_counter()
     told = ROWS[row](size, run)
     wall = perf_counter() - began if told is None else told
@@ -160,7 +154,6 @@ def main() -> int:
 
 
 def figures(sizes: list[int], rows: list[str], place: Path) -> dict[str, dict[int, dict[str, float]]]:
-    """Measure and print each size."""
     found: dict[str, dict[int, dict[str, float]]] = {row: {} for row in rows}
     print(f"{'experiments':>12} {'':18}{'CPU s':>9}{'wall s':>9}{'MB':>8}{'us CPU each':>13}{'growth':>8}")
     for size in sizes:

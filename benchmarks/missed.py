@@ -34,7 +34,6 @@ ROAD_SEED = 11
 def is_found(
     model: CameraModel, picture: np.ndarray | Picture, truth: tuple[tuple[float, float], ...]
 ) -> bool:
-    """Whether a detector without history finds both lines."""
     lines = RobustDetector(model).detect(CameraView(0.0, 0.0, 0.0, (), 0.0, np.asarray(picture)))
     return all(
         line.prob > 0.0 and abs(line.y - y + (line.slope - slope) * AHEAD) <= ERROR

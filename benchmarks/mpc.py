@@ -78,13 +78,11 @@ def measure(rounds: int) -> dict[str, list[float]]:
 
 
 def repeat(task: Callable[[], object]) -> None:
-    """Repeat `task` for each update of a round."""
     for _ in range(UPDATES):
         task()
 
 
 def main() -> None:
-    """Measure and print. Exit with 1 if a median misses its goal."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--plain", action="store_true", help="without compiled code")
     parser.add_argument("--rounds", type=int, default=15)

@@ -4,8 +4,8 @@
 spliced, or spliced with each file parsed again by LibCST. First it builds the mutant of every experiment of
 the paper's campaign, including diff, compile check and digests. Then the three ways build the same sample
 alternately, in rounds. The mutants of operators, each at a different place, are found in the shipped
-controller. Each mutant of a sample is built once, and its files are parsed before. Times are CPU times of
-this process. The exit code is 1 if either kind misses the goal.
+controller, whose files are parsed before. Times are CPU times of this process. The exit code is 1 if either
+kind misses the goal.
 """
 
 import argparse
@@ -34,7 +34,6 @@ PLACES = ["selfdrive/controls/**"]
 
 
 def rate(make: Callable[[Experiment], object], experiments: list[Experiment]) -> float:
-    """Return experiments per second of CPU."""
     start = process_time()
     for experiment in experiments:
         make(experiment)
@@ -42,7 +41,7 @@ def rate(make: Callable[[Experiment], object], experiments: list[Experiment]) ->
 
 
 def operators(manifest: TargetManifest, models: FaultModels, count: int) -> tuple[float, float]:
-    """Operators' mutants per second of CPU: find them in the controller, drop equal code, and build them."""
+    """Return operators' mutants per second of CPU: found in the controller, without equal code, and built."""
     find_mutations(manifest, models, [Operator.RETURN], PLACES)  # parses the files, as every campaign must
     start = process_time()
     found = find_mutations(manifest, models, list(Operator), PLACES)
@@ -57,7 +56,6 @@ def operators(manifest: TargetManifest, models: FaultModels, count: int) -> tupl
 
 
 def main() -> None:
-    """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--sample", type=int, default=200)
     parser.add_argument("--rounds", type=int, default=5)

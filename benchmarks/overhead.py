@@ -1,11 +1,11 @@
 """Measure the cost of an experiment without its simulation.
 
-`python benchmarks/overhead.py [--experiments 200] [--against CLONE] [--json FILE]`. The faults first act in
-the last steps of a 30 s run. The fork engine runs faults of the paper's campaign with ideal vision, each at
-its own time shortly before the end, with all of a worker's steps: mutant, run, comparison with golden, patch,
-record. It prints the CPU of the worker, of its children and of the processes from which they fork. For
-comparison it prints the CPU of 30 s of the same simulation. With `--against`, a checkout of an older commit
-runs alternately. Compare the ratio. The exit code is 1 if the overhead exceeds its goal.
+`python benchmarks/overhead.py [--experiments 200] [--against CLONE] [--json FILE]`. The fork engine runs
+faults of the paper's campaign with ideal vision, each of which first acts at its own time in the last steps
+of a 30 s run. All of a worker's steps are included: mutant, run, comparison with golden, patch, record. It
+prints the CPU of the worker, of its children and of the processes from which they fork, and the CPU of 30 s
+of the same simulation. With `--against`, a checkout of an older commit runs alternately. Compare the ratio.
+The exit code is 1 if the overhead exceeds its goal.
 """
 
 import argparse
@@ -41,7 +41,7 @@ GOAL_MS = 5.0
 GOAL_OF_OLDER = 0.65
 END_S, LAST_STEPS, STEP_S = 30.0, 10, 0.01
 SCENARIO = "S1"
-FEW = 5  # first experiments, not counted: they do one-time work
+FEW = 5  # first experiments, which do one-time work and are not measured
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,7 +59,7 @@ def late(workspace: Workspace, count: int) -> list[Experiment]:
     known = {e.fault.id: e for e in plan.experiments if e.scenario == SCENARIO and not e.fault.changes}
     made = []
     for number, experiment in enumerate(islice(cycle(known.values()), count)):
-        # no two triggers are equal; later and later, in the golden run's order
+        # no two triggers are equal, and each is later than the one before
         t = END_S - STEP_S * (1.5 + LAST_STEPS * (1 - (number + 1) / count))
         trigger = Trigger(name="late", condition=f"t >= {t:.9f}", hold=Hold.TO_END, armed_after_s=1.5)
         made.append(replace(experiment, trigger=trigger, setting=()))
@@ -67,8 +67,6 @@ def late(workspace: Workspace, count: int) -> list[Experiment]:
 
 
 class Bench:
-    """The target and its golden run in a scratch folder."""
-
     def __init__(self, workspace: Workspace, folder: Path) -> None:
         self.workspace, self.folder = workspace, folder
         self.manifest, self.models = workspace.manifest("openpilot"), workspace.fault_models()
@@ -87,10 +85,8 @@ class Bench:
         return whole.cpu_s - short.cpu_s
 
     def cost(self, experiments: Sequence[Experiment]) -> Cost:
-        """Return an engine's time for the experiments, without the first `FEW`, which do one-time work.
-
-        All experiments must be forked.
-        """
+        """Return an engine's time for the experiments, without the first `FEW`. All experiments must be
+        forked."""
         null = build(self.manifest, self.models, None, always()).files
         engine = ForkEngine(*self.common, null=null)
         goldens = Goldens(self.manifest, lambda experiment: self.folder / "golden" / "out")
@@ -110,7 +106,7 @@ class Bench:
         before, began = self._server(), process_time()
         children = run(experiments[FEW:])
         worker, after = process_time() - began, self._server()
-        assert before.keys() <= after.keys()  # an ended one would lose its time
+        assert before.keys() <= after.keys()  # the time of an ended process would be lost
         records.close()
         engine.close()
         return Cost(worker=worker, children=children, server=sum(after.values()) - sum(before.values()))
@@ -148,7 +144,6 @@ def against(clone: Path, options: argparse.Namespace) -> int:
 
 
 def _told_by(root: Path, experiments: int) -> dict[str, float]:
-    """Return the figures of that checkout's benchmark, ms by part."""
     with tempfile.TemporaryDirectory() as folder:
         told = Path(folder) / "told.json"
         words = ["--experiments", str(experiments), "--json", str(told)]

@@ -1,10 +1,9 @@
 """Compare the time of a frame in a run between this version and an older one.
 
 `python benchmarks/pictures.py CLONE`. CLONE is a checkout of the older commit. Each version has its own
-interpreter, compiled helpers and empty cache. They process frames alternately, and all frames are new. It
-prints the CPU time of moving a frame to the car's pose, image effect and detection together, and the ratio. A
-detector or effect that the older version lacks is left out. If the two versions see different lines, it
-reports them.
+interpreter, compiled helpers and empty cache. They process new frames alternately. It prints the CPU time of
+moving a frame to the car's pose, image effect and detection together, and the ratio. A detector or effect
+that the older version lacks is left out. Different lines are reported.
 """
 
 import argparse
@@ -55,18 +54,17 @@ class Version:
         self.detectors, self.effects = self.ask("has")
 
     def ask(self, *words: object) -> Any:
-        """Return the process's answer."""
         assert self._process.stdout is not None
         print(json.dumps(words), file=self._process.stdin, flush=True)
         return json.loads(self._process.stdout.readline())
 
     def end(self) -> None:
-        """End the process."""
         self._process.communicate()
 
 
 def answers(cache: Path) -> Iterator[object]:
-    """Answer the parent's requests: the detectors and effects that exist; times and results of frames."""
+    """Answer the parent's requests for the existing detectors and effects, or for times and results of
+    frames."""
     import cv2
     from selfdrive.common import compiled
     from selfdrive.sim import effects, vision
@@ -130,7 +128,6 @@ class Drive:
 
 
 def main() -> int:
-    """Measure and print."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("clone", type=Path, nargs="?", help="checkout of the older commit")
     parser.add_argument("--take", type=Path, help=argparse.SUPPRESS)
@@ -164,7 +161,6 @@ def main() -> int:
 def _compared(
     versions: list[Version], detector: str, effect: str, options: argparse.Namespace
 ) -> list[list[float]]:
-    """Measure the older version and this one alternately and return a line of the table."""
     times: list[list[float]] = [[], []]
     same = True
     for number in range(options.rounds + 1):

@@ -1,9 +1,8 @@
 """How many of the places that make a value are reached by anchors: `python benchmarks/places.py`.
 
-Eight modules of third-party packages, chosen before any count (`MODULES` says why), each in the version of
-constraints.txt. This counts places with `ast` alone, not with the harness's own search; the harness says
-whether an anchor leads to one. A place may count in several kinds: an argument that is a sum is an argument
-and arithmetic. Goal: 90 % of all.
+The places are in eight modules of third-party packages, chosen before any count (`MODULES` says why), each in
+the version of constraints.txt. They are counted with `ast` alone, not with the harness's own search. A place
+may count in several kinds: an argument that is a sum is an argument and arithmetic. Goal: 90 % of all.
 """
 
 import argparse
@@ -55,8 +54,6 @@ class Site:
 
 
 class Counting(ast.NodeVisitor):
-    """Walks a module and records every place."""
-
     def __init__(self) -> None:
         self.sites: list[Site] = []
         self.scope: list[str] = []
@@ -140,10 +137,8 @@ class Counting(ast.NodeVisitor):
         self.generic_visit(node)
 
     def bound(self, target: ast.expr, value: ast.expr | None) -> None:
-        """Record a place for each assigned name, attribute or item.
-
-        At the level of a module or class, record the constants.
-        """
+        """Record a place for each assigned name, attribute or item. At the level of a module or class, record
+        the constants."""
         if isinstance(target, ast.Tuple | ast.List):
             for element in target.elts:
                 self.bound(element, None)
@@ -250,7 +245,6 @@ class Reach:
         return True
 
     def is_assigned(self, site: Site) -> bool:
-        """Whether `after_assign` leads to the statement that binds the name there."""
         functions = self.file.functions.get(site.function, ())
         known = [s for f in functions for s in f.statements if s.reason is None and site.name in s.assigns]
         for nth, statement in enumerate(known, 1):
@@ -282,7 +276,6 @@ def reason(site: Site) -> str:
 
 
 def counted(name: str, models: FaultModels) -> Iterator[tuple[Site, bool]]:
-    """Return the places of a module and whether anchors lead to each."""
     spec = importlib.util.find_spec(name)
     assert spec is not None and spec.origin is not None
     root, path = Path(spec.origin).parents[name.count(".")], f"{name.replace('.', '/')}.py"

@@ -1,9 +1,9 @@
 """Measure the CPU time of work around the paper's 11,280 experiments.
 
 `python benchmarks/planning.py`. It measures planning, freezing, reaching the first experiment and resuming a
-complete run. The complete run is synthetic: every experiment has a record of a masked fault. The cached
-checks of a start are synthetic, too. A start ends where the first mutant would be run (no workers). Each time
-is also printed per experiment and relative to planning.
+complete run. In the complete run, which is synthetic, every experiment has a record of a masked fault. The
+cached checks of a start are synthetic, too. A start ends where the first mutant would be run (no workers).
+Each time is also printed per experiment and relative to planning.
 """
 
 import argparse
@@ -69,7 +69,6 @@ def masked(experiment: Experiment) -> Record:
 
 
 def make_up_checks(workspace: Workspace, folder: RunFolder) -> None:
-    """Make the cache report this plan's checks as passed."""
     looked_at = preflight._Checks(workspace, folder)
     goldens = {}
     for one in looked_at.keys:

@@ -1,9 +1,9 @@
 """Measure the cost of finding which channels left golden.
 
 `python benchmarks/propagation.py [--repeat N]`. The CPU of an experiment's verdict with all channels of the
-manifest is compared with that for only the needed channels, and with the CPU of the run. The reference engine
-runs one experiment of the shipped target. Its trace is then loaded and compared repeatedly. The exit code is
-1 if the difference is more than 1 % of the run's CPU.
+manifest is compared with that for only the needed channels, and with the CPU of the run. The run is one
+experiment of the shipped target on the reference engine. The exit code is 1 if the difference is more than 1
+% of the run's CPU.
 """
 
 import argparse
@@ -23,7 +23,6 @@ GOAL = 0.01  # of the CPU of a run
 
 
 def cpu_ms(todo: Callable[[], object], repeat: int) -> float:
-    """Return the CPU time of one call."""
     todo()
     began = process_time()
     for _ in range(repeat):

@@ -65,7 +65,6 @@ def made_series(manifest: TargetManifest) -> dict[str, Any]:
 
 
 def frame_rate(browser: Any, page_file: Path, width: int, ratio: int, seconds: float) -> float:
-    """Return the frames per second after that many seconds of playback."""
     context = browser.new_context(
         viewport={"width": width, "height": 1000}, device_scale_factor=ratio, reduced_motion="no-preference"
     )

@@ -1,10 +1,10 @@
 """Measure the size and opening time of the report's page for 1,000, 11,280 and 100,000 experiments.
 
 `python benchmarks/report_page.py [--json FILE]`. The experiments are those of the paper's campaign, with more
-seeds if needed. Their records are synthetic, and their diffs are those of their mutants. The page opens in
-the system's Chromium, headless. Times are wall times in the browser from the navigation, best of several:
-until the table is usable, then for the first filter, sort, search and opened experiment. The exit code is 1
-if 11,280 experiments do not open in a second or take more than 8 MB.
+seeds if needed. Their records are synthetic. The page opens in the system's Chromium, headless. Times are
+wall times in the browser from the navigation, best of several: until the table is usable, then for the first
+filter, sort, search and opened experiment. The exit code is 1 if 11,280 experiments do not open in a second
+or take more than 8 MB.
 """
 
 import argparse
@@ -84,10 +84,7 @@ STEPS = {  # what a reader does first
 
 
 def written_run(workspace: Workspace, size: int, out: Path) -> list[Experiment]:
-    """Write a run folder with results of synthetic records and return its experiments.
-
-    They are those of the paper's campaign, with more seeds if needed.
-    """
+    """Write a run folder with results of synthetic records and return its experiments."""
     plan = make_plan(workspace, "paper")
     known = plan.experiments
     experiments = [replace(known[i % len(known)], seed=1 + i // len(known)) for i in range(size)]
@@ -104,7 +101,7 @@ def written_run(workspace: Workspace, size: int, out: Path) -> list[Experiment]:
 
 
 def patches(workspace: Workspace, experiments: Sequence[Experiment]) -> Iterator[tuple[str, str, str]]:
-    """Return the diffs without the probe. They are the same for every seed."""
+    """Return the diffs without the probe, which are the same for every seed."""
     manifest, models = workspace.manifest("openpilot"), workspace.fault_models()
     known: dict[tuple[str, Trigger], str] = {}
     for experiment in experiments:
@@ -194,7 +191,6 @@ def opened(browser: Any, page_file: Path, repeat: int, steps: Mapping[str, str] 
 
 
 def launched(playwright: Any) -> Any:
-    """Return the system's Chromium, headless. Raise SystemExit if there is none."""
     path = next(filter(None, map(shutil.which, BROWSERS)), None)
     if path is None:
         raise SystemExit("no Chromium on the PATH")

@@ -132,13 +132,10 @@ class TrueLabels(ReferencePlant):
     mirrors = False
 
     def pictured(self, truth: GroundTruth) -> GroundTruth:
-        """The car where it is."""
         return truth
 
 
 class FaultyCamera(PictureCamera):
-    """A camera with the case's effect while its context holds."""
-
     def __init__(self, camera: PictureCamera, case: Case) -> None:
         self._geometry, self._library, self._move = camera._geometry, camera._library, camera._move
         self.model = camera.model
@@ -148,7 +145,6 @@ class FaultyCamera(PictureCamera):
             self._move = CodedView()
 
     def look(self, truth: GroundTruth) -> CameraView:
-        """Return the view at this moment."""
         self._update(truth)
         frame = self._library.frame(truth.t, truth.position)
         if self._active and PLACE in self._parts:
@@ -219,7 +215,6 @@ class MixedDetector:
 
 
 def drive(case: Case) -> tuple[Case, Ending]:
-    """Run a case."""
     cv2.setNumThreads(1)
     labels = LABELS in case.row.parts
     simulator.PLANTS[REFERENCE] = ReferencePlant if labels else TrueLabels
@@ -245,7 +240,7 @@ def faulty(free: dict[Case, Ending], names: Iterable[str], levels: Sequence[int]
 
 
 def report(runs: dict[Case, Ending], rows: Sequence[Row]) -> None:
-    """Markdown: for each row the hazards of each effect, and the result of its fault-free runs."""
+    """Return Markdown: for each row the hazards of each effect, and the result of its fault-free runs."""
     print("| differences |", *(f"{name} |" for name in KINDS), "fault-free |")
     print("| --- |" + " --- |" * (len(KINDS) + 1))
     for row in rows:

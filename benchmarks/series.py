@@ -1,9 +1,9 @@
 """Measure the cost of series and patches: bytes per experiment and their share of its CPU.
 
 `python benchmarks/series.py [--campaign paper_sample] [--experiments 60] [--json FILE]`. It runs that many
-experiments of a campaign in this process and measures the time for building and appending series and patch.
-It prints the paired ratios to the CPU time of the same experiments. Bytes are those of the finished run
-folder. The parts that grow with the experiments are scaled to 11,280. The exit code is 1 if a goal is missed.
+experiments of a campaign in this process and prints the time for building and appending series and patch,
+relative to the CPU time of the same experiments. Bytes are those of the finished run folder. The parts that
+grow with the experiments are scaled to 11,280. The exit code is 1 if a goal is missed.
 """
 
 import argparse
@@ -33,13 +33,10 @@ GROWING = ("patches", "series", "records", "timings", "plan", "plan.csv", "repor
 
 
 class Clock:
-    """CPU time (s) of consecutive calls."""
-
     def __init__(self) -> None:
         self.times: list[float] = []
 
     def on(self, owner: Any, name: str) -> None:
-        """Measure each call of a method."""
         function: Callable[..., Any] = getattr(owner, name)
 
         def timed(*words: Any, **keywords: Any) -> Any:
@@ -53,7 +50,6 @@ class Clock:
 
 
 def measured(campaign: str, count: int, out: Path) -> dict[str, float]:
-    """Run the experiments and return shares of CPU and bytes."""
     made, series, patches = Clock(), Clock(), Clock()
     made.on(runner.Runner, "_series")
     series.on(SeriesWriter, "append")
@@ -84,13 +80,11 @@ def measured(campaign: str, count: int, out: Path) -> dict[str, float]:
 
 
 def size_of(path: Path) -> int:
-    """Return the bytes of a file, or of all files in a folder."""
     files = path.rglob("*") if path.is_dir() else [path]
     return sum(file.stat().st_size for file in files if file.is_file())
 
 
 def main() -> int:
-    """Measure and print."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--campaign", default="paper_sample")
     parser.add_argument("--experiments", type=int, default=60)

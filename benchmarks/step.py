@@ -1,13 +1,11 @@
 """Measure the CPU time of one simulated run, without imports, and of the loop's parts.
 
 `python benchmarks/step.py [scenario.yaml] [--plain] [--repeat N]`. The parts are measured in a separate run,
-because measuring slows it down. Times are CPU times of this process, so other work on the machine has little
-effect. It uses the code compiled at installation unless given `--plain`. The exit code is 1 if 30 s of
-simulation exceed their goal.
+because measuring slows it down. Times are CPU times of this process. It uses the code compiled at
+installation unless given `--plain`. The exit code is 1 if 30 s of simulation exceed their goal.
 
-With `--against CLONE` it instead compares this version with a checkout of an older commit. They alternate,
-each time in a fresh interpreter with bytecode and compiled code ready. It divides the times of imports,
-building and loop by those of the older version.
+With `--against CLONE` it instead compares the times of imports, building and loop with a checkout of an older
+commit. The versions alternate, each time in a fresh interpreter with bytecode and compiled code ready.
 """
 
 import argparse
@@ -102,7 +100,7 @@ print(json.dumps({"imports": imports, "build": first[0], "start": imports + firs
 
 
 class Stopwatch:
-    """Measures the own time of nested parts. A part's calls are charged to the called part."""
+    """Measures nested parts. Each part's time excludes the parts that it calls."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
@@ -129,7 +127,6 @@ class Stopwatch:
 
 
 def part_name(owner: type, name: str) -> str:
-    """Return the name of a part in the table."""
     return f"{owner.__name__}.{name}"
 
 
@@ -158,10 +155,7 @@ def run_in_parts(scenario: Scenario) -> tuple[Stopwatch, float]:
 
 
 def against(clone: Path, scenario: Path, rounds: int) -> bool:
-    """Print the times of start and loop in this version and in `clone`'s.
-
-    Return whether the goals are reached.
-    """
+    """Print the times of start and loop in both versions. Return whether the goals are reached."""
     with tempfile.TemporaryDirectory() as place:
         versions = {"older": clone.resolve(), "this": ROOT}
         times: dict[str, list[dict[str, float]]] = {name: [] for name in versions}
@@ -189,7 +183,8 @@ def _folder_option(root: Path, place: str) -> str:
 
 
 def _fresh(root: Path, place: str, *words: str) -> str:
-    """The output of a fresh interpreter with the target of the clone `root`, with its bytecode in `place`."""
+    """Return the output of a fresh interpreter with the target of the clone `root` and its bytecode in
+    `place`."""
     environment = os.environ | {
         "PYTHONPATH": str(root / "target"),
         "PYTHONPYCACHEPREFIX": f"{place}/bytecode",
@@ -201,7 +196,6 @@ def _fresh(root: Path, place: str, *words: str) -> str:
 
 
 def main() -> None:
-    """Measure and print. Exit with 1 if the goal is missed."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("scenario", nargs="?", type=Path, default=ROOT / "fault_library/scenarios/S1.yaml")
     parser.add_argument("--repeat", type=int, default=3, help="runs, of which the fastest counts")
@@ -226,7 +220,6 @@ def main() -> None:
 
 
 def print_parts(scenario: Scenario) -> None:
-    """Print tables of the time of each part of the loop, and of its methods."""
     watch, total = run_in_parts(scenario)
 
     def line(name: str, seconds: float, calls: int) -> str:

@@ -1,8 +1,8 @@
-"""The cost of frames: drawing one, moving it to the car's pose, opening the library, and whole runs.
+"""Measure the cost of frames: drawing one, moving it to the car's pose, opening the library, and whole runs.
 
-`python benchmarks/vision.py [render] [view] [library] [runs] [--repeat N]`. Times are CPU time of this
-process, in one thread; the median counts, and the minimum shows the idle machine's speed. Exit code 1 if a
-median misses its goal.
+`python benchmarks/vision.py [render] [view] [library] [runs] [--repeat N]`. Times are CPU times of this
+process, in one thread. The result is the median; the minimum shows the idle machine's speed. The exit code is
+1 if a median misses its goal.
 """
 
 import argparse
@@ -34,13 +34,12 @@ RUN_GOAL = 1500.0  # ms: 30 s of simulation with frames that are all new
 
 
 def times(work: Callable[[int], object], repeat: int) -> list[float]:
-    """CPU time of each call (ms), without the first, which warms up."""
+    """Return the CPU time of each call (ms), without the first, which warms up."""
     spent = [spent_in(partial(work, number)) for number in range(repeat + 1)]
     return spent[1:]
 
 
 def show(name: str, spent: list[float], goal: float | None = None) -> bool:
-    """Print a line of the table and return whether the goal was met."""
     median = statistics.median(spent)
     against = "" if goal is None else f"  {median / goal:.2f} of the goal of {goal:g} ms"
     print(f"  {name:34} median {median:8.3f} ms  fastest {min(spent):8.3f} ms{against}")
@@ -48,7 +47,7 @@ def show(name: str, spent: list[float], goal: float | None = None) -> bool:
 
 
 def render(repeat: int) -> bool:
-    """Consecutive frames of the standard road, drawn and seen from elsewhere."""
+    """Draw consecutive frames of the standard road, straight and from the side."""
     renderer = RoadRenderer(CameraModel(), "dashed", 0)
     straight = times(lambda number: renderer.grey(number * SPACING), repeat)
     aside = times(lambda number: renderer.grey(number * SPACING, 0.5, 0.02), repeat)
@@ -60,7 +59,6 @@ def render(repeat: int) -> bool:
 
 
 def view(repeat: int) -> bool:
-    """One frame moved to a pose that changes."""
     model = CameraModel()
     drawn = RoadRenderer(model, "dashed", 0, periods=1).grey(0.0)
     frame = Picture(("drawn",), drawn.shape, lambda region: drawn[region.part])
@@ -75,7 +73,6 @@ def view(repeat: int) -> bool:
 
 
 def library(repeat: int) -> bool:
-    """The image library, built and then loaded from its cache."""
     with TemporaryDirectory() as folder:
         pictures = Pictures(cache=Path(folder))
         made = [spent_in(partial(open_library, pictures, seed)) for seed in range(2)]
@@ -85,7 +82,7 @@ def library(repeat: int) -> bool:
 
 
 def runs(repeat: int) -> bool:
-    """Thirty seconds of simulation: without frames, with new ones, and with remembered ones."""
+    """Simulate 30 s without frames, with new ones, and with remembered ones."""
     scenario, good = load_scenario(ROOT / "fault_library/scenarios/S1.yaml"), True
     show("runs: without pictures", times(lambda number: simulate(scenario, 0), 2))
     with TemporaryDirectory() as folder:
@@ -103,14 +100,12 @@ def runs(repeat: int) -> bool:
 
 
 def spent_in(work: Callable[[], object]) -> float:
-    """CPU time (ms) of one call."""
     start = process_time()
     work()
     return 1000.0 * (process_time() - start)
 
 
 def main() -> None:
-    """Measure and print. Exit with 1 if a goal is missed."""
     parts = {"render": render, "view": view, "library": library, "runs": runs}
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument(

@@ -55,7 +55,7 @@ def add_navigation(app: Sphinx, docname: str, source: list[str]) -> None:
 
 
 def copy_raw_images(app: Sphinx, doctree: nodes.document) -> None:
-    """Copy the images that HTML in a page shows, `<picture>` say: Sphinx leaves it as it is."""
+    """Copy images of raw HTML such as `<picture>`, because Sphinx does not."""
     page = Path(app.env.doc2path(app.env.docname))
     for node in doctree.findall(nodes.raw):
         for name in RAW_IMAGE.findall(node.astext()):

@@ -47,7 +47,6 @@ FILM_STYLE = f"""
 
 
 def main() -> None:
-    """Take all pictures, at each width and in each colour scheme."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -76,7 +75,6 @@ def main() -> None:
 
 
 def mutator(*words: str) -> None:
-    """Run a command of the installed `mutator`."""
     subprocess.run(command(*words), check=True, stdout=subprocess.DEVNULL)
 
 
@@ -86,7 +84,7 @@ def command(*words: str) -> list[str]:
 
 @contextlib.contextmanager
 def served(*runs: Path) -> Iterator[str]:
-    """The address of a server of these runs, which ends with the block."""
+    """Yield the address of a server of these runs."""
     words = command("serve", *map(str, runs), "--no-browser")
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as server:
         try:
@@ -113,14 +111,12 @@ def report(page: Any, path: Path, name: str) -> None:
 
 
 def static(page: Any, address: str, name: str) -> None:
-    """The first screen of a page."""
     page.goto(address)
     page.wait_for_load_state("networkidle")
     save(page.screenshot(), name)
 
 
 def show(page: Any, what: str, *, below: str) -> None:
-    """Scroll until `what` begins right under a heading that stays in view."""
     page.evaluate(
         """([what, below]) => {
             const found = document.querySelector(what), head = document.querySelector(below);
@@ -132,7 +128,7 @@ def show(page: Any, what: str, *, below: str) -> None:
 
 
 def film(page: Any, name: str) -> None:
-    """Step the replay from one second before the activation to the last event; keep what is seen."""
+    """Step the replay from one second before the activation to the last event, and keep its frames."""
     end = time(page)
     page.locator(".jumps button").first.click()
     page.mouse.move(0, 0)
@@ -161,7 +157,7 @@ def film(page: Any, name: str) -> None:
 
 
 def around(top: dict[str, float], bottom: dict[str, float]) -> dict[str, float]:
-    """Whole pixels around two boxes, one below the other."""
+    """Return whole pixels around two boxes, one below the other."""
     x, y = floor(top["x"]) - MARGIN, floor(top["y"]) - MARGIN
     return {
         "x": x,
@@ -172,7 +168,6 @@ def around(top: dict[str, float], bottom: dict[str, float]) -> dict[str, float]:
 
 
 def time(page: Any) -> float:
-    """The time of the replay in s, once it is drawn."""
     page.evaluate("new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn)))")
     return float(page.get_attribute(".replay-player", "data-t"))
 
