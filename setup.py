@@ -1,4 +1,4 @@
-"""Compiles the C of the target, and puts into a wheel what ships with the harness."""
+"""Compile the C of the target, and put the shipped library, templates and target into the wheel."""
 
 import shutil
 import sys
@@ -12,10 +12,10 @@ from setuptools.command.build_py import build_py
 CLONE = Path(__file__).resolve().parent
 SHIPPED = ("target", "fault_library", "templates")
 ARCHIVE = Path("mutator", "_common", "shipped.zip")  # where mutator/_common/shipped.py looks for it
-COMPILER = "ziglang>=0.13"  # a C compiler from the package index, where the machine has none
+COMPILER = "ziglang>=0.13"  # a C compiler from the package index for machines without one
 
 sys.path.insert(0, str(CLONE / "target"))
-sys.dont_write_bytecode = True  # none may lie beside a target's sources
+sys.dont_write_bytecode = True  # no bytecode may lie beside a target's sources
 from selfdrive.common import compiled  # noqa: E402
 from selfdrive.common.errors import ConfigError  # noqa: E402
 from selfdrive.sim.compile_helpers import FOLDER, compile_helpers, compiler  # noqa: E402

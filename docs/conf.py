@@ -30,7 +30,7 @@ myst_heading_anchors = 6
 myst_enable_extensions = ["html_image"]
 nb_execution_mode = "off"
 
-highlight_language = "none"  # a block without a language is text
+highlight_language = "none"  # of blocks without a language
 
 html_theme = "furo"
 pygments_dark_style = "github-dark"

@@ -1,4 +1,4 @@
-"""Make the pictures of README and docs from two finished runs: a campaign, on two versions of the controller.
+"""Make the pictures of README and docs from two runs of a campaign, on two versions of the controller.
 
     mutator run quickstart --out runs/quickstart -n 2
     cp -r target runs/distant-target

@@ -1,4 +1,4 @@
-"""Frames, detections and traces have the same bytes on every Python, processor, and with compiled code."""
+"""Frames, detections and traces have the same bytes on every Python and processor, and with compiled code."""
 
 import json
 import os

@@ -12,7 +12,7 @@ import pytest
 
 CLONE = Path(__file__).parents[2]
 TOP_MODULES = 12
-# may import the harness inside functions, to defer what a command does not need
+# may import the harness inside functions, to load only what a command needs
 LAZY = ("mutator/__init__.py", "mutator/cli/", "mutator/execution/pytest_plugin.py")
 
 
@@ -171,7 +171,7 @@ def test_a_violation_fails_the_lint(name: str, tmp_path: Path) -> None:
     assert not is_clean(tmp_path)
 
 
-# vocabulary of options and help texts, and presentation of data: no verb depends on them for its work
+# modules that the command line may import for options, help texts and presentation
 SHOWN_BY_THE_COMMAND_LINE = {
     "mutator.config.yaml_files",
     "mutator.engines.kinds",

@@ -107,7 +107,7 @@ class Misdeed:
     def write(self, workspace: Workspace) -> None:
         imports = [f"import {name}" for name in MODULES]
         body = ["    " + line for line in (*imports, *self.lines)]
-        # what looks like Jinja2 in them is Python
+        # not rendered: the lines may look like Jinja2
         code = ['if _fi.active("{{ fi }}"):{% raw %}', "    if _fi.steps() == 1:"]
         text = "\n".join([*code, *("    " + line for line in body), "{% endraw %}"])
         names = {"name": self.name, "model": self.model, "more": "raises: true\n" * self.raises}
@@ -165,7 +165,7 @@ class Misbehaving:
 
     def _draw(self, seed: int) -> Drawn:
         chance = random.Random(seed)
-        engine = list(ENGINES)[-1 - seed % len(ENGINES)]  # so that a few tries cover every engine, fork first
+        engine = list(ENGINES)[-1 - seed % len(ENGINES)]  # a few tries cover every engine, fork first
         workers, method = (chance.choice(some) for some in (WORKERS, METHODS))
         names = chance.sample(sorted(self.misdeeds), chance.randint(1, MOST))
         return Drawn(engine=engine, workers=workers, method=method, names=tuple(names))
@@ -205,7 +205,7 @@ class Misbehaving:
             return f"not one of {', '.join(sorted(misdeed.ends))}: {row}"
         truth = self._reference(method)
         if status is Status.HARNESS_ERROR is truth.status[misdeed.model]:
-            return ""  # the guard of a run words it differently in another engine
+            return ""  # engines word a harness error differently
         right = truth.bad[misdeed.model]
         return "" if row == right else f"{row}, not {right} as on the reference engine"
 

@@ -41,10 +41,10 @@ class Told:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Place:
-    folder: Path  # holds all of it
-    genuine: Path = Path()  # the undamaged one, elsewhere
-    campaign: tuple[str, ...] = ()  # the words that ran it, without `--out`
-    experiment: str = ""  # one of it
+    folder: Path  # contains everything
+    genuine: Path = Path()  # the undamaged run folder
+    campaign: tuple[str, ...] = ()  # the words of its command, without `--out`
+    experiment: str = ""  # one of its experiments
     shards: tuple[Path, ...] = ()
 
     @property
@@ -145,7 +145,7 @@ def verify(place: Place) -> Told:
     found, genuine = contents(place.run) if code == 0 else {}, contents(place.genuine)
     ledger = json.loads(genuine["digests.json"])
     known = [*ledger["files"], "digests.json"]
-    # Nothing may be added to a finished run; the final files of an unfinished one are not yet known.
+    # Nothing may be added to a finished run. The final files of an unfinished run are unknown.
     audited = {
         name: found[name] for name in found if name in known or (ledger["finished"] and AUDITED.match(name))
     }

@@ -38,7 +38,7 @@ class Scene:
     words: tuple[object, ...]
     told: Callable[[], Told]  # of the command's output
     home: Path | None = None  # the folder's content before; None: nothing
-    fresh_cache: bool = False  # so that the checks are run, too
+    fresh_cache: bool = False  # runs the checks, too
     victims: Sequence[str] = ("command", "group")
     takes_s: float = math.inf  # the command's shortest duration
 
@@ -51,7 +51,7 @@ class Scene:
         for _ in range(KILLS):
             began, command = time.monotonic(), self._command()
             kills.append(struck(command, chance, self.victims, self.takes_s))
-            command.end()  # and that of every process that it started, soon
+            command.end()  # with all processes that it started
             if kills == [None]:  # it completed; the machine is less busy now
                 self.takes_s = min(self.takes_s, time.monotonic() - began)
             if self._is_done(command):

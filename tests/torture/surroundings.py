@@ -21,7 +21,7 @@ time.time = jumping
 time.time_ns = lambda: int(jumping() * 1e9)
 """
 LIMIT = "import resource\nresource.setrlimit(resource.RLIMIT_{name}, ({most}, {most}))"
-# otherwise root may raise its limits again
+# otherwise root could raise its limits again
 NO_PRIVILEGE = "import ctypes\nctypes.CDLL(None).prctl(24, 24, 0, 0, 0)"
 NOBODY_READS = "import os\nread, write = os.pipe()\nos.close(read)\nfor fd in {fds}: os.dup2(write, fd)"
 

@@ -43,10 +43,9 @@ class World:
             kind = chance.choice(sorted(kinds))
             how, touched = damage(self.place.folder, kinds[kind], chance, self.damages)
             told = self._tell(reader) if self.reseal is None else self._resealed(reader)
-        # digests.json covers all the others; where all digests match, another file may be the inconsistent
-        # one
+        # if digests.json is damaged, or all digests match, the error may name any file
         at_large = kind == "digests.json" or self.reseal is not None
-        touched += TABLES if kind in ("records", "timings") else ()  # they follow from these
+        touched += TABLES if kind in ("records", "timings") else ()  # derived from both
         named = ["seal", *kinds, *chain(*kinds.values())] if at_large else touched
         end, why = judged(told, right, named)
         story = f"{how} of {', '.join(touched)}, then {reader}: {why}\n{told.said[-LAST:]}"
