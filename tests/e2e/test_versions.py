@@ -159,7 +159,7 @@ def test_pytest_refuses_and_accepts_versions_like_the_command(
 def test_another_machine_repeats_the_golden_runs(
     toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, driven: list[str]
 ) -> None:
-    """A difference is refused."""
+    """If the golden runs differ, the run is refused."""
     out = tmp_path / "run"
     run_campaign(toy, "small", out, distributor=OnePiece())
     assert sorted(driven) == ["a-A", "a-A+alone", "b-A", "b-A+alone"]

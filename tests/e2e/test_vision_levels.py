@@ -32,8 +32,8 @@ def departures(workspace: Workspace, out: Path, detector: str) -> Counter[str]:
 
 
 def test_lane_departures_of_each_effect_and_detector(workspace: Workspace, tmp_path: Path) -> None:
-    """Rain, snow and contrast mislead the published detector, and fog and blur do not. The other detector is
-    more robust."""
+    """Rain, snow and contrast mislead the published detector; fog, brightness and blur hardly do. The other
+    detector is more robust."""
     paper = departures(workspace, tmp_path / "paper", "paper")
     robust = departures(workspace, tmp_path / "robust", "robust")
     assert all(paper[name] > 0 for name in ("rain", "snow", "contrast"))

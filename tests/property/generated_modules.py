@@ -268,7 +268,7 @@ class ModuleWriter(StatementWriter):
         return [name if level == 1 or name[0] == "_" else f"{name}{level}" for name in names]
 
     def _declaration(self, outer: Scope, pool: Sequence[str]) -> tuple[list[str], tuple[str, ...]]:
-        """A `global` or `nonlocal` statement, if any, and the names that it makes writable."""
+        """Return a `global` or `nonlocal` statement, if any, and the names that it makes writable."""
         if self.chance(0.75):
             return [], ()
         own = [n for n in outer.pool if n in outer.known and n not in (*outer.writable, *pool)]

@@ -67,7 +67,7 @@ def probe(ids: Sequence[str]) -> Any:
 
 
 def read(names: types.ModuleType, one: FixedValue) -> Any:
-    """The value under its name, or in the signature as Python reports it."""
+    """Return the value under its name, or in the signature as Python reports it."""
     *path, last = one.path.split(".")
     found: Any = names
     for name in path:
@@ -81,7 +81,7 @@ def read(names: types.ModuleType, one: FixedValue) -> Any:
 def readable(
     names: types.ModuleType, cases: Sequence[tuple[FixedValue, FaultLocation]]
 ) -> Iterator[FixedValue]:
-    """The values that exist on this system. Some are defined only on others."""
+    """Return the values that exist on this system. Some are defined only on others."""
     for one, _ in cases:
         try:
             read(names, one)

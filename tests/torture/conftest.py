@@ -16,5 +16,5 @@ def seeds(request: pytest.FixtureRequest) -> Callable[[int], Sequence[int]]:
 
 @pytest.fixture
 def print_tally(record_property: Callable[[str, object], None]) -> Callable[[Tally | str], None]:
-    """Print at the end of the session, also from workers of pytest-xdist."""
+    """Print a tally or a text at the end of the session, also from workers of pytest-xdist."""
     return lambda tally: record_property("tally", str(tally))
