@@ -40,58 +40,60 @@ REAL = "real-frames.csv"  # in the folder of pictures; counted by `selfdrive.vis
 TEXT = """\
 # Image effects
 
-Weather, dirt and light that a fault can put between the road and the camera's picture; how to ask for them is
-in [fault specs](fault-spec.md). This page is written by `python -m selfdrive.sim.effects.page`.
+This page shows the weather, dirt and light that a fault can put between the road and the camera. The fault
+model [image_effect](fault-models.md#image_effect) applies an effect. `python -m selfdrive.sim.effects.page`
+writes this page.
 
-An effect is made of an amount, a seed and the camera's model. What it does to a picture follows from these
-and from the moment (time, distance driven, speed) alone, so pictures may be asked for in any order. Drops and
-flakes fall and come nearer from picture to picture, dirt stays on the lens. The same seed gives the same
-bytes. Grey levels are taken as proportional to light, so that laws of optics hold for them as they stand.
+An effect has an amount, a seed and a camera model. These and the moment (time, distance driven, speed)
+determine how it changes a picture, so pictures can be computed in any order. Drops and flakes fall and come
+nearer from picture to picture; dirt stays on the lens. The same seed gives the same bytes. The effects treat
+grey levels as proportional to light, so that the laws of optics apply to them directly.
 
-The pictures show levels 1, 5 and 10, or the mildest, a middle and the strongest where there are fewer; lines
-show what detectors find: **broad red** the `paper` detector, **narrow blue** the `robust` one, **thin green**
-the one `as_coded`. The tables give means over {seeds} seeds and {pictures} pictures each, 20 a second, at
-60 mph in the middle of a rendered lane with solid lines, by the default camera:
+The pictures show levels 1, 5 and 10 or, if there are fewer levels, the mildest, a middle one and the
+strongest. Lines show what the detectors find: **broad red** for `paper`, **narrow blue** for `robust`,
+**thin green** for `as_coded`. The tables give means over {seeds} seeds with {pictures} pictures each
+(20 a second, at 60 mph, in the middle of a rendered lane with solid lines, with the default camera):
 
-* PSNR against the clean picture: the higher, the more alike.
-* Mark contrast: grey levels between the lane's lines and the road beside them, 5 to 30 m ahead. Clean
-  pictures have {clean.contrast:.0f}.
-* False edges: share of the lane's inside, away from its lines, where the horizontal gradient (Sobel) is that
-  of a step of 8 grey levels at least, and half as strong as a mark's edge at the contrast that is left. Clean
-  pictures have {clean.false_edges:.1%}.
+* PSNR: similarity to the clean picture; a higher value means a smaller difference.
+* Mark contrast: difference in grey levels between the lane's lines and the road beside them, 5 to 30 m ahead.
+  Clean pictures have {clean.contrast:.0f}.
+* False edges: share of the lane's inside, away from its lines, where the horizontal gradient (Sobel) is at
+  least that of a step of 8 grey levels, and at least half that of a mark's edge at the remaining contrast.
+  Clean pictures have {clean.false_edges:.1%}.
 * Covered: share of the lane's inside, 5 to 30 m ahead, where drops, flakes, blobs or blotches change an even
-  grey by 8 levels or more.
-* Found: share of pictures in which a detector sees both lines, each within 0.3 m of the truth 10 m ahead. The
-  one `as_coded` repeats what it last said where it sees nothing at all, which here is right by chance: its
-  high shares at the strongest levels mean that it is blind.
-* Missed on real frames: in how many pictures a detector misses a line. There are six frames of highways (from
-  Udacity's first project on lane finding, MIT licence), each seen with 20 seeds where chance has a part in
-  the effect, by a detector with no memory of earlier pictures. They are not independent of each other: they
-  show six roads. The frames are not in this repository, [the counts](image-effects/real-frames.csv) are.
-  `python -m selfdrive.visiond.under_effects FRAMES TRUTH` counts anew and, with `--strips`, shows all levels
-  on frames of your own. The detectors were tuned for rain and snow on rendered roads only.
+  grey by at least 8 levels.
+* Found: share of pictures in which a detector finds both lines, each within 0.3 m of the truth 10 m ahead. If
+  `as_coded` finds nothing, it repeats its last result, which happens to be correct here. Its high shares at
+  the strongest levels therefore mean that it sees nothing.
+* Missed on real frames: number of pictures in which a detector misses a line. The six frames show highways
+  (from Udacity's first project on lane finding, MIT licence). Random effects are applied with 20 seeds. The
+  detectors have no memory of earlier pictures. The counts are not independent, because they come from only
+  six roads. The repository contains [the counts](image-effects/real-frames.csv), but not the frames. For your
+  own frames, `python -m selfdrive.visiond.under_effects FRAMES TRUTH` counts the misses and, with `--strips`,
+  shows all levels. The detectors were tuned only for rain and snow on rendered roads.
 
-## What a level of the paper's effects stands for
+## What a level of the paper's effects represents
 
-The paper's text counts streaks, blocks and blobs and gives contrasts, but does not say how bad a weather that
-is. What it leaves open (how long streaks are, how many blocks there are) is settled by what a level stands
-for; in one thing, where blobs lie, the effects here depart from it:
+The paper's text gives numbers of streaks, blocks and blobs, and contrasts, but not how bad the weather is.
+The weather of each level is derived from these numbers. Parameters that the text leaves open (the length of
+streaks, the number of blocks) were chosen to match this weather. Only the position of blobs differs from the
+text:
 
-* Rain: a streak is a drop of 1 mm or more within 2.2 m, so the rate follows from Marshall's and Palmer's
-  (1948) number of drops in what the camera sees of that. A streak is as long as such a drop falls (6 m/s;
-  Atlas and others, 1973) while a shutter is open for 4 ms.
-* Snow: a block of two pixels is a flake that looks as large or larger (Gunn and Marshall, 1958; density after
+* Rain: a streak is a drop of at least 1 mm within 2.2 m of the camera. The rain rate follows from the number
+  of drops in this part of the view (Marshall and Palmer, 1948). A streak is as long as the distance that such
+  a drop falls (6 m/s; Atlas and others, 1973) during an exposure of 4 ms.
+* Snow: a block of two pixels is a flake that looks at least as large (Gunn and Marshall, 1958; density after
   Holroyd, 1971).
-* Two numbers are ours alone: the 2.2 m, and 100 blocks for each level. They were chosen once, before any
-  detector was tuned, such that levels 1 to 10 are light to violent rain (50 mm/h and more) and light to heavy
-  snow (a range below 400 m).
-* Fog: the text's contrast is what is left 17.5 m ahead, in the middle of the measured road, after Koschmieder
-  (1924).
-* Range: the meteorological one, at which 5 % of the contrast is left; in rain and snow after their extinction
-  (Halder and others, 2019; ITU-R P.1814). The text's contrasts of rain and snow are worse than that.
-* Occlusion: the text puts blobs anywhere in the picture. Here they lie below the horizon, as dirt that hides
-  the sky hides nothing that counts. Up to four blobs mostly miss the lane; from five on, a level stands for
-  the share of the lane's inside that is covered, in the table below.
+* Two numbers are our own choice: the 2.2 m, and 100 blocks for each level. We chose them once, before tuning
+  any detector, so that levels 1 to 10 range from light to violent rain (50 mm/h and more) and from light to
+  heavy snow (a range below 400 m).
+* Fog: the text's contrast is the one that remains 17.5 m ahead, in the middle of the measured road
+  (Koschmieder, 1924).
+* Range: the meteorological range, at which 5 % of the contrast remains. In rain and snow, it follows from
+  their extinction (Halder and others, 2019; ITU-R P.1814). The text's contrasts of rain and snow are lower.
+* Occlusion: in the text, blobs can be anywhere in the picture. Here they lie below the horizon, because dirt
+  on the sky hides nothing important. Up to four blobs mostly miss the lane. With five or more, a level
+  represents the share of the lane's inside that is covered, as the table shows.
 
 {stands_for}
 """
@@ -99,15 +101,19 @@ PRESETS = (
     (
         "The paper's effects",
         PAPER,
-        "With the paper's parameters; an amount is a level, a gain, a bias or a kernel.",
+        "These effects have the paper's parameters. An amount is a level, a gain, a bias or a kernel.",
     ),
     (
         "The paper's effects as coded",
         CODED,
-        "As the paper's authors coded them: drawn anew in every picture. Contrast, brightness and blur are "
-        "those above.",
+        "These effects follow the code of the paper's authors and are redrawn in every picture. Contrast, "
+        "brightness and blur are the same as above.",
     ),
-    ("Physical effects", PHYSICAL, "In real units, after published laws, which the modules name."),
+    (
+        "Physical effects",
+        PHYSICAL,
+        "These effects have physical units and follow published laws, which the modules cite.",
+    ),
 )
 
 
