@@ -1,4 +1,4 @@
-"""The codec agrees with cantools on every message that the car knows."""
+"""The CAN encoder and decoder agree with cantools on every message of the car and its radar."""
 
 from functools import cache
 
@@ -41,7 +41,7 @@ def test_pack_and_decode_agree_with_cantools(path, name, data):
 
 
 def test_checksum_of_a_known_frame():
-    """The half bytes of address, data and checksum add up to 8 modulo 16, as Honda's units require."""
+    """The half bytes of address, data and checksum add up to 8 modulo 16, as the car requires."""
     frame = Packer(load(CAR_DBC)["ENGINE_DATA"], ("XMISSION_SPEED",)).pack((96.56,), 2)
     halves = [int(digit, 16) for digit in f"{frame.address:x}" + frame.data.hex()]
     assert frame.data[:2] == (9656).to_bytes(2, "big")
@@ -61,7 +61,7 @@ def test_checksum_of_a_known_frame():
     ],
 )
 def test_unsigned_values_round_and_stay_in_range(value, raw):
-    """A value outside the field's range is limited to the nearest end, and NaN reads 0."""
+    """A value outside the field's range is set to the nearest end of the range, and NaN becomes 0."""
     field = load(CAR_DBC)["WHEEL_SPEEDS"].fields["WHEEL_SPEED_FL"]
     assert encode([field], [value]) == raw << field.shift
 
@@ -70,13 +70,12 @@ def test_unsigned_values_round_and_stay_in_range(value, raw):
     ("value", "raw"), [(-1e9, 0x7FFF), (1e9, 0x8000), (-0.1, 1), (float("-inf"), 0x7FFF), (float("nan"), 0)]
 )
 def test_signed_values_stay_in_range(value, raw):
-    """One bit of the steering angle is -0.1 degrees, and the angle is limited at both ends of its range."""
+    """One count of the steering angle is -0.1 degrees. Angles beyond the range are set to its nearest end."""
     field = load(CAR_DBC)["STEERING_SENSORS"].fields["STEER_ANGLE"]
     assert encode([field], [value]) == raw << field.shift
 
 
-def test_a_packer_forgets_its_last_values():
-    """A frame does not depend on earlier ones. The same values and counter give the same bytes."""
+def test_a_frame_does_not_depend_on_earlier_ones():
     used = Packer(load(CAR_DBC)["ENGINE_DATA"], ("XMISSION_SPEED",))
     for kph in (50.0, 50.0, 51.0, 50.0):
         for counter in (0, 1, 5, 4):
@@ -85,8 +84,7 @@ def test_a_packer_forgets_its_last_values():
 
 
 @pytest.mark.parametrize("path", [CAR_DBC, RADAR_DBC], ids=lambda path: path.name)
-def test_layouts_are_those_cantools_reads(path):
-    """The address, the size, and the place, sign and scale of every signal agree with cantools."""
+def test_message_layouts_agree_with_cantools(path):
     reference = {message.name: message for message in load_reference(path).messages}
     assert list(load(path)) == list(reference)
     for name, message in load(path).items():
@@ -109,7 +107,7 @@ def test_layouts_are_those_cantools_reads(path):
         ('SG_ S : 63|9@0+ (1,0) [0|511] "" A', "beyond the message's 8 bytes"),
     ],
 )
-def test_other_layouts_are_refused(tmp_path, signal, complaint):
+def test_unsupported_layouts_are_refused(tmp_path, signal, complaint):
     dbc = tmp_path / "other.dbc"
     dbc.write_text(f'VERSION ""\nBU_: A\nBO_ 1 M: 8 A\n {signal}\n')
     with pytest.raises(ValueError, match=rf"other\.dbc:4.*{complaint}"):

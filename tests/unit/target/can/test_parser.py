@@ -1,4 +1,4 @@
-"""The parser accepts only values with a valid size, checksum and counter, and detects missing messages."""
+"""The parser accepts only frames with a valid size, checksum and counter, and detects missing messages."""
 
 import pytest
 from selfdrive.can.dbc import load
@@ -28,14 +28,13 @@ def wheels():
     return Packer(MESSAGES["WHEEL_SPEEDS"], ("WHEEL_SPEED_FL",))
 
 
-def test_values_before_the_first_frame(parser):
+def test_values_are_defaults_before_the_first_frame(parser):
     parser.update([], 0.0)
     assert parser.values == {"ENGINE_DATA": (-1,), "WHEEL_SPEEDS": (0,)}
     assert not parser.valid
 
 
-def test_valid_once_every_message_has_come(parser, speed, wheels):
-    """The bus is invalid after one of two messages and valid after both. Then their values are readable."""
+def test_the_bus_is_valid_once_every_message_has_arrived(parser, speed, wheels):
     parser.update([speed.pack((50.0,), 0)], 0.0)
     assert not parser.valid
     parser.update([speed.pack((51.0,), 1), wheels.pack((52.0,))], 0.01)
@@ -46,7 +45,7 @@ def test_valid_once_every_message_has_come(parser, speed, wheels):
 
 
 @pytest.mark.parametrize("bit", range(64))
-def test_any_flipped_bit_is_noticed(parser, speed, bit):
+def test_a_frame_with_any_flipped_bit_is_rejected(parser, speed, bit):
     frame = speed.pack((50.0,), 0)
     broken = (int.from_bytes(frame.data, "big") ^ (1 << bit)).to_bytes(8, "big")
     parser.update([frame._replace(data=broken)], 0.0)
@@ -55,13 +54,13 @@ def test_any_flipped_bit_is_noticed(parser, speed, bit):
 
 
 @pytest.mark.parametrize("change", [{"bus": 1}, {"address": 0x999}, {"data": b"\0" * 7}])
-def test_frames_of_others_are_ignored(parser, speed, change):
+def test_frames_of_another_bus_address_or_size_are_ignored(parser, speed, change):
     parser.update([speed.pack((50.0,), 0)._replace(**change)], 0.0)
     assert parser.values["ENGINE_DATA"] == (-1,)
 
 
-def test_silence_of_ten_periods_is_borne_eleven_are_not(parser, speed, wheels):
-    """A message is invalid after more than ten missed periods. The next frame makes it valid again."""
+def test_the_bus_is_invalid_after_more_than_ten_missed_periods(parser, speed, wheels):
+    """The next frame makes the bus valid again."""
     parser.update([speed.pack((50.0,), 0), wheels.pack((50.0,))], 1.0)
     for step in range(1, 11):
         parser.update([wheels.pack((50.0,))], 1.0 + step / 100)
@@ -72,7 +71,7 @@ def test_silence_of_ten_periods_is_borne_eleven_are_not(parser, speed, wheels):
     assert parser.valid
 
 
-def test_slower_messages_are_waited_for_longer(parser, speed, wheels):
+def test_slower_messages_have_longer_timeouts(parser, speed, wheels):
     """At 50 Hz, ten missed periods are 0.2 s."""
     parser.update([wheels.pack((50.0,))], 1.0)
     for step in range(1, 21):
@@ -82,19 +81,19 @@ def test_slower_messages_are_waited_for_longer(parser, speed, wheels):
     assert not parser.valid
 
 
-def test_a_stuck_counter_is_believed_four_times(parser, speed):
+def test_four_frames_with_a_repeated_counter_are_accepted(parser, speed):
     for repeat in range(8):
         parser.update([speed.pack((float(repeat),), 0)], repeat / 100)
     assert parser.values["ENGINE_DATA"] == pytest.approx((4.0,))
 
 
-def test_a_lost_frame_does_no_harm(parser, speed):
+def test_a_frame_after_a_lost_one_is_accepted(parser, speed):
     parser.update([speed.pack((1.0,), 0)], 0.0)
     parser.update([speed.pack((2.0,), 2)], 0.02)
     assert parser.values["ENGINE_DATA"] == pytest.approx((2.0,))
 
 
-def test_counting_right_again_restores_belief(parser, speed):
+def test_frames_are_accepted_again_once_the_counter_is_correct(parser, speed):
     for repeat in range(8):
         parser.update([speed.pack((1.0,), 0)], repeat / 100)
     for counter in range(1, 5):

@@ -18,7 +18,7 @@ class Rig:
         self.car = CarState()
 
     def send(self, cycles=2, enabled=True, **demand):
-        """Repeat a demand for some cycles and return the actuators' commands."""
+        """Repeat a demand for this many cycles and return the commands that the actuators receive."""
         for _ in range(cycles):
             control = CarControl(enabled=enabled, actuators=Actuators(**demand))
             frames = self.controller.update(control, self.car, self.frame)
@@ -32,8 +32,8 @@ def rig():
     return Rig()
 
 
-def test_gas_is_quantised_like_the_original(rig):
-    """Gas is sent in whole pedal counts, with the values that the original's plant decoded."""
+def test_gas_is_quantised_like_openpilots(rig):
+    """Gas is sent in whole pedal counts, with the values that openpilot's plant decoded."""
     assert rig.send(gas=0.011).gas == pytest.approx(0.01094, abs=1e-5)  # 11 counts
     assert rig.send(gas=0.0359).gas == pytest.approx(0.035743, abs=1e-6)  # 36 counts
     assert rig.send(gas=0.0119).gas == pytest.approx(0.01094, abs=1e-5)  # 11.95 counts, truncated
@@ -49,7 +49,7 @@ def test_brake_rises_slowly_and_falls_at_once(rig):
     assert rig.send(cycles=2, brake=0.0).brake == 0.0
 
 
-def test_brake_is_quantised_and_never_full(rig):
+def test_brake_is_quantised_and_limited_to_255_counts(rig):
     assert rig.send(cycles=200, brake=5.0).brake == 255 / 256
     rig.send(brake=0.0)
     assert rig.send(cycles=60, brake=0.3).brake == 74 / 256  # 0.29 is 74.24 counts
@@ -78,29 +78,26 @@ def test_steering_torque(rig, steer, taken):
     assert rig.send(steer=steer).steer == pytest.approx(taken / 3840)
 
 
-def test_no_torque_while_the_eps_refuses(rig):
+def test_no_torque_while_steering_is_not_allowed(rig):
     rig.car = CarState(steer_not_allowed=True)
     assert rig.send(steer=0.5).steer == 0.0
 
 
-def test_disabled_means_zero(rig):
+def test_disabled_control_sends_zero_commands(rig):
     rig.send(cycles=30, gas=0.3, brake=0.3, steer=0.3)
     taken = rig.send(enabled=False, gas=0.3, brake=0.3, steer=0.3)
     assert (taken.gas, taken.brake, taken.steer) == (0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("bad", [float("nan"), float("inf"), float("-inf")])
-def test_a_demand_that_is_no_number_is_zero(rig, bad):
+def test_nan_and_infinite_demands_are_sent_as_zero(rig, bad):
     taken = rig.send(gas=bad, brake=bad, steer=bad)
     assert (taken.gas, taken.brake, taken.steer) == (0.0, 0.0, 0.0)
     assert rig.send(cycles=20, brake=0.1).brake > 0.0
 
 
-def test_what_is_sent_when(rig):
-    """Steering is sent every cycle, gas and brake every second cycle, the dashboard every tenth.
-
-    All frames are valid.
-    """
+def test_each_command_has_its_own_period(rig):
+    """Steering is sent every cycle, gas and brake every second cycle, the dashboard every tenth."""
     addresses = []
     for frame in range(20):
         frames = rig.controller.update(CarControl(enabled=True), rig.car, frame)
@@ -126,16 +123,14 @@ def test_what_is_sent_when(rig):
         ({"visual_alert": "steer_required"}, {"FCW": 0, "BEEP": 0, "STEERING_REQUIRED": 1}),
     ],
 )
-def test_what_the_driver_is_shown(rig, control, shown):
-    """The dashboard shows the set speed, lead, lanes and warnings, as decoded by cantools."""
+def test_the_dashboard_shows_speed_lead_lanes_and_warnings(rig, control, shown):
     values = {}
     for frame in rig.controller.update(CarControl(**control), rig.car, 0):
         values |= DBC.decode_message(frame.address, frame.data, decode_choices=False)
     assert {name: values[name] for name in shown} == shown
 
 
-def test_every_command_frame_is_accepted(rig):
-    """In a long run, the receiver's check of counter and checksum accepts every frame."""
+def test_the_receiver_accepts_every_command_frame(rig):
     parser = rig.receiver._parser
     for cycle in range(40):
         rig.send(cycles=1, steer=0.01 * cycle, gas=0.01 * cycle)

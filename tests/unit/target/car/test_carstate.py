@@ -24,8 +24,8 @@ def pack(name, counter, **signals):
     return Packer(load(CAR_DBC)[name], tuple(signals)).pack(tuple(signals.values()), counter)
 
 
-def test_an_ordinary_car(reader, bench):
-    """An ordinary car is in drive, belts fastened, doors closed, main switch on, no button pressed."""
+def test_an_ordinary_car_is_ready_to_engage(reader, bench):
+    """The car is in drive, with belts fastened, doors closed, the main switch on and no button pressed."""
     state = read(reader, bench, v_ego=20.0, steer_angle=radians(12.3), steer_rate=radians(-7.0))
     assert state.can_valid and state.cruise_available and state.gear == "drive"
     assert state.v_ego_raw == pytest.approx(20.0, abs=0.002)
@@ -46,8 +46,7 @@ def test_an_ordinary_car(reader, bench):
     assert state.buttons == ()
 
 
-def test_nothing_received_is_unsafe(reader):
-    """Before the first frame, the car does not count as fit to engage."""
+def test_the_car_is_not_fit_to_engage_before_the_first_frame(reader):
     state = reader.update([], 0.0)
     assert not state.can_valid
     assert state.door_open and state.seatbelt_unlatched and state.esp_disabled and state.steer_error
@@ -55,9 +54,8 @@ def test_nothing_received_is_unsafe(reader):
 
 
 def test_speed_estimate_starts_at_zero_and_overshoots(reader, bench):
-    """The speed filter starts at 0, passes 26.8 m/s after 0.2 s and overshoots to 27.1 m/s at 1.03 s.
-
-    The original gets its first reading at 0.12 s and shows 27.108 at 1.15 s with a coasting car.
+    """The speed filter starts at 0, overshoots to more than 29.5 m/s and is at 27.1 m/s after 1.03 s.
+    openpilot gets its first reading at 0.12 s and estimates 27.108 m/s at 1.15 s for a coasting car.
     """
     estimates = [read(reader, bench, v_ego=26.8224 - 0.00176 * (k + 12)).v_ego for k in range(600)]
     assert estimates[2] == pytest.approx(8.9335, abs=0.01)
@@ -70,9 +68,9 @@ def test_speed_estimate_starts_at_zero_and_overshoots(reader, bench):
     ("wheels", "gearbox", "expected"), [(0.5, 1.0, 1.0), (3.5, 4.5, 4.0), (8.0, 9.0, 8.0)]
 )
 def test_wheel_and_gearbox_speed_are_blended(reader, wheels, gearbox, expected):
-    """Below 1 m/s only the gearbox speed counts, above 6 m/s only the wheel speed.
+    """Below 1 m/s only the gearbox speed is used, above 6 m/s only the wheel speed.
 
-    At 3.5 m/s each counts half.
+    At 3.5 m/s, the result is their mean.
     """
     kph = wheels * 3.6
     frames = [
@@ -83,7 +81,7 @@ def test_wheel_and_gearbox_speed_are_blended(reader, wheels, gearbox, expected):
 
 
 def test_standstill(reader, bench):
-    """Below 0.3 m/s the speed reads 0, but only a stopped car is at standstill."""
+    """Below 0.3 m/s the reported speed is 0, but only a stopped car is at standstill."""
     assert read(reader, bench, v_ego=0.0).standstill
     creeping = read(reader, bench, v_ego=0.29)
     assert not creeping.standstill and creeping.v_ego_raw == 0.0
@@ -126,14 +124,12 @@ def test_setting_button(reader):
         ("STEER_STATUS", {"STEER_STATUS": 5}, "steer_error"),
     ],
 )
-def test_single_signals(reader, bench, name, signals, field):
-    """Each switch and each fault bit sets only its own field."""
+def test_each_signal_sets_its_field(reader, bench, name, signals, field):
     assert not getattr(read(reader, bench), field)
     assert getattr(reader.update([pack(name, 1, **signals)], 0.01), field)
 
 
-def test_brake_switch_needs_two_frames(reader, bench):
-    """A brake switch that flickers for one frame is ignored. Two frames in a row count."""
+def test_the_brake_switch_must_be_on_for_two_frames(reader, bench):
     read(reader, bench)
     assert not reader.update([pack("POWERTRAIN_DATA", 1, BRAKE_SWITCH=1)], 0.01).brake_pressed
     assert reader.update([pack("POWERTRAIN_DATA", 2, BRAKE_SWITCH=1)], 0.02).brake_pressed

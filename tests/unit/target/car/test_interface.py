@@ -53,7 +53,7 @@ def test_cancel_happens_on_press(car, bench):
 
 
 def test_gas_pedal(car, bench):
-    """Pressing the gas disengages once. Holding it only delays engaging."""
+    """Pressing the gas pedal disengages once. Holding it only delays engaging."""
     update(car, bench)
     first = car.update([pack("POWERTRAIN_DATA", 1, PEDAL_GAS=9)], 0.01)
     assert [e.kinds for e in first.events] == [("no_entry", "user_disable"), ("pre_enable",)]
@@ -84,14 +84,15 @@ def test_brake_pedal(car, bench):
         ("STANDSTILL", {"BRAKE_ERROR_1": 1}, "brake_unavailable", "immediate_disable"),
     ],
 )
-def test_conditions(car, bench, name, signals, event, kind):
-    """Each of the car's conditions refuses to engage and disengages in its own way."""
+def test_each_condition_prevents_engaging_and_disengages_in_its_own_way(
+    car, bench, name, signals, event, kind
+):
     update(car, bench)
     raised = kinds(car.update([pack(name, 1, **signals)], 0.01))
     assert {"no_entry", kind} <= raised[event]
 
 
-def test_interfaces_share_nothing(bench):
+def test_interfaces_do_not_share_state(bench):
     used, fresh = CarInterface(), CarInterface()
     for _ in range(20):
         frames = bench.frames(v_ego=20.0)

@@ -17,15 +17,15 @@ def frames(d_rel=50.0, v_rel=-3.0, **truth):
     return RadarSensor(Road(None, None)).measure(GroundTruth(**(values | truth)))
 
 
-def test_a_track(radar):
-    """A track has the radar's resolution of 1/16 m and 1/32 m/s, and left is positive."""
+def test_a_track_has_the_radars_resolution(radar):
+    """Distances are multiples of 1/16 m and speeds of 1/32 m/s. Positions to the left are positive."""
     data = radar.update(frames(d_rel=97.681, v_rel=-8.8902, lateral_offset=0.5), 1.0)
     (point,) = data.points
     assert (point.d_rel, point.v_rel, point.y_rel) == (97.625, -8.875, -0.5)
     assert data.t == 1.0 and data.errors == ()
 
 
-def test_no_cycle_no_data(radar):
+def test_an_incomplete_radar_cycle_gives_no_data(radar):
     """A step without the frame that ends a radar cycle returns None, before and after the first cycle."""
     assert radar.update([], 0.0) is None
     state, track = frames()
@@ -43,20 +43,19 @@ def test_track_ends_at_255_m(radar):
     assert first.track_id == same.track_id != other.track_id
 
 
-def test_fault_state(radar):
+def test_a_fault_in_the_state_frame_is_reported(radar):
     state, track = frames()
     broken = state._replace(data=b"\x78" + state.data[1:])
     assert radar.update([broken, track], 0.0).errors == ("fault",)
     assert radar.update([state, track], 0.05).errors == ()
 
 
-def test_missing_state_frames(radar):
-    """Tracks without the state frame are a communication error after ten cycles."""
+def test_tracks_without_a_state_frame_are_an_error_after_ten_cycles(radar):
     state, track = frames()
     radar.update([state, track], 0.0)
     errors = [radar.update([track], 0.05 * cycle).errors for cycle in range(1, 13)]
     assert errors == [()] * 10 + [("comm_issue",)] * 2
 
 
-def test_car_frames_are_not_the_radars(radar):
+def test_frames_of_the_car_bus_are_ignored(radar):
     assert radar.update([frame._replace(bus=0) for frame in frames()], 0.0) is None

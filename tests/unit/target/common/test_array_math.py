@@ -10,20 +10,19 @@ from selfdrive.common.ordered import total
 RANDOM = np.random.default_rng(4)
 
 
-def test_products_are_those_of_matrices() -> None:
-    """Products equal NumPy's matrix products within rounding, for any matching shapes."""
+def test_products_equal_numpys_matrix_products() -> None:
     a, b = RANDOM.normal(size=(3, 5)), RANDOM.normal(size=(5, 2))
     assert array_math.product(a, b) == pytest.approx(a @ b, rel=1e-13)
     assert array_math.dot(a[0], b[:, 1]) == pytest.approx(a[0] @ b[:, 1], rel=1e-13)
     assert isinstance(array_math.dot(a[0], b[:, 1]), float)
 
 
-def test_lengths_keep_their_axis() -> None:
+def test_length_keeps_the_summed_axis() -> None:
     vectors = np.array([[3.0, 4.0], [5.0, 12.0]])
     assert array_math.length(vectors).tolist() == [[5.0], [13.0]]
 
 
-def test_each_value_is_calculated_alone() -> None:
+def test_each_calls_the_function_for_one_value_at_a_time() -> None:
     """The function receives floats in order. The result has the array's shape, even if the array is empty."""
     values = np.array([[1.0, 2.0], [3.0, 4.0]], np.float32)
     asked = []
@@ -37,7 +36,7 @@ def test_each_value_is_calculated_alone() -> None:
 
 @pytest.mark.parametrize(("kind", "digits"), [(np.float64, 4e-16), (np.float32, 3e-7)])
 def test_logarithm_is_exact_to_the_last_digits(kind: type, digits: float) -> None:
-    """The logarithm is exact for all powers of two and near 1, to the precision of the array's type."""
+    """The errors stay within the precision of the array's type, for 180 powers of two and near 1."""
     powers = np.ldexp(RANDOM.uniform(0.5, 1.0, 2000), RANDOM.integers(-90, 90, 2000))
     values = np.concatenate((powers, np.linspace(0.6, 1.6, 101))).astype(kind)
     found = array_math.log(values)
@@ -48,10 +47,7 @@ def test_logarithm_is_exact_to_the_last_digits(kind: type, digits: float) -> Non
 
 
 def test_totals_are_added_from_left_to_right() -> None:
-    """Totals are added from left to right, with the rounding errors of that order.
-
-    Python's `sum` differs since 3.12.
-    """
+    """Since Python 3.12, `sum` rounds differently."""
     assert total([1e16, 1.0, -1e16]) == 0.0
     assert total(iter([0.1] * 10)) == 0.9999999999999999
     assert total([]) == 0

@@ -15,7 +15,7 @@ ahead, sideways, turned = st.floats(3.0, 300.0), st.floats(-20.0, 20.0), st.floa
 
 
 def test_the_default_is_the_published_calibration():
-    """The horizon lies at row 170.7, as in the Caltech frames. Lines 3.7 m apart diverge by 1.48 px a row."""
+    """The horizon is row 170.7, as in the Caltech frames. Lines 3.7 m apart diverge by 1.48 px per row."""
     assert pytest.approx(170.7, abs=0.05) == CALTECH.horizon
     assert CALTECH.spread() == pytest.approx(1.48, abs=0.005)
     assert CALTECH.pitch == pytest.approx(radians(14.0))
@@ -23,14 +23,14 @@ def test_the_default_is_the_published_calibration():
 
 @CAMERAS
 @given(x=ahead, y=sideways)
-def test_a_point_on_the_road_is_projected_where_its_row_and_column_are(model, x, y):
+def test_project_agrees_with_row_and_column_for_road_points(model, x, y):
     assert model.project(x, y, 0.0) == pytest.approx((model.column(x, y), model.row(x)), abs=1e-6)
 
 
 @CAMERAS
 @given(x=ahead)
 def test_row_and_distance_are_inverse(model, x):
-    """The row of a road point x metres ahead converts back to x, with the scale of that depth."""
+    """The row of a point x metres ahead converts back to x. `metres_per_pixel` is the scale of that row."""
     row = model.row(x)
     assert model.distance(row) == pytest.approx(x, rel=1e-6, abs=1e-6)
     assert model.metres_per_pixel(row) * (model.cx - model.column(x, 1.0)) == pytest.approx(1.0)
@@ -38,7 +38,7 @@ def test_row_and_distance_are_inverse(model, x):
 
 @CAMERAS
 @given(y=sideways, slope=turned)
-def test_a_line_of_the_road_is_a_line_of_the_picture(model, y, slope):
+def test_a_straight_line_on_the_road_is_straight_in_the_picture(model, y, slope):
     a, b = model.line_in_picture(y, slope)
     for x in (4.0, 20.0, 100.0):
         assert a * model.row(x) + b == pytest.approx(model.column(x, y + slope * x), abs=1e-6)
@@ -46,15 +46,15 @@ def test_a_line_of_the_road_is_a_line_of_the_picture(model, y, slope):
 
 
 @CAMERAS
-def test_what_is_as_high_as_the_camera_is_seen_at_the_horizon_row_far_away(model):
-    """A higher point lies higher in the image. A point at the camera's height lies at the horizon."""
+def test_far_points_at_camera_height_lie_on_the_horizon(model):
+    """A point above the road lies higher in the image than the road below it."""
     far = 1e7
     assert model.project(far, 0.0, model.height)[1] == pytest.approx(model.horizon, abs=1e-3)
     assert model.project(20.0, 0.0, 1.0)[1] < model.project(20.0, 0.0, 0.0)[1]
 
 
-def test_a_camera_from_its_view_has_that_horizon():
-    """`from_view` puts the horizon at the requested row, with square pixels and the axis in the middle."""
+def test_from_view_puts_the_horizon_at_the_requested_row():
+    """Pixels are square, and the optical axis goes through the middle of the image."""
     assert pytest.approx(200.0) == SQUARE.horizon
     assert (SQUARE.fx, SQUARE.fy, SQUARE.cx, SQUARE.cy) == (600.0, 600.0, 319.5, 239.5)
     assert tan(SQUARE.pitch) == pytest.approx((239.5 - 200.0) / 600.0)

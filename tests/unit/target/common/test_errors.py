@@ -4,6 +4,5 @@ from selfdrive.common.errors import ConfigError
 
 
 def test_error_names_place_expectation_and_remedy() -> None:
-    """An error's text begins with file and line and states what was expected and what to do."""
     error = ConfigError("speed_mph is -3", where="S1.yaml", line=4, expected="0 or more", remedy="correct it")
     assert str(error) == "S1.yaml:4: speed_mph is -3, expected 0 or more; correct it"

@@ -1,14 +1,12 @@
-"""Kalman filters. The speed estimate is compared with values measured on the original code."""
+"""Kalman filters. The speed estimate is compared with values measured on openpilot."""
 
 import pytest
 from selfdrive.car.honda.carstate import SPEED_GAINS
 from selfdrive.common.kalman import DistanceFilter, SteadyKalman
 
 
-def test_speed_estimate_starts_as_the_original() -> None:
-    """With initial estimate 0 and a measured speed of 26.797 m/s, the estimates at steps 3 and 4 match the
-    original's.
-    """
+def test_speed_estimate_starts_like_openpilots() -> None:
+    """From 0, with a measured 26.797 m/s, the third and fourth estimates equal openpilot's."""
     speed = SteadyKalman(0.0, 0.0, dt=0.01, gains=SPEED_GAINS)
     values = []
     for _ in range(4):
