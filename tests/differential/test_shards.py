@@ -156,7 +156,7 @@ def test_shards_of_other_plans_or_sources_are_refused(
     head = json.loads((two / "run.json").read_text())
     for change, told in (
         ({"plan": "0" * 64}, "expected 0000000000000000"),
-        ({"sources": head["sources"] | {"target": "0" * 64}}, "another source"),
+        ({"sources": head["sources"] | {"target": "0" * 64}}, "a different source"),
     ):
         change_head(two, **head | change)
         reseal(two)
