@@ -34,7 +34,7 @@ def make_engine(name: str, setting: Setting) -> Engine:
 
 def not_worth_forking(manifest: TargetManifest, experiments: int) -> str:
     """Return why this many experiments are not forked unless requested; empty if they are."""
-    few = f"that pays off from {WORTH_IT} experiments on" if experiments < WORTH_IT else ""
+    few = f"forking pays off only with {WORTH_IT} or more experiments" if experiments < WORTH_IT else ""
     return not_forkable(manifest) or few
 
 

@@ -15,8 +15,8 @@ _DASK = "mutator.execution.cluster.dask_workers:ClusterWorkers"
 class Distributor(Protocol):
     """Distributes the pieces of a prepared session until none is left, or the session must stop.
 
-    When `run` returns, finished work is in the run folder. Reasons for an early end go to `session.problem`
-    and `session.interrupted`.
+    When `run` returns, finished work is in the run folder. If it ends early, it sets
+    `session.problem` or `session.interrupted`.
     """
 
     def run(self, session: Session) -> None: ...
@@ -32,7 +32,7 @@ def distributor(cluster: str | None = None, *, insecure: bool = False) -> Distri
             raise MutatorError(
                 "no cluster",
                 argument="insecure_network",
-                remedy="leave it out: without a cluster, all work runs on this machine",
+                remedy="leave out `insecure_network`: without a cluster, all work runs on this machine",
             )
         return LocalWorkers()
     where = parse(cluster)

@@ -10,7 +10,7 @@ from mutator.verification.equivalence import Proof
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ended:
-    """The outcome that every session of a finished run reports."""
+    """The outcome that every later session of a finished run reports."""
 
     outcomes: Counter[str]
     proof: Proof | None

@@ -18,7 +18,7 @@ class LocalWorkers:
     """The distributor of `mutator run`: `session.workers` processes, or only this process if 0."""
 
     def run(self, session: Session) -> None:
-        """Run the pending pieces as pytest items, ignoring the user's pytest configuration."""
+        """Run the pending chunks as pytest items, ignoring the user's pytest configuration."""
         installed = any(entry.name == "mutator" for entry in metadata.entry_points(group="pytest11"))
         folder = session.folder.path
         arguments = [

@@ -38,15 +38,15 @@ from mutator.verification import equivalence
 
 _SEGMENTS = {"records": SCHEMA, "timings": TIMINGS_SCHEMA, equivalence.FOLDER: SCHEMA}
 _MARK = f".{HEAD}."  # followed by a process id: marks an unfinished merge
-_REMEDY = "give the folder of each shard of one plan, once"
+_REMEDY = "give the folder of each shard of one plan exactly once"
 
 
 def merge(shards: Sequence[Path], out: Path, *, accept_versions: bool = False) -> Path:
     """Merge the run folders `shards` into the new or empty folder `out`; return the path of its results.csv.
 
     Raises MutatorError for a shard that is missing, duplicate, unfinished, in use, or of another plan; unless
-    `accept_versions`, also for one that ran with another Python or other packages. Raises CheckFailed if a
-    proof failed, or if golden runs differ: then the machines compute different results.
+    `accept_versions`, also for one that ran with different versions. Raises CheckFailed if a proof failed, or
+    if golden runs differ, because the machines then compute different results.
     """
     if RunFolder.exists(out):
         raise MutatorError(
@@ -131,7 +131,7 @@ def _check_numbers(folders: Sequence[RunFolder]) -> None:
             )
         if shard.number in held:
             raise MutatorError(
-                f"shard {shard.number}/{of} a second time",
+                f"shard {shard.number}/{of} is given twice",
                 where=folder.path,
                 expected=f"a different shard from {held[shard.number].path}",
                 remedy=_REMEDY,
@@ -147,7 +147,7 @@ def _check_complete(folder: RunFolder) -> None:
     done = sum(one.counts for one in endings(records))
     if done < folder.planned:
         raise MutatorError(
-            f"unfinished: {done} of {folder.planned} experiments done",
+            f"unfinished: {done} of {folder.planned} experiments are done",
             where=folder.path,
             expected="a finished shard",
             remedy="resume it with the command that started it",
@@ -155,7 +155,7 @@ def _check_complete(folder: RunFolder) -> None:
     equivalence.judge(folder, records)
     if left := len(equivalence.left(folder)):
         raise MutatorError(
-            f"unfinished: {counted(left, 'experiment')} of its proof left to run",
+            f"unfinished: its proof has {counted(left, 'experiment')} left to run",
             where=folder.path,
             expected="a finished shard",
             remedy="resume it with the command that started it",
@@ -163,7 +163,7 @@ def _check_complete(folder: RunFolder) -> None:
 
 
 def _check_goldens(folders: Sequence[RunFolder]) -> None:
-    """Check that fault-free runs are equal in all shards. If not, the results do not belong together."""
+    """Check that golden runs are equal in all shards; otherwise their results cannot be combined."""
     first = read_json(folders[0].path / CHECKS, CHECKS_SCHEMA)["goldens"]
     for folder in folders[1:]:
         goldens = read_json(folder.path / CHECKS, CHECKS_SCHEMA)["goldens"]
@@ -177,13 +177,13 @@ def _check_goldens(folders: Sequence[RunFolder]) -> None:
 
 
 def _stretches(folders: Sequence[RunFolder], *, accept: bool) -> Iterator[Stretch]:
-    """Yield all shards' stretches. Unless accepted, their versions must equal those of the first shard."""
+    """Yield the stretches of all shards. Unless `accept`, all must have the versions of the first shard."""
     first = folders[0]
     for folder in folders:
         ends = zip(first.stretches[-1:], folder.stretches[-1:], strict=False)
         found = [text for one, other in ends for text in differences(one, other.python, other.packages)]
         if found and not accept:
-            raise other_versions(folder.path, f"not run as {first.path}, but with", found)
+            raise other_versions(folder.path, f"not run like {first.path}, but with", found)
         assert folder.shard is not None
         for i, stretch in enumerate(folder.stretches):
             yield replace(
@@ -194,7 +194,7 @@ def _stretches(folders: Sequence[RunFolder], *, accept: bool) -> Iterator[Stretc
 
 
 def _copy(folders: Sequence[RunFolder], out: Path, stretches: Sequence[dict[str, Any]]) -> None:
-    """Copy all content. The head comes last, so that an unfinished copy is not a run folder."""
+    """Copy all content. The head is written last, so that an unfinished copy is not a run folder."""
     first = folders[0]
     ledger = digests.settled(first.path)
     reviewed = all((folder.path / REVIEWED).exists() for folder in folders)

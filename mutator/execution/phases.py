@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from mutator.store.progress import Progress
 
-LINE_EVERY_S = 15.0  # shows in a log that the run is alive
+LINE_EVERY_S = 15.0  # so that a log shows that the run is alive
 
 STAGES = {
     "plan": "planning",

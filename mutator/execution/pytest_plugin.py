@@ -1,6 +1,6 @@
 """The pytest plugin that runs campaigns: `pytest --campaign FILE --campaign-out DIR -n 2`.
 
-Every pytest of the environment loads it, so it imports the harness only if a campaign is requested.
+Every pytest session in the environment loads this plugin, so it imports the harness only for a campaign.
 """
 
 from pathlib import Path
@@ -13,7 +13,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption(
         "--campaign",
         metavar="FILE",
-        help="run this campaign (a file, or a name of the fault library) instead of tests",
+        help="run this campaign (a file, or a name in the fault library) instead of tests",
     )
     group.addoption(
         "--campaign-out",
@@ -29,12 +29,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption(
         "--accept-versions",
         action="store_true",
-        help="continue with another Python or other packages than the run folder was started with",
+        help="resume even if Python or packages have changed since the run folder was last used",
     )
     group.addoption(
         "--campaign-cluster",
         metavar="WHERE",
-        help="use the workers of a Dask cluster, as `mutator run --cluster`",
+        help="use the workers of a Dask cluster, like `mutator run --cluster`",
     )
     group.addoption(
         "--insecure-network",
@@ -60,7 +60,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
     cluster, insecure = config.getoption("campaign_cluster"), config.getoption("insecure_network")
     if cluster and getattr(config.option, "numprocesses", None):
-        raise pytest.UsageError("--campaign-cluster with -n: its workers are those of the cluster")
+        raise pytest.UsageError("--campaign-cluster with -n: leave out -n, the cluster has its own workers")
     try:
         deals = distributor(cluster, insecure=insecure) if cluster or insecure else None
     except MutatorError as err:

@@ -38,7 +38,7 @@ class HarnessErrors(Exception):
 
 
 class CampaignItem(pytest.Item):
-    """Work of a campaign. Fails only for harness errors; known ones have no traceback."""
+    """An item with work of a campaign. It fails only for harness errors; known ones have no traceback."""
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
         if isinstance(excinfo.value, HarnessErrors | MutatorError):
@@ -97,7 +97,7 @@ def _defect(err: Exception, chunk: str) -> str:
 
 
 class LazyWorker:
-    """This process's Worker, made when the first chunk runs, because collection needs none."""
+    """This process's Worker, made when the first chunk runs, because collection does not need it."""
 
     def __init__(self, workspace: Workspace, assignment: Assignment) -> None:
         self._workspace = workspace
@@ -126,7 +126,7 @@ def configure(
 ) -> None:
     """Register the plugin for this process's role.
 
-    Each worker takes the next piece of work, whatever the user's configuration says about files. With a
+    Workers take items one by one, even if the user's configuration groups tests, for example by file. With a
     `distributor`, pytest itself distributes nothing.
     """
     if getattr(config.option, "dist", "no") != "no":
@@ -192,7 +192,7 @@ class WorkerSide:
 
 
 class Controller:
-    """Plugin of the controller: distributes chunks, or runs them itself without xdist."""
+    """Plugin of the controller: distributes chunks or, without xdist, runs them itself."""
 
     def __init__(self, begun: Session | None = None) -> None:
         self.begun = begun

@@ -1,4 +1,4 @@
-"""The frozen plan of a command: a new one, or the one in its run folder."""
+"""Open the frozen plan in a run folder, or make a new one."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -20,7 +20,7 @@ def open_frozen(
     """Open the run folder `out`, which the caller owns, with a frozen plan of the campaign.
 
     With `reviewed`, also store the approvals. If anything is not approved, raise CheckFailed and store no new
-    plan. Raises MutatorError if the folder has another plan, other sources or another version of mutator.
+    plan. Raises MutatorError if the folder has a different plan, sources or version of mutator.
     """
     if RunFolder.exists(out):
         folder = _found(workspace, campaign, out, choices)

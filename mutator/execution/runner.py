@@ -1,4 +1,4 @@
-"""From experiments to records: build each mutant, run it on an engine, compare with golden, judge."""
+"""Turn experiments into records: build each mutant, run it, compare it with its golden run, judge it."""
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
@@ -26,7 +26,7 @@ from mutator.store.series_format import encode
 from mutator.store.series_packing import EncodedSeries
 from mutator.targets.manifest import TargetManifest
 
-_KEPT = 32  # golden runs: those of the current seed and the next
+_KEPT = 32  # golden runs in memory: enough for the current seed and the next
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,7 +80,7 @@ class Goldens:
 
 
 class Runner:
-    """Runs experiments on an engine, in the engine's order."""
+    """Runs experiments on an engine, which chooses their order."""
 
     def __init__(
         self,
@@ -236,7 +236,7 @@ class Runner:
 
     def _failed(self, experiment: Experiment, built: Mutant, execution: Execution) -> Record:
         status, detail = assign_blame(execution, built.files, self._raising(experiment, built))
-        # a crash's count is reproducible; a time-out's depends on the machine's speed
+        # the count of a crash is reproducible; that of a time-out depends on the machine's speed
         activation = activation_of(execution.probe or {}) if status is Status.CRASHED else None
         bare = _bare(experiment, status, detail, built, activation)
         return replace(bare, error=error_of(execution.raised))

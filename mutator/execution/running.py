@@ -30,8 +30,8 @@ def run_campaign(
 ) -> Summary:
     """Run or resume the campaign in the run folder `out` with `workers` processes (0: in this process).
 
-    A frozen plan in `out` is used unchanged. Omitted `choices` are the frozen ones. `engine` is a name in
-    `engines.kinds` (None: the fastest that pays off). With `reviewed`, only approved mutants run
+    A frozen plan in `out` is used unchanged. Omitted `choices` keep their frozen values. `engine` is a name
+    in `engines.kinds` (None: the fastest that pays off). With `reviewed`, only approved mutants run
     (`mutator.review.gate`). Without `accept_versions`, Python and packages must not change during a run.
     Another thread calls `notify` about twice a second.
 

@@ -1,6 +1,6 @@
-"""A session: one command holds the lock of a run folder and takes it from the plan to the results.
+"""A session: one command holds the lock of a run folder and takes the run from plan to results.
 
-`distribution` decides how the work goes to processes.
+`distribution` decides which processes do the work.
 """
 
 import os
@@ -59,12 +59,12 @@ class Summary:
     outcomes: Counter[str]  #: experiments by outcome or status
     harness_errors: tuple[tuple[str, str], ...]  #: (experiment id, detail) of each harness error
     problem: str  #: why the session ended early (disk full, a worker died); else empty
-    interrupted: bool  #: whether a signal ended it
+    interrupted: bool  #: whether a signal ended the session
     results: Path | None  #: path of results.csv; None if the disk was full
     proof: equivalence.Proof | None  #: the equivalence check; None if none was needed
     seal: str | None  #: the seal; None if the run is not finished
     not_forked: (
-        str  #: why no experiment was forked; empty if any was, or if the reference engine was requested
+        str  #: why no experiment was forked; empty if one was, or if the reference engine was requested
     )
     elapsed_s: float  #: duration of the session (s)
 
@@ -72,12 +72,12 @@ class Summary:
     def proof_note(self) -> str:
         """The state of the proof, or why there is none; empty if the reference engine was requested."""
         if self.not_forked:
-            return f"none is needed, as no experiment was forked: {self.not_forked}"
+            return f"none is needed, because no experiment was forked: {self.not_forked}"
         return str(self.proof) if self.proof else ""
 
     @property
     def exit_code(self) -> int:
-        """0 fine; 3 harness errors or experiments left; 130 interrupted."""
+        """0: fine; 3: harness errors, or experiments left to run; 130: interrupted."""
         if self.interrupted:
             return EXIT_INTERRUPTED
         whole = self.done == self.planned and (self.proof is None or self.proof.whole)
@@ -105,7 +105,7 @@ class Session:
         self.pending: tuple[Pending, ...] = ()
         self.proof: tuple[equivalence.Sample, ...] = ()
         self.manifest = workspace.manifest(folder.head["target"])
-        # For the whole plan, so that all shards and an unsharded run agree on whether there is a proof.
+        # for the whole plan, so that all shards and an unsharded run agree on whether a proof is needed
         experiments = folder.head["experiments"]
         self.engine = choose_engine(engine, self.manifest, experiments)
         self._not_forked = "" if engine else not_worth_forking(self.manifest, experiments)
@@ -120,7 +120,7 @@ class Session:
     def prepare(self) -> None:
         """Find the work to do. If there is any, run the checks, create the pristine tree and begin a stretch.
 
-        Raises MutatorError if versions of Python or packages have changed and this is not accepted.
+        Unless `accept_versions`, raises MutatorError if versions of Python or packages have changed.
         """
         self._known = ended_before(self.folder)
         if self._known and are_there(self.folder):
@@ -243,12 +243,12 @@ class Session:
             self.problem = self.problem or str(err)
 
     def _close_segments(self, *, finished: bool | None = None) -> None:
-        """Record the digests of the workers' files, unless a worker is still ending."""
+        """Record the digests of the workers' files, unless a worker is still running."""
         if not wait_for_workers(self.folder.path):
             digests.close_segments(self.folder.path, finished=finished)
 
     def _pack_series(self) -> None:
-        """Pack the workers' series, unless a worker is still ending. The next session then packs them."""
+        """Pack the workers' series. While a worker is still running, leave this to the next session."""
         folder = self.folder
         if segments(folder.path) and not wait_for_workers(folder.path):
             texts = Results.of_run(folder.path).texts()
@@ -270,7 +270,7 @@ def open_session(
 ) -> Iterator[Session]:
     """Lock the run folder `out`, freeze the plan if needed, and yield the session.
 
-    Scratch folders are deleted before and after.
+    Scratch folders are deleted before and after the session.
     """
     is_new = not out.exists()
     make_run_folder(out)

@@ -25,10 +25,10 @@ from mutator.workspace import Workspace
 
 @dataclass(frozen=True, kw_only=True)
 class Single:
-    """An experiment run alone. `golden` and `faulty` are output folders (`golden.load_trace` reads them)."""
+    """An experiment run alone. `golden` and `faulty` are output folders, for `load_trace`."""
 
     experiment: Experiment
-    mutant: Mutant | None  # None if the mutant does not compile; the record says so
+    mutant: Mutant | None  # None if the mutant does not compile; the record then says why
     record: Record
     golden: Path
     faulty: Path
@@ -44,9 +44,9 @@ def run_single(
     limits: Limits | None = None,
     golden: Path | None = None,
 ) -> Single:
-    """Run `experiment` into the folder `out`: golden/ (unless given), faulty/ and mutant.patch.
+    """Run an experiment; write golden/ (unless given), faulty/ and mutant.patch into the folder `out`.
 
-    `faulty` is empty if the mutant was refused. Raises CheckFailed if the golden run fails.
+    faulty/ is empty if the mutant could not be built. Raises CheckFailed if the golden run fails.
     """
     with _engine(manifest, out, limits or Limits()) as engine:
         reference = golden or _run_golden(workspace, engine, experiment, out / "golden")
@@ -66,7 +66,7 @@ def run_single(
 def run_golden(
     workspace: Workspace, manifest: TargetManifest, experiment: Experiment, out: Path, *, limits: Limits
 ) -> Path:
-    """Run `experiment` without its fault into the folder `out`; return the output folder.
+    """Run an experiment without its fault; return the output folder, golden/ in `out`.
 
     Raises CheckFailed if the run fails.
     """
@@ -77,9 +77,9 @@ def run_golden(
 def rerun(
     workspace: Workspace, run: Path, experiment_id: str, *, out: Path | None = None
 ) -> tuple[Single, bool]:
-    """Rerun a planned experiment into the folder `out` (default: traces/<id>/ of the run folder).
+    """Rerun a planned experiment, with output in the folder `out` (default: traces/<id>/ of the run folder).
 
-    The second value is whether the record equals the campaign's, or there is none yet.
+    The second value is True if the record equals the campaign's, or if the campaign has none yet.
     """
     folder = RunFolder.open(run)
     manifest = manifest_of(workspace, folder)
@@ -98,7 +98,7 @@ def rerun(
 
 
 def is_same(folder: RunFolder, known: Record | None, found: Record) -> bool:
-    """Return whether a rerun's record equals the campaign's; True if there is none yet.
+    """Return whether a rerun's record equals the campaign's; True if the campaign has none yet.
 
     Raises MutatorError if the patch of the campaign's record is damaged.
     """
@@ -152,7 +152,7 @@ def _run_golden(workspace: Workspace, engine: ReferenceEngine, experiment: Exper
 def _kept(runs: Iterator[Finished], out: Path) -> Iterator[Finished]:
     for finished in runs:
         left = finished.out
-        if left is None or not left.is_dir():  # a run may delete it
+        if left is None or not left.is_dir():  # a run can delete it
             left = out / "work" / "nothing"
             left.mkdir()
         _replace(left, out / "faulty")
@@ -162,7 +162,7 @@ def _kept(runs: Iterator[Finished], out: Path) -> Iterator[Finished]:
 
 
 def _replace(new: Path, place: Path) -> None:
-    """Replace a folder that another process may be reading."""
+    """Replace a folder that another process might be reading."""
     aside = Path(mkdtemp(dir=new.parent))
     if os.path.lexists(place):
         place.rename(aside / place.name)

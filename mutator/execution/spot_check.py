@@ -44,5 +44,5 @@ def driven_again(workspace: Workspace, folder: RunFolder, ids: Sequence[str]) ->
                 yield MutatorError(
                     f"{name} rerun: {equivalence.difference(found, known)}",
                     where=folder.path,
-                    expected="the same record again",
+                    expected="the record of the campaign",
                 )

@@ -37,7 +37,7 @@ class Traces:
 
     def record(self, experiment_id: str) -> Record:
         if experiment_id not in self._records:
-            raise MutatorError(f"the record of {experiment_id} is gone", where=self.folder.path)
+            raise MutatorError(f"the record of {experiment_id} is missing", where=self.folder.path)
         return self._records[experiment_id]
 
     def of(self, experiment_id: str) -> tuple[Trace, Trace]:
@@ -62,7 +62,7 @@ class Traces:
         """Return the fault-free and the faulty trace from an experiment's series, at most 20 values a second.
 
         Without a series, the experiment is rerun if `drive` is set. Raises MutatorError if there is no
-        series, it is damaged, or the rerun fails as in `of`.
+        series, if it is damaged, or if the rerun fails.
         """
         series = SeriesFolder(self.folder.path)
         found = series.read(experiment_id)
@@ -79,7 +79,7 @@ class Traces:
         return sampled_traces(*found, self.manifest.time_channel)
 
     def is_kept(self, experiment_id: str) -> bool:
-        """Return whether the stored trace is that of the campaign's run, and not of other sources."""
+        """Return whether a faulty trace is stored that matches the record."""
         faulty = self.folder.path / "traces" / experiment_id / "faulty"
         if not (faulty / self.manifest.trace_file).is_file():
             return False

@@ -45,7 +45,7 @@ class Assignment:
 
 
 class Worker:
-    """Runs chunks of a run folder and appends results. Reads the plan chunk by chunk."""
+    """Runs chunks of a run folder and appends their results. Reads the plan chunk by chunk."""
 
     def __init__(self, workspace: Workspace, assignment: Assignment) -> None:
         self.folder = RunFolder.open(assignment.run)
@@ -65,7 +65,7 @@ class Worker:
         self._seed: int | None = None  # the seed being run
         self._prover: Runner | None = None
         self._proofs: LineWriter | None = None
-        self._needs_proof: bool | None = None  # None: not known from its own runs
+        self._needs_proof: bool | None = None  # None: not known yet
         self._planned: Mapping[str, Experiment] = {}
         self._faults = plan_file.read_faults(self.folder.path)
         plan = head["plan"]
@@ -98,8 +98,8 @@ class Worker:
         """Run an experiment of the proof's sample on the reference engine; return harness errors as `run`
         does.
 
-        The run shares nothing with others, because the proof must also cover what runs share. If nothing was
-        forked, nothing is run.
+        The run uses no data of other runs, because the proof must also detect errors in such data. If no
+        experiment was forked, nothing is run.
         """
         if self._needs_proof is None:
             self._needs_proof = equivalence.needless(self.folder) is None
@@ -150,7 +150,7 @@ class Worker:
         )
 
     def _keep(self, finished: Finished) -> None:
-        """Append the patch first and the record last, so that everything exists for each record."""
+        """Append the patch first and the record last, so that each record's other data exist."""
         if finished.mutant is not None:
             self._patches.append(finished.experiment.id, finished.mutant.patch_bytes)
         if self._series is not None and finished.series is not None:
@@ -181,11 +181,11 @@ def timing_of(finished: Finished, worker: str) -> dict[str, Any]:
 
 
 def dying_python(parent: int) -> list[str]:
-    """Return the start of a Python command line. From its start, the process dies with `parent`."""
+    """Return the beginning of a Python command line. Its process dies with `parent`, even while starting."""
     return [sys.executable, "-I", "-S", guard.__file__, str(parent), sys.executable]
 
 
 def bind_to_parent(parent: int) -> None:
-    """End with the process `parent`, which also handles Ctrl-C."""
+    """End this process when `parent` ends, and ignore Ctrl-C, which `parent` handles."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     guard.die_with_parent(parent)

@@ -105,7 +105,7 @@ def test_workers_that_do_not_reproduce_the_golden_run_are_refused(
         summary = on(two, toy, tmp_path / "run")
     assert summary.exit_code == 3
     assert summary.done == 0
-    assert "no worker is left that may do the work: golden run" in summary.problem
+    assert "no worker is left to do the work: golden run" in summary.problem
 
 
 def test_a_worker_with_another_version_is_refused(

@@ -3,5 +3,5 @@
 The command distributes pieces of work (`board`) and writes the results into the run folder (`intake`). A
 worker gets the target in a `bundle` and runs pieces in a separate process (`child`), which its `host`
 supervises. Dask (extra `cluster`) is the transport: `dask_workers`, `dealing`, `calls`, `dask_side`. `where`
-names the cluster.
+parses the user's choice of a cluster.
 """

@@ -1,8 +1,8 @@
-"""Decide which worker runs which piece of work next. Uses no network and starts nothing.
+"""Decide which worker runs which piece of work next. The board uses no network and starts no process.
 
-Pieces are cut on demand, sized by measured times, so that all workers finish at about the same time. If
-possible, a worker gets work with the golden run that it already has. Near the end, idle workers repeat late
-pieces.
+Pieces are cut on demand. Their sizes depend on measured times, so that all workers finish at about the same
+time. If possible, a worker gets experiments whose golden run it already has. Near the end, idle workers
+repeat late pieces.
 """
 
 import time
@@ -22,10 +22,10 @@ LEAST_S, MOST_S = 0.5, 8.0  # shortest and longest intended duration of a piece
 _SHARE = 4  # a piece is the remaining work divided by the number of workers and by this
 _FIRST = 4  # runs in a piece before the first measurement
 _GUESS_S = 0.5  # duration of a run before the first measurement
-_LATE = 3.0  # a piece that takes this many times as long as expected is repeated elsewhere
-_LATE_S = 5.0  # and not before this many seconds
-_DEATHS = 2  # workers that a piece may kill before it is split
-_PROOF_S = 20.0  # idle time before a worker may check its own runs; longer if runs are long
+_LATE = 3.0  # a piece that takes this many times as long as expected is repeated by another worker
+_LATE_S = 5.0  # but only after this many seconds
+_DEATHS = 2  # a piece that has killed this many workers is split
+_PROOF_S = 20.0  # a worker idle for this long (or longer, if runs are slow) proves its own runs
 
 
 @dataclass
@@ -49,7 +49,7 @@ class _Out:
 
 
 class Board:
-    """Distributes the pending work of a run folder. `now` is a clock, in seconds."""
+    """Distributes the pending work of a run folder. `now` returns the time in seconds."""
 
     def __init__(
         self,
@@ -94,8 +94,8 @@ class Board:
     def take(self, worker: str, *, ahead: bool = False) -> Piece | None:
         """Return the next piece for a worker, or None.
 
-        With `ahead`, the piece waits at the worker while another one runs there. Near the end no piece is
-        given ahead.
+        With `ahead`, the piece waits at the worker while another one runs there; None near the end of the
+        work.
         """
         if ahead and self._waiting * self._mean_s(Kind.RUN) < 2 * self._at_once * LEAST_S:
             return None
@@ -124,7 +124,7 @@ class Board:
         return True
 
     def give_back(self, piece: Piece, worker: str) -> None:
-        """Put back an unfinished piece that is not the cause of the problem."""
+        """Put back a piece that a worker could not finish, for a reason other than the piece."""
         if (out := self._out.get(piece.number)) is None:
             return
         if not out.goes_on_without(worker):
@@ -134,8 +134,8 @@ class Board:
     def died(self, piece: Piece, worker: str, at: str = "") -> Piece | None:
         """Note that a worker or its process died during a piece, perhaps in the experiment `at`.
 
-        The piece goes to another worker, if there is one. After two deaths it is split or, if it has only one
-        experiment, returned, and the caller gives it up.
+        The piece is put back for other workers, with `at` in a piece of its own. After two deaths, a piece is
+        split; if it has only one experiment, it is returned, and the caller must give it up.
         """
         if (out := self._out.get(piece.number)) is None:
             return None
@@ -191,7 +191,7 @@ class Board:
         return max(1, round(min(MOST_S, max(LEAST_S, share_s)) / mean_s)) if mean_s else _FIRST
 
     def _group_for(self, worker: str) -> Group | None:
-        """Return the worker's group or, without work there, the one with the most work per worker."""
+        """Return the worker's group or, if that has no work, the group with the most work per worker."""
         own = self._groups.get(self._at.get(worker, ""))
         if own is not None and self._has_for(own, worker):
             return own
@@ -207,9 +207,9 @@ class Board:
         return worker not in piece.died_at or self._slots.keys() <= set(piece.died_at)
 
     def _proof_for(self, worker: str) -> Piece | None:
-        """Return an experiment of the proof that another worker or an earlier session ran.
+        """Return a piece of the proof with an experiment that another worker or an earlier session ran.
 
-        A worker gets its own only if it is alone, or after a long idle time.
+        A worker proves its own experiments only if it is the only worker, or after a long idle time.
         """
         running = {name for out in self._out.values() for name in out.piece.lines if name in self._sampled}
         idle_s = self._now() - self._idle_since.get(worker, self._now())

@@ -1,12 +1,12 @@
-"""The bundle: everything that a worker needs of a campaign except its plan. Its digest is its name.
+"""The bundle: everything that a worker needs of a campaign, except the plan.
 
 * meta.json: engine, limits, digests of the golden runs, version of mutator
 * manifest/NAME: the target's manifest
-* target/, overlay/: its tree, and files in its root that runs read (`{root}/...` in their arguments)
+* target/, overlay/: the target's tree, and files in its root that the arguments of a run name (`{root}/...`)
 * templates/: the fault models
 * scenarios/: the scenario files of the golden runs
 
-Each machine makes the golden runs itself. Their digests show whether it computes the same results.
+Each machine makes the golden runs itself; their digests show whether its results are the same.
 """
 
 import json
@@ -109,7 +109,7 @@ class Site:
 
     @cached_property
     def manifest(self) -> TargetManifest:
-        """The target, with its root in the bundle."""
+        """The target's manifest, with the root in the unpacked bundle."""
         path = self.place / "manifest" / self.meta["manifest"]
         overlay = self.place / "overlay"
         found = load_manifest(path, self.place / "target", overlay if overlay.is_dir() else None)

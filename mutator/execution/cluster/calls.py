@@ -57,7 +57,7 @@ async def answer(future: "Future[_T]") -> _T:
         await asyncio.Event().wait()  # the worker is gone; other code notices that
         raise
     except FutureCancelledError:
-        raise Cut("the scheduler dropped its work") from None
+        raise Cut("the scheduler dropped the worker's tasks") from None
     except MutatorError as err:
         raise Refused(str(err)) from None
     except Exception as err:

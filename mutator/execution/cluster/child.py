@@ -1,7 +1,7 @@
 """The process on a worker that runs pieces of work: `python -m mutator.execution.cluster.child FD SITE NAME`.
 
 It receives pieces from its host over the connection FD, and sends the id of each finished experiment, then
-the result of the piece. Because it is separate from the host, no run can kill the worker.
+the result of the piece. Because the process is separate from the host, no run can kill the worker.
 """
 
 import os
@@ -44,7 +44,7 @@ class Unlike(Exception):
 
 
 class PieceRunner:
-    """Runs pieces on the site of a bundle, and packs the results."""
+    """Runs pieces in an unpacked bundle, and packs the results."""
 
     def __init__(self, site: Site, name: str, parent: int) -> None:
         self._site, self._name, self._parent = site, name, parent
@@ -59,9 +59,9 @@ class PieceRunner:
         self._runners: dict[Kind, Runner] = {}
 
     def run(self, piece: Piece, tell: Callable[[str], None]) -> Result:
-        """Run a piece. Calls `tell` with each finished experiment.
+        """Run a piece. Calls `tell` with the id of each finished experiment.
 
-        Raises Unlike if a golden run differs here.
+        Raises Unlike if a golden run made here differs from the campaign's.
         """
         began = time.monotonic()
         experiments = piece.experiments()
@@ -110,7 +110,7 @@ class PieceRunner:
         return self._runners[kind]
 
     def _have_golden(self, key: str) -> None:
-        """Make a golden run or copy it from the cache. Unlike if its bytes differ from the campaign's."""
+        """Make a golden run or copy it from the cache. Raises Unlike if it differs from the campaign's."""
         golden, known = self._site.goldens[key]
         place = self._goldens / key
         self._goldens.mkdir(exist_ok=True)
@@ -183,7 +183,7 @@ def _serve(connection: Connection, runner: PieceRunner) -> None:
 
 
 def _refuse(connection: Connection, err: Exception) -> None:
-    """Answer the first piece with the reason why nothing can run here."""
+    """Answer the first piece with the reason why this process can run nothing."""
     with suppress(EOFError):
         piece = Piece.of(connection.recv_bytes())
         text = str(err if isinstance(err, MutatorError) else shortage(err) or repr(err))

@@ -39,7 +39,7 @@ _CLASSES = {
     "lsf": ("dask_jobqueue", "LSFCluster"),
     KUBERNETES: ("dask_kubernetes.operator", "KubeCluster"),
 }
-# Options that a file may not set: those set by this module, and those that name Python objects.
+# Options that a file must not set: those set by this module, and those that name Python objects.
 RESERVED = (
     "asynchronous",
     "config_name",
@@ -60,11 +60,11 @@ class ClusterModel(StrictModel, title="A cluster file"):
         description="The queueing system that starts the workers as jobs, or Kubernetes with Dask's operator."
     )
     workers: Annotated[int, Field(ge=1, le=100_000)] = Field(
-        description="Number of worker processes of one thread each. The run begins when the first is ready."
+        description="Number of single-threaded worker processes. The run starts when the first one is ready."
     )
     options: dict[str, Any] = Field(
         default={},
-        description="Keyword options of the class that starts them: `SLURMCluster`, `PBSCluster`, "
+        description="Keyword arguments of the class that starts the workers: `SLURMCluster`, `PBSCluster`, "
         "`SGECluster` or `LSFCluster` of dask-jobqueue, `KubeCluster` of dask-kubernetes.",
     )
 
@@ -106,7 +106,7 @@ class ClusterFile:
                 _delete_keys(cluster)
 
     async def _started(self, cluster: Any, insecure: bool, problems: list[Exception]) -> None:
-        """Wait for the scheduler and the jobs. Errors of jobs that the system refuses go to `problems`."""
+        """Start the scheduler and submit the jobs. `problems` collects the errors of failed submissions."""
         with self._blamed():
             await cluster
         if not insecure and not is_closed(cluster.scheduler_address):
@@ -121,7 +121,7 @@ class ClusterFile:
             cluster.adapt(minimum=workers, maximum=workers, interval=_RENEWED_EVERY)
 
     def _check_closed(self) -> None:
-        """Raise MutatorError if others could reach the scheduler, as far as known before the start."""
+        """Raise MutatorError if the options show that others could reach the scheduler."""
         options = self.model.options
         scheduler = options.get("scheduler_options")
         scheduler = scheduler if isinstance(scheduler, Mapping) else {}
@@ -153,8 +153,8 @@ class ClusterFile:
             raise self._error(
                 ("options", "processes"),
                 f"{processes} processes on {self.model.options.get('cores')} cores",
-                expected="a process for each core: a worker has one thread",
-                remedy="leave `processes` out",
+                expected="one process per core, because a worker has one thread",
+                remedy="remove `processes`",
             )
 
     def _options(self) -> dict[str, Any]:
@@ -175,7 +175,7 @@ class ClusterFile:
 
     @contextmanager
     def _blamed(self) -> Iterator[None]:
-        """Turn complaints of the class about options, and of the queueing system about a job, into errors."""
+        """Turn the class's errors about options, and the queueing system's about jobs, into MutatorError."""
         try:
             yield
         except FileNotFoundError as error:
@@ -183,9 +183,9 @@ class ClusterFile:
                 ("kind",), str(error), remedy="submit from a machine that has this command"
             ) from None
         except (ImportError, TypeError, ValueError, RuntimeError, OSError) as error:
-            remedy = f"correct the options: see the documentation of {_CLASSES[self.model.kind][1]}"
+            remedy = f"correct the options (see the documentation of {_CLASSES[self.model.kind][1]})"
             if self.model.kind == KUBERNETES:
-                remedy += ", and see that kubectl works here"
+                remedy += ", and check that kubectl works here"
             raise self._error(("options",), " ".join(str(error).split()), remedy=remedy) from None
 
     def _error(self, keys: tuple[str, ...], got: str, **more: str) -> MutatorError:
@@ -198,7 +198,7 @@ def load_cluster(path: Path) -> ClusterFile:
 
 
 def _noting(job_class: Any, problems: list[Exception]) -> type:
-    """Make a class of jobs that keeps the errors of failed submissions, which Dask only logs."""
+    """Make a job class that adds errors of failed submissions to `problems`; Dask only logs them."""
 
     from distributed import Status
 

@@ -21,8 +21,8 @@ _ADDRESS = re.compile(
     r"(?P<protocol>tcp|tls)://(?P<host>\[[0-9a-fA-F:.]+\]|[^\s:/@\[\]]+):(?P<port>\d{1,5})/?"
 )
 _TO_CLOSE = (
-    "anyone who reaches a Dask scheduler can run code on its workers: use tls:// "
-    "(see docs/how-to/run-on-many-machines.md), or allow it with `insecure_network` if nobody else is on "
+    "anyone who can reach a Dask scheduler can run code on its workers: use tls:// "
+    "(see docs/how-to/run-on-many-machines.md), or give `insecure_network` if nobody else is on "
     "the network"
 )
 
@@ -44,7 +44,7 @@ def checked_address(address: str, *, where: Path | None = None) -> str:
 
 
 def is_closed(address: str) -> bool:
-    """Return whether nobody else can read the traffic or join, because it uses TLS or stays on this machine.
+    """Return whether others cannot connect or read the traffic: it uses TLS or stays on this machine.
 
     Host names except `localhost` are not looked up.
     """
@@ -77,9 +77,9 @@ def importing(extra: str) -> Iterator[None]:
         yield
     except ModuleNotFoundError as error:
         raise MutatorError(
-            f"no package {error.name}",
+            f"the package {error.name} is not installed",
             argument="cluster",
-            remedy=f"pip install '.[{extra}]' in a clone; of a wheel: pip install 'FILE.whl[{extra}]'",
+            remedy=f"pip install '.[{extra}]' in a clone, or pip install 'FILE.whl[{extra}]'",
         ) from None
 
 
@@ -88,7 +88,7 @@ def own_scheduler() -> Iterator[None]:
     """Apply Dask settings for a scheduler in this process.
 
     A frozen worker is noticed within a minute. Dask does not profile its threads, which saves CPU time. The
-    dashboard's link uses the only address on which it answers.
+    link to the dashboard uses the only address on which the dashboard answers.
     """
     import dask
 
@@ -107,7 +107,7 @@ def certificates() -> "Security":
     from distributed import Security
 
     remedy = (
-        "name the certificates in Dask's configuration, as DASK_DISTRIBUTED__COMM__TLS__CA_FILE, "
+        "name the certificates in Dask's configuration: DASK_DISTRIBUTED__COMM__TLS__CA_FILE, "
         "..__CLIENT__CERT and ..__CLIENT__KEY (docs/how-to/run-on-many-machines.md)"
     )
     try:
@@ -143,7 +143,7 @@ async def connected(to: "str | Cluster", *, where: Path | None = None) -> AsyncI
                 f"no Dask scheduler answers at {address}{await _reason(address, error)}",
                 where=where,
                 argument="cluster",
-                remedy="start it (`dask scheduler`), or check address, firewall and certificates",
+                remedy="start one (`dask scheduler`), or check address, firewall and certificates",
             ) from None
         yield client
     finally:

@@ -1,4 +1,4 @@
-"""The workers of a run: admitted ones, refused ones with reasons, and their speed."""
+"""The workers of a run: which are admitted, which are refused and why, and how fast they are."""
 
 import time
 from collections import deque
@@ -15,14 +15,14 @@ _RECENT = 20  # finished pieces used to measure a worker's rate
 
 @dataclass
 class _Member:
-    """An admitted worker: its machine, and when it finished how many experiments."""
+    """An admitted worker: its machine, and the time and number of experiments of its last pieces."""
 
     host: str
     finished: deque[tuple[float, int]] = field(default_factory=lambda: deque(maxlen=_RECENT))
 
 
 class Crew:
-    """All workers seen so far. `now` is a clock in seconds."""
+    """The workers of a run, present and refused. `now` returns the time in seconds."""
 
     def __init__(self, stretch: Stretch, *, accept: bool, now: Callable[[], float] = time.monotonic) -> None:
         self._stretch, self._accept, self._now = stretch, accept, now
@@ -44,9 +44,9 @@ class Crew:
         self.refused[name] = why
 
     def objection(self, facts: Mapping[str, Any]) -> str:
-        """Return why a worker may not take part; empty if it may.
+        """Return why a worker is refused; empty if it is admitted.
 
-        The reasons are those for which its machine could not resume the run.
+        For the same reasons, its machine could not resume the run.
         """
         if facts["mutator"] != VERSION:
             return f"mutator {facts['mutator']}, here {VERSION}"

@@ -1,7 +1,8 @@
 """Functions that the command submits to Dask workers by reference.
 
-For each run, a worker runs a task outside the thread pool (`attend`) that lasts as long as the run. When it
-ends, everything of the run on this worker ends. Each piece is a separate task.
+For each run, the task `attend` runs on every worker, outside the thread pool, for as long as the run lasts.
+When it ends, the run's processes on this worker are killed and its files deleted. Each piece is a separate
+task.
 """
 
 import platform
@@ -20,14 +21,14 @@ from mutator.campaigns import machine
 from mutator.errors import MutatorError
 from mutator.execution.cluster.host import Host, Wanted
 
-_PATIENCE_S = 60.0  # time for the run to be delivered before its first piece
+_PATIENCE_S = 60.0  # how long a piece waits for the bundle of its run
 
 _hosts: dict[str, Host] = {}  # by run
 _arrived = threading.Condition()
 
 
 def facts(packages: Iterable[str]) -> dict[str, Any]:
-    """Return what this worker computes with, including the versions of these packages."""
+    """Describe this worker's machine and software, including the versions of these packages."""
     return {
         "mutator": VERSION,
         "host": socket.gethostname(),
@@ -58,12 +59,12 @@ def attend(run: str) -> None:
         host.attend(wanted)
     finally:
         with _arrived:
-            if _hosts.get(run) is host:  # the run may have been delivered again meanwhile
+            if _hosts.get(run) is host:  # unless the run has been delivered again
                 del _hosts[run]
 
 
 def leave(run: str) -> None:
-    """Leave a run, and wait until everything of it on this worker is gone."""
+    """Leave a run, and wait until its processes and files on this worker are gone."""
     if (host := _hosts.get(run)) is not None:
         host.end()
 
@@ -79,7 +80,7 @@ def work(run: str, piece: bytes) -> bytes:
 
 
 def _wanted() -> Wanted:
-    """Make a function that tells whether this thread's task is still wanted and the worker is not closing."""
+    """Make a function that returns whether this thread's task is wanted and the worker is not closing."""
     worker: Worker = get_worker()
     key = worker.get_current_task()
 

@@ -1,4 +1,4 @@
-"""The distributor of `mutator run --cluster`: Dask in a separate thread."""
+"""The distributor of `mutator run --cluster`. It runs Dask in a separate thread."""
 
 import asyncio
 import queue
@@ -21,7 +21,7 @@ class ClusterWorkers:
         self._where, self._insecure = where, insecure
 
     def run(self, session: Session) -> None:
-        """Distribute the pending work in another thread, so that signals reach this one while it is idle."""
+        """Distribute the pending work in another thread, while this one waits and can receive signals."""
         remarks: queue.Queue[str] = queue.Queue()
         loop = asyncio.new_event_loop()
         deal = loop.create_task(self._deal(session, remarks.put))

@@ -27,12 +27,12 @@ from mutator.execution.session import Session
 from mutator.verification import equivalence
 
 _LOOK_S = 0.5  # between two checks of the present workers
-_ALONE_S = 60.0  # without any worker, before the command gives up
+_ALONE_S = 60.0  # without any worker, after which the command gives up
 _AHEAD = 2  # pieces per thread of a worker: one waits while the other runs
 _FAILURES = 3  # consecutive failures after which a worker gets no more work
 _PAUSE_S = 0.1  # before an idle worker asks again
 _PART_S = 5.0  # time for workers to drop the run
-_PATIENCE_S = 30.0  # with a silent scheduler
+_PATIENCE_S = 30.0  # time for the scheduler to answer
 
 
 class _Gone(Exception):
@@ -46,13 +46,13 @@ class _Tended:
     name: str
     address: str
     slots: int
-    lease: "Future[None] | None" = None  # the task that represents the worker's part in the run
+    lease: "Future[None] | None" = None  # the task `attend`
     task: "asyncio.Task[None] | None" = None
     has: dict[int, Piece] = field(default_factory=dict)
-    is_cut: bool = False  # to be admitted again
+    is_cut: bool = False  # the scheduler dropped its tasks, so it must be admitted again
     failures: int = 0  # since its last finished piece
-    ailment: str = ""  # reason of the last failure
-    facts: Mapping[str, Any] = field(default_factory=dict)  # until they are noted in run.json
+    ailment: str = ""  # reason for the last failure
+    facts: Mapping[str, Any] = field(default_factory=dict)  # empty once they are in run.json
 
 
 class Deal:
@@ -72,7 +72,7 @@ class Deal:
         self._crew = Crew(folder.stretches[-1], accept=session.accept_versions)
         self._run = f"mutator-{uuid.uuid4().hex}"
         self._tended: dict[str, _Tended] = {}
-        self._changed = asyncio.Event()  # idle workers may find work now
+        self._changed = asyncio.Event()  # set when idle workers might find work
         self._writing = asyncio.Lock()
         self._writes: set[asyncio.Task[None]] = set()
         self._forked = False
@@ -144,11 +144,11 @@ class Deal:
             self._tended[key] = one
         for one in self._tended.values():
             if one.task is not None and one.task.done():
-                one.task.result()  # raises the error that ended this worker's part
+                one.task.result()  # raises the error that ended the task
         self._check_left()
 
     async def _mourn(self, one: _Tended) -> None:
-        """Handle a lost worker. A piece that it was running may be the cause; a waiting piece cannot be."""
+        """Handle a lost worker. A piece that it was running might be the cause; a waiting piece cannot be."""
         assert one.task is not None
         one.task.cancel()
         await asyncio.gather(one.task, return_exceptions=True)
@@ -164,10 +164,10 @@ class Deal:
             self._alone_since = time.monotonic()
         elif len(self._tended) >= (self._queued or 1):
             reasons = "; ".join(dict.fromkeys(self._crew.refused.values()))
-            self._session.problem = f"no worker is left that may do the work: {reasons}"
+            self._session.problem = f"no worker is left to do the work: {reasons}"
         elif self._queued is None and time.monotonic() - self._alone_since > _ALONE_S:
             self._session.problem = (
-                f"no worker at {self._address} for {_ALONE_S:.0f} s; start some (`dask worker`), then run "
+                f"no worker at {self._address} for {_ALONE_S:.0f} s; start workers (`dask worker`), then run "
                 "the same command"
             )
 
@@ -205,7 +205,7 @@ class Deal:
             self._changed.set()
 
     async def _employ(self, one: _Tended, lease: "Future[None]") -> None:
-        """Give a worker pieces until it is cancelled, or its part in the run ends."""
+        """Give a worker pieces until this task is cancelled, or the worker leaves the run."""
 
         async def watch() -> None:
             await answer(lease)
@@ -279,7 +279,7 @@ class Deal:
 
 
 def _read(data: bytes, piece: Piece) -> Result:
-    """Return the result of a piece. Damaged data counts as a piece that could not run there."""
+    """Return the result of a piece; for damaged data, one with the ending UNFIT."""
     try:
         return Result.of(data)
     except MutatorError as err:

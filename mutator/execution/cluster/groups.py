@@ -20,7 +20,7 @@ Faults = Mapping[str, bytes]  # lines of the plan's faults by id
 
 @dataclass
 class Group:
-    """The remaining work with one golden run."""
+    """The remaining experiments that have the same golden run."""
 
     golden: str
     runs: Iterator[Run]
@@ -33,7 +33,7 @@ class Group:
 
 
 def groups_of(folder: RunFolder, pending: Sequence[Pending], faults: Faults) -> dict[str, Group]:
-    """Return the pending work by golden run. All experiments of a chunk have the same one."""
+    """Return the pending work by golden run. All experiments of a chunk have the same golden run."""
     chunks: dict[str, list[Pending]] = {}
     for one in pending:
         first = next(iter(plan_file.chunk_lines(folder.path, folder.head["chunks"][one.chunk])))
@@ -45,7 +45,7 @@ def groups_of(folder: RunFolder, pending: Sequence[Pending], faults: Faults) -> 
 
 
 def _runs_of(folder: RunFolder, pending: Sequence[Pending]) -> Iterator[Run]:
-    """Yield the rest of these chunks. Experiments that share a run come together."""
+    """Yield the remaining runs of these chunks, each with all its experiments."""
     for one in pending:
         lines = list(plan_file.chunk_lines(folder.path, folder.head["chunks"][one.chunk]))
         read = [(_read(lines[place]), lines[place]) for place in one.places]

@@ -35,7 +35,7 @@ Wanted = Callable[[], bool]
 
 
 class NotWanted(Exception):
-    """Nobody waits for this piece any longer."""
+    """The command no longer waits for this piece."""
 
 
 @dataclass
@@ -46,7 +46,7 @@ class _Child:
     connection: Connection
 
     def run(self, data: bytes, piece: Piece, patience_s: float, wanted: Wanted) -> Result:
-        """Run a piece. Raises NotWanted once nobody waits for it; the process is then unusable."""
+        """Run a piece. Raises NotWanted if it is no longer wanted; the process is then unusable."""
         finished: set[str] = set()
         try:
             result = self._answer(data, patience_s, wanted, finished)
@@ -59,7 +59,7 @@ class _Child:
         return replace(result, at=next((name for name in piece.ids if name not in finished), ""))
 
     def _answer(self, data: bytes, patience_s: float, wanted: Wanted, finished: set[str]) -> Result:
-        """Return the result of a piece; fill `finished`. TimeoutError after `patience_s` of silence."""
+        """Return the result of a piece; add finished ids to `finished`. TimeoutError after `patience_s`."""
         self.connection.send_bytes(data)
         since = time.monotonic()
         while time.monotonic() - since < patience_s:
@@ -102,7 +102,7 @@ class Host:
 
     @classmethod
     def lay_out(cls, data: bytes, place: str, name: str) -> "Host":
-        """Make a host for the bundle `data` in a new folder of `place`; MutatorError if it is damaged."""
+        """Make a host for the bundle `data` in a new folder of `place`; MutatorError for a damaged bundle."""
         with raising_disk_full(Path(place)):
             Path(place).mkdir(parents=True, exist_ok=True)
             folder = Path(tempfile.mkdtemp(prefix="mutator-", dir=place)).resolve()
@@ -139,7 +139,7 @@ class Host:
         self._gone.wait(_END_S)
 
     def run(self, data: bytes, wanted: Wanted) -> Result:
-        """Run a piece. NotWanted once nobody waits for it; MutatorError if it is damaged."""
+        """Run a piece. Raises NotWanted if it is no longer wanted, MutatorError if `data` is damaged."""
         piece = Piece.of(data)
         try:
             child = self._borrowed()
@@ -159,7 +159,7 @@ class Host:
                 child.end()
 
     def _borrowed(self) -> _Child:
-        """Return an idle process or a new one; NotWanted if the host has ended."""
+        """Return an idle process or a new one. Raises NotWanted if the host has ended."""
         with self._lock:
             if self._idle:
                 return self._idle.pop()

@@ -42,7 +42,7 @@ class Intake:
             raise MutatorError(
                 f"a worker sent {len(names)} records for a piece of {len(piece.lines)} experiments",
                 where=self._folder.path,
-                expected="one record of each",
+                expected="one record per experiment",
                 remedy="this is a defect of the harness; please report it",
             )
         if piece.kind is Kind.PROVE:

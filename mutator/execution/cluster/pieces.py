@@ -23,16 +23,16 @@ class Ending(StrEnum):
 
     DONE = "done"
     UNLIKE = "unlike"  # the worker's golden run differs from the campaign's
-    UNFIT = "unfit"  # the worker lacks room, memory, files, processes, or something that the target needs
+    UNFIT = "unfit"  # the worker lacks disk space, memory, files, processes, or a requirement of the target
     DIED = "died"  # the process that ran the piece ended
     FAILED = "failed"  # a defect of the harness
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Piece:
-    """Experiments for one worker, usually with the golden run `golden`.
+    """Experiments for one worker, usually compared with the golden run `golden`.
 
-    `lines` are plan lines by experiment id, in plan order. `faults` are the lines of their faults.
+    `lines` are plan lines by experiment id, in plan order. `faults` are the plan lines of their faults.
     Experiments that share a run stay in one piece.
     """
 
@@ -41,7 +41,7 @@ class Piece:
     golden: str
     lines: Mapping[str, bytes]
     faults: tuple[bytes, ...]
-    runs: int = 1  # runs in this piece; several experiments may share one
+    runs: int = 1  # several experiments can share a run
     died_at: tuple[str, ...] = ()  # workers that this piece killed
 
     @property
@@ -77,7 +77,7 @@ class Result:
     """The result of a piece. If it is not done, `text` says why, and `at` is the experiment that was running.
 
     `records` and `timings` are lines of the run folder's files without checksums. `patches` and `series` are
-    blocks of its files.
+    blocks of these files.
     """
 
     number: int
@@ -90,7 +90,7 @@ class Result:
     timings: tuple[bytes, ...] = ()
     patches: bytes = b""
     series: bytes = b""
-    series_of: tuple[str, ...] = field(default=())  # golden runs that `series` refer to
+    series_of: tuple[str, ...] = field(default=())  # golden runs to which `series` refers
 
     _HEAD = ("number", "ending", "text", "at", "seconds", "forked", "series_of")
 

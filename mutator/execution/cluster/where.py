@@ -1,4 +1,4 @@
-"""Parse `WHERE` of a run on a cluster, and open a Dask client for it.
+"""Parse `WHERE` of `--cluster WHERE`, and open a Dask client for it.
 
 `WHERE` is a scheduler's address, the file that a scheduler wrote, `local:N`, or a cluster file. `parse` does
 not import Dask.
@@ -35,7 +35,7 @@ class Where(Protocol):
     """A usable cluster. `open` returns an asynchronous Dask client and needs a running event loop.
 
     On exit, `open` ends what it started; an existing scheduler keeps running. Raises MutatorError if the
-    cluster does not exist or the extra is not installed, and, unless `insecure`, if others on the network can
+    cluster does not exist or its extra is not installed, and, unless `insecure`, if others on the network can
     reach the cluster.
     """
 
@@ -103,7 +103,7 @@ class Scheduler:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Local:
-    """Worker processes on this machine, of one thread each, with their own scheduler."""
+    """Single-threaded worker processes on this machine, with their own scheduler."""
 
     workers: int
 

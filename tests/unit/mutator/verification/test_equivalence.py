@@ -164,7 +164,11 @@ def test_without_forks_there_is_no_equivalence_check(threaded: Workspace, tmp_pa
 @pytest.mark.parametrize(
     ("engine", "note"),
     [
-        (None, "none is needed, as no experiment was forked: that pays off from 40 experiments on"),
+        (
+            None,
+            "none is needed, because no experiment was forked: "
+            "forking pays off only with 40 or more experiments",
+        ),
         ("reference", ""),
     ],
 )

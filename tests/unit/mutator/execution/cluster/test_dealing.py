@@ -202,7 +202,7 @@ def test_work_waits_for_a_queued_worker_after_a_refusal(session: Any) -> None:
 
 def test_without_a_queue_a_refused_worker_ends_the_command(session: Any) -> None:
     dealt(session, Workers(odd=sick(Ending.UNLIKE)))
-    assert session.problem == "no worker is left that may do the work: the reason"
+    assert session.problem == "no worker is left to do the work: the reason"
 
 
 def test_no_experiment_is_given_up_while_results_are_written(

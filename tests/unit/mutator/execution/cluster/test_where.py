@@ -126,7 +126,7 @@ def test_a_scheduler_that_listens_elsewhere_is_refused_over_the_loopback(
 def test_without_dask_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
     for text in ("local:1", "tcp://127.0.0.1:1"):
-        with pytest.raises(MutatorError, match=r"no package distributed; pip install '.\[cluster\]'"):
+        with pytest.raises(MutatorError, match=r"distributed is not installed; pip install '.\[cluster\]'"):
             run(opened(parse(text)))
 
 
