@@ -31,9 +31,9 @@ names the variable. Types of parameters:
 An integer variable stays an integer if the parameters are whole numbers.
 
 In the examples, the model adds the lines marked with `+`. `_fi` is
-[the probe](../explanation/concepts.md#proof-before-counting): `active` checks whether the trigger holds, and
-`like` converts a number to the variable's type. [Failure modes](../explanation/failure-modes.md) shows what
-each model represents in standards and in the literature.
+[the probe](../explanation/concepts.md#checks-before-and-after-a-run): `active` checks whether the trigger
+holds, and `like` converts a number to the variable's type. [Failure modes](../explanation/failure-modes.md)
+shows what each model represents in standards and in the literature.
 """
 
 _DOES = {

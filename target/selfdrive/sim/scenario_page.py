@@ -17,12 +17,12 @@ TEXT = f"""\
 
 <!-- Written by `python -m selfdrive.sim.scenario_page`; do not edit by hand. -->
 
-What host, lead, driver and road do, in a file of `fault_library/scenarios/`. Scenarios belong to the target,
-which alone reads them; this is what the target that ships with the harness understands.
+A scenario file in `fault_library/scenarios/` describes the controlled car (the host), the lead, the driver
+and the road. Only the target reads scenarios; this page lists the keys that the shipped target accepts.
 [Add a scenario](../how-to/add-a-scenario.md) has an example, and
 [an editor can check the files](../how-to/edit-with-completion.md).
 
-Numbers carry their unit in their key, and times are multiples of {DT_CTRL:g} s. An unknown key is an error
+The key of a number ends in its unit. Times are multiples of {DT_CTRL:g} s. An unknown key is an error
 with file and line.
 """
 
@@ -121,10 +121,12 @@ def page() -> str:
     for name, (meanings, types, needed) in SECTIONS.items():
         lines += [f"## {'The file' if name == 'scenario' else name.capitalize()}\n"]
         if name in ONE_SPEED:
-            lines += ["One of the speeds is given.\n"]
+            lines += ["Give exactly one of the speeds.\n"]
         lines += ["| key | type | | meaning |", "|---|---|---|---|"]
         for key, meaning in meanings.items():
-            lines += [f"| `{key}` | {_words(types[key])} | {'needed' if key in needed else ''} | {meaning} |"]
+            lines += [
+                f"| `{key}` | {_words(types[key])} | {'required' if key in needed else ''} | {meaning} |"
+            ]
         lines += [""]
     return "\n".join(lines).rstrip() + "\n"
 
