@@ -15,8 +15,8 @@ from selfdrive.controls.lib.events import (
 )
 
 
-def test_startup_is_covered_by_the_beep_and_comes_back() -> None:
-    """As measured, the start-up text shows for 15 s, except during the 0.2 s of engaging at 1.31."""
+def test_the_engage_alert_interrupts_the_startup_text() -> None:
+    """As on openpilot, the start-up text is shown for 15 s, except for 0.2 s after engaging at 1.31 s."""
     alerts = AlertManager()
     alerts.add("startup", 0.12)
     shown = {}
@@ -30,7 +30,7 @@ def test_startup_is_covered_by_the_beep_and_comes_back() -> None:
     assert shown[1511] and not shown[1513]
 
 
-def test_higher_priority_is_shown_and_all_are_listed() -> None:
+def test_the_highest_priority_is_shown_and_all_alerts_are_listed() -> None:
     alerts = AlertManager()
     alerts.add("steer_saturated", 1.0)
     alerts.add("fcw", 1.0)
@@ -41,7 +41,7 @@ def test_higher_priority_is_shown_and_all_are_listed() -> None:
     assert alerts.active == ("steer_saturated",)
 
 
-def test_the_newer_of_equals_is_shown() -> None:
+def test_the_newer_of_two_alerts_with_equal_priority_is_shown() -> None:
     alerts = AlertManager()
     alerts.add("can_error_no_entry", 1.0)
     alerts.add("steer_saturated", 1.5)
@@ -65,8 +65,7 @@ def test_sound_picture_and_text_end_one_after_the_other() -> None:
     assert (alerts.active, alerts.text1) == ((), "")
 
 
-def test_raising_again_prolongs() -> None:
-    """An alert raised every cycle lasts its duration from the last time."""
+def test_an_alert_raised_again_lasts_its_full_duration() -> None:
     alerts = AlertManager()
     for k in range(100):
         alerts.add("steer_saturated", k * 0.01)
@@ -99,7 +98,7 @@ SUFFIX = {
 
 
 @pytest.mark.parametrize("event", EVENTS, ids=lambda event: event.name)
-def test_every_event_has_its_alerts(event: Event) -> None:
+def test_every_event_has_an_alert_for_each_of_its_kinds(event: Event) -> None:
     asked = {event.name + SUFFIX[kind] for kind in event.kinds if kind in SUFFIX}
     assert asked <= set(ALERTS)
 

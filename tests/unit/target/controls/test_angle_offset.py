@@ -14,18 +14,18 @@ def learn(
     return offset.value / DEG_TO_RAD
 
 
-def test_one_degree_in_two_minutes() -> None:
-    """At 30 m/s and half a metre off, the filter learns one degree in about two minutes."""
+def test_about_one_degree_is_learnt_in_two_minutes() -> None:
+    """The car drives at 30 m/s, half a metre off the middle of the lane."""
     assert learn(120.0) == pytest.approx(0.967, abs=0.01)
     assert learn(120.0, center=-0.5) == pytest.approx(-0.967, abs=0.01)
 
 
-def test_learns_less_without_lines_at_low_speed_and_in_turns() -> None:
-    """Nothing is learnt without lane lines or below 1 m/s, and less with the wheel turned."""
+def test_less_is_learnt_without_lines_at_low_speed_and_in_turns() -> None:
+    """Nothing is learnt without lane lines or at 1 m/s, and less while the wheel is turned."""
     assert learn(60.0, prob=0.0) == 0.0
     assert learn(60.0, v_ego=1.0) == 0.0
     assert learn(60.0, angle=5.0 * DEG_TO_RAD) == pytest.approx(learn(60.0) / 4.0)
 
 
-def test_at_most_five_degrees() -> None:
+def test_at_most_five_degrees_are_learnt() -> None:
     assert learn(3600.0) == pytest.approx(5.0)

@@ -1,4 +1,4 @@
-"""The control loop with a car made of messages."""
+"""The control loop with a fake car."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -104,25 +104,23 @@ def test_engaging_sets_the_speed_and_takes_over(drive: Drive) -> None:
     assert drive.state.alerts[0] == "enable"
 
 
-def test_not_engaged_nothing_is_asked_of_the_car(drive: Drive) -> None:
-    """While not engaged, all actuators are zero and the set speed is the "none" value."""
+def test_a_disengaged_car_gets_zero_commands(drive: Drive) -> None:
+    """The set speed is 255 km/h, which means that none is set."""
     actuators = drive.asked.actuators
     assert (actuators.gas, actuators.brake, actuators.steer) == (0.0, 0.0, 0.0)
     assert not drive.asked.enabled and drive.asked.cancel_cruise
     assert drive.state.v_cruise == pytest.approx(255 * KPH_TO_MS)
 
 
-def test_control_reaches_the_car(drive: Drive) -> None:
-    """Engaged, a steering angle error gives torque and a speed below the set one gives gas."""
+def test_engaged_control_commands_torque_and_gas(drive: Drive) -> None:
+    """An error of the steering angle causes torque, and a speed below the set speed causes gas."""
     drive.engage().run(30, v_ego=19.0)
     assert drive.asked.actuators.steer == 1.0
     assert drive.asked.actuators.gas > 0.05
 
 
-def test_a_fault_takes_everything_away_in_its_cycle(drive: Drive) -> None:
-    """An immediate fault sets the actuators to zero in the same cycle and keeps them there; the reason is
-    shown.
-    """
+def test_an_immediate_fault_zeroes_the_actuators_in_the_same_cycle(drive: Drive) -> None:
+    """The alert shows the reason, and the car stays disengaged."""
     drive.engage().run(30, v_ego=19.0).run(1, CAN, v_ego=19.0)
     actuators = drive.asked.actuators
     assert (actuators.gas, actuators.brake, actuators.steer) == (0.0, 0.0, 0.0)
@@ -132,8 +130,7 @@ def test_a_fault_takes_everything_away_in_its_cycle(drive: Drive) -> None:
     assert not drive.state.enabled
 
 
-def test_pre_enabled_waits_for_the_pedal(drive: Drive) -> None:
-    """Engaged with the foot on the gas, nothing is controlled until the pedal is released."""
+def test_control_waits_until_the_gas_pedal_is_released(drive: Drive) -> None:
     drive.run(1, ENGAGE, GAS, buttons=RELEASE)
     assert (drive.state.state, drive.state.active, drive.state.long_state) == ("pre_enabled", False, "off")
     drive.run(1)
@@ -148,7 +145,7 @@ def test_buttons_change_the_set_speed_once_engaged(drive: Drive) -> None:
 
 
 def test_lost_messages_disengage(drive: Drive) -> None:
-    """Without new model and radar messages control ends after 0.5 s, with both alerts."""
+    """Without new model and radar messages, control ends after 0.5 s, with both alerts."""
     drive.engage()
     for _ in range(60):
         drive.frame += 1
@@ -159,32 +156,31 @@ def test_lost_messages_disengage(drive: Drive) -> None:
     assert drive.frame * 0.01 == pytest.approx(drive.model.t + 0.51)
 
 
-def test_foot_brake_with_nothing_to_stop_for_disengages(drive: Drive) -> None:
-    """Braking by foot while the plan would accelerate ends control."""
+def test_braking_while_the_plan_accelerates_disengages(drive: Drive) -> None:
     drive.engage().run(1, brake_pressed=True)
     assert not drive.state.enabled and drive.state.alerts[0] == "no_target"
 
 
-def test_steer_saturation_is_told_and_control_goes_on(drive: Drive) -> None:
-    """An unreachable steering angle raises an alert after 0.8 s and changes nothing else."""
+def test_steer_saturation_raises_an_alert_and_control_continues(drive: Drive) -> None:
+    """The alert is raised after the desired angle has been unreachable for 0.8 s."""
     drive.engage().run(78)
     assert "steer_saturated" not in drive.state.alerts
     drive.run(5)
     assert drive.state.alerts[0] == "steer_saturated" and drive.state.enabled and drive.state.steer_saturated
 
 
-def test_a_car_may_do_without_the_steering_alert(params: CarParams) -> None:
+def test_car_parameters_can_switch_off_the_saturation_alert(params: CarParams) -> None:
     drive = Drive(replace(params, steer_limit_alert=False)).engage().run(100)
     assert drive.state.steer_saturated and "steer_saturated" not in drive.state.alerts
 
 
-def test_buttons_without_engaging_set_no_speed(drive: Drive) -> None:
+def test_buttons_do_not_set_a_speed_while_disengaged(drive: Drive) -> None:
     drive.run(1, buttons=(ButtonEvent("decel", False),))
     assert drive.state.v_cruise == pytest.approx(255 * KPH_TO_MS)
 
 
-def test_without_a_driver_the_car_slows_down(drive: Drive) -> None:
-    """When the driver has been inactive for too long, the plan slows the car by 0.2 m/s^2."""
+def test_the_car_slows_down_if_the_driver_is_inactive(drive: Drive) -> None:
+    """The plan decelerates at 0.2 m/s^2."""
     drive.engage()
     drive.controlsd._awareness.status = -0.01
     drive.run(300)
@@ -192,7 +188,7 @@ def test_without_a_driver_the_car_slows_down(drive: Drive) -> None:
     assert drive.state.alerts[0] == "driver_distracted"
 
 
-def test_warnings_and_permanent_alerts(drive: Drive) -> None:
+def test_warnings_need_engagement_and_permanent_alerts_do_not(drive: Drive) -> None:
     drive.run(1, BUSY)
     assert "steer_temp_unavailable" not in drive.state.alerts
     drive.run(1, BROKEN)
@@ -201,15 +197,15 @@ def test_warnings_and_permanent_alerts(drive: Drive) -> None:
     assert "steer_temp_unavailable" in drive.state.alerts
 
 
-def test_collision_warning_works_disengaged(drive: Drive) -> None:
+def test_the_collision_warning_works_while_disengaged(drive: Drive) -> None:
     drive.controlsd._planner._fcw_checker = SimpleNamespace(update=lambda *_: True, reset=lambda: None)
     drive.run(5)
     assert drive.state.alerts[0] == "fcw" and not drive.state.enabled
     assert (drive.asked.visual_alert, drive.asked.audible_alert) == ("fcw", "chime_repeated")
 
 
-def test_driver_actions_keep_the_car_awake(drive: Drive) -> None:
-    """The timer without the driver runs while engaged and restarts with wheel or buttons."""
+def test_driver_actions_restart_the_inactivity_timer(drive: Drive) -> None:
+    """Steering, pressing a button and disengaging restart the timer."""
     drive.engage().run(100)
     awareness = drive.controlsd._awareness
     assert awareness.status < 1.0
@@ -221,16 +217,15 @@ def test_driver_actions_keep_the_car_awake(drive: Drive) -> None:
     assert awareness.status == 1.0 and not drive.state.enabled
 
 
-def test_the_driver_is_shown_whether_there_is_a_lead(drive: Drive) -> None:
-    """The car shows a lead while the first plan is for one."""
+def test_the_dashboard_shows_a_lead_while_the_plan_follows_one(drive: Drive) -> None:
     drive.engage()
     assert not drive.asked.lead_visible
     drive.controlsd._planner.mpc1.prev_lead_status = True
     assert drive.run(1).asked.lead_visible
 
 
-def test_angle_offset_is_learnt_while_in_control(drive: Drive) -> None:
-    """An offset from the middle of the lane is learnt every fifth cycle, but not while the driver steers."""
+def test_the_angle_offset_is_learnt_while_engaged(drive: Drive) -> None:
+    """The offset is updated every fifth cycle, but not while the driver steers."""
     offset = drive.controlsd._angle_offset
     drive.run(20)
     assert offset.value == 0.0
@@ -243,7 +238,7 @@ def test_angle_offset_is_learnt_while_in_control(drive: Drive) -> None:
     assert offset.value == pytest.approx(3 * once, rel=1e-3)
 
 
-def test_the_learnt_offset_is_steered_with(drive: Drive) -> None:
+def test_the_lateral_mpc_gets_the_learnt_angle_offset(drive: Drive) -> None:
     told = []
     drive.controlsd._lateral.mpc.update = lambda *arguments: told.append(arguments[3]) or 0.1
     drive.controlsd._angle_offset.value = 0.02
@@ -256,8 +251,7 @@ def test_frames_are_counted_and_passed_on(drive: Drive) -> None:
     assert drive.sent == [4]
 
 
-def test_startup_is_told(drive: Drive) -> None:
-    """The start-up text shows for the first 15 s."""
+def test_the_startup_text_is_shown_for_15_s(drive: Drive) -> None:
     assert drive.state.alerts == ("startup",) and drive.state.alert_text1 != ""
     drive.run(1490)
     assert drive.state.alerts == ("startup",)

@@ -18,20 +18,22 @@ from selfdrive.messages import LeadData
         (40.0, True, -0.3, 0.3),
     ],
 )
-def test_limits_over_speed(v_ego: float, following: bool, a_min: float, a_max: float) -> None:
-    """The acceleration limits follow the tables, and the jerk limits equal them."""
+def test_acceleration_limits_depend_on_speed(
+    v_ego: float, following: bool, a_min: float, a_max: float
+) -> None:
+    """The jerk limits have the same values."""
     limits = cruise_limits(v_ego, following, 0.0, slow_down=False)
     assert limits == pytest.approx((a_min, a_max, a_min, a_max))
 
 
-def test_jerk_is_never_limited_to_less_than_a_tenth(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_jerk_limit_is_at_least_a_tenth(monkeypatch: pytest.MonkeyPatch) -> None:
     """The jerk limit is at least 0.1 m/s^3, even if the tables allow hardly any acceleration."""
     monkeypatch.setattr(cruise_plan, "A_MIN", (-0.01,) * 5)
     monkeypatch.setattr(cruise_plan, "A_MAX", (0.01,) * 5)
     assert cruise_limits(20.0, False, 0.0, slow_down=False) == (-0.01, 0.01, -0.1, 0.1)
 
 
-def test_turns_leave_less_to_speed_up() -> None:
+def test_turns_lower_the_acceleration_limit() -> None:
     """At 20 m/s, lateral and longitudinal acceleration share 1.9 m/s^2. The jerk limits do not change."""
     limits = cruise_limits(20.0, False, 1.88, slow_down=False)
     assert limits.a_max == pytest.approx((1.9**2 - 1.88**2) ** 0.5)
@@ -40,7 +42,7 @@ def test_turns_leave_less_to_speed_up() -> None:
 
 
 def test_absent_driver_slows_the_car() -> None:
-    """Without a driver, acceleration is limited to -0.2 m/s^2."""
+    """If the driver is absent, acceleration is limited to -0.2 m/s^2."""
     assert cruise_limits(20.0, True, 0.0, slow_down=True)[:2] == (-0.5, -0.2)
 
 
@@ -57,6 +59,6 @@ LEAD = {"status": True, "d_rel": 40.0, "v_lead_k": 21.0, "a_lead_k": 0.1}
         ({"a_lead_k": 0.0}, False),
     ],
 )
-def test_following(change: dict, expected: bool) -> None:
+def test_following_needs_a_near_faster_and_accelerating_lead(change: dict, expected: bool) -> None:
     """The car follows if the lead is nearer than 45 m, faster than the car and accelerating."""
     assert is_following(20.0, LeadData(**(LEAD | change))) is expected

@@ -19,17 +19,17 @@ def warnings(
 
 
 def test_time_to_collision() -> None:
-    """Time to collision is the gap over the closing speed, and less if the lead brakes.
+    """Time to collision is the gap divided by the closing speed, and less if the lead brakes.
 
-    It is at most 5 s, also for a gap that opens.
+    It is limited to 5 s, which is also its value for an opening gap.
     """
     assert time_to_collision(20.0, 0.0, LEAD) == pytest.approx(2.0)
     assert time_to_collision(20.0, 0.0, replace(LEAD, a_lead_k=-2.0)) == pytest.approx(1.7082, abs=1e-3)
     assert time_to_collision(5.0, 0.0, LEAD) == 5.0
 
 
-def test_braking_of_a_slow_lead_counts_little() -> None:
-    """A lead is assumed to need at least 2 s to stop, so at 1 m/s its braking counts as at most 0.5 m/s^2."""
+def test_the_assumed_braking_of_a_slow_lead_is_limited() -> None:
+    """A lead is assumed to need at least 2 s to stop, so at 1 m/s it brakes at no more than 0.5 m/s^2."""
     slow = replace(LEAD, v_lead=1.0)
     assert time_to_collision(10.0, 0.0, replace(slow, a_lead_k=-9.0)) == pytest.approx(
         time_to_collision(10.0, 0.0, replace(slow, a_lead_k=-0.5))
@@ -40,7 +40,7 @@ def test_warns_when_all_counters_are_full() -> None:
     assert warnings() == [pytest.approx(3.0)]
 
 
-# A situation with exactly one condition missing, and the smallest change that satisfies it.
+# Situations that each violate exactly one condition, with the smallest change that satisfies it.
 BARELY = [
     ({"v_ego": 5.0}, {"v_lead": 3.0, "d_rel": 4.0}, {"v_ego": 5.01}, {}),
     ({"v_ego": 18.0}, {}, {"v_ego": 18.01}, {}),  # 2.5 s to collision
@@ -81,28 +81,30 @@ def test_a_condition_must_have_held_for_ten_cycles(
     [
         ((-2.0,) * 21, 0.0, 0),  # the threshold at 10 m/s is -2.67
         ((-2.7,) * 21, 0.0, 1),
-        ((-2.7,) * 21, -0.5, 0),  # the car's current braking does not count
+        ((-2.7,) * 21, -0.5, 0),  # the car's current braking is subtracted
         ((0.0,) * 8 + (-2.7,) * 13, 0.0, 1),  # at 2.8 s
         ((0.0,) * 9 + (-2.9,) * 12, 0.0, 0),  # late
         ((0.0,) * 9 + (-3.1,) * 12, 0.0, 1),  # late but hard
     ],
 )
-def test_planned_braking(a_plan: tuple[float, ...], a_ego: float, expected: int) -> None:
-    """The plan must brake at more than 3 m/s^2, or much harder within 2.8 s than the car does now."""
+def test_a_warning_needs_a_plan_that_brakes_hard(
+    a_plan: tuple[float, ...], a_ego: float, expected: int
+) -> None:
+    """The plan must brake at more than 3 m/s^2 or, within 2.8 s, much harder than the car does now."""
     assert len(warnings(replace(CAR, a_ego=a_ego), a_plan=a_plan)) == expected
 
 
-def test_a_lead_must_have_been_seen_for_31_cycles() -> None:
+def test_a_lead_must_be_detected_for_31_cycles() -> None:
     checker = FcwChecker()
     checker._no_blinker = 10.0
     warned = [checker.update(k * 0.05, CAR, LEAD, BRAKING) for k in range(31)]
     assert warned == [False] * 30 + [True]
 
 
-def test_a_lead_may_have_moved_before_the_camera_saw_it() -> None:
-    """The lead's highest speed counts from the radar's first detection.
+def test_a_lead_that_stopped_before_the_camera_saw_it_causes_a_warning() -> None:
+    """The highest speed of the lead is kept from the radar's first detection.
 
-    The other counters wait for the camera.
+    The other counters start when the camera sees the lead.
     """
     checker = FcwChecker()
     checker.update(0.0, CAR, replace(LEAD, v_lead=9.0, fcw=False), BRAKING)
@@ -110,12 +112,12 @@ def test_a_lead_may_have_moved_before_the_camera_saw_it() -> None:
     assert [k for k in range(80) if checker.update(k * 0.05, CAR, standing, BRAKING)] == [60]
 
 
-def test_five_seconds_between_warnings() -> None:
+def test_warnings_are_at_least_five_seconds_apart() -> None:
     times = warnings(cycles=300)
     assert len(times) == 3 and times[1] - times[0] == pytest.approx(5.05)
 
 
-def test_a_new_lead_counts_anew() -> None:
+def test_a_new_lead_restarts_the_counters() -> None:
     checker = FcwChecker()
     for k in range(59):
         assert not checker.update(k * 0.05, CAR, LEAD, BRAKING)

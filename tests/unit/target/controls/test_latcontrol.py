@@ -22,7 +22,7 @@ class FixedMpc:
 
 
 def control(params: CarParams, *degrees: float, v_ego: float = 20.0) -> tuple[LatControl, CarState]:
-    """Build lateral control with the first of `degrees` planned, for a straight wheel."""
+    """Build lateral control for a straight wheel, and plan the first angle of `degrees`."""
     lateral = LatControl(params)
     lateral.mpc = FixedMpc(*degrees)
     car = CarState(v_ego=v_ego)
@@ -30,7 +30,7 @@ def control(params: CarParams, *degrees: float, v_ego: float = 20.0) -> tuple[La
     return lateral, car
 
 
-def test_wanted_angle_is_held_until_the_next(params: CarParams) -> None:
+def test_the_desired_angle_is_held_until_the_next_plan(params: CarParams) -> None:
     lateral, car = control(params, 0.5, 1.0)
     held = []
     for k in range(10):
@@ -41,23 +41,23 @@ def test_wanted_angle_is_held_until_the_next(params: CarParams) -> None:
     assert held == pytest.approx([0.5] * 5 + [1.0] * 5)
 
 
-def test_torque_is_that_of_the_degree_gains(params: CarParams) -> None:
-    """At walking pace, an error of one degree gives a torque of 0.8, which grows by 0.24 each second."""
+def test_torque_follows_the_gains_per_degree(params: CarParams) -> None:
+    """At walking pace, an error of one degree gives a torque of 0.8, which grows by 0.24 per second."""
     lateral, car = control(params, 1.0, v_ego=0.3)
     assert lateral.update(car, True) == pytest.approx(0.8 + 0.0024, abs=1e-5)
     assert lateral.update(car, True) == pytest.approx(0.8 + 0.0048, abs=1e-5)
 
 
 def test_feedforward_grows_with_lateral_acceleration(params: CarParams) -> None:
-    """With the wheel at the target angle, a degree is held with 0.00006 of torque per (m/s)^2."""
+    """With the wheel at the desired angle, the torque is 0.00006 per degree and (m/s)^2."""
     for v_ego in (10.0, 30.0):
         lateral, _ = control(params, -2.0)
         car = CarState(v_ego=v_ego, steering_angle=lateral.angle_desired)
         assert lateral.update(car, True) == pytest.approx(-2.0 * 0.00006 * v_ego**2)
 
 
-def test_an_angle_that_is_no_number_is_full_torque_to_the_left(params: CarParams) -> None:
-    """If the MPC has no solution, the torque is its upper limit. The next angle is steered normally."""
+def test_a_nan_angle_gives_full_torque_to_the_left(params: CarParams) -> None:
+    """The angle is NaN if the MPC has no solution. At the next valid angle, control is normal again."""
     lateral, car = control(params, nan, 1.0)
     assert [lateral.update(car, True) for _ in range(100)] == [1.0] * 100
     assert not lateral.saturated
@@ -66,7 +66,7 @@ def test_an_angle_that_is_no_number_is_full_torque_to_the_left(params: CarParams
     assert lateral.update(car, True) == fresh.update(car, True)
 
 
-def test_driver_at_the_wheel_is_not_worked_against(params: CarParams) -> None:
+def test_control_does_not_work_against_the_driver(params: CarParams) -> None:
     """While the driver steers, the integral does not grow and no saturation is reported."""
     lateral, _ = control(params, 5.0, 0.0)
     car = CarState(v_ego=20.0, steering_pressed=True)
@@ -78,7 +78,9 @@ def test_driver_at_the_wheel_is_not_worked_against(params: CarParams) -> None:
 
 
 @pytest.mark.parametrize(("v_ego", "active"), [(0.29, True), (20.0, False)])
-def test_no_torque_at_rest_or_out_of_control(params: CarParams, v_ego: float, active: bool) -> None:
+def test_there_is_no_torque_at_rest_or_while_disengaged(
+    params: CarParams, v_ego: float, active: bool
+) -> None:
     lateral, car = control(params, 1.0)
     first, *_ = [lateral.update(car, True) for _ in range(100)]
     assert lateral.update(CarState(v_ego=v_ego), active) == 0.0
@@ -88,8 +90,10 @@ def test_no_torque_at_rest_or_out_of_control(params: CarParams, v_ego: float, ac
 @pytest.mark.parametrize(
     ("v_ego", "degrees", "told"), [(10.1, 5.0, True), (10.0, 5.0, False), (20.0, 0.5, False)]
 )
-def test_saturation_is_told_above_10_mps(params: CarParams, v_ego: float, degrees: float, told: bool) -> None:
-    """Saturation is reported after more than 0.8 s of full torque, but only above 10 m/s."""
+def test_saturation_is_reported_only_above_10_mps(
+    params: CarParams, v_ego: float, degrees: float, told: bool
+) -> None:
+    """The report comes after more than 0.8 s of full torque."""
     lateral, car = control(params, degrees, v_ego=v_ego)
     for _ in range(85):
         lateral.update(car, True)

@@ -20,8 +20,8 @@ def follow(control: LongControl, car: CarState, p: Plan, cycles: int = 1) -> tup
     return output
 
 
-def test_off_gives_nothing_and_follows_the_car(params: CarParams) -> None:
-    """While control is off, gas and brake are zero. The target is the car's speed, at least 0.3 m/s."""
+def test_while_off_the_outputs_are_zero_and_the_target_is_the_cars_speed(params: CarParams) -> None:
+    """The target is at least 0.3 m/s."""
     control = LongControl(params)
     assert control.update(False, at(20.0), plan(30.0)) == (0.0, 0.0)
     assert (control.state, control.v_pid) == (OFF, 20.0)
@@ -41,12 +41,12 @@ def test_off_gives_nothing_and_follows_the_car(params: CarParams) -> None:
         (1.15, 1.15, 0.0, 0.0, 0.075),
     ],
 )
-def test_output_of_the_loop(
+def test_output_is_the_scaled_acceleration(
     params: CarParams, v_ego: float, v_target: float, a_target: float, gas: float, brake: float
 ) -> None:
-    """The output is acceleration / 4.8 within the limits of the speed.
+    """The output is the acceleration divided by 4.8, within limits that depend on the speed.
 
-    Below 2.3 m/s it brakes against creeping.
+    Below 2.3 m/s, the loop brakes against creeping.
     """
     assert follow(LongControl(params), at(v_ego), plan(v_target, a_target)) == pytest.approx(
         (gas, brake), abs=1e-5
@@ -62,7 +62,7 @@ def stopped(params: CarParams) -> LongControl:
 
 
 def test_stopping_needs_low_speed_target_and_future(params: CarParams) -> None:
-    """Open-loop braking begins below 0.5 m/s if target and planned end are below 0.31."""
+    """Open-loop braking begins below 0.5 m/s if the target speed and the future speed are below 0.31 m/s."""
     for car, p in ((at(0.6), plan(0.2)), (at(0.4), plan(0.4)), (at(0.4), plan(0.2, future=0.4))):
         control = LongControl(params)
         follow(control, car, p, 2)
@@ -72,15 +72,14 @@ def test_stopping_needs_low_speed_target_and_future(params: CarParams) -> None:
     assert control.state == STOPPING
 
 
-def test_foot_on_the_brake_stops_too(params: CarParams) -> None:
-    """Below 0.5 m/s the driver's brake makes the control brake, too."""
+def test_the_drivers_brake_also_starts_stopping(params: CarParams) -> None:
     control = LongControl(params)
     follow(control, at(0.4, brake_pressed=True), plan(5.0), 2)
     assert control.state == STOPPING
 
 
-def test_brake_ramps_to_hold_and_no_further(params: CarParams) -> None:
-    """At rest the brake rises by 0.2 a second to 0.5 and stays there.
+def test_the_brake_ramps_up_to_the_holding_value(params: CarParams) -> None:
+    """At rest the brake rises by 0.2 per second to 0.5 and stays there.
 
     While the car rolls, it rises further.
     """
@@ -97,7 +96,7 @@ def test_brake_ramps_to_hold_and_no_further(params: CarParams) -> None:
 
 
 def test_moving_off_releases_the_brake_first(params: CarParams) -> None:
-    """When the car moves off, the brake falls by 0.8 a second to 0.2. Then the control loop takes over."""
+    """The brake falls by 0.8 per second to 0.2. Then the control loop takes over."""
     control = stopped(params)
     follow(control, at(0.0, standstill=True), plan(0.3, future=0.5))
     assert control.state == STOPPING
@@ -110,14 +109,14 @@ def test_moving_off_releases_the_brake_first(params: CarParams) -> None:
     assert cycles == pytest.approx(0.3 / 0.8 * 100, abs=2)
 
 
-def test_moving_off_may_be_given_up(params: CarParams) -> None:
+def test_moving_off_can_be_aborted(params: CarParams) -> None:
     control = stopped(params)
     follow(control, at(0.0, standstill=True), plan(0.3, future=1.0), 3)
     follow(control, at(0.0, standstill=True), plan(0.0))
     assert control.state == STOPPING
 
 
-def test_reset_keeps_nothing_of_the_loop(params: CarParams) -> None:
+def test_reset_clears_the_integral(params: CarParams) -> None:
     control = LongControl(params)
     follow(control, at(20.0), plan(20.5), 300)
     control.reset(20.0)
@@ -126,7 +125,7 @@ def test_reset_keeps_nothing_of_the_loop(params: CarParams) -> None:
 
 
 def test_stopping_does_not_wind_up(params: CarParams) -> None:
-    """The stopping brake ends at its limit, however long the car rolls. It is released from that limit."""
+    """However long the car rolls, the brake stays at its limit."""
     control = LongControl(params)
     follow(control, at(0.4), plan(0.0), 1000)
     assert control.state == STOPPING

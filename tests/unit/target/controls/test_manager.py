@@ -34,7 +34,7 @@ def run(parts: SimpleNamespace, steps: int, view: str | None = None) -> list:
     return sent
 
 
-def test_camera_then_radar_then_controls(parts: SimpleNamespace) -> None:
+def test_camera_radar_and_controls_run_in_this_order(parts: SimpleNamespace) -> None:
     assert run(parts, START_STEP + 2, "view") == ["sent"]
     t = (START_STEP + 1) * 0.01
     assert parts.log[-4:] == [
@@ -53,7 +53,7 @@ def test_controls_start_late_and_without_frames(parts: SimpleNamespace) -> None:
     assert parts.log[-1] == ("controlsd", START_STEP * 0.01, [], None, "model")
 
 
-def test_old_leads_stay_until_new_ones(parts: SimpleNamespace) -> None:
+def test_the_last_leads_are_used_until_new_ones_arrive(parts: SimpleNamespace) -> None:
     """If the radar cycle is incomplete, the last leads are passed on. The planner checks their age."""
     run(parts, START_STEP + 2)
     parts.radar.update = parts.log.call("radar", None)

@@ -8,22 +8,18 @@ def make(kp: float = 1.0, ki: float = 1.0, **options) -> PIController:
     return PIController(((0.0,), (kp,)), ((0.0,), (ki,)), **options)
 
 
-def test_terms_add_up() -> None:
-    """Control is the sum of gain times error, integral and feedforward."""
+def test_the_output_is_the_sum_of_three_terms() -> None:
+    """The terms are gain times error, integral and feedforward."""
     pid = make(kp=0.2, ki=0.5)
     assert pid.update(1.0, 0.0, speed=0.0, feedforward=0.1) == pytest.approx(0.2 + 0.005 + 0.1)
 
 
-def test_gains_follow_speed() -> None:
+def test_gains_are_interpolated_over_speed() -> None:
     pid = PIController(((0.0, 10.0), (1.0, 0.5)), ((0.0,), (0.0,)))
     assert pid.update(0.4, 0.0, speed=5.0) == pytest.approx(0.3)
 
 
-def test_integrator_stops_at_a_limit_and_leaves_it_at_once() -> None:
-    """At a limit the integral stops growing.
-
-    An error in the other direction reduces it from the first cycle.
-    """
+def test_the_integral_stops_at_a_limit_and_leaves_it_at_once() -> None:
     pid = make()
     for _ in range(500):
         pid.update(3.0, 0.0, speed=0.0)
@@ -33,7 +29,7 @@ def test_integrator_stops_at_a_limit_and_leaves_it_at_once() -> None:
 
 
 @pytest.mark.parametrize("side", [1, -1])
-def test_integrator_may_return_from_beyond(side: int) -> None:
+def test_at_a_limit_the_integral_can_still_move_towards_zero(side: int) -> None:
     pid = make()
     pid.i = -0.5 * side
     pid.update(3.0 * side, 0.0, speed=0.0)
@@ -47,8 +43,8 @@ def test_limits_apply_after_conversion() -> None:
     assert pid.update(50.0, 0.0, speed=0.0) == 1.0
 
 
-def test_override_unwinds() -> None:
-    """While the driver overrides, the integral falls to zero at 0.3 per second."""
+def test_driver_override_unwinds_the_integral() -> None:
+    """The integral moves towards zero by 0.3 per second."""
     pid = make()
     pid.i = -0.3
     for _ in range(50):
@@ -65,22 +61,20 @@ def saturate(cycles: int, error: float = 2.0, **options) -> PIController:
     return pid
 
 
-def test_saturation_is_told_after_more_than_800_ms() -> None:
-    """Saturation is reported in the eighty-first cycle at a limit, not before."""
+def test_saturation_is_reported_after_more_than_800_ms() -> None:
     assert not saturate(79).saturated
     assert saturate(82).saturated
 
 
-def test_saturation_needs_error_hands_off_and_check() -> None:
-    """A small error, an overriding driver or a low speed does not count as saturation."""
+def test_small_errors_an_override_or_a_disabled_check_prevent_saturation() -> None:
     assert not saturate(200, error=0.09).saturated
     assert saturate(200, error=0.11).saturated
     assert not saturate(200, override=True).saturated
     assert not saturate(200, check_saturation=False).saturated
 
 
-def test_saturation_is_forgotten_as_slowly_as_learnt() -> None:
-    """The saturation count is at most 1 s. Within the limits it falls as fast as it rose."""
+def test_the_saturation_count_falls_as_fast_as_it_rises() -> None:
+    """The count is limited to 1 s."""
     pid = saturate(300)
     for _ in range(10):
         pid.update(0.0, 0.0, speed=0.0)
@@ -90,7 +84,7 @@ def test_saturation_is_forgotten_as_slowly_as_learnt() -> None:
     assert not pid.saturated
 
 
-def test_reset_forgets() -> None:
+def test_reset_clears_integral_and_saturation() -> None:
     pid = saturate(200)
     pid.i = 1.0
     pid.reset()

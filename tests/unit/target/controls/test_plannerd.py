@@ -26,7 +26,7 @@ class FixedMpc:
 
 
 class Drive:
-    """A planner at 20 m/s whose controllers return fixed solutions."""
+    """A planner at 20 m/s whose MPCs return fixed solutions."""
 
     def __init__(self, params: CarParams, mpc1: FixedMpc | None = None, mpc2: FixedMpc | None = None) -> None:
         self.planner = Planner(params, ModelFit())
@@ -63,8 +63,7 @@ def started(params: CarParams, *mpcs: FixedMpc) -> Drive:
     return drive
 
 
-def test_out_of_control_the_plan_is_the_car(params: CarParams) -> None:
-    """While control is off, each plan starts from the car's speed, not from the previous plan."""
+def test_while_off_the_plan_starts_from_the_cars_speed(params: CarParams) -> None:
     drive = Drive(params)
     plan = drive.run(1, "off")[-1]
     assert (plan.v_target, plan.a_target, plan.source) == (20.0, 0.0, "cruise")
@@ -73,47 +72,48 @@ def test_out_of_control_the_plan_is_the_car(params: CarParams) -> None:
 
 
 def test_moving_off_starts_at_walking_pace(params: CarParams) -> None:
-    """While the brake is released, the plan stays at 0.3 m/s with 0.5 m/s^2."""
+    """While the brake is being released, the planned speed stays near 0.3 m/s and the acceleration is 0.5
+    m/s^2.
+    """
     drive = Drive(params)
     drive.car = CarState(v_ego=0.0)
     plan = drive.run(1, "starting")[-1]
     assert (plan.v_target, plan.a_target) == (pytest.approx(0.305), 0.5)
 
 
-def test_cruise_within_limits(params: CarParams) -> None:
-    """Towards a higher set speed, acceleration rises at the jerk limit up to the acceleration limit."""
+def test_cruise_stays_within_the_jerk_and_acceleration_limits(params: CarParams) -> None:
     plans = started(params).run(500, kph=100.0)
     steps = [after.a_target - before.a_target for before, after in pairwise(plans)]
     assert max(steps) <= 0.5 * 0.01 * 1.5
     assert max(p.a_target for p in plans) == pytest.approx(0.5, abs=0.01)
 
 
-def test_turns_leave_less_to_speed_up(params: CarParams) -> None:
-    """At 20 m/s, a bend of 1.88 m/s^2 leaves 0.27 m/s^2 of the total of 1.9 m/s^2."""
+def test_turns_lower_the_planned_acceleration(params: CarParams) -> None:
+    """At 20 m/s, 1.88 m/s^2 of lateral acceleration leave 0.27 m/s^2 of the total of 1.9 m/s^2."""
     drive = started(params)
     angle = 1.88 / 20.0**2 * params.steer_ratio * params.wheelbase
     drive.car = CarState(v_ego=20.0, a_ego=0.3, steering_angle=angle)
     assert max(plan.a_target for plan in drive.run(300, kph=100.0)) == pytest.approx(0.275, abs=0.01)
 
 
-def test_keeping_up_with_a_lead_allows_more(params: CarParams) -> None:
+def test_following_a_lead_allows_more_acceleration(params: CarParams) -> None:
     """Behind a near lead that pulls away, the plan allows 0.7 m/s^2 at 20 m/s."""
     drive = started(params)
     drive.lead = LeadData(status=True, d_rel=30.0, v_lead=22.0, v_lead_k=22.0, a_lead_k=0.5)
     assert max(plan.a_target for plan in drive.run(300, kph=100.0)) == pytest.approx(0.7, abs=0.01)
 
 
-def test_cruise_never_goes_backwards(params: CarParams) -> None:
+def test_the_cruise_speed_is_never_negative(params: CarParams) -> None:
     drive = started(params)
     drive.planner._v_now, drive.planner._a_now = -0.005, -0.4
     drive.run(1, kph=8.0)
     assert drive.planner._v_cruise == 0.0
 
 
-def test_the_slowest_wins(params: CarParams) -> None:
-    """The planner selects the plan that is slowest in 0.2 s.
+def test_the_slowest_plan_is_selected(params: CarParams) -> None:
+    """The plan with the lowest speed after 0.2 s is selected.
 
-    Only a plan for a lead competes with cruising.
+    An MPC's plan is considered only if it has a lead.
     """
     slow, slower = FixedMpc(-0.1, -0.5, True), FixedMpc(-0.2, -1.0, True)
     assert started(params, slow, slower).run(1)[-1].source == "mpc2"
@@ -122,8 +122,8 @@ def test_the_slowest_wins(params: CarParams) -> None:
     assert started(params, FixedMpc(+0.5, 0.5, True)).run(1)[-1].source == "cruise"
 
 
-def test_plan_is_interpolated_and_its_start_carried_on(params: CarParams) -> None:
-    """Between replans, acceleration is linear to the goal. The next plan starts from the current state."""
+def test_the_plan_is_interpolated_and_the_next_one_starts_from_it(params: CarParams) -> None:
+    """Until the next plan, acceleration changes linearly."""
     mpc = FixedMpc(-0.1, -1.0, True)
     drive = started(params, mpc)
     plans = drive.run(6)
@@ -133,15 +133,14 @@ def test_plan_is_interpolated_and_its_start_carried_on(params: CarParams) -> Non
     assert plans[4].v_target - plans[0].v_target == pytest.approx(-0.25 * 0.05 / 2 + 0.05 * 0.01 / 2)
 
 
-def test_a_plan_that_is_not_renewed_ends(params: CarParams) -> None:
+def test_a_plan_that_is_not_renewed_stops_changing(params: CarParams) -> None:
     drive = started(params, FixedMpc(-0.1, -1.0, True))
     targets = [plan.a_target for plan in drive.run(1) + drive.run(40, radar=False)]
     assert targets[:22] == sorted(set(targets), reverse=True)
     assert targets[22:] == [targets[21]] * 19
 
 
-def test_future_is_the_slowest_of_all(params: CarParams) -> None:
-    """The plan's end is the slowest of both controllers and the set speed."""
+def test_the_future_speed_is_the_lowest_of_both_mpcs_and_the_set_speed(params: CarParams) -> None:
     assert Drive(params, FixedMpc(future=12.0)).run(1)[-1].v_target_future == 12.0
     assert Drive(params, FixedMpc(), FixedMpc(future=11.0)).run(1)[-1].v_target_future == 11.0
     assert Drive(params).run(1, kph=36.0)[-1].v_target_future == pytest.approx(10.0)
@@ -159,19 +158,19 @@ def errors(drive: Drive, plans: list[Plan]) -> dict[str, int]:
     return first
 
 
-def test_silence_of_more_than_half_a_second_is_an_error(params: CarParams) -> None:
-    """A radar state and model from cycle 0 are too old in cycle 51."""
+def test_messages_older_than_half_a_second_are_an_error(params: CarParams) -> None:
+    """A radar state and a model from cycle 0 are too old in cycle 51."""
     drive = Drive(params)
     plans = drive.run(1) + drive.run(60, radar=False)
     assert errors(drive, plans) == {"model_error": 51, "radar_error": 51}
 
 
-def test_nothing_yet_is_an_error_too(params: CarParams) -> None:
+def test_missing_messages_are_an_error(params: CarParams) -> None:
     plan = Planner(params, ModelFit()).update(0.1, CarState(), None, "off", 255.0, False)
     assert [event.name for event in plan.events] == ["model_error", "radar_error"]
 
 
-def test_radar_errors_are_told_at_once(params: CarParams) -> None:
+def test_radar_errors_raise_an_event_at_once(params: CarParams) -> None:
     drive = Drive(params)
     drive.run(1)
     state = RadarState(0.01, LeadData(), LeadData(), ("fault",))
@@ -179,8 +178,8 @@ def test_radar_errors_are_told_at_once(params: CarParams) -> None:
     assert [event.name for event in plan.events] == ["radar_error"]
 
 
-def test_warning_goes_with_the_lead_and_not_with_the_brake(params: CarParams) -> None:
-    """A collision warning is passed on unless the driver already brakes. A new lead restarts the counters."""
+def test_collision_warnings_are_passed_on_unless_the_driver_brakes(params: CarParams) -> None:
+    """A new lead restarts the counters."""
     drive = Drive(params)
     resets = []
     drive.planner._fcw_checker = SimpleNamespace(update=lambda *_: True, reset=lambda: resets.append(1))

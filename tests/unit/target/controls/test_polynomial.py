@@ -14,7 +14,7 @@ from selfdrive.sim.compile_helpers import compiler
 CURVE = (1e-5, -2e-3, 0.05, 1.85)
 
 
-def test_fit_finds_the_cubic() -> None:
+def test_fit_recovers_a_cubic() -> None:
     assert CubicFit()([value(CURVE, x) for x in range(50)]) == pytest.approx(CURVE, rel=1e-9)
 
 
@@ -30,7 +30,7 @@ def test_fit_is_least_squares() -> None:
 
 @pytest.mark.skipif(not compiler(), reason="there is no C compiler")
 def test_a_compiled_fit_has_the_same_bits(all_compiled: Path) -> None:
-    """The compiled fit has the same bits for too few or too many points, infinite values and integers."""
+    """The cases include too few or too many points, infinite values and integers."""
     compiled.use(all_compiled)
     fast = build_fit()
     compiled.use(None)
@@ -56,7 +56,10 @@ def test_slope() -> None:
 
 
 def test_shift_and_blend() -> None:
-    """`shift` moves a curve sideways. `blend` is the weighted mean, and zero if the weights are zero."""
+    """`shifted` moves a curve sideways.
+
+    `blend` is the weighted mean of two curves, or zero if both weights are zero.
+    """
     assert value(shifted(CURVE, 0.5), 30.0) == pytest.approx(value(CURVE, 30.0) + 0.5)
     assert value(blend(CURVE, 3.0, ZERO, 1.0), 10.0) == pytest.approx(0.75 * value(CURVE, 10.0))
     assert blend(CURVE, 0.0, CURVE, 0.0) == ZERO

@@ -6,7 +6,7 @@ import pytest
 from selfdrive.controls.lib.predicted_path import distance_to, model_curve, steering_curve
 
 
-def test_straight_on() -> None:
+def test_straight_path() -> None:
     """On a straight path, the distance is the object's lateral position, positive to the left."""
     straight = steering_curve(0.0)
     assert distance_to(straight, 50.0, 1.2) == pytest.approx(1.2)
@@ -14,7 +14,7 @@ def test_straight_on() -> None:
     assert distance_to(straight, 50.0, 0.0) == 0.0
 
 
-def test_slanting_line() -> None:
+def test_slanting_path() -> None:
     assert distance_to(model_curve((0.0, 0.0, 1.0, 0.0)), 20.0, 0.0) == pytest.approx(-20.0 / 2**0.5)
 
 

@@ -20,25 +20,25 @@ def step(
     ("v_rel", "v_ego", "stationary"),
     [(-20.0, 20.0, True), (-16.1, 20.0, True), (-15.9, 20.0, False), (-3.9, 3.9, False), (-23.9, 20.0, True)],
 )
-def test_stationary_is_slower_than_4_while_the_car_is_faster(
+def test_an_object_below_4_mps_is_stationary_while_the_car_is_faster(
     v_rel: float, v_ego: float, stationary: bool
 ) -> None:
     assert track(v_rel=v_rel, v_ego=v_ego).stationary is stationary
 
 
-def test_what_has_moved_is_never_stationary_again() -> None:
+def test_an_object_that_has_moved_is_never_stationary_again() -> None:
     t = track(v_rel=0.0)
     step(t, -20.0)
     assert not t.stationary
 
 
-def test_a_standing_object_may_start() -> None:
+def test_a_stationary_object_can_start_moving() -> None:
     t = track(v_rel=-20.0)
     step(t, -15.0)
     assert not t.stationary
 
 
-def test_oncoming_may_change() -> None:
+def test_an_object_can_stop_being_oncoming() -> None:
     """An object is oncoming while it moves towards the car at more than 3.9 m/s."""
     t = track(v_rel=-24.0)
     assert t.oncoming
@@ -46,7 +46,7 @@ def test_oncoming_may_change() -> None:
     assert not t.oncoming
 
 
-def test_camera_clears_stationary_after_three_fusions() -> None:
+def test_an_object_fused_three_times_is_no_longer_stationary() -> None:
     t = track(v_rel=-20.0)
     t.fuse()
     t.fuse()
@@ -65,13 +65,13 @@ def test_lead_speed_and_acceleration_follow_the_measurement() -> None:
 
 
 def test_relative_acceleration_is_limited() -> None:
-    """A jump in speed counts as at most 10 m/s^2, after a low-pass filter."""
+    """A jump of the speed gives 10 m/s^2 at most, before a low-pass filter."""
     t = track(v_rel=0.0)
     step(t, -5.0)
     assert t.a_rel == pytest.approx(-10.0 * 0.1358, abs=0.01)
 
 
-def test_lateral_speed_is_not_learnt_while_the_driver_steers() -> None:
+def test_lateral_speed_is_not_estimated_while_the_driver_steers() -> None:
     """An object moving towards the path has lateral speed, unless the driver's steering moves the path."""
     free, steered = track(d_path=3.0), track(d_path=3.0)
     for k in range(1, 21):
@@ -95,39 +95,35 @@ def lead(d_rel: float = 50.0, d_path: float = 0.0, v_lat: float = 0.0, v_rel: fl
         (lead(v_rel=-20.0), False),
         (lead(v_rel=-30.0), False),
         (lead(d_rel=10.0, d_path=2.0, v_lat=-0.6), True),  # cuts in
-        (lead(d_rel=57.0, d_path=2.0, v_lat=-99.0), False),  # too far for lateral speed to count
+        (lead(d_rel=57.0, d_path=2.0, v_lat=-99.0), False),  # too far away, so the lateral speed is ignored
         (lead(d_rel=56.0, d_path=2.0, v_lat=-99.0), True),
-        (lead(d_rel=10.0, d_path=2.6, v_lat=-5.0), False),  # at most 1 m is corrected
-        (lead(d_rel=10.0, d_path=1.4, v_lat=5.0), True),  # a lead that leaves does not count
+        (lead(d_rel=10.0, d_path=2.6, v_lat=-5.0), False),  # the correction is limited to 1 m
+        (lead(d_rel=10.0, d_path=1.4, v_lat=5.0), True),  # a speed away from the path is ignored
     ],
 )
 def test_lead_is_on_the_path_or_cuts_in(cluster: Cluster, expected: bool) -> None:
-    """A lead is within 1.5 m of the path, after its lateral speed is considered.
-
-    It is not stationary or oncoming.
+    """A lead is within 1.5 m of the path, corrected for its lateral speed, and neither stationary nor
+    oncoming.
     """
     assert cluster.is_lead(20.0) is expected
 
 
 @pytest.mark.parametrize("v_rel", [-20.0, -30.0])
-def test_one_moving_track_makes_the_vehicle_a_lead(v_rel: float) -> None:
+def test_one_moving_track_makes_a_cluster_a_lead(v_rel: float) -> None:
     assert not Cluster([track(v_rel=v_rel), track(v_rel=v_rel)]).is_lead(20.0)
     assert Cluster([track(v_rel=v_rel), track()]).is_lead(20.0)
 
 
-def test_second_lead_is_apart() -> None:
-    """The second lead is more than 8 m further away or differs by more than 1 m/s."""
+def test_the_second_lead_must_be_apart_from_the_first() -> None:
+    """The second lead is more than 8 m further away, or its speed differs by more than 1 m/s."""
     first = lead(d_rel=40.0)
     assert not lead(d_rel=48.0).is_apart(first)
     assert lead(d_rel=48.1).is_apart(first)
     assert lead(d_rel=41.0, v_rel=1.1).is_apart(first)
 
 
-def test_clusters_are_what_lies_within_two_and_a_half() -> None:
-    """Near tracks form one vehicle.
-
-    Lateral distance counts double, and a speed difference counts as distance.
-    """
+def test_tracks_are_clustered_by_distance_lateral_position_and_speed() -> None:
+    """Lateral distance is doubled, and a speed difference is treated as a distance."""
     tracks = [
         track(d_rel=40.0),
         track(d_rel=42.0),
@@ -139,27 +135,24 @@ def test_clusters_are_what_lies_within_two_and_a_half() -> None:
 
 
 @pytest.mark.parametrize(("gap", "vehicles"), [(2.4, 1), (2.6, 2)])
-def test_clusters_reach_two_and_a_half(gap: float, vehicles: int) -> None:
-    """Tracks 2.4 m apart are one vehicle. Tracks 2.6 m apart are two."""
+def test_tracks_within_two_and_a_half_metres_are_one_cluster(gap: float, vehicles: int) -> None:
     assert len(cluster_tracks([track(d_rel=40.0), track(d_rel=40.0 + gap)])) == vehicles
 
 
-def test_centroids_keep_a_chain_apart() -> None:
-    """A long chain of tracks is not one vehicle, because distances are measured to the centre of the merged
-    tracks.
-    """
+def test_a_long_chain_of_tracks_is_split() -> None:
+    """Distances are measured to the centre of the merged tracks."""
     clusters = cluster_tracks([track(d_rel=d) for d in (40.0, 42.0, 44.0, 46.0)])
     assert sorted(c.d_rel for c in clusters) == [41.0, 45.0]
 
 
-def test_nothing_gives_no_clusters() -> None:
+def test_no_tracks_give_no_clusters() -> None:
     assert cluster_tracks([]) == []
 
 
-def test_message_has_means_from_the_bumper_and_the_best_fusion() -> None:
-    """The lead's message has the means of its tracks.
+def test_lead_data_has_the_means_of_the_tracks() -> None:
+    """The radar's position is subtracted from the distance.
 
-    Its distance is reduced by the position of the radar.
+    One track with 20 fusions is enough for warnings.
     """
     near, far = track(d_rel=40.0, v_rel=-1.0), track(d_rel=42.0, v_rel=-2.0)
     for _ in range(20):

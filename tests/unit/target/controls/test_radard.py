@@ -1,4 +1,4 @@
-"""radard agrees with numbers measured on the original, and selects leads."""
+"""radard agrees with numbers measured on openpilot, and selects leads."""
 
 import pytest
 from selfdrive.car.params import CarParams
@@ -45,10 +45,10 @@ class Drive:
         return state
 
 
-def test_lead_speed_starts_as_the_original(params: CarParams) -> None:
+def test_lead_speed_starts_like_openpilots(params: CarParams) -> None:
     """There is no lead while the speeds of 0.1 s ago are unknown.
 
-    Then the filtered speeds match the original's.
+    Then the filtered speeds match openpilot's.
     """
     radard = Radard(params, ModelFit())
     leads = []
@@ -66,25 +66,21 @@ def test_distance_is_from_the_bumper(params: CarParams) -> None:
     assert Drive(params).see(point(d_rel=42.5)).lead_one.d_rel == pytest.approx(42.5)
 
 
-def test_closest_lead_and_the_next(params: CarParams) -> None:
-    """The closest vehicle on the path is the first lead, the next one the second.
-
-    Vehicles off the path do not count.
-    """
+def test_the_two_closest_separate_vehicles_on_the_path_are_the_leads(params: CarParams) -> None:
     drive = Drive(params)
     state = drive.see(point(1, 70.0), point(2, 40.0), point(3, 43.0), point(4, 20.0, y_rel=3.0), cycles=3)
     assert state.lead_one.d_rel == pytest.approx(40.0)
     assert state.lead_two.d_rel == pytest.approx(70.0)
 
 
-def test_path_moved_away_loses_the_lead(params: CarParams) -> None:
+def test_a_vehicle_off_the_path_is_not_a_lead(params: CarParams) -> None:
     drive = Drive(params)
     assert drive.see(point(), cycles=3).lead_one.status
     assert not drive.see(point(), vision=model(path=2.0), cycles=3).lead_one.status
 
 
-def test_disengaged_the_steering_wheel_shows_the_path(params: CarParams) -> None:
-    """While control is off or the driver steers, objects are compared with the steering circle."""
+def test_the_steering_angle_gives_the_path_while_the_driver_steers(params: CarParams) -> None:
+    """This also holds while control is off."""
     straight = {"steering_angle": 0.5}
     assert Drive(params, **straight).see(point(), cycles=3).lead_one.status
     assert not Drive(params, active=False, **straight).see(point(), cycles=3).lead_one.status
@@ -92,14 +88,14 @@ def test_disengaged_the_steering_wheel_shows_the_path(params: CarParams) -> None
 
 
 @pytest.mark.parametrize("steered", [False, True])
-def test_the_driver_s_steering_gives_no_lead_a_lateral_speed(params: CarParams, steered: bool) -> None:
+def test_leads_get_no_lateral_speed_while_the_driver_steers(params: CarParams, steered: bool) -> None:
     drive = Drive(params, steer_override=steered)
     for k in range(20):
         lead = drive.see(point(y_rel=0.05 * k)).lead_one
     assert (lead.v_lat == 0.0) is steered
 
 
-def test_standing_vehicle_is_a_lead_only_with_the_camera(params: CarParams) -> None:
+def test_a_stationary_vehicle_is_a_lead_only_with_the_camera(params: CarParams) -> None:
     """A stationary object is a lead once the camera has seen it three times at the same place."""
     drive = Drive(params)
     drive.see(point(9, 90.0), cycles=4)  # the speed history fills
@@ -113,13 +109,13 @@ def test_standing_vehicle_is_a_lead_only_with_the_camera(params: CarParams) -> N
     assert not any(closing[:2]) and closing[-1]
 
 
-def test_twenty_fusions_make_a_lead_good_for_warnings(params: CarParams) -> None:
+def test_a_lead_can_cause_warnings_after_twenty_fusions(params: CarParams) -> None:
     drive = Drive(params)
     assert not drive.see(point(), cycles=19).lead_one.fcw
     assert drive.see(point(), cycles=2).lead_one.fcw
 
 
-def test_a_lost_track_is_forgotten(params: CarParams) -> None:
+def test_a_lost_track_loses_its_fusions(params: CarParams) -> None:
     drive = Drive(params)
     drive.see(point(), cycles=30)
     assert not drive.see().lead_one.status

@@ -16,20 +16,17 @@ def drive(v: float, a: float, target: float, steps: int, limits: Limits = LIMITS
     return path
 
 
-def test_first_step_from_rest_in_acceleration() -> None:
-    """From constant speed, acceleration changes at the jerk limit."""
+def test_from_constant_speed_acceleration_changes_at_the_jerk_limit() -> None:
     assert smooth_speed(20.0, 0.0, 25.0, LIMITS, 0.2) == pytest.approx((20.02, 0.2))
     assert smooth_speed(20.0, 0.0, 15.0, LIMITS, 0.2) == pytest.approx((19.98, -0.2))
 
 
-def test_wrong_way_is_left_three_times_as_fast() -> None:
-    """While the car accelerates away from the target, the jerk limit is three times as high."""
+def test_acceleration_away_from_the_target_ends_with_three_times_the_jerk_limit() -> None:
     _, a = smooth_speed(20.0, -0.5, 25.0, LIMITS, 0.1)
     assert a == pytest.approx(-0.2)
 
 
-def test_beyond_the_limit_comes_back_with_jerk() -> None:
-    """An acceleration above its limit returns to the limit at maximum jerk and stays there."""
+def test_an_acceleration_above_its_limit_returns_at_the_jerk_limit() -> None:
     assert smooth_speed(20.0, 1.5, 40.0, LIMITS, 0.2)[1] == pytest.approx(1.3)
     assert smooth_speed(20.0, 1.1, 40.0, LIMITS, 0.5)[1] == pytest.approx(1.0)
 
@@ -40,9 +37,7 @@ def test_beyond_the_limit_comes_back_with_jerk() -> None:
     target=st.floats(0.0, 40.0),
 )
 def test_limits_are_kept_and_the_target_reached(v: float, a: float, target: float) -> None:
-    """From any state, acceleration stays within its limits, jerk within three times its limit, and the speed
-    reaches the target.
-    """
+    """From any state, the jerk stays within three times its limit."""
     before, path = a, drive(v, a, target, 1200)
     for _, now in path:
         assert -1.0 - 1e-6 <= now <= 1.0 + 1e-6
@@ -59,7 +54,9 @@ def test_limits_are_kept_and_the_target_reached(v: float, a: float, target: floa
     side=st.sampled_from((1, -1)),
     once=st.floats(0.01, 30.0),
 )
-def test_a_profile_goes_on_as_planned(v: float, a: float, gain: float, side: int, once: float) -> None:
+def test_many_small_steps_follow_the_profile_of_one_large_step(
+    v: float, a: float, gain: float, side: int, once: float
+) -> None:
     limits = Limits(a_min=-0.8, a_max=0.8, j_min=-0.7, j_max=0.7)
     v_far, a_far = smooth_speed(v, side * a, v + side * gain, limits, once)
     (v_near, a_near), *_ = reversed(drive(v, side * a, v + side * gain, 200, limits, once / 200))
@@ -67,6 +64,6 @@ def test_a_profile_goes_on_as_planned(v: float, a: float, gain: float, side: int
     assert a_near == pytest.approx(a_far, abs=1e-2)
 
 
-def test_a_ceiling_below_zero_slows_down_towards_a_higher_target() -> None:
+def test_a_negative_upper_limit_slows_the_car_despite_a_higher_target() -> None:
     v, a = drive(20.0, 0.0, 30.0, 100, Limits(-0.5, -0.2, -0.5, 0.5))[-1]
     assert a == pytest.approx(-0.2) and v == pytest.approx(19.02, abs=0.05)

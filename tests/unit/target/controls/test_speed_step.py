@@ -56,8 +56,8 @@ def drive(params: CarParams, v_rel: list[float], gap: float = 60.0, jump: float 
     return found
 
 
-def test_nothing_begins_anew(params: CarParams) -> None:
-    """After a speed step the track continues, its filter converges and the plan keeps its lead."""
+def test_a_speed_step_resets_nothing(params: CarParams) -> None:
+    """The track continues, its filter converges, and the plan keeps its lead."""
     found = drive(params, [-2.0] * 60 + [18.0] * 40 + [-2.0] * 40)
     assert not any(cycle.new_lead for cycle in found[10:])
     before, after, settled = (found[k].state.lead_one for k in (59, 60, 99))
@@ -67,7 +67,7 @@ def test_nothing_begins_anew(params: CarParams) -> None:
 
 
 def test_fusions_pause_while_the_camera_disagrees(params: CarParams) -> None:
-    """Fusion stops while camera and radar differ by more than 10 m/s. Fusions counted before remain."""
+    """Fusion stops while camera and radar differ by more than 10 m/s. Earlier fusions are still counted."""
     found = drive(params, [-2.0] * 60 + [18.0] * 40 + [-2.0] * 40)
     assert found[59].fusions >= 20 and found[59].state.lead_one.fcw
     assert found[99].fusions == found[59].fusions and found[99].state.lead_one.fcw
@@ -81,20 +81,20 @@ def test_a_warning_needs_half_a_second_after_the_step(params: CarParams) -> None
     assert [k for k, cycle in enumerate(found) if cycle.fcw] == [89]
 
 
-def test_a_step_that_the_plan_cannot_follow_begins_anew(params: CarParams) -> None:
-    """A plan that passes 50 m through the lead is discarded, and the next lead is new.
+def test_a_step_that_the_plan_cannot_follow_resets_the_lead(params: CarParams) -> None:
+    """A plan that passes the lead by more than 50 m is discarded, and the lead is treated as new.
 
-    The longest count, 3 s without blinker, restarts.
+    The longest counter of the warning, 3 s without a blinker, restarts.
     """
     found = drive(params, [-2.0] * 80 + [-20.0] * 80, gap=50.0)
     assert [k for k, cycle in enumerate(found) if cycle.new_lead and k >= 80] == [81]
     assert [k for k, cycle in enumerate(found) if cycle.fcw] == [81 + 60]
 
 
-def test_a_jump_of_the_distance_begins_anew(params: CarParams) -> None:
-    """A jump of more than 2.5 m means another lead.
+def test_a_jump_of_the_distance_resets_the_lead(params: CarParams) -> None:
+    """A jump of more than 2.5 m is treated as another lead.
 
-    The counts of 30 cycles in sight and 3 s without blinker restart.
+    The counters of 30 cycles of detection and 3 s without a blinker restart.
     """
     found = drive(params, [-2.0] * 80 + [-18.0] * 40, jump=-3.0)
     assert found[80].new_lead

@@ -44,14 +44,14 @@ class Drive:
         ((GAS,), "disabled"),
     ],
 )
-def test_engaging(events: tuple[Event, ...], state: str) -> None:
-    """A button engages the car unless an event refuses it. While the gas is pressed, the car waits."""
+def test_a_button_engages_unless_an_event_prevents_it(events: tuple[Event, ...], state: str) -> None:
+    """While the gas pedal is pressed, the car is only pre-enabled."""
     drive = Drive()
     assert drive.step(*events) == (state != "disabled")
     assert drive.state == state
 
 
-def test_refusal_says_why() -> None:
+def test_a_refused_engagement_shows_the_reasons() -> None:
     assert Drive((ENGAGE, DOOR, CAN)).alerts.active == ("door_open_no_entry", "can_error_no_entry")
 
 
@@ -67,7 +67,7 @@ def test_refusal_says_why() -> None:
     ],
 )
 def test_disengaging(first: tuple[Event, ...], event: Event, state: str, alert: str) -> None:
-    """The driver and faults disengage at once, and soft reasons after a notice.
+    """The driver and immediate faults disengage at once, soft faults after a warning.
 
     The alert shows the reason.
     """
@@ -76,19 +76,19 @@ def test_disengaging(first: tuple[Event, ...], event: Event, state: str, alert: 
     assert alert in drive.alerts.active
 
 
-def test_pre_enabled_ends_with_the_gas_pedal() -> None:
+def test_control_becomes_active_when_the_gas_pedal_is_released() -> None:
     drive = Drive((ENGAGE, GAS), (GAS,))
     assert drive.machine.enabled and not drive.machine.active
     drive.step()
     assert drive.machine.active
 
 
-def test_driver_beats_fault() -> None:
+def test_the_driver_takes_precedence_over_a_fault() -> None:
     """If the driver disengages in the same cycle as a fault, the alert names the driver's action."""
     assert Drive((ENGAGE,), (CAN, BRAKE)).alerts.active[0] == "disable"
 
 
-def test_soft_disabling_is_active_for_300_cycles() -> None:
+def test_control_stays_active_for_300_cycles_of_soft_disabling() -> None:
     drive = Drive((ENGAGE,), (DOOR,))
     active = []
     for _ in range(310):
@@ -110,7 +110,7 @@ def test_a_fault_ends_soft_disabling() -> None:
     assert Drive((ENGAGE,), (DOOR,), (DOOR, CAN)).state == "disabled"
 
 
-def test_no_re_engaging_by_itself() -> None:
+def test_the_car_does_not_re_engage_by_itself() -> None:
     drive = Drive((ENGAGE,), (CAN,), (), ())
     assert drive.state == "disabled"
     assert drive.step(ENGAGE) and drive.state == "enabled"

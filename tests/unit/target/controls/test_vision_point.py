@@ -30,20 +30,19 @@ def track(d_rel: float = 50.0, y_rel: float = 0.0, v_rel: float = 0.0) -> Track:
         (track(v_rel=10.1), False),
     ],
 )
-def test_match_needs_place_and_speed(other: Track, matches: bool) -> None:
-    """A match needs half the distance error and twice the lateral error within 4 m, and the speed error
-    within 10 m/s.
+def test_a_track_must_match_in_place_and_speed(other: Track, matches: bool) -> None:
+    """Half the distance error and twice the lateral error must be below 4 m, and the speed error below 10
+    m/s.
     """
     assert (seen().best_match([other], ZERO) is other) is matches
 
 
-def test_the_best_of_several() -> None:
-    """The track closest in place and speed together is the camera's lead."""
+def test_the_track_closest_in_place_and_speed_matches() -> None:
     tracks = [track(d_rel=52.0), track(d_rel=51.0), track(d_rel=50.0, v_rel=3.0)]
     assert seen().best_match(tracks, ZERO) is tracks[1]
 
 
-def test_it_is_taken_to_be_on_the_path() -> None:
+def test_the_cameras_lead_is_assumed_to_be_on_the_path() -> None:
     bend = (0.0, 0.001, 0.0, 0.0)
     off, on = track(y_rel=0.0), track(y_rel=2.5)
     assert seen().best_match([off, on], bend) is on
@@ -63,13 +62,13 @@ def test_filter_is_a_kalman_filter_with_the_camera_s_variance() -> None:
     assert (point._filter.value, point._filter.rate) == pytest.approx(tuple(x))
 
 
-def test_an_unsure_lead_matches_nothing() -> None:
+def test_an_uncertain_lead_matches_no_track() -> None:
     assert seen(prob=0.7).best_match([track()], ZERO) is None
     assert seen(prob=0.71).best_match([track()], ZERO) is not None
 
 
-def test_becoming_sure_starts_at_the_seen_distance() -> None:
-    """The first certain distance is used directly, with no speed from before."""
+def test_the_filter_restarts_when_the_lead_becomes_certain() -> None:
+    """The first certain distance is used directly, without the earlier speed."""
     point = seen(d_rel=80.0)
     point.update(LeadVision(30.0, 0.5, 0.1))
     point.update(LeadVision(30.0, 0.9, 0.1))
