@@ -34,7 +34,7 @@ class Selection:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Canary:
-    """A fault known to be harmful: its largest value, active from `at_s` on, must reach `hazard`."""
+    """A fault known to be harmful: active from `at_s` (s), it must cause `hazard`."""
 
     spec: str  # the full name of a variant
     scenario: str
@@ -64,7 +64,7 @@ class Campaign:
     random_until_s: float | None
     hold_s: float | None  # how long faults stay active; None: while the context holds, or to the end
     sample: int | None  # number of experiments, equally per variant
-    proportional: bool  # instead: in pairs, in proportion to each fault type and scenario
+    proportional: bool  # whether to sample pairs, in proportion to each fault type and scenario
     seeds: range  # the campaign is repeated with each
     canary: Canary
     limits: Limits
@@ -85,7 +85,7 @@ class Campaign:
         return _in(self.setting, reading)
 
     def setting_keys(self, reading: str) -> Keys:
-        """Return the position of these manifest changes in the file."""
+        """Return the keys in the campaign file under which `setting_in` is."""
         return ("setting", reading) if reading in self.setting else ("setting",)
 
     def error(self, keys: Keys, got: str, *, expected: str, remedy: str) -> MutatorError:
@@ -100,7 +100,7 @@ def _in(told: Mapping[str, _Told], reading: str) -> _Told:
 def load_campaign(path: Path) -> Campaign:
     """Read a campaign file strictly; any mistake raises MutatorError with file and line.
 
-    The study may be missing here, so that old runs still open. `load_study` checks it.
+    The study need not be installed, so that old runs still open. `load_study` checks it.
     """
     model, source = read(path, CampaignModel, SCHEMA, older={SCHEMA: with_list})
     _check_once(model, source)

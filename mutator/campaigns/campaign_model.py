@@ -70,19 +70,19 @@ _NAMES = {"type": "array", "items": {"type": "string"}}
 
 
 class _CanaryModel(StrictModel, title="The canary"):
-    """A fault known to be harmful. The campaign starts only if it reaches its hazard."""
+    """A fault known to be harmful. The campaign starts only if this fault causes its hazard."""
 
     spec: str = Field(
         description="The full name of a variant, `<module>/<fault_type>/<variant>`. Its largest value runs "
         "first; the other values follow until one causes the hazard."
     )
     scenario: str = Field(description="The scenario.")
-    hazard: str = Field(description="The hazard that the fault must reach.")
+    hazard: str = Field(description="The hazard that the fault must cause.")
     at_s: float = Field(ge=0.0, allow_inf_nan=False, description="The time from which the fault is active.")
 
 
 class _LimitsModel(StrictModel, title="Limits"):
-    """The resources that one run may use before it is stopped."""
+    """The resources that one run can use before it is stopped."""
 
     cpu_s: int = Field(default=60, ge=1, le=MOST, description="CPU time in seconds.")
     wall_s: int = Field(default=300, ge=1, le=MOST, description="Wall time in seconds.")
@@ -105,7 +105,7 @@ class SeedsModel(StrictModel, title="Seeds"):
     @model_validator(mode="after")
     def _check(self) -> "SeedsModel":
         if not 0 <= self.to - self.from_ < MOST_SEEDS:
-            raise ValueError(f"`to` from {self.from_} to {self.from_ + MOST_SEEDS - 1}, not {self.to}")
+            raise ValueError(f"`to` between {self.from_} and {self.from_ + MOST_SEEDS - 1}")
         return self
 
 
@@ -168,7 +168,7 @@ class CampaignModel(StrictModel, title="The file"):
         "hazard](../explanation/verdicts.md#the-end-of-the-drive). This saves time, but later "
         "hazards and alerts are not observed.",
     )
-    limits: _LimitsModel = Field(_LimitsModel(), description="The resources that one run may use.")
+    limits: _LimitsModel = Field(_LimitsModel(), description="The resources that one run is allowed to use.")
     chunk: int = Field(
         20,
         ge=1,
@@ -179,9 +179,9 @@ class CampaignModel(StrictModel, title="The file"):
     @model_validator(mode="after")
     def _check(self) -> "CampaignModel":
         if self.proportional and self.sample is None:
-            raise ValueError("`proportional` without `sample`; set `sample` to the number of experiments")
+            raise ValueError("`sample`, the number of experiments, together with `proportional`")
         if self.proportional and any(one.operators for one in self.faults):
-            raise ValueError("`proportional` with `operators`: use their own `sample`")
+            raise ValueError("no `proportional` with `operators`, which have their own `sample`")
         if (self.seed is None) == (self.seeds is None):
             raise ValueError(
                 "either `seed` or `seeds`" if self.seed is None else "`seed` or `seeds`, not both"

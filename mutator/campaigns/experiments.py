@@ -220,7 +220,7 @@ class Expansion:
     def _of_operators(
         self, scenario: str, mutants: list[OperatorFault], triggers: tuple[Trigger, ...]
     ) -> Iterator[Experiment]:
-        """Yield experiments with mutants, in scenarios that execute them.
+        """Yield the experiments of each mutant in the scenarios that execute its changed line.
 
         Permanent mutants are always active; transient ones follow the other triggers.
         """
@@ -244,7 +244,7 @@ class Expansion:
     def _random(self, scenario: str, fault: Fault, number: int, row: Trigger) -> Trigger:
         """Return the random partner of a row's trigger.
 
-        It depends on the reading only through the earliest possible time.
+        The drawn time depends on the reading only through the earliest possible time.
         """
         assert self.campaign.random_until_s is not None  # the schema requires it for random times
         time = draw_time(
@@ -286,7 +286,7 @@ class Expansion:
 
     @contextmanager
     def _placed(self, keys: Keys) -> Iterator[None]:
-        """Report an unknown name at the campaign's `keys`. Errors in other files keep their own place."""
+        """Report errors without a line at `keys` of the campaign file; leave errors with a line unchanged."""
         try:
             yield
         except MutatorError as err:

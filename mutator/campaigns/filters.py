@@ -96,7 +96,9 @@ class _Compiler:
 
     def contains(self, group: object, value: object) -> bool:
         if not isinstance(group, tuple | str) or (isinstance(group, str) and not isinstance(value, str)):
-            raise _error(self.text, f"{group!r} on the right of `in`", "a tuple, or a text for a text")
+            raise _error(
+                self.text, f"{group!r} on the right of `in`", "a tuple, or text if the left side is text"
+            )
         return value in group
 
     def ordered(self, op: type[ast.cmpop], a: object, b: object) -> bool:

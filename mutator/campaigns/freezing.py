@@ -34,7 +34,7 @@ from mutator.store.run_head import CAMPAIGN, HEAD, SCHEMA
 from mutator.workspace import Workspace
 
 CSV = "plan.csv"
-_OURS = ("owner.lock", "workers", "plan", CSV, CAMPAIGN, digests.FILE)  # a killed freeze may have left files
+_OURS = ("owner.lock", "workers", "plan", CSV, CAMPAIGN, digests.FILE)  # files that a killed freeze can leave
 
 
 def freeze(plan: Plan | Planning, out: Path, workspace: Workspace) -> RunFolder:
@@ -66,7 +66,7 @@ def make_run_folder(out: Path) -> None:
         strangers = [name for name in names if name not in _OURS and not is_half_written(name)]
         if strangers:
             raise MutatorError(
-                f"no {HEAD}, and not empty ({', '.join(sorted(strangers)[:3])})",
+                f"this folder has no {HEAD} and is not empty ({', '.join(sorted(strangers)[:3])})",
                 where=out,
                 argument="out",
                 expected="a run folder, or a new or empty folder",
@@ -82,10 +82,10 @@ def freeze_owned(plan: Plan | Planning, out: Path, workspace: Workspace) -> tupl
         tally, found = _counted(plan)
         if folder.head["plan"] != found:
             raise MutatorError(
-                "holds another plan",
+                "this folder holds another plan",
                 where=out,
                 expected=f"plan {found[:16]}",
-                remedy="use another folder, or the campaign and options with which this one was planned",
+                remedy="use another folder, or the campaign and options with which this folder was planned",
             )
         check_version(out, folder.head["schema"], folder.head["provenance"])
         check_sources(out, folder.head["sources"], _sources(tally, plan, workspace))

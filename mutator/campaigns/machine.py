@@ -1,4 +1,4 @@
-"""Finds what a run computes with: Python, operating system, processor, BLAS, packages and git commits."""
+"""Finds what a run depends on: Python, operating system, processor, BLAS, packages and git commits."""
 
 import json
 import os
@@ -23,7 +23,7 @@ _BLAS = "import json, numpy, threadpoolctl; print(json.dumps(threadpoolctl.threa
 
 
 def surroundings() -> list[Any]:
-    """Return everything outside the target's sources that may change what it computes."""
+    """Return everything outside the target's sources that can affect its results."""
     return [python(), platform.platform(), cpu(), blas(), threads(), versions()]
 
 
@@ -49,7 +49,7 @@ def threads() -> dict[str, str]:
 def blas() -> tuple[dict[str, Any], ...]:
     """Return the BLAS that numpy loads in the target's environment; empty without numpy.
 
-    `kernel` is the one chosen for this processor.
+    `kernel` is the one that the library chose for this processor.
     """
     with tempfile.TemporaryDirectory() as folder:
         done = subprocess.run(
@@ -68,7 +68,7 @@ def blas() -> tuple[dict[str, Any], ...]:
 def _installed() -> dict[str, tuple[str, list[str]]]:
     """Return the version and requirements of each installed package.
 
-    If a package is installed twice, these are of the imported one.
+    If a package is installed twice, these are of the one that Python imports.
     """
     found: dict[str, tuple[str, list[str]]] = {}
     for distribution in metadata.distributions():
@@ -108,7 +108,7 @@ def required() -> frozenset[str]:
 def packages_of(modules: Iterable[str]) -> tuple[str, ...]:
     """Return the packages that provide these top-level modules. Modules without a package are omitted."""
     providers = metadata.packages_distributions()
-    # a package installed as a link to its sources may be listed only under its own name
+    # the modules of an editable installation can be missing in `providers`; try the module's name
     names = (name for module in modules for name in providers.get(module, [module]))
     return tuple(sorted({canonicalize_name(name) for name in names} & _installed().keys()))
 

@@ -17,7 +17,7 @@ from mutator.targets.manifest import TargetManifest
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OperatorFault:
-    """A fault created by an operator, and the scenarios whose golden runs execute its line."""
+    """A fault created by an operator, and the scenarios whose golden runs execute the changed line."""
 
     fault: Fault
     when: tuple[When, ...]
@@ -25,12 +25,12 @@ class OperatorFault:
 
 
 class OperatorFaults:
-    """The faults of selections, for any seed. Enumerations are kept for the next seed."""
+    """Creates the operator faults of selections. What it enumerates for one seed is used again for others."""
 
     def __init__(self, manifest: TargetManifest, models: FaultModels, limits: Limits) -> None:
         self._manifest, self._models, self._limits = manifest, models, limits
         self._found: dict[tuple[OperatorSelection, frozenset[tuple[str, frozenset[int]]]], Found] = {}
-        self.told: dict[str, None] = {}  # what was found and left out, without duplicate lines
+        self.told: dict[str, None] = {}  # lines that say what was found and left out, without duplicates
 
     def of(
         self, selection: OperatorSelection, drives: Mapping[str, GoldenDrive], seed: int, reading: str

@@ -18,7 +18,9 @@ Group = tuple[str, str, str]  # module, fault type, method
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Part:
-    """Experiments in run order, the lengths of their chunks, and the number of runs, which may be shared."""
+    """Experiments in run order, the lengths of their chunks, and the number of runs; experiments can share
+    a run.
+    """
 
     experiments: Sequence[Experiment]
     chunks: Sequence[int]
@@ -27,7 +29,7 @@ class Part:
 
 @dataclass(slots=True, kw_only=True)
 class Tally:
-    """The totals of a plan, once all its parts have been added."""
+    """The totals of the parts of a plan that have been added."""
 
     canary: Experiment
     several_seeds: bool  # each seed has its own golden runs

@@ -76,7 +76,7 @@ class Cost:
     wall_s: float
     disk_bytes: int
     workers: int
-    measured: bool  # whether the rate comes from this run folder's golden runs
+    measured: bool  # whether `cpu_s` is based on golden runs of the run folder
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -90,7 +90,7 @@ class Plan:
     experiments: Sequence[Experiment]  #: the experiments in run order
     chunks: tuple[int, ...]  #: the number of experiments in each chunk, in order
     canary: Experiment  #: a fault that must cause its hazard; the checks before the campaign run it
-    runs: int  #: the number of runs; a run that several scenarios share counts once
+    runs: int  #: the number of runs; a run that several scenarios share is counted once
     digest: str  #: the digest: equal on every machine for the same campaign, choices, library and scenarios
     run_cpu_s: float | None = None  #: the measured CPU time of one run in s; None: not measured
     told: tuple[str, ...] = ()  #: how many mutants the operators produced, and what was left out
@@ -101,7 +101,7 @@ class Plan:
 
     @property
     def seeds(self) -> range:
-        """The seed, or all of several."""
+        """All seeds of the plan."""
         return _seeds(self.campaign, self.choices)
 
     @cached_property
@@ -218,7 +218,7 @@ class Planning:
                 where=self.campaign.path,
                 argument="only",
                 expected="at least one",
-                remedy="widen `only`, `exclude` or the campaign's faults",
+                remedy="widen `only` or the campaign's faults, or narrow `exclude`",
             )
         self._check_shards(chunks)
         idle.warn()

@@ -38,7 +38,7 @@ def check_sources(run: Path, frozen: dict[str, str], now: dict[str, str]) -> Non
     changed = [name for name in frozen if now.get(name) != frozen[name]]
     if changed:
         raise MutatorError(
-            f"changed since this run was planned: {', '.join(changed)}",
+            f"these sources changed since this run was planned: {', '.join(changed)}",
             where=run,
             expected="the same target, templates and scenarios during the whole run",
             remedy=_REMEDY,
@@ -52,7 +52,7 @@ def check_version(run: Path, schema: str, provenance: Mapping[str, Any]) -> None
     """
     if (schema, provenance["mutator"]) != (SCHEMA, VERSION):
         raise MutatorError(
-            f"was planned by mutator {provenance['mutator']} ({schema})",
+            f"this run was planned by mutator {provenance['mutator']} ({schema})",
             where=run,
             expected=f"mutator {VERSION} ({SCHEMA})",
             remedy="finish the run with that version, or use another folder; this run can still be read",
@@ -68,7 +68,7 @@ def check_versions(folder: RunFolder, *, accept: bool = False) -> tuple[str, ...
         return ()
     found = differences(folder.stretches[-1], machine.python(), _packages(folder))
     if found and not accept:
-        raise other_versions(folder.path, "run with", found)
+        raise other_versions(folder.path, "this run used", found)
     return found
 
 

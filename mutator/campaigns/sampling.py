@@ -41,7 +41,7 @@ def pick_pairs(experiments: Sequence[Experiment], count: int, seed: int) -> tupl
 def _pick(
     experiments: Sequence[Experiment], units: Iterable[list[Experiment]], count: int, seed: int
 ) -> tuple[Experiment, ...]:
-    """Like `pick`, but draw units, which are not split."""
+    """Like `pick`, but draw whole `units`. Only the last one is split if `count` requires it."""
     if count >= len(experiments):
         return tuple(experiments)
     cells: dict[str, dict[_Cell, deque[list[Experiment]]]] = defaultdict(dict)
@@ -95,8 +95,8 @@ def _load(taken: Counter[Hashable], cell: _Cell) -> list[int]:
 def pick_in_proportion(experiments: Sequence[Experiment], count: int, seed: int) -> tuple[Experiment, ...]:
     """Draw `count` experiments, guided and random ones in pairs, in their original order.
 
-    A systematic sample represents each fault type and scenario in proportion to its number, with at least one
-    pair each. ValueError if the count is too small or not a whole number of pairs.
+    Each fault type in each scenario is sampled systematically, in proportion to its number of experiments,
+    with at least one pair. ValueError if the count is too small or not a whole number of pairs.
     """
     if count >= len(experiments):
         return tuple(experiments)

@@ -1,4 +1,4 @@
-"""Installed studies: published works that a campaign may reproduce, each in a separate package.
+"""Installed studies: published works that a campaign can reproduce, each in a separate package.
 
 A package registers its study as an entry point of the group `mutator.studies`; a campaign names it with
 `study:`. `mutator.report.studies` defines what a study adds to a report.
@@ -15,7 +15,7 @@ GROUP = "mutator.studies"
 FUNCTIONS = ("check", "published", "drawings")
 PARTS = ("about", "panels", *FUNCTIONS)
 """Required attributes of an entry point's object: the fields of `mutator.report.studies.Study`, which this
-layer may not import.
+layer is not allowed to import.
 """
 
 
@@ -50,7 +50,7 @@ def find_study(name: str) -> Study:
 
 
 def study_problems(name: str, study: Study, workspace: Workspace) -> list[MutatorError]:
-    """Return the problems of a study's data in a fault library, including a check that raises."""
+    """Return the problems of a study's data in a fault library. A check that raises is one, too."""
     try:
         problems = list(study.check(workspace))
     except MutatorError as error:
@@ -64,7 +64,7 @@ def study_problems(name: str, study: Study, workspace: Workspace) -> list[Mutato
 
 def _refused(name: str, got: str, remedy: str) -> MutatorError:
     others = [other for other in study_names() if other != name]
-    expected = f"one of {', '.join(others)}" if others else "no `study`: no other one is installed"
+    expected = f"one of {', '.join(others)}" if others else "no `study`, because none is installed"
     return MutatorError(got, expected=expected, remedy=remedy)
 
 

@@ -34,19 +34,18 @@ def by_reading(given: object) -> object:
 
 
 def or_by_reading(schema: dict[str, Any]) -> dict[str, Any]:
-    """Return the JSON schema of a value that may be given for each reading."""
+    """Return the JSON schema of a value that is given once or for each reading."""
     return {"anyOf": [schema, {"type": "object", "additionalProperties": schema}]}
 
 
 class _ListedModel(StrictModel, title="A trigger"):
     """Exactly one of `always`, `at_s` and `when`. `always` is short for `always: true`."""
 
-    always: bool = Field(False, description="`true`: from the time at which triggers are armed, to the end.")
+    always: bool = Field(False, description="`true`: active from the time at which triggers are armed.")
     at_s: Seconds | None = Field(None, description="Active from this time (s) to the end.")
     when: str | None = Field(
         None,
-        description="Active while this condition holds. It may use `t` (s) and the values that the target "
-        "observes.",
+        description="Active while this condition on `t` (s) and the target's observed values holds.",
     )
     hold_s: float | None = Field(
         None,
@@ -76,7 +75,7 @@ class TriggersModel(StrictModel, title="Triggers"):
     """When faults become active.
 
     Guided experiments wait for the contexts of a table or the triggers of a list; random experiments start at
-    a drawn time. `triggers` may be the list itself: `triggers: [always, {at_s: 3}, {when: speed > 5}]`.
+    a drawn time. `triggers` can be the list itself: `triggers: [always, {at_s: 3}, {when: speed > 5}]`.
     """
 
     table: str | None = Field(None, description="The context table, by its name.")
@@ -116,10 +115,10 @@ class TriggersModel(StrictModel, title="Triggers"):
         if (self.table is None) == (self.listed is None):
             raise ValueError("either a `table` or a `list`")
         if self.rows is not None and self.table is None:
-            raise ValueError("`rows` of a `table`")
+            raise ValueError("`rows` only with a `table`")
         until, armed = self.random_until_s, max(self.armed_after_s.values(), default=0.0)
         if until is not None and until <= armed:
-            raise ValueError("random_until_s must be later than armed_after_s")
+            raise ValueError("`random_until_s` later than `armed_after_s`")
         return self
 
     def triggers(self) -> tuple[ListedTrigger, ...]:
@@ -154,7 +153,7 @@ def listed_triggers(
     armed_after_s: float,
     hold_s: float | None,
 ) -> tuple[Trigger, ...]:
-    """Return the triggers of a campaign's list in `source`; `hold_s` is the default of how long they hold.
+    """Return the triggers of a campaign's list in `source`; `hold_s` is their default hold.
 
     MutatorError with the line for a condition on unobserved values, and for a duplicate trigger.
     """
@@ -163,7 +162,7 @@ def listed_triggers(
         with source.placing((*_LIST, i, "when")):
             trigger = _made(one, manifest.observation.variables, armed_after_s, one.hold_s or hold_s)
         if trigger.name in found:
-            got = f"'{trigger.name}' a second time"
+            got = f"'{trigger.name}' is listed twice"
             raise source.error((*_LIST, i), got, expected="each trigger once", remedy="remove one")
         found[trigger.name] = trigger
     return tuple(found.values())

@@ -38,23 +38,24 @@ class Gate(StrEnum):
     NEW_HAZARD = Change.NEW_HAZARD.value  #: a hazard, although the first run has none
     #: another hazard, although the first run already has one
     OTHER_HAZARD = Change.OTHER_HAZARD.value
-    HIGHER_SEVERITY = Change.HIGHER_SEVERITY.value  #: a contact of a higher class, or instead of none
+    HIGHER_SEVERITY = (
+        Change.HIGHER_SEVERITY.value
+    )  #: a contact of a higher class, or one where there was none
     EARLIER_HAZARD = Change.EARLIER_HAZARD.value  #: less time from activation to the first hazard
     LOST_ALERT = Change.LOST_ALERT.value  #: an alert of the first run is missing
     WORSE = Change.WORSE.value  #: a worse outcome, in the order no effect, sdc, hazard; includes a new hazard
     NEW_CRASH = Change.NEW_CRASH.value  #: the controller crashes or does not finish
     HARNESS_ERROR = Change.HARNESS_ERROR.value  #: the second run has no result, although the first has one
     UNMATCHED = "unmatched"  #: an experiment that only one of the runs has
-    SEVERITY_S0 = "severity:S0"  #: a contact of class S0 or worse, with a milder one or none in the first run
-    SEVERITY_S1 = "severity:S1"  #: a contact of class S1 or worse, with a milder one or none in the first run
-    SEVERITY_S2 = "severity:S2"  #: a contact of class S2 or worse, with a milder one or none in the first run
-    SEVERITY_S3 = "severity:S3"  #: a contact of class S3, with a milder one or none in the first run
+    SEVERITY_S0 = "severity:S0"  #: a contact of class S0 or worse; in the first run a milder one or none
+    SEVERITY_S1 = "severity:S1"  #: a contact of class S1 or worse; in the first run a milder one or none
+    SEVERITY_S2 = "severity:S2"  #: a contact of class S2 or worse; in the first run a milder one or none
+    SEVERITY_S3 = "severity:S3"  #: a contact of class S3; in the first run a milder one or none
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """An experiment on which a gate fails, and why. For an experiment in both runs, the id is that of the
-    second."""
+    """An experiment on which a gate fails, and why. If both runs have it, the id is the second run's."""
 
     gate: Gate
     experiment_id: str
@@ -63,7 +64,7 @@ class Finding:
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
-    """Two matched runs. `alerts_notes` name the alerts that each run's fault-free runs raise, if any."""
+    """Two matched runs. `alerts_notes` has a note on the alerts of each run's fault-free runs, or ''."""
 
     a: Side
     b: Side
@@ -134,7 +135,7 @@ class Comparison:
             (f"only in {names.b}", m.only_b),
             (f"no result in {names.a}", m.no_result_a),
             (f"no result in {names.b}", m.no_result_b),
-            ("several with the same key in one run", m.ambiguous),
+            ("several with the same fault, scenario and trigger in one run", m.ambiguous),
         )
         return tuple((why, experiment) for why, group in groups for experiment in group)
 

@@ -1,4 +1,4 @@
-"""Decides whether target, fault or harness caused a mutant's run to fail.
+"""Decides whether the target, the fault or the harness made a mutant's run fail.
 
 If an injected line is on the stack of the exception or of its cause, the injection is the origin, even if a
 function that the line called raised the exception. A failure before the fault was first active is blamed on
@@ -19,7 +19,7 @@ _At = tuple[str, int, int]  # file, line, column
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Source:
-    """The origin of an exception outside the target: an injected line or, without a tag, the probe."""
+    """The cause of an exception: an injected line or, if `tag` is None, the probe."""
 
     place: str
     tag: Tag | None = None
@@ -27,7 +27,7 @@ class _Source:
 
 
 class _Files:
-    """The changed files of a mutant. Stack positions are looked up in them."""
+    """The changed files of a mutant, with the injection at each position."""
 
     def __init__(self, files: Mapping[str, bytes]) -> None:
         self._files = files
@@ -38,8 +38,8 @@ class _Files:
         return tag_of(file[line - 1]) if 0 < line <= len(file) else None
 
     def injected_at(self, at: _At, tag: Tag, in_probe: bool) -> Sequence[str]:
-        """Return the injections whose code raised at this position, if any. A changed line still has original
-        parts.
+        """Return the ids of the injections whose code is at this position, which can be none: a changed line
+        also has unchanged parts.
         """
         if tag.was is None:
             return tag.ids if tag.of_fault and not (in_probe and tag.asks_probe) else ()
@@ -51,9 +51,9 @@ class _Files:
 def assign_blame(
     execution: Execution, files: Mapping[str, bytes], raising: Collection[str]
 ) -> tuple[Status, str]:
-    """Decide status and detail of a mutant's failed run. `files` are the changed files.
+    """Return the status and detail of a mutant's run. `files` are the mutant's changed files.
 
-    `raising` has the ids of injections whose fault models declare that they raise exceptions.
+    `raising` has the ids of injections whose fault models raise exceptions on purpose.
     """
     status, detail, raised = execution.status, execution.detail, execution.raised
     if status not in (Status.CRASHED, Status.TIMEOUT):
@@ -75,18 +75,18 @@ def error_of(raised: Raised | None) -> RunError | None:
 
 def _source(raised: Raised, files: _Files) -> _Source | None:
     own, *others = raised.stacks
-    if raised.kind == RecursionError.__name__:  # any call may be the one that exceeds the limit
+    if raised.kind == RecursionError.__name__:  # any call can be the one that exceeds the limit
         own = tuple(dropwhile(lambda at: is_probe(at[0]) or files.tag_at(at) is not None, own))
     found = [source for stack in (own, *others) if (source := _on_stack(stack, files))]
     return min(found, key=lambda source: source.tag is not None, default=None)  # the probe comes first
 
 
 def _on_stack(stack: Stack, files: _Files) -> _Source | None:
-    """Return the innermost position on the stack that is not in the target's own code.
+    """Return the innermost injected line or probe call on the stack; None if it has neither.
 
-    If a probe helper fails on a value, the calling line is the origin. If the probe fails to decide whether
-    the fault is active, the probe is. Exceptions in calls that the target makes with a changed value belong
-    to the target.
+    If a helper function of the probe fails on a value, the line that called it is the cause. If the probe
+    fails while it decides whether the fault is active, the probe is the cause. If a changed line calls the
+    target's own code, exceptions there belong to the target.
     """
     in_probe = in_target = False
     for at in stack:

@@ -16,7 +16,7 @@ ColumnType = Literal["text", "flag", "count", "number"]
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """A column. The type `flag` is 0 or 1."""
+    """A column of a table. A `flag` is 0 or 1."""
 
     name: str
     type: ColumnType
@@ -29,13 +29,13 @@ _TO_MANIFEST = (
         "experiment_id",
         "text",
         "",
-        "the experiment; a content hash: the same input has the same id everywhere",
+        "the experiment's id, a hash of its content: equal experiments have equal ids on every machine",
     ),
-    Column("fault_id", "text", "", "the fault; also a content hash"),
+    Column("fault_id", "text", "", "the fault's id, also a hash of its content"),
     Column("module", "text", "", "the module of the fault spec"),
     Column("fault_type", "text", "", "the fault type of the spec"),
     Column("reading", "text", "", "the [reading](../explanation/concepts.md#readings) of the fault"),
-    Column("value", "number", "as `unit` says", "the drawn value; empty for a fault without one"),
+    Column("value", "number", "as in `unit`", "the drawn value; empty for a fault without a value"),
     Column("unit", "text", "", "the unit of `value` as the spec states it, `-` for a plain number"),
     Column("scenario", "text", "", "the scenario"),
     Column("method", "text", "", "`guided` (a context or a listed trigger) or `random` (a random time)"),
@@ -52,28 +52,35 @@ _TO_MANIFEST = (
     Column("t_activation", "number", "s", "time of the first activation"),
     Column("activations", "count", "", "number of activations in the whole run"),
     Column("manifested", "flag", "", "whether an actuator output differed from golden after the activation"),
-    Column("t_manifest", "number", "s", "time of the first such difference"),
+    Column(
+        "t_manifest", "number", "s", "time of the first difference of an actuator output after the activation"
+    ),
 )
 _TO_REACTION = (
     Column("alerts", "text", "", "names of the alerts in the order of their times, joined by `;`"),
     Column("t_alert", "number", "s", "time of the first alert"),
     Column(
-        "reaction_time", "number", "s", "first hazard minus first alert; empty unless the alert came first"
+        "reaction_time",
+        "number",
+        "s",
+        "time from the first alert to the first hazard; empty unless the alert came first",
     ),
 )
 T_END = "t_end"
-SEVERITY = Column("severity", "text", "", "class of the contact that ended the drive; empty without one")
+SEVERITY = Column(
+    "severity", "text", "", "class of the contact that ended the drive; empty without a contact"
+)
 SINCE = (
-    Column("fault_tolerant_time", "number", "s", "first hazard minus activation"),
+    Column("fault_tolerant_time", "number", "s", "time from the activation to the first hazard"),
     Column(
         "manifest_to_hazard",
         "number",
         "s",
-        "first hazard minus manifestation; empty if the hazard came first",
+        "time from the manifestation to the first hazard; empty if the hazard came first",
     ),
 )
 OF_PATHS = (
-    Column("reached", "text", "", "the component furthest along the fault's path that left golden"),
+    Column("reached", "text", "", "the component farthest along the fault's path that left golden"),
     Column(
         "stopped_at",
         "text",
@@ -89,13 +96,13 @@ EXTRA = (
 )
 TIMINGS = (
     Column("experiment_id", "text", "", "the experiment"),
-    Column("cpu_s", "number", "s", "CPU time of its run"),
-    Column("wall_s", "number", "s", "wall time of its run"),
-    Column("host", "text", "", "the machine"),
-    Column("worker", "text", "", "the worker of the session"),
+    Column("cpu_s", "number", "s", "CPU time of the experiment's run"),
+    Column("wall_s", "number", "s", "wall time of the experiment's run"),
+    Column("host", "text", "", "the machine that ran the experiment"),
+    Column("worker", "text", "", "the worker that ran the experiment"),
 )
 PLAN_COLUMNS = (*(column.name for column in _TO_MANIFEST[:11]), "variant", "aim", "condition")
-# Columns that readers of the table add. Hazards must not use these names.
+# Columns that are added when the table is read. No hazard can have one of these names.
 _DERIVED_TEXTS = ("kind", "fault", "row", "ending", "hazards", "warning", "through")
 DERIVED = (*_DERIVED_TEXTS, "rank", "hazard", "t_hazard")
 _PLAIN = (*_TO_MANIFEST, *_TO_REACTION, SEVERITY, *OF_PATHS, *EXTRA)
@@ -158,7 +165,7 @@ def is_text(column: str) -> bool:
 
 @lru_cache(maxsize=64)
 def hazard_columns(hazard: str) -> tuple[Column, Column]:
-    """Return the columns of a hazard, flag and time: `near` and `t_near` for NEAR."""
+    """Return the flag and the time column of a hazard: `near` and `t_near` for NEAR."""
     name = hazard.lower()
     return (
         Column(name, "flag", "", f"whether hazard {hazard} occurred"),
@@ -167,7 +174,7 @@ def hazard_columns(hazard: str) -> tuple[Column, Column]:
 
 
 def hazards_in(columns: Iterable[str]) -> tuple[str, ...]:
-    """Return the hazards of a table, in order. A hazard has a flag and a time of the same name."""
+    """Return the hazards of a table, in order: each name that also occurs with the prefix `t_`."""
     known = dict.fromkeys(columns)
     return tuple(name.upper() for name in known if f"t_{name}" in known)
 
@@ -196,7 +203,9 @@ def driven_columns(channels: Sequence[str], metrics: Iterable[Sequence[str]]) ->
 
 
 def check_names(manifest: TargetManifest) -> None:
-    """Raise MutatorError if columns of a hazard or metric collide with others, or look like a hazard's."""
+    """Raise MutatorError if a column of a hazard or metric has the name of another column, or if a metric's
+    column could be taken for a hazard's.
+    """
     compared = [channel.name for channel in manifest.compared]
     taken = {column.name for column in result_columns((), compared, paths=True)}
     taken |= {SEVERITY.name, *(column.name for column in SINCE)}
@@ -224,7 +233,7 @@ def check_names(manifest: TargetManifest) -> None:
 
 
 def plan_row(experiment: Experiment) -> dict[str, object]:
-    """Return the `PLAN_COLUMNS` of one experiment. `variant` includes a text value."""
+    """Return the `PLAN_COLUMNS` of one experiment. If the value is text, it is part of `variant`."""
     fault, trigger = experiment.fault, experiment.trigger
     variant = fault.spec.split("/", 2)[-1]
     is_text = isinstance(fault.value, str)

@@ -1,6 +1,6 @@
-"""Counts activated, manifested and hazardous faults in the results table, by column.
+"""Counts activated, manifested and hazardous faults in the results table.
 
-`texts` comes from `Results.texts`. Harness errors and invalid mutants enter no other number.
+`texts` comes from `Results.texts`. Harness errors and invalid mutants are counted only as such.
 """
 
 from collections.abc import Mapping

@@ -54,7 +54,7 @@ def load_trace(
     channels: Sequence[Channel] | None = None,
     also: Sequence[Channel] = (),
 ) -> Trace:
-    """Load channels (default: all) and time of the trace in `out`. Channels in `also` may be missing."""
+    """Load channels (default: all) and times of the trace in `out`. Channels in `also` can be missing."""
     path = out / manifest.trace_file
     kind = f"an {path.suffix} file" if path.suffix in (".npz", ".mcap") else f"a {path.suffix} file"
     try:
@@ -116,7 +116,7 @@ def _newest(times: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarray
 
 
 def load_record(manifest: TargetManifest, out: Path) -> dict[str, Any]:
-    """Load the record that the target wrote in `out`. It is empty if the manifest names no record."""
+    """Load the record that the target wrote in `out`, or an empty one if the manifest names no record."""
     if manifest.record_file is None:
         return {"hazards": {}, "alerts": []}
     path = out / manifest.record_file
@@ -135,7 +135,7 @@ def load_record(manifest: TargetManifest, out: Path) -> dict[str, Any]:
 
 
 def _check_is_of_output(err: Exception) -> None:
-    """Raise Shortage if mutator ran out of memory or files. The run is not to blame for that."""
+    """Raise Shortage if mutator ran out of memory or files, which is not the fault of the run."""
     if short := shortage(err):
         if isinstance(err, MemoryError):
             with suppress(MemoryError):
@@ -162,7 +162,7 @@ def _has_times(record: dict[str, Any], *, judges: bool) -> bool:
 
 
 def _events(record: Mapping[str, Any]) -> Any:
-    """Return every recorded raise of an alert if the record has them, else only the first of each."""
+    """Return all times at which alerts were raised or, if the record lacks them, the first of each alert."""
     return record.get("alert_events") or record.get("alerts") or []
 
 
@@ -171,7 +171,7 @@ def alerts_of(record: Mapping[str, Any], counted: Sequence[str]) -> list[tuple[s
 
 
 def sharing_times(golden: Trace, faulty: Trace, time: str) -> Trace:
-    """Let the faulty trace share golden's time array if both are equal, which makes comparisons faster."""
+    """Return the faulty trace with golden's time array if both are equal, which makes comparisons faster."""
     return {**faulty, time: golden[time]} if np.array_equal(golden[time], faulty[time]) else faulty
 
 
@@ -180,8 +180,8 @@ def compare(
 ) -> Difference:
     """Compare channels value by value. NaN equals NaN.
 
-    Traces of different lengths differ from the end of the shorter one, traces with different times from the
-    first such time. `t_end` is the end of the drive if that is before the end of the run.
+    If one trace is shorter, the traces differ from its end. If their times differ, the traces differ from the
+    first different time. `t_end` is the end of the drive if that is before the end of the run.
     """
     end = np.inf if t_end is None else t_end + _TINY
     first = end_of_shorter(golden[time], faulty[time])
@@ -242,9 +242,9 @@ def end_of_shorter(golden: np.ndarray, faulty: np.ndarray) -> float:
 
 
 def _on_same_times(times: list[np.ndarray], values: list[np.ndarray]) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Return common times and the values of both runs at them.
+    """Return times and the values of both runs at these times.
 
-    If the times differ, these are the times of either run, with the newest values.
+    If the runs have different times, return the union of their times and each run's newest values.
     """
     if times[0] is times[1]:
         return times[0], values
@@ -256,7 +256,7 @@ def _on_same_times(times: list[np.ndarray], values: list[np.ndarray]) -> tuple[n
 
 
 def _deviation(golden: np.ndarray, faulty: np.ndarray) -> np.ndarray:
-    """Return |faulty - golden|; equal infinities and two NaN differ by 0, NaN and a number by infinity."""
+    """Return |faulty - golden|; equal infinities and two NaNs differ by 0, NaN and a number by infinity."""
     golden, faulty = golden.astype(float), faulty.astype(float)
     same = (golden == faulty) | (np.isnan(golden) & np.isnan(faulty))
     with np.errstate(invalid="ignore", over="ignore"):

@@ -1,7 +1,6 @@
 """Reads .npz files with uncompressed members, as `numpy.savez` writes them (PKWARE's APPNOTE 6.3).
 
-`numpy.load` and `zipfile` take longer than all other work on a trace. They still read unusual and damaged
-files.
+`numpy.load` would take longer than all other work on a trace. It is used only for unusual or damaged files.
 """
 
 import io
@@ -48,7 +47,7 @@ def _members(data: bytes) -> dict[str, np.ndarray] | None:
 
 
 def _member(data: bytes, view: memoryview, at: int) -> tuple[str, np.ndarray, int] | None:
-    """Return name and array of the member with the directory entry at `at`, and where the next entry is."""
+    """Return name and array of the member whose directory entry is at `at`, and the next entry's position."""
     (magic, _, _, _, flags, method, _, _, crc, packed, size, named, extra, comment, *_, begin) = (
         _ENTRY.unpack_from(data, at)
     )

@@ -1,8 +1,8 @@
 """Finds the path of a fault along the control structure, from the injected components to the process.
 
-The path excludes feedback: links out of the process, links of people, and links that are not studied. A
-component counts as changed by feedback if it left golden only after the process, and feedback can have
-reached it no later than the fault along the path.
+The path excludes links out of the process (feedback), links from or to people, and links that are not
+studied. A change of a component is attributed to feedback if the component left golden only after the
+process did, and feedback could reach it no later than the fault could.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -45,8 +45,8 @@ class Passage(StrEnum):
 class Stage:
     """A component on a path, and its channels that left golden.
 
-    `t_by` is the time (s) at which a component that only this one feeds left golden, if that was before this
-    component's own channels did. By then this component had changed, too.
+    If a component that only this one feeds left golden before this one's own channels did, `t_by` is the time
+    (s) when that happened: this component must have changed by then.
     """
 
     component: str
@@ -85,11 +85,11 @@ class Path:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Course:
-    """Everything about a path except times: equal for paths with the same injected components, on which
+    """A path without times. Paths have the same course if they have the same injected components, and
     components left golden in the same order.
 
-    `late` has the components that changed before their own channels show it, each with the index of the time
-    of that change. `entered` is the link by which the fault reached the first actuator.
+    `late` has the components that must have changed before their own channels did, each with the rank of
+    `Stage.t_by` among all times. `entered` is the link by which the fault reached the first actuator.
     """
 
     states: Mapping[str, State]  # in causal order
@@ -116,8 +116,8 @@ class Ways:
     """The paths of faults through a target.
 
     `channels` have name, unit, role, component and meaning, as in run.json. Without a `structure`, the
-    components form a chain: those of internal channels in manifest order, then those of actuators, then those
-    of the true state. In a chain, the place of injection is unknown.
+    components form a chain: those of internal channels, then those of actuators, then those of ground truth.
+    In a chain, the place of injection is unknown.
     """
 
     def __init__(self, channels: Sequence[Sequence[str]], structure: StructureModel | None) -> None:
@@ -174,7 +174,7 @@ class Ways:
         )
 
     def course(self, fault: Fault, record: Record) -> Course | None:
-        """Return the course of an experiment; None in the same cases as for `path`."""
+        """Return the course of an experiment; None in the same cases as `path`."""
         sight = self.sight(fault, record)
         return sight and self.course_of(sight)
 
@@ -182,7 +182,7 @@ class Ways:
         return self._course(*sight)
 
     def sight(self, fault: Fault, record: Record) -> Sight | None:
-        """Return the sight of an experiment; None if the fault was not active or the run has no outcome."""
+        """Return the inputs of a course; None if the fault was not active or the run has no outcome."""
         if record.outcome in (None, Outcome.NOT_ACTIVATED):
             return None
         firsts: dict[str, float] = {}
@@ -226,8 +226,8 @@ class Ways:
     ) -> tuple[dict[str, State], set[str]]:
         """Return the state of each component of a way, and the components that the fault reached.
 
-        `left` has the times (s) by which components left golden. The channels of components in `shown` show
-        it. An unrecorded component counts as reached if a component that feeds it was reached.
+        `left` has the rank of the time by which each component left golden. Components in `shown` have
+        channels that left golden. The fault reaches an unrecorded component if it reached one that feeds it.
         """
         moved = self._moved(left)
         states: dict[str, State] = {}
@@ -252,15 +252,14 @@ class Ways:
         return states, arrived
 
     def _moved(self, left: Mapping[str, float]) -> float:
-        """Return the time (s) at which the process left golden; infinite if it did not."""
+        """Return the rank of the time at which the process left golden; infinite if it did not."""
         return min((left[name] for name in self.processes if name in left), default=inf)
 
     def _latest(self, way: Way, left: Mapping[str, float]) -> dict[str, float]:
-        """Return the times (s) by which components left golden.
+        """Return the rank of the time by which each component left golden.
 
-        They follow from a component's own channels, or from those of a component that only it feeds, provided
-        that feedback cannot have reached the latter yet. If the place of injection is unknown, nothing is
-        inferred.
+        If a component is the only one that feeds another, it left golden no later than the other did, unless
+        feedback could have reached the other. If the place of injection is unknown, nothing is inferred.
         """
         moved, times = self._moved(left), dict(left)
         for name in reversed(way.components if way.injected else ()):
@@ -277,10 +276,10 @@ class Ways:
         return structured(self.structure.components, self._links, self.processes, injected)
 
     def _fed_back(self, names: Collection[str], left: Mapping[str, float]) -> float:
-        """Return the earliest time (s) of feedback through one of these components, or infinity.
+        """Return the rank of the earliest time of feedback through one of these components, or infinity.
 
-        It is the time at which the component left golden or, if the component is not recorded, one that leads
-        to it.
+        A recorded component feeds back once it has left golden, any other once a component that leads to it
+        has.
         """
         unseen = steps_from([name for name in names if name not in self._roles], self._back).keys()
         return min((left[name] for name in {*names, *unseen} if name in left), default=inf)
@@ -314,9 +313,8 @@ def _passage(tail: str, tip: str, states: Mapping[str, State], arrived: Collecti
 
 
 def _holding(way: Way, states: Mapping[str, State], arrived: Collection[str]) -> tuple[str, ...]:
-    """Return the components that held a fault.
-
-    These are fed by components that the fault reached. If it reached none, they are at its entry.
+    """Return the components that held a fault: those fed by a component that the fault reached or, if there
+    are none, the first ones on its path.
     """
     held = [name for name in way.components if states[name] is State.HELD]
     reached = {name for name in way.components if states[name] is State.REACHED}

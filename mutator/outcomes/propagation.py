@@ -1,4 +1,4 @@
-"""Finds the channels that left golden in a run, with first times and largest deviations."""
+"""Finds the channels that left golden in a run, with the first time and largest deviation of each."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -16,21 +16,21 @@ Departure = tuple[str, float, float]  # channel, first time (s), largest deviati
 _TINY = 1e-9  # s; times are sums of steps
 COLUMNS = (
     Column("experiment_id", "text", "", "the experiment"),
-    Column("channel", "text", "", "a channel that left golden beyond its tolerance"),
+    Column("channel", "text", "", "a channel that differed from golden by more than its tolerance"),
     Column("component", "text", "", "the component of the channel, from the manifest"),
     Column("role", "text", "", "`actuator`, `truth` or `internal`"),
-    Column("t_first", "number", "s", "when it first left golden"),
-    Column("max_dev", "number", "the channel's", "its largest difference from golden up to the drive's end"),
+    Column("t_first", "number", "s", "when the channel first left golden"),
+    Column("max_dev", "number", "the channel's", "the largest difference from golden up to the drive's end"),
 )
 
 
 def departures(
     golden: Trace, faulty: Trace, channels: Sequence[Channel], time: str, t_end: float | None
 ) -> tuple[Departure, ...]:
-    """Return the `channels` that left golden beyond their tolerance before the end of the drive.
+    """Return the `channels` that left golden, by more than their tolerance, before the end of the drive.
 
-    Channels that one run did not record are skipped. If one run ends earlier, all other channels leave golden
-    there at the latest. The largest deviation is over the common time.
+    Channels that are not recorded in both runs are skipped. If one run ends earlier, all channels leave
+    golden at its end at the latest. The largest deviation is taken over the time that both runs have.
     """
     end = np.inf if t_end is None else t_end + _TINY
     ended = end_of_shorter(golden[time], faulty[time])

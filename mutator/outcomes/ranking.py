@@ -72,7 +72,7 @@ def places(texts: "pd.DataFrame") -> "np.ndarray":
 def _turn(
     texts: "pd.DataFrame", ending: "np.ndarray", has_class: "np.ndarray", by_id: "np.ndarray"
 ) -> "np.ndarray":
-    """Compute `_turns` by column. The result is infinite for rows without a margin."""
+    """Return the ranks of `_turns` for each row of a frame, infinite without a margin."""
     import numpy as np
     import pandas as pd
 
@@ -98,8 +98,8 @@ def worth_of(texts: "pd.DataFrame") -> dict[str, int]:
 
 
 def worth(rows: Iterable[Row]) -> dict[str, int]:
-    """Return the rank of each finished experiment (0 is the worst), which decides whose series are kept if
-    there is no room for all.
+    """Return the rank of each experiment with status `ok` (0 is the worst). If there is no room for all
+    series, those of the worst experiments are kept.
     """
     return {row.experiment_id: i for i, row in enumerate(worst(rows)) if row.status is Status.OK}
 

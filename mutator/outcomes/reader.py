@@ -1,4 +1,4 @@
-"""The only reader of a run's results: as rows, pandas frames, or bytes.
+"""Reads a run's results as rows, pandas frames, or bytes.
 
 Only functions that return frames import pandas.
 """
@@ -75,8 +75,8 @@ class Results:
             raise MutatorError(
                 f"no results here (no {path.name})",
                 where=path.parent,
-                expected="a run folder",
-                remedy="build them: `mutator report DIR`; for a run folder see `mutator run --help`",
+                expected="a run folder, as `mutator run` makes it",
+                remedy="correct the path, or build the results: `mutator report DIR`",
             ) from None
         except OSError as err:
             raise MutatorError(f"the results cannot be read ({err.strerror})", where=path) from None
@@ -137,7 +137,7 @@ class Results:
         """Return a frame of all columns, typed and indexed by experiment id.
 
         Names are categories; `outcome` and `status` are ordered. Flags are nullable booleans (NA: the run
-        failed). Times are floats in simulated seconds (NaN: did not happen). Added columns are `kind`
+        failed). Times are floats in simulated seconds (NaN: no such event). Added columns are `kind`
         (`sensor/bias`), `hazard` (any hazard) and `t_hazard` (the first one). `frame.attrs["units"]` has the
         unit of each number.
         """
@@ -174,7 +174,7 @@ class Results:
             raise MutatorError(
                 "no propagation was recorded",
                 where=self.path.parent,
-                expected=f"{results.PROPAGATION}, which runs of this version have",
+                expected=f"{results.PROPAGATION}, which runs of this version of mutator have",
                 remedy="rerun the campaign into another folder",
             )
         return self._read(path)
@@ -203,7 +203,7 @@ def row_of(
 
 
 def same_parquet(path: Path, made: Path) -> bool:
-    """Return whether two Parquet files have the same rows. Different versions of pyarrow may write different
+    """Return whether two Parquet files have the same rows. Different versions of pyarrow can write different
     bytes.
     """
     import pyarrow as pa

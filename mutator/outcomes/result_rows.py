@@ -27,10 +27,10 @@ def row(
     ends: bool = False,
     scale: Scale | None = None,
 ) -> dict[str, object]:
-    """Build one row, by column name. If the run left no trace, the row has no largest differences.
+    """Return one row, by column name. If the run left no trace, the row has no largest differences.
 
-    `hazards` are those that the target checks. `ends`: a hazard can end the drive. `scale` classifies
-    delta-v. None is an empty cell. Flags are 0 or 1. Times are in simulated seconds.
+    `hazards` are those that the target checks. `ends` says whether a hazard can end the drive. `scale`
+    classifies delta-v. None is an empty cell. Flags are 0 or 1. Times are in simulated seconds.
     """
     cells = plan_row(experiment) | _verdict_cells(record, scale)
     ok, times = record.status is Status.OK, dict(record.hazards)

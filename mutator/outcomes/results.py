@@ -67,8 +67,8 @@ def names(folder: RunFolder) -> tuple[str, ...]:
 def write(folder: RunFolder, paths: Mapping[str, Path]) -> None:
     """Write the tables of a run folder to the given `paths`.
 
-    Experiments are read in batches, so that a million needs only some hundred MB. For a large run, two
-    processes build the batches.
+    Experiments are read in batches, so that a million of them need only a few hundred MB of memory. For a
+    large run, two processes build the batches.
     """
     with beside(lambda: _write_timings(folder, paths[TIMINGS_PARQUET]), processes_for(folder.planned)) as end:
         _write_results(folder, paths)
@@ -150,7 +150,7 @@ def _stamp(folder: RunFolder) -> dict[str, Any]:
 
 
 def _unedited(folder: RunFolder, now: Mapping[str, str]) -> dict[str, str]:
-    """Return the digests of the tables that a build made, and warn about any other table.
+    """Return the digests of the tables that a build wrote, and warn about tables that were edited since.
 
     Older folders without results.json cannot be checked.
     """
@@ -160,7 +160,7 @@ def _unedited(folder: RunFolder, now: Mapping[str, str]) -> dict[str, str]:
     made = {name: (now[name], stamp["tables"].get(name), stamp["before"].get(name)) for name in found}
     for name in found:
         if tells and found[name] not in made[name]:
-            text = f"{folder.path / name}: does not match plan and records; rebuilt"
+            text = f"{folder.path / name}: the table did not match plan and records, so it was rebuilt"
             warnings.warn(text, MutatorWarning, stacklevel=2)
     return {name: one for name, one in found.items() if one in made[name]}
 

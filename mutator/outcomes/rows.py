@@ -39,11 +39,11 @@ class Row:
     detail: str
     severity: str = ""  # class of the contact that ended the drive
     delta_v: float | None = None  # delta-v of that contact in m/s
-    margins: tuple[tuple[str, float], ...] = ()  # to the hazards that occurred; else to all
+    margins: tuple[tuple[str, float], ...] = ()  # to the hazards that occurred or, if none did, to all
 
     @property
     def margin(self) -> float | None:
-        """The least margin, in the unit of its hazard."""
+        """The smallest margin, in the unit of its hazard."""
         return min((margin for _, margin in self.margins), default=None)
 
     @property

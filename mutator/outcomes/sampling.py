@@ -1,9 +1,9 @@
 """Samples a run's channels into its series: six digits, at most 20 values a second (internal channels: 10).
 
-A sample is the newest value at its time, so events shorter than 50 ms may fall between samples. Channels that
-differ therefore keep extra points: the first differing step, the steps of the largest difference in the drive
-and in the whole run, and the last step of a run that ended early. All channels keep the steps in which a
-hazard first occurred, so that replays show the values by which it was judged.
+A sample is the newest value at its time, so events shorter than 50 ms can fall between samples. Channels that
+differ from golden therefore keep extra points: the first differing step, the steps of the largest difference
+in the drive and in the whole run, and the last step of a run that ended early. All channels keep the steps in
+which a hazard first occurred, so that replays show the values on which the verdict is based.
 """
 
 from functools import cached_property
@@ -19,7 +19,7 @@ from mutator.store.series_format import Points, Series, encode
 from mutator.targets.channels import Channel, Role
 from mutator.targets.manifest import TargetManifest
 
-RATE = 20.0  # maximum of samples a second
+RATE = 20.0  # maximum number of samples per second
 _EVERY = {Role.ACTUATOR: 1, Role.TRUTH: 1, Role.INTERNAL: 2}  # a channel keeps every n-th sample
 _HALF = np.uint32(8)  # half of the lowest bit that is kept
 _TINY = 1e-9  # s; times are sums of steps
@@ -86,7 +86,7 @@ class Sampler:
         return [np.ascontiguousarray(row[::every]) for row, every in zip(single, self._every, strict=True)]
 
     def _together(self, faulty: Trace, own: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the step times of both runs together, and each run's values, which are NaN after its end."""
+        """Return the union of both runs' step times, and each run's values, which are NaN after its end."""
         rows = min(len(own), len(self._time))
         if np.array_equal(own[:rows], self._time[:rows]):
             time = max(own, self._time, key=len)
@@ -104,7 +104,7 @@ class Sampler:
 
     @staticmethod
     def _held(values: np.ndarray, own: np.ndarray, time: np.ndarray) -> np.ndarray:
-        """Return the newest value of each row at other times; NaN before its first and after its last."""
+        """Return the newest value of each row at the given times; NaN before its first and after its last."""
         place = np.searchsorted(own, time + _TINY, side="right") - 1
         there = (place >= 0) & (time <= own[-1] + _TINY)
         return np.where(there, values[:, np.maximum(place, 0)], np.nan)
@@ -131,7 +131,9 @@ def _filled(values: np.ndarray, count: int) -> np.ndarray:
 
 
 def _single(values: np.ndarray) -> np.ndarray:
-    """Round the values to single precision and six digits (20 bits). More would add a tenth to the size."""
+    """Round the values to single precision and six digits (20 bits). More digits would make a series a tenth
+    larger.
+    """
     with np.errstate(over="ignore"):  # overflow becomes infinity
         single = values.astype("<f4")
         words = (single.view("<u4") + _HALF) & ~np.uint32(2 * _HALF - 1)

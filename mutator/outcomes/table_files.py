@@ -9,8 +9,8 @@ from typing import Any
 
 from mutator.outcomes.columns import Column
 
-_ROWS = 1 << 20  # maximum of rows in a row group (pyarrow's default)
-_CELLS = 1 << 23  # maximum of cells in a row group, because a whole group is in memory
+_ROWS = 1 << 20  # maximum number of rows in a row group (pyarrow's default)
+_CELLS = 1 << 23  # maximum number of cells in a row group, because a whole group is in memory
 _TYPES = {"text": "string", "flag": "int8", "count": "int64", "number": "float64"}
 
 
@@ -22,7 +22,7 @@ def csv_lines(rows: Iterable[Sequence[object]]) -> bytes:
 
 
 def record_batch(columns: Sequence[Column], values: Sequence[Sequence[object]]) -> Any:
-    """Make Parquet rows from a sequence of values for each column."""
+    """Return Parquet rows, given the values of each column."""
     import pyarrow as pa  # type: ignore[import-untyped]
 
     schema = _schema(columns)
@@ -54,7 +54,7 @@ class CsvTable:
 
 
 class ParquetTable:
-    """A Parquet file. Its bytes do not depend on time, place or batches."""
+    """A Parquet file. Equal rows give equal bytes, in whatever batches they are appended."""
 
     def __init__(self, path: Path, columns: Sequence[Column]) -> None:
         import pyarrow as pa

@@ -24,19 +24,19 @@ class BadTrace(ValueError):
 
 
 def own_times(name: str) -> str:
-    """Return the name of the times of a channel that does not have a value at each step."""
+    """Return the name under which a channel's own times are stored; it lacks values at some steps."""
     return f"{name}@"
 
 
 def read(
     path: Path, manifest: TargetManifest, channels: Iterable[Channel] | None, also: Sequence[Channel] = ()
 ) -> Arrays:
-    """Read channels and time of a trace, by manifest name, and under `own_times` the times of channels that
-    lack some steps.
+    """Read the channels and step times of a trace, by manifest name. A channel that lacks values at some
+    steps has its own times, named by `own_times`.
 
-    Without `channels`, read everything, including names that are not in the manifest. Channels in `also` may
-    be missing. BadTrace for an invalid file, KeyError for any other missing channel. Errors of the readers
-    pass through.
+    Without `channels`, read everything, including names that are not in the manifest. Channels in `also` can
+    be missing. BadTrace for an invalid file, KeyError for any other missing channel. Other errors of the
+    reader are not caught.
     """
     wanted = manifest.channels if channels is None else (*channels, *also)
     if path.suffix == ".mcap":

@@ -36,7 +36,7 @@ def judge(*, activation: Activation | None, t_manifest: float | None, hazards: E
 
 
 def reaction_time(hazards: Events, alerts: Events) -> float | None:
-    """Return the time (s) from the first alert to the first hazard, which a driver has to react.
+    """Return the time (s) that a driver has to react: from the first alert to the first hazard.
 
     None unless both happened and the alert came first.
     """

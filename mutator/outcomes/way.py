@@ -1,4 +1,4 @@
-"""Finds the components on the way of a fault to the controlled process, in causal order."""
+"""Finds the components on a fault's way to the controlled process, in causal order."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -10,13 +10,13 @@ from mutator.targets.channels import Role
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Way:
-    """The way that faults of some components can take: components in causal order, and their links."""
+    """The way that faults in some components can take: the components in causal order, and their links."""
 
     components: tuple[str, ...]
     links: Mapping[str, tuple[str, str]]
     sources: frozenset[str]  # components at which the fault enters
     injected: bool  # whether the sources are known to be the place of injection
-    fed: Mapping[str, frozenset[str]]  # by component: components off the way that lead to it
+    fed: Mapping[str, frozenset[str]]  # by component: the components not on the way that lead to it
     steps: Mapping[str, int]  # by component: number of links to the process
 
     def feeders(self, component: str) -> set[str]:
@@ -28,7 +28,7 @@ def chained(roles: Mapping[str, str], processes: frozenset[str]) -> Way:
     order = [role.value for role in (Role.INTERNAL, Role.ACTUATOR, Role.TRUTH)]
     chain = sorted(roles, key=lambda name: order.index(roles[name]))
     links = {f"{tail}-{tip}": (tail, tip) for tail, tip in pairwise(chain)}
-    # the observed process may also feed the first component
+    # the process can also feed back into the first component
     return Way(
         components=tuple(chain),
         links=links,
@@ -84,7 +84,8 @@ def _in_causal_order(
 ) -> tuple[str, ...]:
     """Sort the nodes so that each follows all nodes that feed it.
 
-    If several may come next, or in a cycle, the node with the most `steps` to the process comes first.
+    If several nodes can come next, or none because of a cycle, the one with the most `steps` to the process
+    does.
     """
     left = sorted(nodes, key=lambda name: -steps.get(name, len(nodes)))
     order: list[str] = []

@@ -12,17 +12,17 @@ Steps = np.ndarray[tuple[int], np.dtype[np.bool_]]  # one flag per step
 
 APPLIED = 0.01  # share of full gas or brake; less is ignored
 WRONG_S = 0.5  # minimum duration of wrong gas or brake
-BRAKE_S = 0.1  # minimum duration of braking that is too short
-SHORT = 0.5  # maximum share of golden's braking time that is too short
+BRAKE_S = 0.1  # braking for less than this is ignored
+SHORT = 0.5  # braking is too short up to this share of golden's braking time
 RELEASED_S = 1.0  # maximum time from the alert to the last gas or brake
 MISSED_S = 0.1  # minimum duration of gas, and of braking, that only the fault-free run has
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pair:
-    """Both runs over their common steps, with a value for each step.
+    """A golden and a faulty run over their common steps, with a value for each step.
 
-    The search is from `start`, the activation of the fault, to `end`, the hazard or the end of the run.
+    Actions are sought from `start`, the activation of the fault, to `end`, the hazard or the end of the run.
     """
 
     t: np.ndarray  # simulated time, s
@@ -52,7 +52,7 @@ class Pair:
         )
 
     def applied(self, channel: str) -> tuple[Steps, Steps]:
-        """Return the steps between `start` and `end` in which golden and faulty apply gas or brake."""
+        """Return the steps between `start` and `end` in which golden and faulty apply `channel`."""
         within = (self.t >= self.start) & (self.t <= self.end)
         return within & (self.golden[channel] > APPLIED), within & (self.faulty[channel] > APPLIED)
 
@@ -135,8 +135,8 @@ WANTED = (
         title="Unsafe control action: gas at a wrong time",
         query=f"{_WRONG_DATA} and t_h1 > t_activation",
         order="max_dev_gas",
-        confirmed=f"between activation and H1 the faulty run gives gas for {WRONG_S} s or more while the "
-        "fault-free run gives none (grey)",
+        confirmed=f"between activation and H1 the faulty run applies gas for {WRONG_S} s or more while the "
+        "fault-free run does not (grey)",
         look=at_a_wrong_time("gas"),
         actions=("gas",),
         panels=(_GAS, _BRAKE, _DISTANCE),
@@ -160,8 +160,8 @@ WANTED = (
         query='module == "radar" and fault_type == "jamming" and status == "ok" and t_alert >= t_activation '
         "and max_dev_gas > 0",
         order="max_dev_brake",
-        confirmed=f"from {RELEASED_S:.0f} s after the first alert at the latest the faulty run gives neither "
-        f"gas nor brake any more (grey), while the fault-free run still gives each for {MISSED_S} s or more",
+        confirmed=f"at most {RELEASED_S:.0f} s after the first alert, the faulty run stops applying gas and "
+        f"brake (grey), while the fault-free run still applies each for {MISSED_S} s or more",
         look=both_unavailable,
         actions=("gas", "brake"),
         panels=(_GAS, _BRAKE, _SPEED),

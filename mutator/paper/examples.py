@@ -17,7 +17,7 @@ from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
 QUERY = "Query over results.csv"
-LOOKED_AT = 5  # maximum of candidates examined for each figure
+LOOKED_AT = 5  # maximum number of candidates examined for each figure
 
 
 def example_drawings(
@@ -26,7 +26,7 @@ def example_drawings(
     workspace: Workspace | None,
     wanted: Sequence[Wanted] = WANTED,
 ) -> tuple[Drawing, ...]:
-    """Make a drawing for each wanted figure. If a figure is missing, its drawing has the reason.
+    """Return a drawing for each wanted figure; without the figure, it gives the reason.
 
     `frame` comes from `statistics.frame.load`. Traces come from stored series, so nothing is rerun.
     """
@@ -36,7 +36,7 @@ def example_drawings(
         try:
             made.append(_drawing(frame, traces, one))
         except MutatorError as err:
-            made.append(_none(one, f"its traces are not available: {err.got}"))
+            made.append(_none(one, f"the traces are not available: {err.got}"))
     return tuple(made)
 
 
@@ -88,7 +88,7 @@ def _drawing(frame: pd.DataFrame, traces: Traces | None, wanted: Wanted) -> Draw
             )
     return _none(
         wanted,
-        f"the first {len(looked_at)} of the {len(found)} experiments that the query finds do not show it",
+        f"none of the first {len(looked_at)} of the {len(found)} experiments that the query finds shows it",
     )
 
 
@@ -108,6 +108,6 @@ def _note(wanted: Wanted, row: Mapping[Hashable, Any], number: int, of: int) -> 
     return (
         f"{fault} in {row['scenario']}, {row['method']}, trigger "
         f"{row['trigger']}: experiment {row['experiment_id']}. It is number {number} of the {of} that the "
-        f"query finds, largest {wanted.order} first: the first (of at most {LOOKED_AT} examined) "
+        f"query finds, largest {wanted.order} first, and the first (of at most {LOOKED_AT} examined) "
         f"whose traces show that {wanted.confirmed}."
     )

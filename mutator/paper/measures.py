@@ -1,8 +1,7 @@
 """Measures that evaluate published observations on a frame of results, each with an interval.
 
 `runs` comes from `mutator.statistics.frame.load`. `of`, `part` and `against` are pandas queries on it; an
-empty query selects all runs. Reports show the evaluated call of each claim. You can repeat it
-in Python:
+empty query selects all runs. Reports show the call for each claim, which you can repeat in Python:
 
     from mutator.paper.measures import *
     from mutator.statistics.frame import load
@@ -70,7 +69,7 @@ def clustered_difference(runs: pd.DataFrame, *, of: str) -> Estimate:
     one, other = (
         _share(chosen, f'method == "{how}"', "is_hazard") for how in (contrasts.GUIDED, contrasts.RANDOM)
     )
-    found = contrasts.resampled(chosen, "injected")  # `chosen` are already the runs to count
+    found = contrasts.resampled(chosen, "injected")  # `chosen` has only the runs to count
     return Estimate(
         estimate=found.difference,
         low=found.low,
@@ -100,7 +99,7 @@ def stratified(runs: pd.DataFrame, *, of: str) -> Estimate:
 
 
 def paired(runs: pd.DataFrame, *, of: str) -> Estimate:
-    """Return the share of guided-random pairs, among those with one hazard, in which the guided run has it.
+    """Return how often, in pairs of a guided and a random run with one hazard, the guided run has the hazard.
 
     The Clopper-Pearson interval agrees with McNemar's exact test. `of` is a query on pairs, with column names
     that end in `_guided` and `_random`.
@@ -119,8 +118,8 @@ def paired(runs: pd.DataFrame, *, of: str) -> Estimate:
         high=high,
         n=unlike,
         count=matched.first_only,
-        text=f"hazard in the guided run only {matched.first_only}, in the random one only "
-        f"{matched.second_only}, of {matched.pairs} pairs (McNemar p {matched.p:.2g})",
+        text=f"of {matched.pairs} pairs, {matched.first_only} have a hazard only in the guided run, "
+        f"{matched.second_only} only in the random run (McNemar p {matched.p:.2g})",
     )
 
 
@@ -141,8 +140,8 @@ def mean_time(runs: pd.DataFrame, *, of: str, start: str, end: str) -> Estimate:
 def median_time(runs: pd.DataFrame, *, of: str) -> Estimate:
     """Return the Kaplan-Meier median of the time (s) from the first alert to a hazard.
 
-    It is censored at the end of the run (column `t_end`, simulated seconds), and infinite if no hazard
-    follows most alerts.
+    Times are censored at the end of the run (column `t_end`, simulated seconds). The median is infinite if
+    most alerts are not followed by a hazard.
     """
     chosen = _query(runs, of)
     if chosen["t_end"].isna().any():

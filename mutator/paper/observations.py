@@ -1,4 +1,4 @@
-"""Tests published observations. Each claim is a query on the results, and a rule decides the verdict.
+"""Judges published observations. Each claim is a query on the results, and a rule decides the verdict.
 
 Claims, queries and rules are data in the fault library (`references/paper_observations.yaml`).
 """
@@ -18,7 +18,7 @@ from mutator.statistics.shares import share
 
 FILE = "paper_observations.yaml"
 SCHEMA = "paper_observations/1"
-FEWEST = 10  # minimum of runs for a verdict from an interval
+FEWEST = 10  # minimum number of runs for a verdict from an interval
 
 
 class Verdict(StrEnum):
@@ -33,8 +33,8 @@ class Rule(StrictModel):
     """The condition under which a claim holds. Exactly one field is set.
 
     Shares and differences are fractions; times are in s. `above`, `below` and `within` (plus or minus) are
-    bounds for the whole interval. With `some`, at least one run must have the property; with `never`, none
-    may. If no run has it, a verdict needs an interval that ends at or below this share.
+    bounds for the whole interval. With `some`, at least one run must have the property; with `never`, no run
+    must have it. If no run has it, a verdict needs an interval that ends at or below the given share.
     """
 
     above: float | None = None
@@ -46,7 +46,7 @@ class Rule(StrictModel):
     @model_validator(mode="after")
     def _check(self) -> "Rule":
         if len(self.model_dump(exclude_none=True)) != 1:
-            raise ValueError("not exactly one of above, below, within, some, never")
+            raise ValueError("exactly one of above, below, within, some, never")
         return self
 
     def verdict(self, found: Estimate) -> Verdict:
@@ -85,7 +85,7 @@ class _Each(StrictModel):
 class Claim(StrictModel):
     """One claim. The comment at the top of the file of observations explains the fields.
 
-    Without a measure, results cannot decide the claim, and `see` names what might.
+    If the results cannot decide the claim, it has no measure, and `see` says where to look instead.
     """
 
     says: str
@@ -106,11 +106,11 @@ class Claim(StrictModel):
     @model_validator(mode="after")
     def _check(self) -> "Claim":
         if self.measure is not None and self.measure not in MEASURES:
-            raise ValueError(f"measure '{self.measure}' is none of {', '.join(MEASURES)}")
+            raise ValueError(f"as `measure` one of {', '.join(MEASURES)}")
         if (self.measure is None) != (self.holds is None) or (self.measure is None) != bool(self.see):
-            raise ValueError("either measure and holds, or see")
+            raise ValueError("either `measure` and `holds`, or `see`")
         if any(len(pair) != 2 for pair in self.paper):
-            raise ValueError("paper: pairs of a count and its whole")
+            raise ValueError("in `paper` only pairs of a count and a total")
         return self
 
     def calls(self) -> Iterator[tuple[str, dict[str, str]]]:
@@ -149,7 +149,7 @@ class Observations(StrictModel):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Answer:
-    """One query and its result. `group` is '' if the claim has no groups."""
+    """A query and its result. `group` is '' if the claim has no groups."""
 
     group: str
     query: str
@@ -203,7 +203,7 @@ def judge(
 
 
 def together(verdicts: Sequence[Verdict]) -> Verdict:
-    """Combine verdicts: one that fails decides, otherwise one that lacks data."""
+    """Return FAILS if any verdict is, else UNDECIDED if any is or there is none, else HOLDS."""
     for verdict in (Verdict.FAILS, Verdict.UNDECIDED):
         if verdict in verdicts:
             return verdict

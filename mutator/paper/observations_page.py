@@ -7,14 +7,15 @@ from mutator.paper.observations import FEWEST, JudgedClaim, JudgedObservation
 from mutator.statistics.sheet import Cell, Sheet
 
 RULES = f"""\
-The 95 % interval of a claim's number decides the claim, not the number. *above x*: the claim holds if the
-whole interval lies above x, and does not hold if it lies below; *below x* and *within x* (plus or minus x)
-likewise. With fewer than {FEWEST} runs there is not enough data. *some x*: the claim holds if one run shows
-it. *never x*: it does not hold if one run shows it. If no run shows it, the opposite verdict needs an
-interval that ends at x or below. A claim with groups must hold in each group. A claim about all faults
-needs a complete run with all fault types of the paper. An observation holds if all claims that it rests on
-hold, and does not hold if one of them does not; otherwise there is not enough data. The intervals treat
-runs as independent, except where whole faults are resampled, so the true uncertainty is at least as large."""
+A claim is decided by the 95 % interval of its number, not by the number itself. *above x*: the claim holds if
+the whole interval lies above x, and does not hold if it lies below; *below x* and *within x* (plus or minus
+x) likewise. With fewer than {FEWEST} runs there is not enough data. *some x*: the claim holds if at least one
+run has the property. *never x*: the claim does not hold if at least one run has the property. If no run has
+it, the opposite verdict needs an interval that ends at x or below. A claim with groups must hold in each
+group. A claim about all faults needs a complete run with all fault types of the paper. An observation holds
+if all claims that it depends on hold, and does not hold if one of them does not; otherwise there is not
+enough data. The intervals treat runs as independent, except where whole faults are resampled, so the true
+uncertainty is at least as large."""
 
 SESSION = """\
 from mutator.paper.measures import *
@@ -22,7 +23,7 @@ from mutator.statistics.frame import load
 
 runs = load(Path("results.csv"))"""
 
-HEADS = ("claim", "", "the paper", "rule on its counts", "here", "rule", "verdict")
+HEADS = ("claim", "", "the paper", "verdict on its counts", "here", "rule", "verdict")
 
 
 def table(observation: JudgedObservation) -> Table:
@@ -78,7 +79,7 @@ def heading(one: JudgedObservation) -> str:
 
 
 def rules() -> str:
-    return RULES.replace("\n", " ") + " Claims that an observation rests on are marked with *."
+    return RULES.replace("\n", " ") + " Claims that an observation depends on are marked with *."
 
 
 def sheet(observations: Sequence[JudgedObservation]) -> Sheet:

@@ -85,7 +85,7 @@ def observations_panel(run: ReportedRun) -> Panel | None:
         coverage,
         observations_page.verdicts(judged),
         *(("### Seed by seed", seeds.ABOUT, of_seeds.as_markdown()) if of_seeds else ()),
-        f"Their claims, rules, numbers and queries are in [{FILE}]({FILE}).",
+        f"The claims, rules, numbers and queries are in [{FILE}]({FILE}).",
     ]
     html = rendered(
         _HTML,
@@ -108,7 +108,7 @@ def _missing(kinds: Sequence[str], runs: "pd.DataFrame") -> list[str]:
 
 
 def _lacks(run: ReportedRun, missing: list[str]) -> Iterator[str]:
-    """Yield how the run differs from the paper's mixture of faults. A shard counts as incomplete."""
+    """Yield how the run differs from the paper's mixture of faults. A shard is always incomplete."""
     if missing:
         yield f"{len(missing)} of the paper's fault types are missing"
     if run.done < (planned := int(run.folder.head["experiments"])):
@@ -116,7 +116,7 @@ def _lacks(run: ReportedRun, missing: list[str]) -> Iterator[str]:
 
 
 def _coverage(run: ReportedRun, kinds: int, missing: list[str]) -> str:
-    text = f"From {len(run.frame)} of {run.folder.planned} experiments, which have {kinds - len(missing)} "
-    text += f"of the paper's {kinds} fault types."
+    text = f"Based on {len(run.frame)} of {run.folder.planned} experiments, which have "
+    text += f"{kinds - len(missing)} of the paper's {kinds} fault types."
     text += f" Missing: {', '.join(missing)}." if missing else ""
     return " ".join(filter(None, (text, own_alerts(run.fault_free()))))

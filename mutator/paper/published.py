@@ -30,8 +30,8 @@ class Paper:
             by_kind=self.coverage,
             scenario_title="the paper's table II",
             kind_title="the paper's table III",
-            counts_note="The paper's counts are cited, their intervals are ours.",
-            kind_note="The paper divides by activated faults; hazards/injected is what experiments yield.",
+            counts_note="The paper gives the counts; their intervals are computed here.",
+            kind_note="The paper has only hazards/activated; hazards/injected relates to all experiments.",
             times_note=f"The paper's mean times from alert to hazard lie between {least:g} and {most:g} s.",
             driver_s=self.driver_reaction_s,
         )
@@ -114,7 +114,7 @@ def has_paper(references: Path) -> bool:
 
 
 def _check(tally: Tally, source: Source, row: int) -> None:
-    """Raise MutatorError if a part exceeds its whole, or if counts of hazards and alerts disagree."""
+    """Raise MutatorError if a part exceeds its whole, or if counts of hazards and alerts are inconsistent."""
     parts = (tally.manifested or 0, tally.hazards, tally.alerts or 0)
     fits = tally.activated <= tally.injected and max(parts) <= tally.activated
     if tally.alerts is not None:

@@ -59,7 +59,7 @@ def _twice(source: Source, name_of: Callable[[dict[str, Any]], str]) -> Iterator
         seen[name_of(row)] += 1
         if seen[name_of(row)] == 2:
             yield source.error(
-                ("rows", i), f"{name_of(row)} a second time", expected="it once", remedy=_REMEDY
+                ("rows", i), f"{name_of(row)} is listed twice", expected="one row", remedy=_REMEDY
             )
 
 
@@ -72,7 +72,7 @@ def _unknown(
                 ("rows", i),
                 f"{what} '{name_of(row)}'",
                 expected=f"one of {', '.join(sorted(known))}",
-                remedy="correct the name, or add what it names to the library",
+                remedy=f"correct the name, or add the {what} to the library",
             )
 
 
@@ -89,7 +89,7 @@ def _sums(paper: Paper, coverage: Source, summary: Path) -> Iterator[MutatorErro
             if got != expected:
                 yield coverage.error(
                     ("rows",),
-                    f"{got} {method} {name} in all",
+                    f"{got} {method} {name} in total",
                     expected=f"{expected}, the sum in {summary.name}",
                     remedy=_REMEDY,
                 )

@@ -13,8 +13,8 @@ from mutator.statistics.sheet import Cell, Sheet
 BySeed = Mapping[str, Sequence[JudgedObservation]]
 
 ABOUT = (
-    "Each seed is the whole campaign with different draws. Its observations are judged only on its runs, by "
-    "the same rules. A seed has fewer runs than all together, so more verdicts lack data."
+    "Each seed is the whole campaign with different draws. The observations are judged on the runs of one "
+    "seed at a time, by the same rules. One seed has fewer runs than all seeds, so more verdicts lack data."
 )
 
 

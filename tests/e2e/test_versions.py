@@ -104,7 +104,7 @@ def test_another_python_is_refused(cli: Cli, half: Path) -> None:
     before = contents(half)
     code, _, err = cli("run", "small", "--out", half, "-n", "0")
     assert code == 2
-    assert f"run with other versions: {PYTHONS}" in err and "--accept-versions" in err
+    assert f"this run used other versions: {PYTHONS}" in err and "--accept-versions" in err
     assert contents(half) == before
 
 

@@ -55,7 +55,7 @@ def test_a_campaign_is_read(tmp_path: Path) -> None:
         ("values: 2", "value: 2", 8, "unknown key 'value'"),
         ("[guided, random]", "[guided, guided]", 9, "listed twice"),
         ("[guided, random]", "[guided, chance]", 9, "chance"),
-        ("random_until_s: 5.0", "random_until_s: 1.0", None, "later than armed_after_s"),
+        ("random_until_s: 5.0", "random_until_s: 1.0", None, "later than `armed_after_s`"),
         ("random_until_s: 5.0", "random_until: 5.0", None, "random_until"),
         ("as_described: 1.5", "as_described: -1.5", 12, "-1.5"),
         ("seed: 3", "seed: three", 14, "three"),

@@ -123,7 +123,7 @@ def test_review_groups_do_not_depend_on_the_draw(toycar: Workspace, campaign: Pa
         ("sample: 12", "sample: 0", "greater than or equal to 1"),
         ("arithmetic, branch", "arithmetics", "'arithmetic', 'comparison'"),
         ("sample: 12", "when: [sometimes]", "'permanent' or 'transient'"),
-        ("seed: 3", "seed: 3\nsample: 4\nproportional: true", "use their own `sample`"),
+        ("seed: 3", "seed: 3\nsample: 4\nproportional: true", "have their own `sample`"),
     ],
 )
 def test_a_wrong_selection_is_refused_with_its_line(campaign: Path, old: str, new: str, said: str) -> None:

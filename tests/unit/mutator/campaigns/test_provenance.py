@@ -93,7 +93,7 @@ def test_other_versions_are_refused_unless_accepted(
     with pytest.raises(MutatorError) as caught:
         check_versions(folder)
     assert caught.value.exit_code == EXIT_WRONG_INPUT
-    assert caught.value.got == f"run with other versions: {told}"
+    assert caught.value.got == f"this run used other versions: {told}"
     begin_stretch(folder, toycar, records="0002-*", accept=True)
     assert [list(stretch.accepted) for stretch in folder.stretches] == [[], [told]]
     assert check_versions(folder) == ()  # the run's versions from now on

@@ -111,8 +111,8 @@ def test_a_large_plan_loads_experiments_when_accessed(
     [
         ("about_seeds: 3", "either `seed` or `seeds`|unknown"),
         ("seed: 3\nseeds: {from: 3, to: 5}", "`seed` or `seeds`, not both"),
-        ("seeds: {from: 5, to: 3}", "`to` from 5 to 10004, not 3"),
-        ("seeds: {from: 1, to: 10001}", "`to` from 1 to 10000, not 10001"),
+        ("seeds: {from: 5, to: 3}", "`to` between 5 and 10004"),
+        ("seeds: {from: 1, to: 10001}", "`to` between 1 and 10000"),
         ("seeds: {from: -1, to: 3}", "from"),
         ("seeds: {from: 1}", "to"),
         ("seeds: 3", "seeds"),

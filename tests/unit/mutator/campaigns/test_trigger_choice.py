@@ -71,7 +71,7 @@ def test_triggers_may_be_a_plain_list(pole: Workspace) -> None:
     ("triggers", "methods", "said"),
     [
         ("triggers:\n  - always\n  - {when: angel > 0}\n", "[guided]", "11: unknown name 'angel' in"),
-        ("triggers:\n  - always\n  - always\n", "[guided]", "11: 'always' a second time; expected each"),
+        ("triggers:\n  - always\n  - always\n", "[guided]", "11: 'always' is listed twice; expected each"),
         ("triggers:\n  - always\n  - {at: 3}\n", "[guided]", "11: unknown key 'at'; expected one of always"),
         ("triggers:\n  - {hold_s: 3}\n", "[guided]", "10: .*one of `always`, `at_s` and `when`"),
         ("triggers:\n  - {at_s: 1, when: t > 3}\n", "[guided]", "10: .*one of `always`, `at_s` and `when`"),
@@ -79,7 +79,7 @@ def test_triggers_may_be_a_plain_list(pole: Workspace) -> None:
         ("triggers: []\n", "[guided]", "9: "),
         ("triggers: {random_until_s: 3}\n", "[guided]", "9: .*either a `table` or a `list`"),
         ("triggers: {table: x, list: [always]}\n", "[guided]", "9: .*either a `table` or a `list`"),
-        ("triggers: {list: [always], rows: [C1]}\n", "[guided]", "9: .*`rows` of a `table`"),
+        ("triggers: {list: [always], rows: [C1]}\n", "[guided]", "9: .*`rows` only with a `table`"),
         ("triggers: [always]\n", "[random]", "`random_until_s` in `triggers` for random times"),
     ],
 )

@@ -51,7 +51,7 @@ def test_missing_numbers_are_reported_with_a_remedy(workspace: Workspace) -> Non
             r"coverage\.yaml:13: .*injectd",
         ),
         ("coverage", "fault_type: fog", "fault_type: mist", r"coverage\.yaml:13: .*'vision_input/mist'"),
-        ("coverage", "fault_type: fog", "fault_type: rain", r"coverage\.yaml:13: .*/rain a second time"),
+        ("coverage", "fault_type: fog", "fault_type: rain", r"coverage\.yaml:13: .*/rain is listed twice"),
         ("coverage", "guided_hazards: 154", "guided_hazards: 155", r"coverage\.yaml:\d: 1317 guided hazards"),
         ("coverage", "guided_hazards: 154", "guided_hazards: 433", r"coverage\.yaml:6: .*contradict"),
         (
@@ -66,7 +66,12 @@ def test_missing_numbers_are_reported_with_a_remedy(workspace: Workspace) -> Non
             "method: blind, scenario: S5",
             r"summary\.yaml:14: .*blind",
         ),
-        ("summary", "scenario: S5, injected", "scenario: S4, injected", r"summary\.yaml:9: .*in S4 a second"),
+        (
+            "summary",
+            "scenario: S5, injected",
+            "scenario: S4, injected",
+            r"summary\.yaml:9: .*in S4 is listed twice",
+        ),
         ("times", "driver_reaction_s: 1.8", "driver_reaction_s: -1", r"times\.yaml:4: "),
     ],
 )

@@ -74,7 +74,7 @@ def test_an_experiment_outside_the_plan_has_no_figure(run: Path) -> None:
     """Markdown and page show the query instead."""
     forms = study_forms(run)
     for text in forms:
-        assert "No figure: its traces are not available" in text
+        assert "No figure: the traces are not available" in text
         assert "t_h1 > t_activation" in text
     assert "action_" not in forms[0]
     assert "<figure" not in (run / "report" / "study.html").read_text()
