@@ -78,12 +78,12 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     group = parser.getgroup("torture")
-    group.addoption("--tries", type=int, metavar="N", help="so many cases of each torture")
-    group.addoption("--seed", type=int, metavar="SEED", help="of each torture only the case of this seed")
+    group.addoption("--tries", type=int, metavar="N", help="number of cases of each torture test")
+    group.addoption("--seed", type=int, metavar="SEED", help="run each torture test only with this seed")
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
-    """Report what tests have recorded, in any process."""
+    """Print the tallies that tests recorded in any process."""
     reports = [*terminalreporter.getreports("passed"), *terminalreporter.getreports("failed")]
     told = [text for report in reports for name, text in report.user_properties if name == "tally"]
     for text in told:
@@ -107,7 +107,7 @@ def _caches(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 def _cache(
     tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch, _caches: Path
 ) -> Iterator[Path]:
-    """Give each test an empty cache, and delete it afterwards: frames take 184 MB."""
+    """Give each test an empty cache, and delete the cache after the test, because frames take 184 MB."""
     folder = tmp_path_factory.mktemp("cache")
     monkeypatch.setenv("XDG_CACHE_HOME", str(folder))
     yield folder
@@ -116,7 +116,7 @@ def _cache(
 
 @pytest.fixture
 def kept_checks(_cache: Path, _caches: Path) -> None:
-    """Reuse checks that passed in an earlier test of the same sources, because they take long."""
+    """Reuse the results of checks that passed in an earlier test of the same sources: checks are slow."""
     kept = _caches / "mutator" / "checks"
     kept.mkdir(parents=True, exist_ok=True)
     (_cache / "mutator").mkdir()
@@ -149,7 +149,7 @@ def copy_toycar() -> Callable[[Path], Workspace]:
 
 @pytest.fixture(scope="session")
 def give_eyes() -> Callable[..., None]:
-    """Let the car of a copied toy see a frame, and add the image effect `sensor/light` to its library."""
+    """Give the car of a copied toy a camera frame, and add the image effect `sensor/light` to its library."""
 
     def give(
         toycar: Workspace,
@@ -173,7 +173,7 @@ def give_eyes() -> Callable[..., None]:
 
 @pytest.fixture
 def pole(tmp_path: Path) -> Workspace:
-    """A copy of the pole's library and tree, with the project's templates."""
+    """A copy of the pole target's library and tree, with the project's templates."""
     root = tmp_path / "pole"
     shutil.copytree(_TESTS / "pole", root, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copytree(_TESTS.parent / "templates", root / "templates")
@@ -269,8 +269,8 @@ def write_run(record: Callable[..., Record]) -> Callable[..., Path]:
         changed: Callable[[Plan], Plan] = lambda plan: plan,
         **choices: Any,
     ) -> Path:
-        """`became` holds each record's own fields; None means that the experiment was not run. `changed`
-        alters the campaign's plan."""
+        """`became` returns the fields of an experiment's record, or None if the experiment has no record.
+        `changed` alters the campaign's plan."""
         plan = changed(make_plan(workspace, campaign, Choices(**choices)))
         freeze(plan, out, workspace)
         compared = workspace.manifest(plan.campaign.target).compared
@@ -288,8 +288,9 @@ def write_run(record: Callable[..., Record]) -> Callable[..., Path]:
 
 @pytest.fixture(scope="session")
 def of_operators() -> Callable[[Workspace, str], Callable[[Plan], Plan]]:
-    """Turn a plan into one of operator mutants: the sign of each operation of a file is changed, in the
-    scenarios of the plan's first experiments. The second mutant has a permanent fault."""
+    """Turn a plan into one of operator mutants, each of which changes the sign of one arithmetic operation in
+    a file. Each mutant runs with the scenarios and triggers of the plan's first experiments, but is permanent
+    in the second."""
 
     def of(workspace: Workspace, path: str, drives: int = 2) -> Callable[[Plan], Plan]:
         def changed(plan: Plan) -> Plan:

@@ -1,4 +1,4 @@
-"""A small foreign target with its library, copied so that tests may change it, and a fork engine for it."""
+"""Workspaces and a fork engine for unit tests. Targets are copied, so that tests can change them."""
 
 import shutil
 from collections.abc import Iterator

@@ -19,7 +19,7 @@ LIMITS = Limits(cpu_s=20, wall_s=60, memory_mb=1024, steps=500)
 
 
 class Fork:
-    """`manifest` is read on first use, so files can be edited before."""
+    """A fork engine that is created on first use, so that files of the toy can be edited before."""
 
     def __init__(self, toy: Workspace, folder: Path) -> None:
         self.toy = toy
@@ -78,7 +78,7 @@ class Fork:
         return pool
 
     def processes(self) -> list[int]:
-        """The process ids of the server and all its descendants."""
+        """Return the process ids of the server and all its descendants."""
         return sorted(int(path.name) for path in Path("/proc").glob("[0-9]*") if self._is_ours(path))
 
     def _is_ours(self, path: Path) -> bool:

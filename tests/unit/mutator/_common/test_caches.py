@@ -60,8 +60,7 @@ def test_passed_checks_are_one_entry_and_each_target_file_is_another(filled: Pat
     assert all(entry.size >= 5000 for entry in caches.entries())
 
 
-def test_a_sparse_file_counts_with_its_size_on_disk() -> None:
-    """The sparse file of 800 MB takes little space, so pruning keeps the other entries."""
+def test_the_size_of_a_sparse_file_is_its_size_on_disk() -> None:
     place = caches.of_target("car")
     place.mkdir(parents=True)
     with (place / "table").open("wb") as file:
@@ -88,8 +87,10 @@ def test_clearing_deletes_links_but_not_their_targets(filled: Path) -> None:
     assert (outside / "kept").exists()
 
 
-def test_recently_used_files_of_a_target_stay(filled: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Only the least recently used files are deleted, and only if space is short."""
+def test_making_room_deletes_the_least_recently_used_files_of_a_target(
+    filled: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Files are deleted only if space is short."""
     assert caches.make_room("car") == []
     monkeypatch.setattr(caches, "TARGET_BYTES", 2 * 12_288)
     assert [entry.path.name for entry in caches.make_room("car")] == ["hog.so"]

@@ -31,7 +31,7 @@ def test_a_written_object_is_read_back_unchanged(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "text", ["", "{", "[]", "{}", '{"schema": "b/1"}', '{"schema": "a"}', '{"schema": 1}']
 )
-def test_a_file_of_another_schema_is_refused_by_name(tmp_path: Path, text: str) -> None:
+def test_the_error_names_a_file_without_the_expected_schema(tmp_path: Path, text: str) -> None:
     path = tmp_path / "a.json"
     path.write_text(text)
     with pytest.raises(MutatorError, match=r"a\.json"):
@@ -46,15 +46,15 @@ def test_a_pipe_is_refused_without_waiting(tmp_path: Path) -> None:
     assert no_pipe(tmp_path / "b").read_bytes() == b"x"
 
 
-def test_newer_schema_is_refused() -> None:
+def test_a_newer_schema_is_refused() -> None:
     check_schema("run/1", "run/2", Path("run.json"))
     with pytest.raises(MutatorError, match=r"run\.json: schema 'run/3' .*newer mutator.*update mutator"):
         check_schema("run/3", "run/2", Path("run.json"))
 
 
 def test_any_folder_can_be_removed(tmp_path: Path) -> None:
-    """Deep, locked and unusual folders are deleted. The targets of links stay, and so does a link in place of
-    the folder."""
+    """Deep, locked and unusual folders are deleted. The targets of links stay, and so does a link that is
+    passed as the folder."""
     kept, folder = tmp_path / "kept", tmp_path / "folder"
     kept.mkdir()
     (kept / "x").touch()
@@ -77,7 +77,7 @@ def test_any_folder_can_be_removed(tmp_path: Path) -> None:
 
 
 def test_a_scratch_folder_is_deleted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The folder goes at the end of its `with` block, or together with its object."""
+    """The folder is deleted at the end of its `with` block, or together with its object."""
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     with ScratchFolder("x-") as folder:
         (folder / "y").mkdir()
@@ -90,7 +90,7 @@ def test_a_scratch_folder_is_deleted(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 @pytest.mark.parametrize("name", ["pipe", "link", "/dev/zero"])
 def test_pipes_devices_and_links_to_them_are_refused_without_waiting(tmp_path: Path, name: str) -> None:
-    """A folder causes the usual error."""
+    """Folders and missing files are accepted, so that opening them raises the usual errors."""
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "link").symlink_to(tmp_path / "pipe")
     with pytest.raises(OSError, match="No such device") as refused:
@@ -136,7 +136,7 @@ def no_room(*_: object, **__: object) -> None:
 
 
 def test_a_full_disk_is_recognized_in_other_errors(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """`shutil` raises a list of texts, and libraries raise errors of their own."""
+    """`shutil` raises an error with a list of texts, and libraries raise their own errors."""
     (tmp_path / "from").mkdir()
     (tmp_path / "from" / "file").touch()
     monkeypatch.setattr(shutil, "copyfile", no_room)

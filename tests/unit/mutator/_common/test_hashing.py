@@ -53,7 +53,7 @@ def fault(kind: type[model.Fault], injection: type[model.Injection], **more: obj
 def experiment(
     kind: type[model.Experiment], trigger: type[model.Trigger], of: model.Fault, **more: object
 ) -> model.Experiment:
-    """The chaff fault in S1 under C1, built from the given classes."""
+    """The chaff fault in scenario S1 with trigger C1, built from the given classes."""
     return kind(of, "S1", "d" * 64, Method.GUIDED, trigger(name="C1", condition=CONDITION), 7, **more)
 
 
@@ -102,7 +102,8 @@ def test_values_of_different_types_have_different_digests() -> None:
     ["[1.5, -0.0, 1e-7]", "NaN", "[Infinity, -1e999]", "18446744073709551615", '"\\ud800"', "-0"],
 )
 def test_json_is_read_as_the_standard_library_reads_it(text: str) -> None:
-    """The faster reader refuses NaN, infinities and lone surrogates, which must be read, too."""
+    """The faster JSON reader refuses NaN, infinities and lone surrogates, but the harness must read them,
+    too."""
     assert repr(from_json(text.encode())) == repr(json.loads(text))
 
 

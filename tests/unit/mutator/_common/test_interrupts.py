@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM end a command cleanly, after running native code has returned."""
+"""Ctrl-C and SIGTERM end a command cleanly, once any running native code has returned."""
 
 import signal
 
@@ -10,7 +10,7 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 @pytest.mark.parametrize("number", SIGNALS)
-def test_signal_interrupts(number: signal.Signals) -> None:
+def test_a_signal_raises_a_keyboard_interrupt(number: signal.Signals) -> None:
     before = signal.getsignal(number)
     with pytest.raises(KeyboardInterrupt), terminable():
         signal.raise_signal(number)
@@ -18,7 +18,7 @@ def test_signal_interrupts(number: signal.Signals) -> None:
 
 
 @pytest.mark.parametrize("number", SIGNALS)
-def test_held_signal_waits_until_the_outermost_ends(number: signal.Signals) -> None:
+def test_a_held_signal_waits_until_the_outermost_block_ends(number: signal.Signals) -> None:
     done = []
     with pytest.raises(KeyboardInterrupt), terminable(), held():
         with held():
@@ -27,7 +27,7 @@ def test_held_signal_waits_until_the_outermost_ends(number: signal.Signals) -> N
         done.append("outer")
     assert done == ["inner", "outer"]
     with terminable(), held():
-        pass  # one request gets one response
+        pass  # the signal is raised only once
 
 
 def test_a_held_signal_is_raised_before_the_error() -> None:
@@ -36,7 +36,7 @@ def test_a_held_signal_is_raised_before_the_error() -> None:
         raise ValueError
 
 
-def test_ignored_signal_stays_ignored() -> None:
+def test_an_ignored_signal_stays_ignored() -> None:
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         with terminable():

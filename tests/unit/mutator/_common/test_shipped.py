@@ -62,7 +62,7 @@ def test_another_archive_has_another_folder(archive: Path) -> None:
 
 
 def edit(folder: Path) -> None:
-    (folder / "target/selfdrive/a.py").write_bytes(b"A = 2\n")  # of the same size
+    (folder / "target/selfdrive/a.py").write_bytes(b"A = 2\n")  # same size
 
 
 def add(folder: Path) -> None:
@@ -84,14 +84,14 @@ def test_a_changed_copy_is_refused(archive: Path, change: Callable[[Path], None]
         as_in_a_new_process()
 
 
-def test_bytecode_does_not_count_as_a_change(archive: Path) -> None:
+def test_bytecode_is_not_a_change(archive: Path) -> None:
     folder = shipped_folder()
     (folder / "target/selfdrive/__pycache__").mkdir()
     (folder / "target/selfdrive/__pycache__/a.cpython-311.pyc").touch()
     assert as_in_a_new_process() == folder
 
 
-def test_a_read_only_data_folder_is_an_error_with_a_remedy(
+def test_an_unusable_data_folder_is_an_error_with_a_remedy(
     archive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "file").touch()
@@ -110,13 +110,13 @@ def test_a_folder_unpacked_by_another_process_is_used(archive: Path, monkeypatch
 
 
 def _first(seen: set[Path], path: Path) -> bool:
-    """True for the first check of a path, so that the folder seems not to exist yet."""
+    """Return whether this is the first check of a path; if so, the folder seems not to exist yet."""
     new = path not in seen
     seen.add(path)
     return new
 
 
-def test_the_unpacked_library_is_not_written_to(archive: Path, tmp_path: Path) -> None:
+def test_writing_to_the_shipped_library_is_refused(archive: Path, tmp_path: Path) -> None:
     refuse_shipped(tmp_path / "library" / "reviews" / "openpilot.yaml")
     with pytest.raises(MutatorError, match=r"ships with mutator.*mutator init DIR"):
         refuse_shipped(shipped_folder() / "fault_library" / "reviews" / "openpilot.yaml")
@@ -144,7 +144,7 @@ def test_a_new_library_is_a_copy_that_finds_the_controller(
 
 
 def test_edits_in_a_new_library_take_effect(tmp_path: Path) -> None:
-    """The mutant's diff shows edits of a template and a spec."""
+    """The mutant's diff shows edits to a template and a spec."""
     write_library(tmp_path / "new")
     template = tmp_path / "new/templates/offset.py.j2"
     template.write_text(template.read_text().replace("{{ by | signed }}", "{{ by | signed }} * 1.0", 1))

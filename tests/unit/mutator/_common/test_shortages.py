@@ -22,7 +22,7 @@ from mutator.errors import EXIT_HARNESS_ERRORS
     ],
 )
 def test_each_shortage_has_a_remedy(error: Exception, said: str) -> None:
-    """The shortage may be the cause of another error."""
+    """A shortage is also recognized as the cause of another error."""
     found = shortage(error)
     assert found is not None
     assert said in str(found)
@@ -36,5 +36,5 @@ def test_each_shortage_has_a_remedy(error: Exception, said: str) -> None:
 @pytest.mark.parametrize(
     "error", [ValueError("x"), ImportError("No module named 'x'"), OSError(errno.ENOENT, "")]
 )
-def test_other_errors_are_no_shortages(error: Exception) -> None:
+def test_other_errors_are_not_shortages(error: Exception) -> None:
     assert shortage(error) is None

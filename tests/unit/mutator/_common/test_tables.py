@@ -1,4 +1,4 @@
-"""Tables, shown in three ways."""
+"""Tables as text, Markdown and HTML."""
 
 from markupsafe import Markup
 
@@ -11,7 +11,7 @@ def test_text_pads_columns_and_aligns_numbers_to_the_right() -> None:
     assert table.as_text().splitlines() == ["fault        runs", "radar/chaff     7", "fog            12"]
 
 
-def test_a_table_without_rows_has_its_heads() -> None:
+def test_a_table_without_rows_shows_its_headings() -> None:
     table = Table(heads=("a", "b"), rows=[])
     assert table.as_text() == "a  b"
     assert table.as_markdown() == "| a | b |\n|---|---|"
@@ -37,7 +37,7 @@ def test_a_vertical_bar_in_a_cell_is_escaped() -> None:
 
 
 def test_html_escapes_texts_and_marks_continued_rows() -> None:
-    """A row with an empty first cell has a class."""
+    """A row with an empty first cell gets the class `group`."""
     html = Table(heads=["<b>"], rows=[["<i> & {0}"], [""]]).as_html("plain")
     assert '<table class="plain">' in html
     assert '<th scope="col">&lt;b&gt;</th>' in html
@@ -51,7 +51,7 @@ def test_html_keeps_cells_that_are_marked_as_markup() -> None:
     assert '<tr><td><a href="#e=1">&lt;1&gt;</a></td><td>&lt;b&gt;</td></tr>' in html
 
 
-def test_html_has_heads_of_rows_and_columns_of_numbers() -> None:
+def test_html_has_row_headings_and_number_columns() -> None:
     html = Table(heads=("", ""), rows=[("runs", "7")], right=(1,), named=True).as_html()
     assert '<tr><th scope="row">runs</th><td class="number">7</td></tr>' in html
     assert "<thead>" not in html

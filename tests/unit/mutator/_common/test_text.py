@@ -18,7 +18,7 @@ from mutator.triggers.conditions import check_condition
         ("match(name, 'a=!b&&') and", ""),
     ],
 )
-def test_an_operator_of_another_language_gets_one_hint(text: str, hint: str) -> None:
+def test_operators_of_other_languages_get_a_hint(text: str, hint: str) -> None:
     """Valid or quoted operators get no hint."""
     assert operator_hint(text) == hint
 

@@ -46,7 +46,7 @@ def drive(workspace: Workspace, **given: Any) -> mutator.Trial:
         (lambda w, out: drive(w, armed_after_s=-1), "armed_after_s"),
     ],
 )  # fmt: skip
-def test_a_wrong_argument_is_named_as_in_python(
+def test_the_error_for_a_wrong_argument_uses_its_python_name(
     toycar: Workspace, tmp_path: Path, call: Callable[[Any, Path], Any], argument: str
 ) -> None:
     """The MutatorError names the argument, not a command-line option."""

@@ -54,7 +54,7 @@ def test_a_campaign_runs_resumes_and_is_compared(toycar: Workspace, tmp_path: Pa
         same.findings(["bad"])
 
 
-def test_harness_errors_are_named_in_a_warning_and_retried(
+def test_a_warning_names_harness_errors(
     toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def run_campaign(*args: Any, **kwargs: Any) -> mutator.Summary:

@@ -17,7 +17,7 @@ def test_a_second_library_does_not_overwrite_the_first(tmp_path: Path) -> None:
         mutator.init_library(folder)
 
 
-def test_a_new_library_for_a_controller_only_lacks_its_placeholders(tmp_path: Path) -> None:
+def test_a_new_library_for_a_controller_is_valid_except_for_placeholders(tmp_path: Path) -> None:
     (tmp_path / "tree").mkdir()
     (tmp_path / "tree" / "a.py").write_text("def control(x):\n    y = 2 * x\n    return y\n")
     folder = mutator.init_library(tmp_path / "own", target=tmp_path / "tree")

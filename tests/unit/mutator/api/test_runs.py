@@ -55,8 +55,9 @@ def run(
 
 
 def test_propagation_is_available_as_frames(run: Run) -> None:
-    """A run's frame has a row for each channel that left golden. An experiment's frame has its channels by
-    time. Older runs lack the data, and an error says so."""
+    """A run's frame has a row for each channel that deviated from the golden run. An experiment's frame sorts
+    its channels by the time of their first deviation. For older runs, which lack the data, there is an
+    error."""
     frame = run.propagation()
     lanes = run.results.index[run.results["fault_type"] == "lane"]
     assert list(frame["experiment_id"].unique()) == sorted(lanes)
@@ -135,14 +136,14 @@ def driven_once(
 
 @pytest.fixture
 def driven(driven_once: Path, toycar: Workspace, tmp_path: Path) -> Run:
-    """A copy of that run in runs/first."""
+    """A copy of the run `driven_once` in runs/first."""
     run = shutil.copytree(driven_once, tmp_path / "runs" / "first")
     return mutator.load_run(run, workspace=toycar)
 
 
-def test_traces_are_frames_and_exact_ones_are_rerun(driven: Run) -> None:
-    """Without a stored series, the experiment is rerun once. Exact traces are rerun each time and have all
-    channels in double precision."""
+def test_traces_are_frames_and_exact_traces_need_a_rerun(driven: Run) -> None:
+    """Without a stored series, the experiment is rerun once. For exact traces, which have all channels in
+    double precision, it is rerun each time."""
     [name] = driven.results.index
     golden = driven.golden("A")
     assert (golden.index.name, len(golden)) == ("time", 120)
@@ -181,8 +182,8 @@ def test_an_experiment_has_a_diff_a_record_and_a_plot(driven: Run) -> None:
 
 
 def test_a_rerun_is_compared_with_the_campaigns_record(driven: Run) -> None:
-    """A rerun leaves no files unless the caller requests them. The series of a rerun that differs is not
-    kept."""
+    """A rerun leaves no files unless the caller requests them. The series of a rerun that differs from the
+    record is not kept."""
     experiment = driven.experiment(driven.results.index[0])
     trial = experiment.rerun()
     assert trial.same_as_record is True
@@ -199,7 +200,7 @@ def test_a_rerun_is_compared_with_the_campaigns_record(driven: Run) -> None:
     assert kept.exists()
 
 
-def test_two_processes_may_request_the_same_series(driven: Run) -> None:
+def test_two_processes_can_request_the_same_series(driven: Run) -> None:
     """Each process gets the complete series."""
     [name] = driven.results.index
     library = driven.workspace.library
@@ -224,7 +225,7 @@ def test_two_processes_may_request_the_same_series(driven: Run) -> None:
 def test_the_code_of_the_notebook_page_runs(
     driven: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The page's blocks run as printed, on a run in runs/first."""
+    """The page's code blocks run unchanged, on a run in runs/first."""
     library = driven.workspace.library
     monkeypatch.setenv("MUTATOR_ROOT", str(library.parent))
     small = (library / "campaigns" / "small.yaml").read_text()
@@ -242,7 +243,7 @@ def test_the_code_of_the_notebook_page_runs(
     assert names["trial"].outcome == "hazard"
 
 
-def test_the_error_for_missing_data_lists_the_existing_data(run: Run, tmp_path: Path) -> None:
+def test_missing_data_are_an_error(run: Run, tmp_path: Path) -> None:
     with pytest.raises(MutatorError, match="no golden run Z"):
         run.golden("Z")
     with pytest.raises(MutatorError, match="no experiment 'zz'"):
@@ -251,7 +252,7 @@ def test_the_error_for_missing_data_lists_the_existing_data(run: Run, tmp_path: 
         mutator.load_run(tmp_path)
 
 
-def test_a_planned_experiment_has_a_diff_and_no_traces(
+def test_a_planned_experiment_has_a_diff_but_no_traces(
     toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path]
 ) -> None:
     """The mutant is built on request. The error for the missing traces has a remedy."""
@@ -279,7 +280,7 @@ def test_a_displayed_run_names_its_harness_errors(
     assert set(run.harness_errors.values()) == {"oh"}
 
 
-def test_reports_and_exports(run: Run) -> None:
+def test_a_run_writes_exports_and_reports(run: Run) -> None:
     assert run.export("csv").read_bytes() == (run.path / "results.csv").read_bytes()
     with pytest.raises(MutatorError, match=r"'xls'.*expected one of mutation-elements, junit, csv, parquet"):
         run.export("xls")

@@ -28,7 +28,7 @@ def test_a_fault_is_tried_by_name(toycar: Workspace) -> None:
 
 
 def test_value_replaces_the_drawn_values(toycar: Workspace, tmp_path: Path) -> None:
-    """`out` keeps all files."""
+    """All files are kept in the folder `out`."""
     trial = mutator.try_fault(
         "sensor/distance/longer", "A", "near", value=12.5, workspace=toycar, out=tmp_path / "o"
     )

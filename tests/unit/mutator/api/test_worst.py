@@ -15,7 +15,7 @@ from mutator.store.records import SCHEMA, line_of
 from mutator.workspace import Workspace
 
 
-def test_the_worst_results_of_a_filter(
+def test_filtered_results_are_sorted_by_severity(
     toycar: Workspace, tmp_path: Path, record: Callable[..., Record], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Hazards come first for any batch size. A limit shortens the list and leaves the count unchanged."""

@@ -107,7 +107,7 @@ def test_a_single_arming_time_applies_to_every_reading(toycar: Workspace) -> Non
     assert [campaign.armed_after(name) for name in toycar.readings().names] == [1.25, 1.25]
 
 
-def test_a_setting_may_differ_by_reading(toycar: Workspace) -> None:
+def test_a_setting_can_differ_by_reading(toycar: Workspace) -> None:
     """A setting that is a list applies to every reading; the default is an empty list. An entry that is
     listed twice is refused."""
     for text, expected in (

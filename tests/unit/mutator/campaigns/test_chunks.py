@@ -40,7 +40,7 @@ def test_everything_is_pending_at_first(folder: RunFolder) -> None:
 
 
 def test_an_experiment_with_a_record_is_not_pending(folder: RunFolder, record: Callable[..., Record]) -> None:
-    """A harness error stays pending. Complete chunks are left out."""
+    """An experiment with a harness error stays pending. Complete chunks are left out."""
     faults = read_faults(folder.path)
     chunks = [read_chunk(folder.path, chunk, faults) for chunk in folder.head["chunks"]]
     records = {e.id: record(e.id) for e in (*chunks[0], chunks[1][1], chunks[2][0])}

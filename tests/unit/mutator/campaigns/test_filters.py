@@ -1,4 +1,4 @@
-"""Filter expressions: valid and invalid ones, and that they never run as code."""
+"""Valid and invalid filter expressions, which never run as code."""
 
 import pytest
 
@@ -30,7 +30,7 @@ ROW = {"fault_type": "ghost_vehicle", "scenario": "S2", "value": 120, "unit": No
     ],
 )
 def test_filter_expressions_work_as_in_python(text: str, expected: bool) -> None:
-    """A comparison with an empty cell is false."""
+    """An empty cell is neither less nor greater than any value."""
     assert compile_filter(text, ROW)(ROW) is expected
 
 
@@ -58,13 +58,13 @@ def test_filter_expressions_work_as_in_python(text: str, expected: bool) -> None
         "value == " + "1" * 3000,
     ],
 )
-def test_anything_else_is_refused(text: str) -> None:
+def test_an_invalid_filter_is_refused(text: str) -> None:
     with pytest.raises(MutatorError) as error:
         compile_filter(text, ROW)
     assert "filter" in str(error.value)
 
 
-def test_unknown_column_lists_the_known_ones() -> None:
+def test_the_error_for_an_unknown_column_lists_the_known_columns() -> None:
     with pytest.raises(MutatorError, match=r"unknown column `speed`.*fault_type.*value"):
         compile_filter("speed > 1", ROW)
 

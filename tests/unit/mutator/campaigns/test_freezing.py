@@ -1,4 +1,4 @@
-"""Freezing a plan: the content of the run folder, and when it may change."""
+"""Freezing a plan: the content of the run folder, and when a plan can be frozen again."""
 
 import csv
 from pathlib import Path
@@ -12,7 +12,7 @@ from mutator.workspace import Workspace
 
 
 def test_a_frozen_plan_is_read_back_equal(toycar: Workspace, tmp_path: Path) -> None:
-    """plan.csv is written next to it."""
+    """The plan is also written as plan.csv."""
     plan = make_plan(toycar, "toy", Choices(limit=9))
     folder = freeze(plan, tmp_path / "run", toycar)
     back = load_plan(folder)
@@ -23,7 +23,7 @@ def test_a_frozen_plan_is_read_back_equal(toycar: Workspace, tmp_path: Path) -> 
     assert rows[0]["condition"] == plan.experiments[0].trigger.condition
 
 
-def test_only_the_same_plan_may_be_frozen_again(toycar: Workspace, tmp_path: Path) -> None:
+def test_only_the_same_plan_can_be_frozen_again(toycar: Workspace, tmp_path: Path) -> None:
     freeze(make_plan(toycar, "toy"), tmp_path / "run", toycar)
     before = {p: p.stat().st_mtime_ns for p in (tmp_path / "run").rglob("*") if p.name != "owner.lock"}
     freeze(make_plan(toycar, "toy"), tmp_path / "run", toycar)
@@ -42,7 +42,7 @@ def test_a_run_does_not_resume_with_changed_sources(toycar: Workspace, tmp_path:
         freeze(plan, tmp_path / "run", toycar)
 
 
-def test_other_files_and_folders_are_refused(toycar: Workspace, tmp_path: Path) -> None:
+def test_a_folder_with_other_files_is_refused(toycar: Workspace, tmp_path: Path) -> None:
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "thesis.tex").touch()
     for place in ("full", "full/thesis.tex"):

@@ -17,8 +17,8 @@ def git(folder: Path, *words: str) -> None:
     subprocess.run(["git", "-C", folder, *IDENTITY, *words], env=clean, check=True, capture_output=True)
 
 
-def test_required_packages_include_indirect_ones() -> None:
-    """Names are canonical. mutator and its extras are left out."""
+def test_required_packages_include_indirect_requirements() -> None:
+    """The names are canonical. mutator and its extras are left out."""
     found = machine.required()
     assert {"numpy", "jinja2", "markupsafe", "pydantic-core", "execnet", "pytest-xdist"} <= found
     assert not {"hypothesis", "mypy", "tox", "import-linter", "mutator"} & found

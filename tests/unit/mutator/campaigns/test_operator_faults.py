@@ -1,4 +1,4 @@
-"""Campaigns with mutants of operators: plans, active times and refusals."""
+"""Campaigns with operator mutants: plans, active times and refusals."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -32,7 +32,8 @@ def lines(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def campaign(toycar: Workspace, tmp_path: Path) -> Path:
-    """A campaign of operators' mutants only, with random times of half a second."""
+    """A campaign with only operator mutants. Transient faults start at random times and last half a
+    second."""
     text = toycar.campaign("small").read_text()
     begin, end = text.index("faults:"), text.index("methods:")
     text = f"{text[:begin]}faults:\n{ENTRY}\n{text[end:]}".replace("[guided, random]", "[random]")
@@ -49,9 +50,9 @@ def _edited(campaign: Path, old: str, new: str) -> Path:
     return campaign
 
 
-def test_mutants_are_permanent_and_transient(toycar: Workspace, campaign: Path) -> None:
-    """Each drawn mutant is planned under `always` and at a random time. Ids, order and digest are
-    reproducible, and the plan lists what was left out."""
+def test_each_mutant_is_planned_as_permanent_and_as_transient(toycar: Workspace, campaign: Path) -> None:
+    """The permanent fault has the trigger `always`, the transient one a random time. The plan's digest is
+    reproducible, and the plan reports how many mutants it left out."""
     plan = make_plan(toycar, campaign)
     assert len({one.fault.id for one in plan.experiments}) == 12 == len(plan.experiments) / 2
     found = Counter((one.method, one.trigger.hold) for one in plan.experiments)
@@ -72,8 +73,8 @@ def test_the_frozen_plan_lists_left_out_mutants(toycar: Workspace, campaign: Pat
     assert "operators" not in freeze(make_plan(toycar, "small"), tmp_path / "other", toycar).head
 
 
-def test_when_selects_permanent_or_transient_mutants(toycar: Workspace, campaign: Path) -> None:
-    """Context rows and specs are planned as well."""
+def test_the_key_when_selects_permanent_or_transient_mutants(toycar: Workspace, campaign: Path) -> None:
+    """The campaign can also contain specs and context rows."""
     _edited(campaign, "sample: 12}", "sample: 2, when: [permanent]}\n  - spec: sensor/silence/no_data")
     kinds = Counter((one.fault.module, one.trigger.name) for one in make_plan(toycar, campaign).experiments)
     assert kinds == {("operators", "always"): 2, ("sensor", "random/always"): 1}
@@ -100,7 +101,7 @@ def test_another_seed_draws_other_mutants(toycar: Workspace, campaign: Path) -> 
 
 
 def test_review_groups_do_not_depend_on_the_draw(toycar: Workspace, campaign: Path) -> None:
-    """Each operator has one group for each function."""
+    """There is one group for each operator and function."""
 
     def groups(plan: Plan) -> dict[str, object]:
         return {one.what: one.bound for one in of_plan(toycar, plan) if ": operator" in one.what}
@@ -143,7 +144,7 @@ def test_a_wrong_selection_is_refused_with_its_line(campaign: Path, old: str, ne
 def test_a_place_without_mutants_is_refused_with_its_line(
     toycar: Workspace, campaign: Path, place: str, said: str
 ) -> None:
-    """The place does not exist, or no golden run reaches it."""
+    """Either the place does not exist, or no golden run executes it."""
     _edited(campaign, "toycar/driver.py::Driver.*", place)
     with pytest.raises(MutatorError, match=r"operators\.yaml:7: ") as caught:
         make_plan(toycar, campaign)

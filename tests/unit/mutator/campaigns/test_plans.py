@@ -1,4 +1,4 @@
-"""The content of plans, and that they are reproducible."""
+"""The content and the reproducibility of plans."""
 
 import shutil
 from collections import Counter
@@ -16,7 +16,7 @@ from mutator.workspace import Workspace
 
 @pytest.fixture
 def whole(toycar: Workspace) -> Workspace:
-    """A workspace with a campaign `toy` that uses every feature."""
+    """The toy workspace, whose campaign `toy` is planned in full instead of as a sample."""
     path = toycar.campaign("toy")
     path.write_text(path.read_text().replace("sample: 24\n", ""))
     return toycar
@@ -27,7 +27,7 @@ def pair_key(experiment: Experiment) -> tuple[str, str, str]:
 
 
 def test_guided_and_random_are_matched_pairs(whole: Workspace) -> None:
-    """Partners have the same scenario, fault and row."""
+    """The two partners have the same scenario, fault and context row."""
     experiments = make_plan(whole, "toy").experiments
     guided = Counter(pair_key(e) for e in experiments if e.method is Method.GUIDED)
     random = Counter(pair_key(e) for e in experiments if e.method is Method.RANDOM)
@@ -36,9 +36,8 @@ def test_guided_and_random_are_matched_pairs(whole: Workspace) -> None:
     assert len(guided) == 2 * 2 * (4 + 2 + 4 + 1)  # scenarios, rows, faults
 
 
-def test_triggers_are_armed_as_the_reading_says(whole: Workspace) -> None:
-    """Guided triggers wait until they are armed. Random times are starts of steps, from the arming time to
-    the last step."""
+def test_the_reading_determines_when_triggers_are_armed(whole: Workspace) -> None:
+    """Random times are starts of steps, from the arming time to the last step."""
     for reading, armed in (("as_described", 1.0), ("as_coded", 0.0)):
         times = set()
         for experiment in make_plan(whole, "toy", Choices(reading=reading)).experiments:
@@ -95,7 +94,7 @@ def test_experiments_with_the_same_golden_run_are_adjacent(whole: Workspace) -> 
 
 
 def test_a_setting_applies_to_all_runs(whole: Workspace) -> None:
-    """The canary and the golden runs have the setting, too. It changes the ids."""
+    """The setting also applies to the canary and the golden runs, and it changes the ids."""
     before = make_plan(whole, "toy")
     path = whole.campaign("toy")
     path.write_text(path.read_text().replace("faults:", "setting: [alone]\nfaults:", 1))
@@ -109,8 +108,8 @@ def test_a_setting_applies_to_all_runs(whole: Workspace) -> None:
         make_plan(whole, "toy")
 
 
-def test_filters_and_limit(whole: Workspace) -> None:
-    """`--limit` takes an even sample of what the filters keep."""
+def test_a_plan_can_be_filtered_and_limited(whole: Workspace) -> None:
+    """The limit takes an even sample of the experiments that the filters keep."""
     plan = make_plan(
         whole, "toy", Choices(only='scenario == "A"', exclude='method == "random" or value > 60', limit=5)
     )
@@ -182,15 +181,14 @@ def test_scenarios_must_be_inside_the_library(toycar: Workspace) -> None:
     assert {e.scenario for e in make_plan(toycar, "toy").experiments} == {"more/C"}
 
 
-def test_hold_s_limits_every_fault(toycar: Workspace) -> None:
-    """Guided and random faults stay active for that time after their trigger."""
+def test_hold_s_sets_the_duration_of_every_fault(toycar: Workspace) -> None:
     path = toycar.campaign("toy")
     path.write_text(path.read_text().replace("  random_until_s", "  hold_s: 1.5\n  random_until_s"))
     triggers = {e.trigger for e in make_plan(toycar, "toy").experiments}
     assert {(trigger.hold, trigger.hold_s) for trigger in triggers} == {(Hold.FOR, 1.5)}
 
 
-def test_a_campaign_can_select_values_of_a_variant(whole: Workspace) -> None:
+def test_a_campaign_can_limit_the_values_of_each_variant(whole: Workspace) -> None:
     path = whole.campaign("toy")
     path.write_text(path.read_text().replace("  - spec: sensor/*", "  - {spec: sensor/*, values: 2}"))
     faults = {e.fault.id: e.fault.spec for e in make_plan(whole, "toy").experiments}
@@ -203,7 +201,7 @@ def test_a_campaign_can_select_values_of_a_variant(whole: Workspace) -> None:
 
 
 def test_the_expected_time_depends_on_workers_and_rate(toycar: Workspace) -> None:
-    """A measured rate replaces the default one."""
+    """A measured rate replaces the default rate."""
     plan = make_plan(toycar, "toy")
     one, two = plan.cost(1), plan.cost(2)
     assert one.cpu_s == two.cpu_s > 0
@@ -238,7 +236,7 @@ def plan_of(clone: Workspace, tmp_path: Path, **choices: str) -> Plan:
 
 
 def test_the_published_experiments_expand_in_both_readings(clone: Workspace, tmp_path: Path) -> None:
-    """Without a sample, the plan has the 11,280 published experiments: each value in each scenario and
+    """Without sampling, the plan has the 11,280 published experiments: each value in each scenario and
     context."""
     described, coded = (plan_of(clone, tmp_path, reading=r) for r in ("as_described", "as_coded"))
     assert len(described.experiments) == len(coded.experiments) == 282 * 5 * 4 * 2
@@ -267,7 +265,7 @@ def test_published_plans_keep_their_digests(
     assert make_plan(clone, campaign, Choices(reading=reading)).digest == promised
 
 
-def test_the_run_schema_is_no_part_of_the_plan_digest(
+def test_the_run_schema_does_not_affect_the_plan_digest(
     toycar: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     before = make_plan(toycar, "small").digest

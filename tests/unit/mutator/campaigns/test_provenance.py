@@ -1,4 +1,4 @@
-"""What a session records about itself in run.json, and when it is refused."""
+"""What a session records about itself in run.json, and when a session is refused."""
 
 import json
 from collections.abc import Iterable
@@ -18,8 +18,7 @@ from mutator.workspace import Workspace
 
 @pytest.fixture
 def folder(toycar: Workspace, tmp_path: Path) -> RunFolder:
-    """A planned run with checks that list `iniconfig` and `hypothesis` as packages that its golden runs
-    loaded."""
+    """A planned run, whose checks list `iniconfig` and `hypothesis` as packages that golden runs loaded."""
     planned = freeze(make_plan(toycar, "small"), tmp_path / "run", toycar)
     said = {"schema": SCHEMA, "packages": ["hypothesis", "iniconfig"]}
     (planned.path / "checks.json").write_text(json.dumps(said))
@@ -38,8 +37,6 @@ def use(monkeypatch: pytest.MonkeyPatch, **other: str | None) -> None:
 
 
 def test_a_session_records_everything_that_affects_results(folder: RunFolder, toycar: Workspace) -> None:
-    """Python, platform, processor, BLAS, threads, and the packages of the harness and of golden runs are
-    recorded."""
     begin_stretch(folder, toycar, records="0001-*", accept=False)
     (stretch,) = RunFolder.open(folder.path).stretches
     assert stretch == folder.stretches[0]
@@ -50,7 +47,7 @@ def test_a_session_records_everything_that_affects_results(folder: RunFolder, to
 
 
 def _clone() -> dict[str, object] | None:
-    """Only the harness's paths may be in a clone, because the toy is a copy."""
+    """Return the state of the harness's clone, if there is one. The toy is a copy outside any clone."""
     state = machine.clone_state(Path(machine.__file__).parents[1])
     return {"mutator": state} if state else None
 
@@ -80,7 +77,7 @@ def test_before_the_first_run_any_version_is_accepted(
     ],
     ids=["of the harness", "of the target", "gone"],
 )
-def test_other_versions_are_refused_unless_accepted(
+def test_different_versions_are_refused_unless_accepted(
     folder: RunFolder,
     toycar: Workspace,
     monkeypatch: pytest.MonkeyPatch,
@@ -96,10 +93,10 @@ def test_other_versions_are_refused_unless_accepted(
     assert caught.value.got == f"this run used other versions: {told}"
     begin_stretch(folder, toycar, records="0002-*", accept=True)
     assert [list(stretch.accepted) for stretch in folder.stretches] == [[], [told]]
-    assert check_versions(folder) == ()  # the run's versions from now on
+    assert check_versions(folder) == ()  # from now on, these are the run's versions
 
 
-def test_another_python_is_refused(
+def test_another_python_version_is_refused(
     folder: RunFolder, toycar: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("platform.python_version", lambda: "3.11.7")
@@ -113,7 +110,7 @@ def test_another_python_is_refused(
 def test_another_machine_is_recorded_but_not_refused(
     folder: RunFolder, toycar: Workspace, monkeypatch: pytest.MonkeyPatch, changed: str
 ) -> None:
-    """Golden runs show whether two machines compute the same."""
+    """Golden runs show whether two machines compute the same results."""
     begin_stretch(folder, toycar, records="0001-*", accept=False)
     other = {"threads": {"OMP_NUM_THREADS": "8"}}.get(changed, "another")
     name = "platform.platform" if changed == "platform" else f"mutator.campaigns.machine.{changed}"

@@ -37,7 +37,7 @@ def test_a_sample_is_balanced(many: list[Experiment], count: int) -> None:
         assert max(counts.values()) - min(counts.values()) <= 1
 
 
-def test_other_variants_fill_the_share_of_an_exhausted_one(many: list[Experiment]) -> None:
+def test_if_a_variant_has_too_few_experiments_others_fill_its_share(many: list[Experiment]) -> None:
     """No experiment is picked twice."""
     picked = pick(many, 60, seed=1)
     counts = Counter(e.fault.spec for e in picked)
@@ -46,7 +46,7 @@ def test_other_variants_fill_the_share_of_an_exhausted_one(many: list[Experiment
 
 
 def test_a_seed_always_picks_the_same_experiments(many: list[Experiment]) -> None:
-    """Experiments keep their order. Another seed picks others."""
+    """The experiments keep their order. Another seed picks different ones."""
     picked = pick(many, 10, seed=1)
     assert [many.index(e) for e in picked] == sorted(many.index(e) for e in picked)
     assert pick(list(reversed(many)), 10, seed=1) == tuple(reversed(picked))
@@ -54,7 +54,7 @@ def test_a_seed_always_picks_the_same_experiments(many: list[Experiment]) -> Non
 
 
 @pytest.mark.parametrize("draw", [pick, pick_pairs])
-def test_runs_that_stop_sample_the_same_faults(
+def test_stopping_after_a_hazard_does_not_change_the_sample(
     many: list[Experiment], draw: Callable[..., tuple[Experiment, ...]]
 ) -> None:
     stopping = [replace(experiment, after_hazard=AfterHazard.STOP) for experiment in many]
@@ -74,8 +74,8 @@ def test_values_are_spread_evenly_over_the_range(count: int, wanted: int, indice
     assert spread(count, wanted) == indices
 
 
-def test_in_proportion_takes_pairs_and_half_of_each_type(many: list[Experiment]) -> None:
-    """The sample is half of the plan, in each scenario."""
+def test_a_proportional_sample_keeps_pairs_and_the_share_of_each_variant(many: list[Experiment]) -> None:
+    """The sample is half of the plan."""
     picked = pick_in_proportion(many, 56, seed=1)
     assert len(picked) == len({e.id for e in picked}) == 56
     assert Counter(e.fault.spec for e in picked) == dict(zip(SPECS, (40, 4, 12), strict=True))
@@ -86,9 +86,9 @@ def test_in_proportion_takes_pairs_and_half_of_each_type(many: list[Experiment])
 
 
 @pytest.mark.parametrize("count", [2, 12, 24, 40, 54])
-def test_pairs_stay_together(many: list[Experiment], count: int) -> None:
-    """Variants, scenarios and rows are evenly spread, and a seed picks the same experiments for any input
-    order."""
+def test_sampled_pairs_stay_together(many: list[Experiment], count: int) -> None:
+    """Variants, scenarios and context rows are evenly spread, and a seed picks the same experiments for any
+    input order."""
     picked = pick_pairs(many, count, seed=1)
     assert len(picked) == count
     keys = {m: {key(e) for e in picked if e.method is m} for m in Method}
@@ -108,7 +108,7 @@ def test_a_sample_of_odd_size_splits_one_pair(many: list[Experiment], count: int
     assert len(picked) == count and len(guided - random) == 1 and random <= guided
 
 
-def test_without_partners_pairs_are_single_experiments(many: list[Experiment]) -> None:
+def test_without_partners_single_experiments_are_sampled(many: list[Experiment]) -> None:
     """The sample equals the result of `pick`."""
     guided = [e for e in many if e.method is Method.GUIDED]
     assert pick_pairs(guided, 9, seed=1) == pick(guided, 9, seed=1)
@@ -119,7 +119,7 @@ def key(experiment: Experiment) -> tuple[str, str, str]:
 
 
 @pytest.mark.parametrize("count", [10, 57])
-def test_in_proportion_refuses_sizes_that_do_not_divide(many: list[Experiment], count: int) -> None:
-    """A size must be even and give a pair of each type in each scenario."""
+def test_a_proportional_sample_of_an_unsuitable_size_is_refused(many: list[Experiment], count: int) -> None:
+    """The size must be even, and at least two for each variant in each scenario."""
     with pytest.raises(ValueError, match="a multiple of 2, 12 or more"):
         pick_in_proportion(many, count, seed=1)

@@ -1,4 +1,4 @@
-"""Campaigns that are repeated with several seeds."""
+"""Campaigns with several seeds."""
 
 import re
 from collections.abc import Callable
@@ -18,7 +18,7 @@ SEEDS = "seeds: {from: 3, to: 5}"
 
 @pytest.fixture
 def campaign(toycar: Workspace, tmp_path: Path) -> Callable[..., Path]:
-    """Write the campaign `small` with other lines instead of its seed."""
+    """Write the campaign `small` with the given lines instead of its seed."""
 
     def write(lines: str = SEEDS, **more: str) -> Path:
         text = toycar.campaign("small").read_text()
@@ -36,10 +36,10 @@ def alone(workspace: Workspace, path: Path, seed: int, **chosen: int) -> Plan:
 
 
 @pytest.mark.parametrize("more", [{}, {"sample": "4"}], ids=["all", "sample"])
-def test_several_seeds_plan_the_same_as_each_alone(
+def test_a_plan_for_several_seeds_joins_the_plans_for_each_seed(
     toycar: Workspace, campaign: Callable[..., Path], more: dict[str, str]
 ) -> None:
-    """`--seed` selects one seed."""
+    """The choice of a seed selects one of the campaign's seeds."""
     path = campaign(**more)
     plan, parts = make_plan(toycar, path), [alone(toycar, path, seed) for seed in (3, 4, 5)]
     assert plan.experiments == tuple(e for part in parts for e in part.experiments)
@@ -56,7 +56,7 @@ def test_a_limit_is_spread_over_the_seeds(toycar: Workspace, campaign: Callable[
     assert {e.seed for e in make_plan(toycar, campaign(), Choices(limit=2)).experiments} == {3, 4}
 
 
-def test_a_filter_may_leave_a_seed_without_experiments(
+def test_a_filter_can_leave_a_seed_without_experiments(
     toycar: Workspace, campaign: Callable[..., Path]
 ) -> None:
     plan = make_plan(toycar, campaign(), Choices(only="seed == 4"))
@@ -68,7 +68,7 @@ def test_a_filter_may_leave_a_seed_without_experiments(
 def test_each_seed_has_its_own_golden_runs(
     toycar: Workspace, campaign: Callable[..., Path], tmp_path: Path
 ) -> None:
-    """A run draws from the seed even without a fault."""
+    """Even a run without a fault uses the seed."""
     folder = freeze(Planning(toycar, campaign()), tmp_path / "run", toycar)
     assert folder.seeds == range(3, 6)
     keys = {one.key for one in folder.goldens}

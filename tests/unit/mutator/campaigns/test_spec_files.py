@@ -28,8 +28,8 @@ def mine(toycar: Workspace, tmp_path: Path) -> Path:
 def test_a_spec_file_is_found_relative_to_the_campaign(
     toycar: Workspace, mine: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """The spec file's faults are added to the library's, from any current folder. The canary may come from a
-    spec file, too. Random times need a latest time; guided triggers do not."""
+    """The spec file's faults are added to the library's, from any current folder. The canary can come from a
+    spec file, too. A campaign without random times needs no `random_until_s`."""
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
     plan = make_plan(toycar, mine)
@@ -48,7 +48,7 @@ def test_a_missing_spec_file_is_reported(toycar: Workspace, mine: Path) -> None:
 
 
 def test_two_specs_with_the_same_name_are_refused(toycar: Workspace, mine: Path) -> None:
-    """Tables could not distinguish them. Naming the library's own file is allowed."""
+    """Tables could not distinguish them. A campaign can name a spec file of the library, however."""
     file = mine.parent / "specs" / "drifting.yaml"
     file.write_text(file.read_text().replace("fault_type: drifting", "fault_type: lane"))
     with pytest.raises(MutatorError, match="has the name of a spec in the library, sensor/lane"):

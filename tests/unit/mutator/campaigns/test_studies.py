@@ -25,7 +25,7 @@ PAGE = CLONE / "docs" / "how-to" / "add-a-study.md"
 
 @pytest.fixture
 def installed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """The study of the how-to page, and a study with a broken package."""
+    """The study of the how-to page, and a study with a broken entry point."""
     package = tmp_path / "site" / "crash_tests"
     package.mkdir(parents=True)
     [code] = re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.S)
@@ -45,8 +45,8 @@ def test_the_shipped_study_is_installed() -> None:
     assert list(find_study("driving_agent_resilience").check(Workspace.find(root=CLONE))) == []
 
 
-def test_a_study_from_another_package_is_in_the_report(installed: None, tmp_path: Path) -> None:
-    """The how-to page's example works as printed."""
+def test_the_report_contains_a_study_from_another_package(installed: None, tmp_path: Path) -> None:
+    """The example on the how-to page works unchanged."""
     run = tmp_path / "run"
     run.mkdir()
     written = building.write(make_run(run, study="crash_tests"), Workspace.find(root=CLONE))
@@ -62,7 +62,7 @@ def test_a_study_from_another_package_is_in_the_report(installed: None, tmp_path
 
 
 def test_an_unknown_or_broken_study_is_refused(installed: None) -> None:
-    """The error lists the known names, or the reason."""
+    """The error lists the known studies or gives the reason."""
     with pytest.raises(MutatorError, match="'moon_landing' is not installed; expected one of broken, crash"):
         find_study("moon_landing")
     with pytest.raises(MutatorError, match=r"'broken' cannot be loaded: .*MISSING"):
@@ -103,8 +103,7 @@ BAD_CHECKS = {
 
 @pytest.fixture
 def strangers(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """The entry points of an installed package: one is valid, and each of the others has a different
-    error."""
+    """The entry points of an installed package, each of which has a different error."""
     package = tmp_path / "site" / "strange_studies"
     package.mkdir(parents=True)
     (package / "raising.py").write_text("STUDY = 1 / 0")
@@ -125,7 +124,9 @@ def asking(toycar: Workspace, study: str) -> Path:
 
 
 @pytest.mark.parametrize("study", STRANGERS)
-def test_an_invalid_study_is_reported_at_the_campaign(strangers: None, toycar: Workspace, study: str) -> None:
+def test_an_invalid_study_is_reported_at_its_line_in_the_campaign(
+    strangers: None, toycar: Workspace, study: str
+) -> None:
     """Planning refuses the study, and `mutator check` lists it."""
     before = [str(problem) for problem in check_library(toycar, "toycar")]
     path = asking(toycar, study)
@@ -143,10 +144,10 @@ def test_an_invalid_study_is_reported_at_the_campaign(strangers: None, toycar: W
 
 
 @pytest.mark.parametrize("study", BAD_CHECKS)
-def test_an_error_in_a_studys_check_is_a_problem_of_the_library(
+def test_an_error_in_a_studys_check_is_reported_as_a_problem(
     strangers: None, toycar: Workspace, study: str
 ) -> None:
-    """`mutator check` continues."""
+    """It does not end `mutator check`."""
     path = asking(toycar, study)
     line = len(path.read_text().splitlines())
     problems = [str(problem) for problem in check_library(toycar, "toycar")]
@@ -169,7 +170,7 @@ def test_every_campaign_with_a_missing_study_is_reported(toycar: Workspace) -> N
     assert [Path(str(problem.where)).name for problem in found] == ["small.yaml", "toy.yaml"]
 
 
-def test_a_run_opens_without_its_study(
+def test_a_run_can_be_opened_without_its_study(
     installed: None, toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asking(toycar, "crash_tests")
@@ -180,5 +181,5 @@ def test_a_run_opens_without_its_study(
         make_plan(toycar, "small")
 
 
-def test_parts_are_the_fields_of_a_study() -> None:
+def test_the_parts_of_a_study_are_its_fields() -> None:
     assert set(studies.PARTS) == {field.name for field in dataclasses.fields(Study)}

@@ -38,7 +38,8 @@ def lane_is_left(e: Experiment) -> dict[str, Any]:
 def runs(
     tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace], write_run: Write
 ) -> tuple[Path, Path]:
-    """Two runs of the toy. In `before`, nothing happens. `after` has a changed target and worse results."""
+    """Two runs of the toy. In `before`, every fault is masked. `after` has a changed target and worse
+    results."""
     place = tmp_path_factory.mktemp("runs")
     toycar = copy_toycar(place)
     before = write_run(toycar, place / "before")
@@ -63,7 +64,6 @@ def test_a_changed_source_file_is_named(found: Comparison) -> None:
 
 
 def test_pairs_in_which_one_run_stops_get_a_remark(found: Comparison) -> None:
-    """The missing alert does not count as lost."""
     first, *rest = found.pairs
     stopped = replace(first, b=replace(first.b, after_hazard=AfterHazard.STOP))
     (remark,) = remarks(found.a, found.b, replace(found.matching, pairs=(stopped, *rest)))
@@ -73,7 +73,7 @@ def test_pairs_in_which_one_run_stops_get_a_remark(found: Comparison) -> None:
 def test_runs_without_a_list_of_files_can_be_compared(
     runs: tuple[Path, Path], tmp_path: Path, reseal: Callable[[Path], None]
 ) -> None:
-    """A remark says that the changed files are unknown."""
+    """The comparison states that the changed files are not known."""
     old = shutil.copytree(runs[0], tmp_path / "old")
     head = old / HEAD
     told = json.loads(head.read_text())
@@ -92,7 +92,7 @@ def test_a_gate_names_each_new_hazard_once(found: Comparison) -> None:
 
 
 def test_the_tables_agree_with_the_pairs(found: Comparison) -> None:
-    """McNemar's test agrees with the counts."""
+    """The p-values are those of McNemar's test, with Holm's correction."""
     endings, changes, rates, _, by_type, _ = found.sheets
     assert sum(sum(line[1:]) for line in endings.lines) == len(found.pairs) == 24  # type: ignore[arg-type]
     total = dict(zip(changes.heads, changes.lines[-1], strict=True))
@@ -120,8 +120,8 @@ def test_a_run_compared_with_itself_has_no_changes(runs: tuple[Path, Path]) -> N
 
 
 def test_differing_versions_are_reported(runs: tuple[Path, Path]) -> None:
-    """Python, processor and package versions of all stretches are compared. If a folder lists every installed
-    package, only those that the other folder lists, too, are compared."""
+    """Python, processor and package versions of all stretches are compared. If one folder lists every
+    installed package, only packages that both folders list are compared."""
     sides = [read_side(runs[0]) for _ in "ab"]
     old = Stretch(python="CPython 3.11.7", packages={"numpy": "2.0"}, platform="Linux", cpu="Cray 1")
     new = replace(old, python="CPython 3.12.1", packages={"numpy": "2.1", "cv": "5"})
@@ -147,7 +147,7 @@ def test_runs_without_a_common_experiment_are_refused(runs: tuple[Path, Path]) -
         compare(*runs, only="value == -1")
 
 
-def test_a_failed_proof_is_not_compared(
+def test_a_run_with_a_failed_proof_is_not_compared(
     runs: tuple[Path, Path], tmp_path: Path, reseal: Callable[[Path], None]
 ) -> None:
     after = shutil.copytree(runs[1], tmp_path / "after")
@@ -159,7 +159,7 @@ def test_a_failed_proof_is_not_compared(
         compare(runs[0], after)
 
 
-def test_missing_results_enter_no_rate(toycar: Workspace, tmp_path: Path, write_run: Write) -> None:
+def test_missing_results_do_not_affect_rates(toycar: Workspace, tmp_path: Path, write_run: Write) -> None:
     """Harness errors and experiments that did not run are reported."""
     broken = {"status": Status.HARNESS_ERROR, "outcome": None, "activation": None, "detail": "no disk"}
     a = write_run(toycar, tmp_path / "a", lambda e: HAZARD)
@@ -189,7 +189,7 @@ class Page(HTMLParser):
         self.loaded += [v for k, v in named.items() if v and (k == "src" or (k == "href" and tag == "link"))]
 
 
-def test_page_markdown_and_csv_list_every_change(found: Comparison, tmp_path: Path) -> None:
+def test_the_page_the_markdown_and_the_csv_file_list_every_change(found: Comparison, tmp_path: Path) -> None:
     """The page is self-contained and escapes text."""
     written = pages.write(found, tmp_path / "out")
     pairs = list(csv.DictReader(written.pairs.open()))
@@ -218,7 +218,7 @@ def test_comparing_again_gives_the_same_bytes(
 def test_a_long_page_shows_the_first_changes_without_scripts(
     found: Comparison, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The page contains all rows."""
+    """The page contains all rows, however."""
     monkeypatch.setattr(pages, "SHOWN", 3)
     text = pages.write(found, tmp_path / "out").page.read_text()
     rows = [line for line in text.splitlines() if '<span class="change' in line]

@@ -1,4 +1,4 @@
-"""Matching the experiments of two runs, and the reported changes."""
+"""The matching of the experiments of two runs, and the reported changes."""
 
 import dataclasses
 from collections.abc import Callable
@@ -43,7 +43,7 @@ def side(*experiments: Experiment, without: tuple[Experiment, ...] = ()) -> Side
 
 
 def test_experiments_are_matched_by_fault_scenario_and_trigger(experiment: Make) -> None:
-    """Reading, setting, time and seed may differ."""
+    """Matching experiments can differ in reading, setting, trigger time and seed."""
     one = experiment(method=Method.RANDOM, trigger="random/C1")
     other = dataclasses.replace(
         one,
@@ -82,7 +82,8 @@ def test_an_experiment_that_did_not_run_forms_no_pair(experiment: Make) -> None:
 
 
 def test_ambiguous_experiments_are_not_matched(experiment: Make) -> None:
-    """Experiments that share a name are matched only if they are identical."""
+    """Identical experiments are matched first. Others with the same fault, scenario and trigger are matched
+    only if one is left on each side."""
     a = experiment()
     twin = dataclasses.replace(a, seed=8)
     third = dataclasses.replace(a, seed=9)
@@ -134,7 +135,7 @@ SDC = {"outcome": Outcome.SDC, "t_manifest": 2.5}
 def test_each_kind_of_change_is_reported(
     experiment: Make, a: dict[str, Any], b: dict[str, Any], changes: str
 ) -> None:
-    """Times count from the activation."""
+    """Times are compared relative to the activation."""
     e = experiment()
     pair = Pair(e, e, row(**a), row(**b))
     assert pair.changes == {Change(name) for name in changes.split()}

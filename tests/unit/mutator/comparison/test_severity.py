@@ -43,13 +43,13 @@ def contact(delta_v: float, **more: float) -> dict[str, Any]:
 
 
 def before(e: Experiment) -> dict[str, Any]:
-    """The result before: lane faults end in light contacts, and the other faults have no effect."""
+    """In the run `before`, lane faults end in light contacts, and the other faults have no effect."""
     return contact(2.0) if e.fault.fault_type == "lane" else {"metrics": (("way", 20.0),)}
 
 
 def after(e: Experiment) -> dict[str, Any]:
-    """The result after: guided lane faults end in harder contacts, and random ones in none. Distance
-    faults end in a contact and cover less distance."""
+    """In the run `after`, guided lane faults end in harder contacts, and random ones in none. With distance
+    faults, the car has a contact and covers less distance."""
     if e.fault.fault_type == "lane":
         return contact(12.0) if e.method is Method.GUIDED else {"metrics": (("way", 30.0),)}
     return contact(5.0, way=16.0) if e.fault.fault_type == "distance" else {"metrics": (("way", 20.0),)}
@@ -61,8 +61,8 @@ def runs(
     copy_toycar: Callable[[Path], Workspace],
     write_run: Callable[..., Path],
 ) -> tuple[Path, ...]:
-    """Three runs of the toy with severity (before, after, before with another scale), and one of a target
-    without severity."""
+    """Three runs of the toy with severity (before, after, and before with another scale), and one run of a
+    target without severity."""
     place = tmp_path_factory.mktemp("runs")
     toycar = copy_toycar(place)
     without = write_run(toycar, place / "without")
@@ -105,9 +105,8 @@ def test_a_gate_finds_contacts_that_were_milder_before(found: Comparison) -> Non
     assert len(findings(found, [Gate.HIGHER_SEVERITY])) == distance + harder
 
 
-def test_medians_of_metrics_in_pairs(found: Comparison) -> None:
-    """The difference is that of the medians over pairs with a value on both sides. The p-value is
-    Wilcoxon's."""
+def test_the_medians_of_metrics_are_compared(found: Comparison) -> None:
+    """Only pairs with a value in both runs are used."""
     sheets = {sheet.name: sheet for sheet in found.sheets}
     lines = [dict(zip(sheets["metrics"].heads, line, strict=True)) for line in sheets["metrics"].lines]
     way = next(line for line in lines if line["metric"] == "way")
@@ -122,13 +121,13 @@ def test_medians_of_metrics_in_pairs(found: Comparison) -> None:
     assert told["sensor/silence"] == (20.0, 20.0, 0.0)
 
 
-def test_each_pair_is_in_one_cell_of_the_table_of_classes(found: Comparison) -> None:
+def test_the_table_of_severity_classes_contains_each_pair_once(found: Comparison) -> None:
     sheet = next(sheet for sheet in found.sheets if sheet.name == "severity")
     assert sheet.heads == ("before / after", "S3", "S2", "S1", "no contact")
     assert sum(sum(line[1:]) for line in sheet.lines) == len(found.pairs)  # type: ignore[arg-type]
 
 
-def test_the_second_runs_scale_applies_to_both(runs: tuple[Path, ...]) -> None:
+def test_the_scale_of_the_second_run_applies_to_both_runs(runs: tuple[Path, ...]) -> None:
     """A remark says that the scales differ."""
     found = compare(runs[0], runs[2])
     assert found.changed == ()
@@ -138,7 +137,7 @@ def test_the_second_runs_scale_applies_to_both(runs: tuple[Path, ...]) -> None:
 
 
 @pytest.mark.parametrize("order", [(0, 3), (3, 0)])
-def test_without_classes_no_change_of_severity_is_reported(
+def test_without_severity_classes_no_change_of_severity_is_reported(
     runs: tuple[Path, ...], order: tuple[int, int]
 ) -> None:
     """A gate on severity is refused."""

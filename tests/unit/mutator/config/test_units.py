@@ -1,4 +1,4 @@
-"""Units in keys."""
+"""Units as suffixes of YAML keys."""
 
 import math
 import re
@@ -41,8 +41,8 @@ def test_the_longest_suffix_of_a_key_is_its_unit() -> None:
         (20, "degc", "degc", 20.0),
     ],
 )
-def test_conversion(number: float, source: str, target: str, expected: float) -> None:
-    """The value in the original unit is preserved exactly."""
+def test_values_are_converted_between_units(number: float, source: str, target: str, expected: float) -> None:
+    """The result is a float, exact except for rounding."""
     result = units.convert(number, units.UNITS[source], units.UNITS[target])
     assert result == pytest.approx(expected, rel=1e-15)
     assert isinstance(result, float)
@@ -55,14 +55,14 @@ def test_units_of_different_dimensions_cannot_be_converted() -> None:
         units.convert(20, units.UNITS["degc"], units.UNITS["k"])
 
 
-def test_each_unit_is_found_once_as_a_suffix() -> None:
+def test_every_unit_is_recognized_as_a_suffix() -> None:
     assert {suffix: units.split(f"by_{suffix}") for suffix in units.UNITS} == {
         suffix: ("by", unit) for suffix, unit in units.UNITS.items()
     }
     assert len({unit.symbol for unit in units.UNITS.values()}) == len(units.UNITS)
 
 
-def test_keys_of_the_shipped_library_have_their_units() -> None:
+def test_the_shipped_library_uses_only_expected_units() -> None:
     first = {"m", "mps", "kph", "mph", "mps2", "rad", "deg", "s", "ms", "mmph", "lx", "px"}
     for path in (*CLONE.glob("fault_library/faults/**/*.yaml"), *CLONE.glob("templates/*.yaml")):
         for key in re.findall(r"[{ ]([a-z][a-z0-9_]*):", path.read_text()):

@@ -31,8 +31,8 @@ def read(tmp_path: Path, text: str | bytes) -> Car:
     return yaml_files.read(path, Car, "car/2")[0]
 
 
-def test_a_good_file_is_read(tmp_path: Path) -> None:
-    """Words that YAML 1.1 reads as booleans or times stay words."""
+def test_a_valid_file_is_read(tmp_path: Path) -> None:
+    """Words that YAML 1.1 reads as booleans, numbers or times remain text."""
     car = read(
         tmp_path, "schema: car/2\nname: on\nwheels: {left: {radius: 3}}\ntags: ['1', 1:30, no, 1_0, 0x1]\n"
     )
@@ -116,7 +116,7 @@ def test_deep_nesting_and_huge_files_are_refused(tmp_path: Path) -> None:
         read(tmp_path, "#" * 1_000_001)
 
 
-def test_a_missing_file_is_a_users_error(tmp_path: Path) -> None:
+def test_a_missing_file_is_reported(tmp_path: Path) -> None:
     with pytest.raises(MutatorError, match="cannot be read"):
         yaml_files.load(tmp_path / "none.yaml")
 

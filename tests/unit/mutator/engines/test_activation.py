@@ -1,4 +1,4 @@
-"""The step at which a mutant leaves its golden run, as its probe determines it."""
+"""The step at which a mutant's fault becomes active, as its probe determines it."""
 
 import math
 import random
@@ -71,10 +71,10 @@ def test_a_fork_starts_at_the_first_active_step(probe, trigger: Trigger, step: i
         "True",
     ],
 )
-def test_the_activation_step_agrees_with_observe(
+def test_the_predicted_activation_step_agrees_with_the_probe(
     probe, condition: str, armed_after_s: float, hold: Hold
 ) -> None:
-    """Observations may include standstill and NaN."""
+    """Observations can contain zeros, infinities and NaN."""
     draw = random.Random(condition)
     code = probe(Trigger(name="x", condition=condition, armed_after_s=armed_after_s, hold=hold))
     for _ in range(10):
@@ -100,8 +100,8 @@ def test_the_probes_template_determines_the_precision_of_the_arming_time(probe) 
 
 
 def test_a_probe_in_two_parts_equals_the_whole(probe) -> None:
-    """The common part and the trigger-specific part, run one after the other, do the same as the whole probe,
-    on the same lines."""
+    """The part that all probes share and the part that depends on the trigger, run one after the other, equal
+    the whole probe, including line numbers."""
     trigger = Trigger(name="x", condition="hwt < 2.0", hold=Hold.FOR, hold_s=0.1)
     whole, parts = {}, {}
     exec(compile(probe(trigger), "_fi", "exec"), whole)
@@ -116,8 +116,8 @@ def test_a_probe_in_two_parts_equals_the_whole(probe) -> None:
     assert parts_of(probe(trigger))[1] == parts_of(probe(always()))[1]
 
 
-def test_a_step_may_have_several_observations_or_none(probe) -> None:
-    """A mutant leaves the golden run before the step that observes."""
+def test_a_step_can_have_several_observations_or_none(probe) -> None:
+    """The fork starts before the step in which the activating observation is made."""
     seen = Observed(values=SEEN.values, before=(0, 1, 3, 3, 6))
     starts = [start_of(probe(at_time(0.05 * i)), seen) for i in range(6)]
     assert [start.step for start in starts if start] == [0, 1, 1, 3, 3, 3]
@@ -125,7 +125,7 @@ def test_a_step_may_have_several_observations_or_none(probe) -> None:
 
 
 @pytest.mark.parametrize("trigger", [at_time(0.2), Trigger(name="x", condition="d_rel <= 20.0")])
-def test_a_probe_set_to_a_state_equals_one_that_observed(probe, trigger: Trigger) -> None:
+def test_setting_the_state_of_a_probe_replaces_its_observations(probe, trigger: Trigger) -> None:
     start = start_of(probe(trigger), SEEN)
     saw: dict = {}
     given: dict = {}
@@ -143,7 +143,7 @@ def test_a_probe_set_to_a_state_equals_one_that_observed(probe, trigger: Trigger
     assert not math.isinf(states[0]["t"])
 
 
-def test_probes_with_the_same_trigger_share_one_answer(probe) -> None:
+def test_the_first_active_step_is_computed_once_per_trigger(probe) -> None:
     one, other = (probe(Trigger(name=name, condition="d_rel <= 30.0")) for name in ("one", "other"))
     assert one != other
     assert start_of(one, SEEN) is start_of(other, SEEN)

@@ -1,4 +1,4 @@
-"""The functions of a loaded program that a mutant changes, and the reasons against a swap."""
+"""The functions of a loaded program that a mutant changes, and the reasons for not swapping them."""
 
 import re
 from collections.abc import Callable
@@ -38,7 +38,7 @@ Changes = Callable[..., CodeSwap]
 
 @pytest.fixture
 def changes() -> Changes:
-    """The code swap for PRISTINE after lines are inserted before those that contain a text."""
+    """Insert lines into PRISTINE before the line that contains a given text, and return the code swap."""
 
     def make(*inserted: tuple[str, str], reads_itself: tuple[str, ...] = ()) -> CodeSwap:
         text = "from car import _fi  # fi:probe\n" + PRISTINE
@@ -72,7 +72,7 @@ def test_changed_functions_are_found(changes: Changes) -> None:
     assert found.imports == ()
 
 
-def test_imports_of_injected_lines(changes: Changes) -> None:
+def test_imports_of_injected_lines_are_listed(changes: Changes) -> None:
     lines = 'if _fi.active("abc"):\n    from car.rain import Rain\n    y = Rain(y)'
     assert changes(("return [value", lines)).imports == ("car.rain",)
 
@@ -90,8 +90,8 @@ def test_imports_of_injected_lines(changes: Changes) -> None:
     ],
 )
 def test_some_changes_cannot_be_swapped(changes: Changes, before: str, lines: str, why: str | None) -> None:
-    """A statement that acts without its trigger, a generator, and an inner function are refused with reasons.
-    Code outside functions needs no swap."""
+    """A change that acts without its trigger, or in a generator or inner function, is refused with the
+    reason. Code outside functions needs no swap."""
     if why is None:
         assert changes((before, lines)).functions == ()
         return
@@ -100,8 +100,7 @@ def test_some_changes_cannot_be_swapped(changes: Changes, before: str, lines: st
 
 
 @pytest.mark.parametrize(("kept", "swappable"), [(1, True), (0, False)])
-def test_a_guard_also_asks_the_probe_in_its_else_branch(kept: int, swappable: bool) -> None:
-    """The guard keeps the whole statement under `else:`."""
+def test_a_guard_must_keep_the_original_statement_in_its_else_branch(kept: int, swappable: bool) -> None:
     guarded = "".join(
         f"        {line}  # fi:abc guard:1\n" for line in ('if _fi.active("abc"):', "    y = x", "else:")
     )

@@ -1,4 +1,5 @@
-"""The fork engine's server processes: their number, their starting points, and what is left after a kill."""
+"""The fork engine's server processes: their number, their starting points, and what happens if one is
+killed."""
 
 import os
 import signal
@@ -33,7 +34,7 @@ def gone(pid: int) -> bool:
 
 
 def test_forking_processes_have_one_thread_and_end_with_the_engine(fork: Fork) -> None:
-    """No scratch file is left."""
+    """The server leaves no scratch files."""
     for time_s in (2.0, 4.0, 3.0):
         assert fork.run(fork.job(at_time(time_s))).mode is RunMode.FORK
     pids = fork.processes()
@@ -55,24 +56,24 @@ def test_a_fork_starts_just_before_its_fault(fork: Fork) -> None:
     assert len(fork.processes()) <= 10
 
 
-def test_late_imports_are_loaded_before_the_fork(fork: Fork) -> None:
+def test_libraries_that_golden_imports_late_are_loaded_before_the_fork(fork: Fork) -> None:
     fork.run(fork.job(at_time(2.0)))
     (seen,) = fork.engine._seen.values()
     assert isinstance(seen, Observed)
-    assert "zipfile" in seen.libraries  # to write its trace
+    assert "zipfile" in seen.libraries  # imported only to write the trace
     assert not any(name.startswith("toycar") for name in seen.libraries)
     assert all(set(seen.libraries) <= waiting.loaded for waiting in fork.pool._waiting if waiting.step)
 
 
-def test_an_experiment_that_never_triggers_gets_goldens_files(fork: Fork) -> None:
-    """No run is needed."""
+def test_an_experiment_that_never_triggers_gets_the_files_of_the_golden_run(fork: Fork) -> None:
+    """The experiment needs no run."""
     execution = fork.run(fork.job(at_time(100.0)))
     assert (execution.mode, execution.status, execution.cpu_s) == (RunMode.GOLDEN, Status.OK, 0.0)
     assert execution.out == fork.golden
 
 
-def test_a_killed_process_is_a_harness_error_for_one_job_only(fork: Fork) -> None:
-    """The next job gets new processes, whether the server or a waiting process was killed."""
+def test_a_killed_process_causes_a_harness_error_for_one_job_only(fork: Fork) -> None:
+    """The next job gets new processes, no matter whether the server or a waiting process was killed."""
     job = fork.job(at_time(2.0))
     for place in (0, -1):  # the first process, then a waiting one
         assert fork.run(job).status is Status.OK
@@ -100,7 +101,7 @@ def test_waiting_processes_end_with_the_server(fork: Fork) -> None:
 
 
 def test_a_killed_guard_is_reported_by_the_next_run(fork: Fork) -> None:
-    """No process is left."""
+    """No process keeps running."""
     fork.run(fork.job(at_time(2.0)))
     pids = fork.processes()
     os.kill(fork.pool._process.pid, signal.SIGKILL)
@@ -143,7 +144,7 @@ def test_the_server_ends_when_its_engine_is_killed(toycar: Workspace, tmp_path: 
 
 
 @pytest.mark.slow
-def test_a_childs_cpu_limit_counts_from_its_fork(fork: Fork, edit: Edit) -> None:
+def test_the_cpu_limit_of_a_fork_excludes_the_time_before_it(fork: Fork, edit: Edit) -> None:
     edit(
         "tree/toycar/world.py",
         "        now = self.frame",

@@ -12,8 +12,8 @@ from ..fork_on_toy import LIMITS, Edit, Fork
 
 
 def test_a_target_with_threads_is_not_forked(fork: Fork, edit: Edit) -> None:
-    """The target starts a thread when it is loaded. The reference engine runs it, and the reason is
-    stored."""
+    """The target starts a thread when it is loaded. The reference engine runs it, and the result gives the
+    reason."""
     edit(
         "tree/toycar/go.py",
         "class Drive:",
@@ -29,7 +29,7 @@ def test_a_target_with_threads_is_not_forked(fork: Fork, edit: Edit) -> None:
 
 
 def test_a_target_with_pandas_is_forked(fork: Fork, edit: Edit) -> None:
-    """The thread of pyarrow's allocator, which pandas would start, is switched off."""
+    """pandas loads pyarrow, whose allocator would start a thread. The harness switches that thread off."""
     pytest.importorskip("pyarrow")
     fork.limits = replace(LIMITS, memory_mb=4096)
     edit("tree/toycar/go.py", "class Drive:", "import pandas\nimport pyarrow\n\n\nclass Drive:")
@@ -38,7 +38,6 @@ def test_a_target_with_pandas_is_forked(fork: Fork, edit: Edit) -> None:
 
 
 def test_a_target_that_cannot_be_imported_is_not_forked(fork: Fork, edit: Edit) -> None:
-    """The reference engine runs the target, and the reason is stored."""
     edit(
         "tree/toycar/go.py",
         "class Drive:",
@@ -50,7 +49,7 @@ def test_a_target_that_cannot_be_imported_is_not_forked(fork: Fork, edit: Edit) 
 
 
 def test_the_stored_reason_is_printable(fork: Fork, edit: Edit) -> None:
-    """A target may raise any text."""
+    """A target can raise an error with any text."""
     edit(
         "tree/toycar/sensing.py",
         "        self.publish((gap",
@@ -79,7 +78,7 @@ def test_a_target_that_behaves_differently_step_by_step_is_not_forked(fork: Fork
 
 @pytest.mark.slow
 def test_a_run_that_leaves_a_thread_is_repeated(fork: Fork, edit: Edit) -> None:
-    """The run would not have ended by itself. The reference engine repeats it and reports that."""
+    """The run does not end by itself. The reference engine repeats it and reports the timeout."""
     fork.limits = replace(LIMITS, wall_s=3)
     edit(
         "tree/toycar/sensing.py",
@@ -93,8 +92,7 @@ def test_a_run_that_leaves_a_thread_is_repeated(fork: Fork, edit: Edit) -> None:
 
 
 @pytest.mark.slow
-def test_a_run_that_writes_into_its_tree_does_not_affect_the_next(fork: Fork, edit: Edit) -> None:
-    """The reference engine decides the run's result."""
+def test_a_run_that_writes_into_its_tree_is_repeated_by_the_reference_engine(fork: Fork, edit: Edit) -> None:
     edit(
         "tree/toycar/sensing.py",
         "        self.publish((gap",
@@ -106,9 +104,8 @@ def test_a_run_that_writes_into_its_tree_does_not_affect_the_next(fork: Fork, ed
     assert "toycar/sensing.py in the tree that ran" in execution.detail
 
 
-def test_a_suspended_function_is_not_forked(fork: Fork, edit: Edit) -> None:
-    """The function is suspended between steps, so the reference engine runs the experiment and stores the
-    reason."""
+def test_a_fault_in_a_generator_is_not_forked(fork: Fork, edit: Edit) -> None:
+    """A generator can be suspended between two steps, so the reference engine runs the experiment."""
     edit(
         "tree/toycar/sensing.py",
         "    def publish(self",
@@ -120,8 +117,7 @@ def test_a_suspended_function_is_not_forked(fork: Fork, edit: Edit) -> None:
 
 
 @pytest.mark.slow
-def test_a_failed_stepwise_golden_run_is_not_forked(fork: Fork, edit: Edit) -> None:
-    """The reference engine runs the experiment, and the reason is stored."""
+def test_without_a_stepwise_golden_run_nothing_is_forked(fork: Fork, edit: Edit) -> None:
     edit(
         "tree/toycar/go.py",
         "    return Drive(case)",
@@ -144,8 +140,8 @@ EARLY = """
 
 
 def test_a_target_that_observes_before_its_first_step_is_not_forked(fork: Fork, edit: Edit) -> None:
-    """A fork cannot see such observations. The reference engine runs these experiments, even if the fault
-    becomes active later."""
+    """A fork would miss such observations. The reference engine runs all experiments of the target, even if
+    the fault becomes active later."""
     edit("fault_library/targets/toycar.yaml", "function: Drive.step,", "function: Drive.look,")
     edit("tree/toycar/go.py", '\n        self.steps = int(case["steps"])\n', EARLY)
     for trigger in (always(armed_after_s=-2.0), at_time(2.0)):

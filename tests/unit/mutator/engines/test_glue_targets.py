@@ -1,4 +1,4 @@
-"""Targets with an entry that uses the harness's glue, in both engines."""
+"""Targets whose entry uses the harness's glue, in the reference and fork engines."""
 
 from pathlib import Path
 
@@ -69,15 +69,15 @@ def test_both_engines_give_the_same_bytes(glued: Fork) -> None:
         assert (forked.out / name).read_bytes() == (plain.out / name).read_bytes()
 
 
-def test_a_run_imports_the_glue_of_its_harness(glued: Fork) -> None:
-    """Another mutator may be installed. The run's report does not list the glue as a package of the
-    target."""
+def test_a_run_imports_the_glue_of_the_harness_that_started_it(glued: Fork) -> None:
+    """Another version of mutator can be installed. The run's report does not list the glue as a package of
+    the target."""
     plain = glued.engine.reference.execute(glued.job(at_time(2.0)), glued.folder / "plain")
     assert Path(plain.log.strip()) == Path(mutator.__file__)
     assert "mutator" not in plain.modules
     assert "numpy" in plain.modules
 
 
-def test_the_path_of_the_glue_gives_access_to_nothing_else() -> None:
+def test_the_import_hook_of_the_glue_finds_no_other_modules() -> None:
     assert Harness.find_spec("tests") is None
     assert Harness.find_spec("mutator.glue") is None

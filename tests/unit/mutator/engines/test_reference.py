@@ -1,4 +1,4 @@
-"""The reference engine: isolation, limits, and the status for each way in which a run ends."""
+"""The reference engine: isolation, limits, and the status of each kind of ending."""
 
 import json
 import os
@@ -53,10 +53,10 @@ def entry(body: str) -> dict[str, str]:
     return {"toycar/go.py": body}
 
 
-def test_a_mutant_of_what_runs_read_shares_nothing(
+def test_a_mutant_of_a_file_that_runs_read_uses_no_shared_caches(
     toycar: Workspace, manifest: TargetManifest, tmp_path: Path
 ) -> None:
-    """The mutants concerned are those of files in `reads_itself`."""
+    """The manifest lists such files in `reads_itself`."""
     said = 'import json, sys\nfrom pathlib import Path\nPath("words.json").write_text(json.dumps(sys.argv))\n'
     changed = replace(manifest, independent=("--forget",), reads_itself=("toycar/sens*.py",))
     engine = ReferenceEngine(changed, prepare_base(manifest, tmp_path / "base"), tmp_path, LIMITS)
@@ -68,7 +68,7 @@ def test_a_mutant_of_what_runs_read_shares_nothing(
         assert ("--forget" in words) is (read == "toycar/sensing.py")
 
 
-def test_a_good_run_leaves_its_trace_and_record(run: Run) -> None:
+def test_a_successful_run_leaves_its_trace_and_record(run: Run) -> None:
     """The CPU time is recorded."""
     execution = run()
     assert (execution.status, execution.detail) == (Status.OK, "")
@@ -99,7 +99,7 @@ def test_a_good_run_leaves_its_trace_and_record(run: Run) -> None:
         ("import os; os.kill(os.getpid(), 15)", Status.HARNESS_ERROR, "killed from outside by SIGTERM"),
     ],
 )
-def test_each_way_to_end_has_its_status(run: Run, body: str, status: Status, detail: str) -> None:
+def test_each_kind_of_ending_has_its_status(run: Run, body: str, status: Status, detail: str) -> None:
     execution = run(entry(body))
     assert (execution.status, execution.detail) == (status, detail)
 
@@ -111,7 +111,7 @@ def test_a_syntax_error_in_executed_code_is_a_crash(run: Run) -> None:
     assert "go.py" in execution.detail
 
 
-def test_endless_loop_hits_the_cpu_limit(run: Run) -> None:
+def test_an_endless_loop_hits_the_cpu_limit(run: Run) -> None:
     execution = run(entry("while True: pass"), replace(LIMITS, cpu_s=1))
     assert (execution.status, execution.detail) == (Status.TIMEOUT, "CPU time limit of 1 s")
 
@@ -128,13 +128,13 @@ def test_sleeping_hits_the_wall_limit(run: Run) -> None:
 
 
 def test_a_run_kept_alive_by_a_thread_times_out(run: Run) -> None:
-    """The run has finished its work."""
+    """The run has otherwise finished its work."""
     body = "import threading, time; threading.Thread(target=time.sleep, args=(100,)).start()"
     execution = run(entry(body), replace(LIMITS, wall_s=2))
     assert (execution.status, execution.detail) == (Status.TIMEOUT, "wall time limit of 2 s")
 
 
-def test_too_many_steps_are_a_timeout(run: Run) -> None:
+def test_a_run_with_too_many_steps_times_out(run: Run) -> None:
     """The run ends at the same step on every machine."""
     probe = (
         "MUTANT = 'm'\nclass StepLimit(RuntimeError): pass\n"
@@ -153,7 +153,7 @@ def test_too_many_steps_are_a_timeout(run: Run) -> None:
     assert "not the one of this mutant" in other.detail
 
 
-def test_a_huge_file_is_refused(run: Run) -> None:
+def test_a_run_that_writes_a_huge_file_crashes(run: Run) -> None:
     body = "f = open('x', 'wb')\nf.seek(1 << 40)\nf.write(b'x')\nf.flush()"
     execution = run(entry(body))
     assert execution.status is Status.CRASHED
@@ -173,7 +173,7 @@ def test_importing_the_package_from_outside_the_tree_is_a_harness_error(
     assert "imported from" in execution.detail
 
 
-def test_running_another_tree_is_a_harness_error(run: Run) -> None:
+def test_changing_the_tree_during_a_run_is_a_harness_error(run: Run) -> None:
     body = "import toycar.world, pathlib\npathlib.Path(toycar.world.__file__).write_text('STEP = 1')"
     execution = run(entry(body))
     assert execution.status is Status.HARNESS_ERROR
@@ -181,7 +181,7 @@ def test_running_another_tree_is_a_harness_error(run: Run) -> None:
     assert run().status is Status.OK, "the next run has its own tree again"
 
 
-def test_emptied_bytecode_affects_only_its_own_run(toycar: Workspace, run: Run, tmp_path: Path) -> None:
+def test_truncated_bytecode_does_not_affect_later_runs(toycar: Workspace, run: Run, tmp_path: Path) -> None:
     body = "import toycar.world, os\nos.truncate(toycar.world.__cached__, 20)"
     assert run(entry(body)).status is Status.OK
     (kept,) = (tmp_path / "base" / "toycar" / "__pycache__").glob("world.*")
@@ -189,8 +189,9 @@ def test_emptied_bytecode_affects_only_its_own_run(toycar: Workspace, run: Run, 
     assert run().status is Status.OK
 
 
-def test_a_replaced_log_or_report_counts_as_missing(run: Run) -> None:
-    """A run may remove the file, or replace it with a folder or a pipe. The engine does not wait for it."""
+def test_a_replaced_log_or_report_is_treated_as_missing(run: Run) -> None:
+    """A run can remove the file, or replace it with a folder or a pipe, for which the engine must not
+    wait."""
     head = "import os\nos.unlink('../log')\n"
     for body in ("", "os.mkdir('../log')", "os.mkfifo('../log')"):
         execution = run(entry(head + body))
@@ -229,7 +230,7 @@ def test_unprintable_names_are_stored_as_printable_text(run: Run) -> None:
 
 
 def test_a_run_receives_signals_that_its_parent_ignored(run: Run) -> None:
-    """Programs in the background ignore some signals."""
+    """Background programs ignore some signals, and their child processes inherit that."""
     body = "import os, signal\nos.kill(os.getpid(), signal.SIGINT)"
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGALRM])
@@ -242,7 +243,7 @@ def test_a_run_receives_signals_that_its_parent_ignored(run: Run) -> None:
 
 
 def test_a_source_file_from_outside_the_tree_is_a_harness_error(run: Run) -> None:
-    """A data cache outside is allowed."""
+    """A data file is allowed."""
     body = "import toycar, pathlib\npathlib.Path(toycar.__file__).with_name('left.py').touch()"
     execution = run(entry(body))
     assert execution.status is Status.HARNESS_ERROR
@@ -258,12 +259,12 @@ def test_stale_bytecode_cannot_run(run: Run, manifest: TargetManifest, tmp_path:
     execution = run({"toycar/world.py": changed, **entry(body)})
     assert execution.detail.startswith("ValueError: 0.06")
     cached = list((tmp_path / "base" / "toycar" / "__pycache__").glob("world.*.pyc"))
-    assert cached, "the pristine tree has bytecode that could have been stale"
+    assert cached, "the pristine tree has bytecode, which the mutant could have loaded"
     assert int.from_bytes(cached[0].read_bytes()[4:8], "little") == 0b11, "checked by hash"
 
 
 def test_the_users_environment_does_not_reach_a_run(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    """PYTHONPATH and similar variables are removed, the job sets the hash seed, and there is one thread."""
+    """The user's variables are removed, the job sets the hash seed, and libraries use one thread."""
     monkeypatch.setenv("PYTHONPATH", "/nowhere")
     monkeypatch.setenv("MUTATOR_SECRET", "x")
     body = (
@@ -274,7 +275,7 @@ def test_the_users_environment_does_not_reach_a_run(run: Run, monkeypatch: pytes
     assert run(entry(body), hash_seed=42).detail.startswith("ValueError: ('42', '1')")
 
 
-def test_the_last_lines_of_output_are_kept(run: Run) -> None:
+def test_the_output_of_a_run_is_kept(run: Run) -> None:
     assert "hello" in run(entry("print('hello')")).log
 
 
@@ -289,7 +290,7 @@ def test_grandchildren_end_with_the_run(run: Run, tmp_path: Path) -> None:
 
 
 def ended(pid: int) -> bool:
-    """Whether the process ends within a few seconds; a zombie has ended."""
+    """Return whether the process ends within a few seconds. A zombie process has ended."""
     deadline = time.monotonic() + 5.0
     while time.monotonic() < deadline:
         try:
@@ -318,7 +319,9 @@ engine.execute(job, folder / "work" / "x")
 """
 
 
-def test_a_run_dies_with_its_engine(toycar: Workspace, manifest: TargetManifest, tmp_path: Path) -> None:
+def test_a_run_ends_when_its_engine_is_killed(
+    toycar: Workspace, manifest: TargetManifest, tmp_path: Path
+) -> None:
     note = tmp_path / "pid"
     (tmp_path / "work").mkdir()
     prepare_base(manifest, tmp_path / "base")
@@ -356,7 +359,9 @@ def test_a_full_disk_is_not_a_crash(run: Run, monkeypatch: pytest.MonkeyPatch) -
     assert run().status is Status.OK
 
 
-def test_jobs_run_in_order_and_clean_up(toycar: Workspace, manifest: TargetManifest, tmp_path: Path) -> None:
+def test_jobs_run_in_order_and_their_folders_are_deleted(
+    toycar: Workspace, manifest: TargetManifest, tmp_path: Path
+) -> None:
     work = tmp_path / "work"
     work.mkdir()
     engine = ReferenceEngine(manifest, prepare_base(manifest, tmp_path / "base"), work, LIMITS)
@@ -369,7 +374,7 @@ def test_jobs_run_in_order_and_clean_up(toycar: Workspace, manifest: TargetManif
     assert list(work.iterdir()) == []
 
 
-def test_two_threads_may_use_one_engine(
+def test_two_threads_can_use_one_engine(
     run: Run, toycar: Workspace, manifest: TargetManifest, tmp_path: Path
 ) -> None:
     """Each thread works in a separate folder."""
@@ -391,13 +396,14 @@ def test_two_threads_may_use_one_engine(
 
 
 def test_the_report_lists_imported_packages(run: Run) -> None:
-    """The target's own packages, the standard library, and modules that Python loaded before are excluded."""
+    """The target's own packages, the standard library, and modules that were loaded before the run are
+    excluded."""
     assert run().modules == ("numpy",)
     assert run(entry("import json, iniconfig.exceptions, toycar.world")).modules == ("iniconfig",)
 
 
-def test_the_report_lists_packages_of_shared_libraries(run: Run) -> None:
-    """The versions of shared libraries affect results, even without an import."""
+def test_the_report_lists_packages_with_loaded_shared_libraries(run: Run) -> None:
+    """The versions of these packages affect results, although the run does not import them."""
     code = (
         "import ctypes; from importlib.util import find_spec; from pathlib import Path\n"
         "ctypes.CDLL(str(Path(find_spec('casadi').origin).with_name('libdaqp.so')))"
@@ -406,10 +412,10 @@ def test_the_report_lists_packages_of_shared_libraries(run: Run) -> None:
 
 
 @pytest.mark.parametrize(("limit", "name"), [("AS", "memory_mb"), ("CPU", "cpu_s"), ("FSIZE", "disk_mb")])
-def test_lower_limits_of_this_process_are_refused(
+def test_resource_limits_below_those_of_the_campaign_are_refused(
     manifest: TargetManifest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, limit: str, name: str
 ) -> None:
-    """Runs would end differently."""
+    """Otherwise, runs would end differently than on other machines."""
     number, unlimited = getattr(resource, f"RLIMIT_{limit}"), (resource.RLIM_INFINITY, resource.RLIM_INFINITY)
     monkeypatch.setattr(resource, "getrlimit", lambda which: (1, 1) if which == number else unlimited)
 

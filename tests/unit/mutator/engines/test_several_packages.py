@@ -1,4 +1,4 @@
-"""Targets with several packages and flat modules, in either engine: the probe is a separate module."""
+"""Targets with several packages and single-file modules, whose probe is a separate module."""
 
 import shutil
 from pathlib import Path
@@ -16,7 +16,7 @@ MANIFEST = "fault_library/targets/toycar.yaml"
 
 @pytest.fixture
 def several(fork: Fork, edit: Edit) -> Fork:
-    """The toy with a sensor that uses a module outside all packages."""
+    """The toy with a sensor that imports a module outside any package."""
     tree = fork.toy.library.parent / "tree"
     (tree / "margin.py").write_text("def wider(gap):\n    gap = gap + 0.0\n    return gap\n")
     edit("tree/toycar/sensing.py", 'world."""\n', 'world."""\n\nimport margin\n')
@@ -41,7 +41,9 @@ def test_both_engines_give_the_same_bytes(several: Fork) -> None:
         assert (forked.out / name).read_bytes() == (plain.out / name).read_bytes()
 
 
-def test_a_flat_module_from_another_folder_is_a_harness_error(several: Fork, tmp_path: Path) -> None:
+def test_importing_a_target_module_from_another_folder_is_a_harness_error(
+    several: Fork, tmp_path: Path
+) -> None:
     _ = several.engine
     (tmp_path / "other").mkdir()
     shutil.copy(several.manifest.root / "margin.py", tmp_path / "other")

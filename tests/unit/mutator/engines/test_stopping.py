@@ -74,7 +74,7 @@ def drive(fork: Fork, engine: Engine, after: AfterHazard, at: float = 2.0) -> Re
     return finished.record
 
 
-def test_a_stopped_run_equals_the_beginning_of_the_complete_one(stopping: Fork) -> None:
+def test_a_stopped_run_equals_the_beginning_of_the_complete_run(stopping: Fork) -> None:
     """Every engine stops at the same step."""
     fork = stopping.engine
     null = build(stopping.manifest, stopping.models, None, always()).files
@@ -98,7 +98,7 @@ def test_a_stopped_run_equals_the_beginning_of_the_complete_one(stopping: Fork) 
 
 @pytest.mark.parametrize("at", [2.0, 1000.0])
 @pytest.mark.parametrize("terminal", ["t > 1.0", "t >= 0"])
-def test_a_drive_that_ends_before_the_fault_is_the_same_in_every_engine(
+def test_engines_agree_on_a_run_that_stops_before_its_fault(
     stopping: Fork, edit: Edit, terminal: str, at: float
 ) -> None:
     edit(MANIFEST, "terminal: speed > 90", f"terminal: {terminal}")
@@ -112,10 +112,10 @@ def test_a_drive_that_ends_before_the_fault_is_the_same_in_every_engine(
 
 
 @pytest.mark.parametrize(("terminal", "outcome"), [("t > 3.0", Outcome.SDC), ("t > 9.0", Outcome.HAZARD)])
-def test_a_drive_that_ends_after_the_fault_where_golden_ends(
+def test_engines_agree_on_a_run_that_stops_after_its_fault(
     stopping: Fork, edit: Edit, terminal: str, outcome: Outcome
 ) -> None:
-    """The fault acted before that end or caused it, so both engines have the same record."""
+    """The fault was active before the terminal hazard or caused it."""
     edit(MANIFEST, "terminal: speed > 90", f"terminal: {terminal}")
     reference, forked = (
         drive(stopping, one, AfterHazard.STOP) for one in (stopping.engine.reference, stopping.engine)
@@ -147,7 +147,7 @@ def test_a_drive_that_ends_after_the_fault_where_golden_ends(
 def test_a_hazard_over_several_steps_cannot_stop_a_run(
     stopping: Fork, edit: Edit, old: str, new: str, message: str
 ) -> None:
-    """The error names what cannot be computed from the values of a single step."""
+    """The error names the hazard or channel that cannot be judged from the values of a single step."""
     edit(MANIFEST, old, new)
     with pytest.raises(MutatorError, match=re.escape(f"cannot stop at a terminal hazard: {message}")):
         stop_source(stopping.toy.manifest("toycar"))
@@ -171,15 +171,15 @@ def test_a_target_without_a_terminal_hazard_is_refused(stopping: Fork, edit: Edi
         (math.nan, 1.0, False),
     ],
 )
-def test_any_terminal_condition_ends_a_drive(stopping: Fork, gap: float, speed: float, over: bool) -> None:
-    """The condition may use the trace's channels and values derived from them."""
+def test_any_terminal_condition_ends_a_run(stopping: Fork, gap: float, speed: float, over: bool) -> None:
+    """The condition can use the trace's channels and values derived from them."""
     source = stop_source(stopping.toy.manifest("toycar"))
     assert compiled(source)({"time": 1.0, "gap": gap, "speed": speed}) is over
 
 
 @pytest.mark.parametrize("terminal", ["max(d_rel, speed) <= 90", "min(speed, d_rel, t) > 40"])
 def test_stopping_agrees_with_the_verdict_on_the_trace(stopping: Fork, edit: Edit, terminal: str) -> None:
-    """A value may be NaN."""
+    """This includes NaN values."""
     edit(MANIFEST, "terminal: speed > 90", f"terminal: '{terminal}'")
     manifest = stopping.toy.manifest("toycar")
     over = compiled(stop_source(manifest))
@@ -192,8 +192,8 @@ def test_stopping_agrees_with_the_verdict_on_the_trace(stopping: Fork, edit: Edi
         assert over({"time": t[0], "gap": gap[0], "speed": speed[0]}) is expected, numbers
 
 
-def test_a_glue_without_recorded_values_is_not_a_crash(stopping: Fork, edit: Edit) -> None:
-    """If values are missing before anything is active, no fault is blamed."""
+def test_missing_recorded_values_are_a_harness_error(stopping: Fork, edit: Edit) -> None:
+    """The values are already missing before the fault is active, so it did not cause the error."""
     edit("tree/toycar/go.py", "def recorded(", "def something_else(")
     record = drive(stopping, stopping.engine.reference, AfterHazard.STOP)
     assert record.status is Status.HARNESS_ERROR
@@ -218,8 +218,8 @@ def test_after_hazard_applies_to_the_whole_campaign(stopping: Fork, edit: Edit) 
         make_plan(stopping.toy, "small")
 
 
-def test_a_trace_is_cut_at_a_time() -> None:
-    """A channel with its own times is cut according to them."""
+def test_a_trace_can_be_cut_at_a_time() -> None:
+    """A channel with separate times is cut at the same time."""
     trace = {"t": np.arange(4.0), "a": np.arange(4.0), "b": np.array([7.0, 8.0]), "b@": np.array([0.5, 2.5])}
     cut = until(trace, 2.0, "t")
     assert {name: values.tolist() for name, values in cut.items()} == {

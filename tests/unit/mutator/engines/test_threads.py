@@ -10,7 +10,7 @@ from mutator.engines import threads
 from mutator.engines.in_target.threads import others
 
 
-def test_threads_are_found_by_name() -> None:
+def test_the_names_of_all_other_threads_are_found() -> None:
     before = others()
     done = threading.Event()
     started = [threading.Thread(target=done.wait, name=name) for name in ("poll", "radar")]

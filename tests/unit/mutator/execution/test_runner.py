@@ -1,4 +1,4 @@
-"""How executions become records: what is accepted, and what is a harness error."""
+"""How executions become records, and which of them are harness errors."""
 
 import json
 from collections.abc import Callable, Iterable, Iterator
@@ -83,7 +83,7 @@ RAN = {"a": {"first": 0.25, "last": 0.5, "count": 3}, "b": {"first": 0.2, "last"
 NEVER = {"a": {"first": None, "last": None, "count": 0}}
 
 
-def test_an_active_run_that_equals_golden_is_masked(judged: Callable[..., Record]) -> None:
+def test_an_active_fault_without_an_effect_is_masked(judged: Callable[..., Record]) -> None:
     """The activation covers all injections."""
     record = judged(ran=RAN)
     assert (record.status, record.outcome) == (Status.OK, Outcome.MASKED)
@@ -98,7 +98,7 @@ def test_a_difference_in_the_activation_step_is_sdc(judged: Callable[..., Record
 
 
 def test_hazards_and_alerts_after_the_activation_are_kept(judged: Callable[..., Record]) -> None:
-    """Hazards and alerts are kept in order of time."""
+    """They are sorted by time."""
     said = {
         "hazards": {"H1": 0.9, "H3": 0.3, "TOO_FAST": None},
         "alert_events": [{"name": "brake_hard", "t": t} for t in (0.1, 0.6, 0.7)] + [{"name": "x", "t": 0.5}],
@@ -109,12 +109,12 @@ def test_hazards_and_alerts_after_the_activation_are_kept(judged: Callable[..., 
     assert record.alerts == (("brake_hard", 0.6),)
 
 
-def test_a_mutant_that_never_ran_its_fault_is_not_activated(judged: Callable[..., Record]) -> None:
+def test_a_mutant_whose_fault_never_ran_is_not_activated(judged: Callable[..., Record]) -> None:
     assert judged(ran=NEVER).outcome is Outcome.NOT_ACTIVATED
 
 
 @pytest.mark.parametrize(("ran", "told"), [(NEVER, "never active"), (RAN, "before 0.2 s")])
-def test_a_difference_that_the_fault_cannot_cause(
+def test_a_difference_that_the_fault_cannot_cause_is_a_harness_error(
     judged: Callable[..., Record], ran: dict, told: str
 ) -> None:
     record = judged(ran=ran, trace={"gas": stepped(3)})
@@ -126,7 +126,7 @@ def test_a_difference_that_the_fault_cannot_cause(
 def test_a_run_without_usable_outputs_is_a_crash_or_a_harness_error(
     judged: Callable[..., Record], outputs: Outputs
 ) -> None:
-    """The run has crashed if its fault was active."""
+    """The run is a crash if its fault was active."""
     record = judged(ran=RAN, **outputs)
     assert (record.status, record.outcome) == (Status.CRASHED, None)
     assert record.activation is not None
@@ -141,7 +141,7 @@ def test_a_run_without_usable_outputs_is_a_crash_or_a_harness_error(
 def test_a_crash_keeps_its_activation_and_a_timeout_does_not(
     judged: Callable[..., Record], status: Status, kept: bool
 ) -> None:
-    """The count of a timeout depends on the machine's speed."""
+    """The number of activations before a timeout depends on the machine's speed."""
     record = judged(status, ran=RAN)
     assert (record.status, record.outcome, record.detail) == (status, None, "why")
     assert (record.activation is not None) == kept

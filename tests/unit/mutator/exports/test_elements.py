@@ -71,7 +71,7 @@ def test_the_report_follows_the_schema(report: dict[str, Any]) -> None:
     assert len(ids) == len(set(ids)) > 0
 
 
-def test_each_drive_is_listed_once_as_a_test(report: dict[str, Any]) -> None:
+def test_each_run_is_listed_once_as_a_test(report: dict[str, Any]) -> None:
     tests = [test["id"] for file in report["testFiles"].values() for test in file["tests"]]
     assert len(tests) == len(set(tests))
     named = {test for _, m in mutants(report) for test in (*m["coveredBy"], *m["killedBy"])}
@@ -96,7 +96,7 @@ def test_a_mutant_replaces_whole_statements(report: dict[str, Any]) -> None:
 def test_a_mutant_of_an_operator_replaces_its_expression(
     toycar: Workspace, tmp_path: Path, write_run: Write, of_operators: Callable[..., Any]
 ) -> None:
-    """The columns are exact. A deleted statement is replaced by `pass`."""
+    """The location gives the exact columns. A deleted statement is replaced by `pass`."""
 
     def changed(plan: Plan) -> Plan:
         mutants = of_operators(toycar, "toycar/driver.py", drives=1)(plan)
@@ -115,7 +115,7 @@ def test_a_mutant_of_an_operator_replaces_its_expression(
     run = write_run(toycar, tmp_path / "run", lambda e: HAZARD, changed=changed)
     made = json.loads(export(run, Format.MUTATION_ELEMENTS, workspace=toycar).read_text())
     *changes, (_, minus), (source, omission) = mutants(made)
-    assert minus["replacement"] == "(1.5 - speed)"  # the column after `gap - 5.0 -`
+    assert minus["replacement"] == "(1.5 - speed)"  # in `gap - 5.0 - 1.5 * speed`
     assert len(changes) == 9  # the binary operations in the file
     found = set()
     for source, mutant in changes:
@@ -141,7 +141,9 @@ def test_a_mutant_with_a_hazard_is_killed(report: dict[str, Any]) -> None:
         assert mutant["killedBy"] == (mutant["coveredBy"] if lane else [])
 
 
-def test_a_run_of_another_target_is_refused(toycar: Workspace, tmp_path: Path, write_run: Write) -> None:
+def test_a_run_whose_target_has_changed_is_refused(
+    toycar: Workspace, tmp_path: Path, write_run: Write
+) -> None:
     run = write_run(toycar, tmp_path / "run")
     (toycar.library.parent / "tree" / "toycar" / "driver.py").write_text("x = 1\n")
     with pytest.raises(MutatorError, match="changed since this run was planned: target"):
@@ -164,13 +166,13 @@ def test_a_run_of_another_target_is_refused(toycar: Workspace, tmp_path: Path, w
         ([{"status": Status.HARNESS_ERROR, "outcome": None, "activation": None}, {}], "Survived"),
     ],
 )
-def test_the_status_follows_from_the_outcomes_of_the_drives(
+def test_the_status_of_a_mutant_follows_from_its_experiments(
     became: list[dict[str, Any] | None],
     status: str,
     experiment: Callable[..., Experiment],
     record: Callable[..., Record],
 ) -> None:
-    """Hazards take precedence."""
+    """A hazard takes precedence over all other results."""
     drives = [experiment(scenario=f"S{i}") for i in range(len(became))]
     records = {
         e.id: record(e.id, **fields) for e, fields in zip(drives, became, strict=True) if fields is not None

@@ -54,7 +54,8 @@ def cases(file: Path) -> dict[str, list[ET.Element]]:
 
 
 def test_hazards_pass_by_default(run: Path) -> None:
-    """Harness errors are errors, and faults that did not act or run are skipped. The counts agree."""
+    """Harness errors are errors. Experiments that did not run and faults that were not activated are
+    skipped."""
     file = export(run, Format.JUNIT)
     found = cases(file)
     assert set(found) == {"lane", "silence", "distance"}
@@ -73,7 +74,7 @@ def test_hazards_pass_by_default(run: Path) -> None:
     assert skipped == {True}
 
 
-def test_hazards_as_failures(run: Path, tmp_path: Path) -> None:
+def test_hazards_can_be_selected_as_failures(run: Path, tmp_path: Path) -> None:
     found = cases(export(run, Format.JUNIT, tmp_path / "j.xml", parts=Parts(failures=["hazard"])))
     assert {c.find("failure").get("message") for c in found["lane"]} == {"H3 at 4.00 s"}  # type: ignore[union-attr]
     assert not any(list(c.iter("failure")) for c in found["distance"])
@@ -85,7 +86,7 @@ def test_a_harness_error_cannot_be_selected_as_a_failure(run: Path) -> None:
         export(run, Format.JUNIT, parts=Parts(failures=["harness_error"]))
 
 
-def test_csv_and_parquet_exports_are_the_runs_tables(run: Path, tmp_path: Path) -> None:
+def test_csv_and_parquet_exports_are_copies_of_the_runs_tables(run: Path, tmp_path: Path) -> None:
     for format, name in ((Format.CSV, "results.csv"), (Format.PARQUET, "results.parquet")):
         file = export(run, format, tmp_path / "new" / name)
         assert file.read_bytes() == (run / name).read_bytes()

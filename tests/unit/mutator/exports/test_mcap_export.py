@@ -150,10 +150,9 @@ def test_negative_times_are_shifted(run: Path, tmp_path: Path) -> None:
     assert facts["times"] == {"first_s": "-0.5"}
 
 
-def test_a_damaged_or_foreign_trace_is_refused(
+def test_a_damaged_trace_is_refused(
     run: Path, tmp_path: Path, copy_toycar: Callable[[Path], Workspace]
 ) -> None:
-    """The series would show another result."""
     copy, name = tmp_path / "run", hazardous(run)[0]
     shutil.copytree(run, copy)
     faulty = copy / "traces" / name / "faulty"
@@ -175,7 +174,7 @@ def test_the_same_run_gives_the_same_bytes(run: Path, tmp_path: Path) -> None:
 
 
 def test_experiments_without_a_series_are_reported(run: Path, tmp_path: Path) -> None:
-    """The message has the command that reruns them. An empty export is an error."""
+    """The message gives the command that reruns them. An empty export is an error."""
     left = 8 - len(hazardous(run))
     with pytest.warns(
         MutatorWarning, match=f"{left} of 8 experiments have no series.*mutator rerun .* --trace"

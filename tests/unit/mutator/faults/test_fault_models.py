@@ -43,7 +43,7 @@ RAISING = ["exception", "reordering", "repetition", "slow_call", "swapped_argume
 
 @pytest.fixture
 def folder(tmp_path: Path, clone: Workspace) -> Path:
-    """A copy of the templates, which a test may break."""
+    """A copy of the templates, so that tests can break them."""
     return Path(shutil.copytree(clone.templates, tmp_path / "templates"))
 
 
@@ -57,7 +57,7 @@ def broken(folder: Path, name: str, old: str, new: str) -> str:
 
 
 def test_the_expected_models_ship(clone: Workspace) -> None:
-    """Two models wrap statements, and some belong to operators."""
+    """Two of the models wrap statements, and some belong to operator mutants."""
     models = clone.fault_models()
     assert list(models.models) == sorted(NAMES + OF_OPERATORS)
     assert [m.name for m in models if m.kind is SnippetKind.GUARD] == ["omission", "reordering"]
@@ -65,8 +65,7 @@ def test_the_expected_models_ship(clone: Workspace) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES + OF_OPERATORS)
-def test_the_examples_of_the_models_hold(clone: Workspace, name: str) -> None:
-    """The original can be restored from each example's result."""
+def test_the_examples_of_each_model_give_the_expected_code(clone: Workspace, name: str) -> None:
     models = clone.fault_models()
     model = models.get(name)
     for example in model.examples:
@@ -74,8 +73,7 @@ def test_the_examples_of_the_models_hold(clone: Workspace, name: str) -> None:
 
 
 def test_the_digest_covers_which_models_raise_on_purpose(folder: Path, clone: Workspace) -> None:
-    """Verdicts depend on these models. Models that raise on purpose do not run the target's own code as it is
-    written."""
+    """Verdicts depend on which models can raise an exception on purpose."""
     known = clone.fault_models()
     assert [model.name for model in known if model.raises] == sorted(RAISING)
     path = folder / "scale.yaml"
@@ -148,7 +146,7 @@ def test_a_mistake_in_a_models_yaml_is_reported(
     assert said in broken(folder, name, old, new)
 
 
-def test_a_missing_template_is_refused_by_name(folder: Path) -> None:
+def test_the_error_names_a_missing_template(folder: Path) -> None:
     (folder / "scale.py.j2").unlink()
     with pytest.raises(MutatorError, match=r"scale.py.j2: cannot be read"):
         load_fault_models(folder)

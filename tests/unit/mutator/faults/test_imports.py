@@ -29,7 +29,7 @@ variants:
 
 
 def answer(toy: Workspace, name: str) -> str:
-    """The error for a spec whose effect has this name, or an empty text if the spec expands."""
+    """Return the error for a spec whose effect has this name, or an empty text if the spec expands."""
     path = toy.library / "faults" / "sensor" / "weather.yaml"
     path.write_text(SPEC.replace("toycar.sensor.NAME", name))
     try:
@@ -39,7 +39,7 @@ def answer(toy: Workspace, name: str) -> str:
     return ""
 
 
-def test_a_spec_may_import_a_class_of_the_target(toy: Workspace) -> None:
+def test_a_spec_can_import_a_class_of_the_target(toy: Workspace) -> None:
     assert answer(toy, "toycar.sensor.Sensor") == ""
 
 

@@ -48,7 +48,7 @@ def test_expansion_draws_one_value_from_each_range(toy: Workspace) -> None:
 
 
 def test_values_are_converted_to_the_variables_unit(toy: Workspace) -> None:
-    """The spec gives the sign. The table keeps km/h."""
+    """The sign comes from the spec. The fault's value remains in km/h."""
     for fault in of(faults(toy), "both"):
         by = dict(fault.injections[1].params)["by"]
         assert by == pytest.approx(-float(fault.value) / 3.6)
@@ -57,8 +57,8 @@ def test_values_are_converted_to_the_variables_unit(toy: Workspace) -> None:
 
 
 def test_both_readings_share_their_draws(toy: Workspace) -> None:
-    """As coded, the same number is taken in another unit. A variant without a part for the reading is the
-    same in both."""
+    """In the reading `as_coded`, the same number is used in another unit. A variant that does not mention the
+    reading is the same in both."""
     described, coded = faults(toy), faults(toy, reading="as_coded")
     assert [f.value for f in described] == [f.value for f in coded]
     assert all(f.reading == "as_coded" for f in coded)
@@ -74,8 +74,8 @@ def test_hold_and_changes_belong_to_the_fault(toy: Workspace) -> None:
     assert (silent.value, silent.unit) == (None, "-")
 
 
-def test_a_reading_may_override_latching(toy: Workspace) -> None:
-    """A reading that the variant does not mention uses the variant's setting."""
+def test_a_reading_can_override_the_hold(toy: Workspace) -> None:
+    """If a variant does not mention the reading, its own hold applies."""
     path = toy.spec(NAME).path
     text = path.read_text()
     both = text.index("as_coded:", text.index("both:"))
@@ -95,7 +95,7 @@ def test_ids_depend_on_the_seed_and_are_unique(toy: Workspace) -> None:
 
 
 def test_the_cap_limits_the_number_of_values() -> None:
-    """The same key and range give the same values, and another key gives others."""
+    """The same key and ranges give the same values, and another key gives different values."""
     ranges = tuple((float(i), float(i + 9)) for i in range(10, 70, 10))
     draw = Draw(key="k", name="speed", unit="mph", kind="integers", ranges=ranges, cap=60)
     same = Draw(key="k", name="fast", unit="mph", kind="integers", ranges=ranges, cap=60)
@@ -110,10 +110,10 @@ def test_the_cap_limits_the_number_of_values() -> None:
     [("true", True), ("null", None), ("far", "far"), ("'12'", "12"), ("'it''s #1'", "it's #1")],
 )
 @pytest.mark.parametrize("unit", ["          unit: m\n", ""])
-def test_a_variable_may_be_stuck_at_a_value_without_a_unit(
+def test_a_variable_can_be_stuck_at_a_value_without_a_unit(
     toy: Workspace, unit: str, written: str, value: object
 ) -> None:
-    """The value may be a truth value, None or a text."""
+    """The value can be a boolean, None or a text."""
     path = toy.library / "faults" / "sensor" / "distance.yaml"
     old = "model: offset\n          unit: m\n          params: {by_m: error}"
     assert old in path.read_text()
@@ -123,8 +123,8 @@ def test_a_variable_may_be_stuck_at_a_value_without_a_unit(
     assert dict(of(faults(toy), "longer")[0].injections[0].params) == {"target": "gap", "value": value}
 
 
-def test_a_parameter_may_name_the_drawn_value(toy: Workspace) -> None:
-    """The value is converted."""
+def test_a_parameter_can_name_the_drawn_value(toy: Workspace) -> None:
+    """A minus sign before the name negates the value."""
     path = toy.library / "faults" / "sensor" / "distance.yaml"
     text = path.read_text().replace("model: offset", "model: stuck", 1)
     path.write_text(text.replace("by_m: error", "value_m: -error", 1))
@@ -315,7 +315,7 @@ def edited(workspace: Workspace, old: str, new: str) -> str:
     ],
 )
 def test_a_mistake_is_reported_with_a_remedy(toy: Workspace, old: str, new: str, said: str) -> None:
-    """The message has file and line, the invalid value, and the expected one."""
+    """The message gives file and line, the invalid value, and the expected one."""
     assert said.replace("{KNOWN}", KNOWN) in edited(toy, old, new)
 
 

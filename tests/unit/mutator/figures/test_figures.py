@@ -18,8 +18,8 @@ BLUR = {"module": "vision_input", "fault_type": "blur"}
 
 @pytest.fixture
 def frame() -> pd.DataFrame:
-    """Runs of two faults. Chaff: H1, H1 with H2, no hazard, not activated. Blur in S2: not activated when
-    guided, H2 at a random time."""
+    """Runs of two faults. Chaff: H1; H1 and H2; no hazard; not activated. Blur in S2: not activated (guided);
+    H2 (random)."""
     return results(
         RUN | H1,
         RUN | H1 | H2,
@@ -35,12 +35,12 @@ def texts(file: Path) -> list[str]:
 
 
 def test_each_run_is_in_exactly_one_part_of_a_bar(frame: pd.DataFrame) -> None:
-    """A bar is divided by the sets of hazards."""
     assert list(hazards.hazard_sets(frame)) == ["H1", "several", "", "", "", "H2"]
 
 
 def test_hazard_bars_show_counts(frame: pd.DataFrame) -> None:
-    """The label is the number injected. A type that was never activated has no rate."""
+    """The label gives the numbers of hazards and of injected faults. A fault type that was never activated
+    has no rate."""
     figure = hazards.draw(frame)
     guided, _, rates = figure.axes
     widths = {c.get_label(): [bar.get_width() for bar in c] for c in guided.containers}
@@ -59,8 +59,9 @@ def test_the_heat_map_shows_hazards_per_activated_fault(frame: pd.DataFrame) -> 
     assert cells.mask.tolist() == [[False, True], [True, True]]
 
 
-def test_times_need_a_run_with_both_events(frame: pd.DataFrame) -> None:
-    """Each panel has a bar if a run has both events, labelled with the number of runs. The mean is marked."""
+def test_time_panels_need_a_run_with_both_events(frame: pd.DataFrame) -> None:
+    """A panel has a bar only if a run has both events. The bar is labelled with the number of such runs, and
+    their mean is marked."""
     panels = {axis.get_title(loc="left"): axis for axis in propagation.draw(frame).axes}
     assert [t.get_text() for t in panels["activation to manifest"].texts] == ["3", "1"]
     assert [t.get_text() for t in panels["alert to hazard"].texts] == ["2", "1"]
@@ -70,7 +71,7 @@ def test_times_need_a_run_with_both_events(frame: pd.DataFrame) -> None:
 
 
 def test_a_figure_drawn_again_has_the_same_bytes(frame: pd.DataFrame, tmp_path: Path) -> None:
-    """The format is SVG or PNG. An SVG has names as text."""
+    """Each figure is written as SVG and PNG. The SVG contains names as text."""
     contents = []
     for _ in range(2):
         write_drawings(drawings(frame)[:1], tmp_path)

@@ -37,7 +37,7 @@ def trace(offset: float = 0.0) -> dict[str, np.ndarray]:
     return {"t": TIME, "gas": np.sin(TIME) + offset, "v_ego": speed}
 
 
-def test_an_svg_names_channels_units_and_marks(tmp_path: Path, manifest: SimpleNamespace) -> None:
+def test_an_svg_contains_channels_units_and_marks(tmp_path: Path, manifest: SimpleNamespace) -> None:
     mark = Mark(kind=MarkKind.HAZARD, t=1.5, label="H1")
     figure = draw_run(trace(), trace(0.1), manifest, title="chaff 35 m", marks=[mark])
     save(figure, [tmp_path / "p.svg"])
@@ -87,7 +87,7 @@ def test_the_files_suffix_decides_the_format(tmp_path: Path, manifest: SimpleNam
 
 
 def test_runs_without_a_common_channel_are_refused(tmp_path: Path, manifest: SimpleNamespace) -> None:
-    """The error names the manifest. No empty figure is drawn."""
+    """The error names the manifest."""
     with pytest.raises(MutatorError, match=re.escape("m.yaml")):
         draw_run(trace(), {"t": TIME}, manifest, title="x")
 

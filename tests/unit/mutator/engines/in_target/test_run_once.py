@@ -65,8 +65,8 @@ class StepLimit(RuntimeError):
 }
 
 
-def test_modules_from_a_named_one_on_are_listed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A module that is imported again is listed, too."""
+def test_modules_imported_after_a_given_module_are_listed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A module that is imported again later is listed, too."""
     for name in ("early", "_fi", "late"):
         monkeypatch.setitem(sys.modules, name, types.ModuleType(name))
     assert imported_since("_fi") == ["late", "_fi"]
@@ -131,7 +131,7 @@ def test_members_of_an_exception_group_are_examined(described: Callable[..., dic
 def test_only_the_probes_own_limit_exception_is_the_step_limit(
     described: Callable[..., dict[str, Any]],
 ) -> None:
-    """The target may have a class with the same name."""
+    """The target can have a class with the same name."""
     assert described("stop") == {"ended": "steps"}
 
 
@@ -146,8 +146,8 @@ FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         (OSError(errno.EACCES, "no"), False),
     ],
 )
-def test_a_full_disk_is_recognized_in_any_error(error: Exception, is_told: bool) -> None:
-    """The wording may vary, and the chain of causes may be cyclic."""
+def test_a_full_disk_is_recognized_in_errors_and_their_causes(error: Exception, is_told: bool) -> None:
+    """The chain of causes can be cyclic."""
     assert describe(error, TREE, None)["disk_full"] is is_told
     later = ValueError("later")
     later.__cause__ = KeyError("x")
@@ -162,8 +162,8 @@ def test_a_full_disk_in_an_exception_group_is_recognized(described: Callable[...
     assert not described("unspeakable")["disk_full"]
 
 
-def test_the_first_activation_is_reported(tmp_path: Path) -> None:
-    """When an injection is first active, the file is deleted and the probe is restored."""
+def test_the_first_activation_deletes_a_file(tmp_path: Path) -> None:
+    """The probe's own function is restored at the same time."""
     inactive = tmp_path / "inactive"
     inactive.touch()
     answers = [False, False, True, False]
@@ -177,7 +177,8 @@ def test_the_first_activation_is_reported(tmp_path: Path) -> None:
 
 
 def test_the_probes_report_is_passed_on() -> None:
-    """An exception of the probe ends the run. Any other value is not a report."""
+    """An exception in the probe ends the run with an error. A value that is not a dictionary is not a
+    report."""
     probe = types.SimpleNamespace(report=lambda: {"mutant": "m"})
     assert asked(probe, TREE, "car._fi") == {"probe": {"mutant": "m"}}
     probe.report = lambda: object()

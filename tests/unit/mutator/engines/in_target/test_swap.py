@@ -1,5 +1,4 @@
-"""Swapping code in loaded modules: all the ways in which a module can hold a function, and the reasons to
-refuse."""
+"""Swapping code in loaded modules: the forms of functions, and the reasons for refusing a swap."""
 
 import sys
 import types
@@ -106,8 +105,7 @@ def functions(old: str, new: str) -> list[tuple[str, tuple[str, ...], types.Code
 def test_functions_of_every_form_run_the_new_code(
     loaded: types.ModuleType, word: str, call: Callable[[types.ModuleType], str]
 ) -> None:
-    """Plain, wrapped, cached, static, class and private functions, methods and properties run the new code,
-    even after many calls of the old code."""
+    """They run the new code even after many calls of the old code."""
     kept = call
     for _ in range(200):
         if word != "cached":
@@ -118,7 +116,7 @@ def test_functions_of_every_form_run_the_new_code(
 
 
 def test_imported_names_and_bound_methods_run_the_new_code(loaded: types.ModuleType) -> None:
-    """Both keep their function object, which has the new code."""
+    """Their function object is kept and gets the new code."""
     plain, method = loaded.plain, loaded.Car().method
     swap_code(functions('"old plain"', '"new plain"'), PROBE)
     swap_code(functions('"old method"', '"new method"'), PROBE)

@@ -1,4 +1,4 @@
-"""An event loop in a separate thread, for tests in a thread where a browser's loop may already run."""
+"""An event loop in a separate thread, because the tests' own thread can already run the loop of a browser."""
 
 import asyncio
 from collections.abc import Coroutine

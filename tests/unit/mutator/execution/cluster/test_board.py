@@ -1,4 +1,4 @@
-"""Which worker gets which piece of work next. Another worker does the proof."""
+"""Which worker gets which piece of work next."""
 
 import random
 from collections import Counter
@@ -21,7 +21,7 @@ CLONE = Path(__file__).parents[5]
 
 
 class Clock:
-    """A clock that the test sets."""
+    """A clock that tests set."""
 
     now = 0.0
 
@@ -31,7 +31,7 @@ class Clock:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> RunFolder:
-    """The plan of `paper_smoke`, in which some experiments share a run."""
+    """A frozen plan in which some experiments share a run."""
     shipped = Workspace.find(root=CLONE)
     return freeze(make_plan(shipped, "paper_smoke"), tmp_path_factory.mktemp("board") / "run", shipped)
 
@@ -47,7 +47,7 @@ def ids(folder: RunFolder) -> list[str]:
 
 
 def board(folder: RunFolder, clock: Clock, proof: tuple[str, ...] = ()) -> Board:
-    """A board for two workers, with the whole plan and the proof of some experiments."""
+    """A board for two workers, with the whole plan and a proof that reruns the experiments in `proof`."""
     samples = [Sample(number, name) for number, name in enumerate(proof)]
     made = Board(folder, pending(folder, {}), samples, now=clock)
     for name in ("alpha", "beta"):
@@ -62,7 +62,7 @@ def taken(board: Board, worker: str) -> Piece:
 
 
 def drained(board: Board, workers: tuple[str, ...] = ("alpha", "beta")) -> list[tuple[str, Piece]]:
-    """Let the workers take pieces until none is left; return who did which."""
+    """Let the workers take pieces until none is left. Return each worker with its piece, in order."""
     done = []
     while not board.is_empty:
         for worker in workers:
@@ -73,7 +73,7 @@ def drained(board: Board, workers: tuple[str, ...] = ("alpha", "beta")) -> list[
 
 
 def test_each_experiment_is_done_once(folder: RunFolder, clock: Clock, ids: list[str]) -> None:
-    """Each piece has one golden run and only faults of that run."""
+    """All experiments of a piece have the same golden run."""
     done = [piece for _, piece in drained(board(folder, clock))]
     assert sorted(name for piece in done for name in piece.lines) == sorted(ids)
     for piece in done:
@@ -82,7 +82,9 @@ def test_each_experiment_is_done_once(folder: RunFolder, clock: Clock, ids: list
         assert {folder.golden_of(experiment).key for experiment in experiments} >= {piece.golden}
 
 
-def test_the_proof_is_done_by_the_other_worker(folder: RunFolder, clock: Clock, ids: list[str]) -> None:
+def test_the_proof_reruns_an_experiment_on_another_worker(
+    folder: RunFolder, clock: Clock, ids: list[str]
+) -> None:
     done = drained(board(folder, clock, tuple(ids[::7])))
     ran = {name: worker for worker, piece in done if piece.kind is Kind.RUN for name in piece.lines}
     proved = {name: worker for worker, piece in done if piece.kind is Kind.PROVE for name in piece.lines}
@@ -90,14 +92,14 @@ def test_the_proof_is_done_by_the_other_worker(folder: RunFolder, clock: Clock, 
     assert all(ran[name] != worker for name, worker in proved.items())
 
 
-def test_a_single_worker_does_its_own_proof(folder: RunFolder, clock: Clock, ids: list[str]) -> None:
+def test_a_single_worker_proves_its_own_experiments(folder: RunFolder, clock: Clock, ids: list[str]) -> None:
     alone = board(folder, clock, tuple(ids[:2]))
     alone.leave("beta")
     done = drained(alone, ("alpha",))
     assert [piece.kind for _, piece in done][-2:] == [Kind.PROVE, Kind.PROVE]
 
 
-def test_a_worker_prefers_its_current_golden_run(folder: RunFolder, clock: Clock) -> None:
+def test_a_worker_prefers_experiments_with_its_current_golden_run(folder: RunFolder, clock: Clock) -> None:
     done = drained(board(folder, clock))
     for worker in ("alpha", "beta"):
         keys = [piece.golden for name, piece in done if name == worker]
@@ -106,7 +108,7 @@ def test_a_worker_prefers_its_current_golden_run(folder: RunFolder, clock: Clock
 
 
 def test_the_last_pieces_are_shorter(folder: RunFolder, clock: Clock) -> None:
-    """The last pieces have one run each if a run takes longer than the shortest piece."""
+    """Here, a run takes longer than the shortest piece should take, so the last pieces have one run each."""
     there = board(folder, clock)
     first = taken(there, "alpha")
     there.done(first, "alpha", 2.0 * first.runs)
@@ -134,7 +136,7 @@ def test_a_late_piece_is_repeated_but_counted_once(folder: RunFolder, clock: Clo
 def test_an_experiment_that_kills_workers_is_identified(
     folder: RunFolder, clock: Clock, ids: list[str]
 ) -> None:
-    """The experiment is given up; all others are done."""
+    """The board gives up this experiment. All others are completed."""
     there, deadly, done = board(folder, clock), ids[17], Counter[str]()
     given_up: list[str] = []
     while not there.is_empty:
@@ -153,7 +155,7 @@ def test_an_experiment_that_kills_workers_is_identified(
 def test_a_known_deadly_experiment_is_given_up_after_its_second_worker(
     folder: RunFolder, clock: Clock, ids: list[str]
 ) -> None:
-    """The experiment is set apart from the others at once."""
+    """After the first death, the experiment gets a piece of its own."""
     there = board(folder, clock)
     piece = taken(there, "alpha")
     deadly = piece.ids[-1]
@@ -163,8 +165,8 @@ def test_a_known_deadly_experiment_is_given_up_after_its_second_worker(
     assert there.died(apart, "beta", deadly) is not None
 
 
-def test_a_worker_does_not_retry_what_killed_it(folder: RunFolder, clock: Clock) -> None:
-    """The last worker left is an exception."""
+def test_a_worker_does_not_retry_the_piece_that_killed_it(folder: RunFolder, clock: Clock) -> None:
+    """If no other worker is left, it retries the piece."""
     there = board(folder, clock)
     deadly = taken(there, "alpha")
     there.died(deadly, "alpha")
@@ -193,8 +195,8 @@ def test_a_worker_that_repeats_a_piece_continues_when_another_dies(folder: RunFo
         assert there.is_empty
 
 
-def test_an_idle_worker_leaves_the_proof_to_a_busy_one(folder: RunFolder, clock: Clock) -> None:
-    """The busy worker's piece must not be late."""
+def test_an_idle_worker_leaves_the_proof_to_a_busy_worker(folder: RunFolder, clock: Clock) -> None:
+    """The busy worker's piece is not late yet."""
     there = board(folder, clock, taken(board(folder, clock), "alpha").ids[:1])
     first = taken(there, "alpha")
     there.done(first, "alpha", 60.0 * first.runs)
@@ -207,8 +209,8 @@ def test_an_idle_worker_leaves_the_proof_to_a_busy_one(folder: RunFolder, clock:
     assert taken(there, "beta").kind is Kind.PROVE
 
 
-def test_no_experiment_is_lost_or_repeated(folder: RunFolder, clock: Clock, ids: list[str]) -> None:
-    """Results, deaths and duplicates come in random order."""
+def test_each_experiment_is_counted_exactly_once(folder: RunFolder, clock: Clock, ids: list[str]) -> None:
+    """Results, returned pieces and deaths of workers come in random order."""
     draw, there, done = random.Random(5), board(folder, clock), Counter[str]()
     out: list[tuple[str, Piece]] = []
     while not there.is_empty:

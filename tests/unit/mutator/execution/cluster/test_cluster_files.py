@@ -1,4 +1,4 @@
-"""Cluster files: their valid content, and the requests that they send to a queueing system."""
+"""Cluster files: their valid content, and the jobs that are submitted to a queueing system."""
 
 import os
 import subprocess
@@ -33,8 +33,8 @@ async def opened(folder: Path, text: str, insecure: bool = False) -> str:
 
 
 def with_slurm(folder: Path, monkeypatch: pytest.MonkeyPatch, sbatch: str) -> None:
-    """Replace Slurm's commands by scripts in this folder. One stores the submitted jobs, the other records
-    cancellations."""
+    """Replace Slurm's commands with scripts: `sbatch` runs the given one, and `scancel` records the cancelled
+    jobs."""
     for name, script in (("sbatch", sbatch), ("scancel", "echo $1 >> cancelled")):
         (folder / name).write_text(f"#!/bin/sh\ncd {folder}\n{script}\n")
         (folder / name).chmod(0o755)
@@ -65,7 +65,7 @@ def with_slurm(folder: Path, monkeypatch: pytest.MonkeyPatch, sbatch: str) -> No
 def test_an_invalid_file_is_refused_with_its_line(
     before: str, after: str, error: str, tmp_path: Path
 ) -> None:
-    """The reason is an unknown kind, key or option, or a value that the class rejects."""
+    """The mistake is an unknown kind, key or option, or a value that the cluster's class rejects."""
     with pytest.raises(MutatorError, match=error):
         run(opened(tmp_path, SLURM.replace(before, after)))
 
@@ -79,7 +79,7 @@ def test_an_invalid_file_is_refused_with_its_line(
         SLURM.replace("kind: slurm", "kind: kubernetes"),
     ],
 )
-def test_an_open_scheduler_is_not_started(text: str, tmp_path: Path) -> None:
+def test_a_scheduler_on_an_unprotected_network_is_not_started(text: str, tmp_path: Path) -> None:
     """The error names the file and the line of the options. Nothing is sent to the queueing system."""
     with pytest.raises(
         MutatorError, match=r"some.yaml:4: the network .* neither encrypted nor on the loopback"
@@ -100,8 +100,7 @@ def test_the_signal_handler_of_dask_jobqueue_is_not_installed() -> None:
     assert done.stdout == "SLURMCluster\n"
 
 
-def test_kubernetes_needs_its_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The error is raised after the check that an open network is allowed."""
+def test_kubernetes_requires_its_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "dask_kubernetes", None)
     monkeypatch.setitem(sys.modules, "dask_kubernetes.operator", None)
     with pytest.raises(MutatorError, match=r"dask_kubernetes.* is not installed.*'.\[kubernetes\]'"):
@@ -109,7 +108,7 @@ def test_kubernetes_needs_its_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 
 def test_jobs_are_submitted_and_cancelled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Four workers on two cores each are two jobs with single-threaded workers."""
+    """Four single-threaded workers need two jobs with two cores each."""
     with_slurm(tmp_path, monkeypatch, "cp $1 job$$; echo Submitted batch job $$")
     dashboard = run(opened(tmp_path, SLURM))
     assert dashboard.startswith("http://127.0.0.1:")
@@ -125,7 +124,7 @@ def test_jobs_are_submitted_and_cancelled(tmp_path: Path, monkeypatch: pytest.Mo
 def test_security_true_creates_certificates_for_the_cluster(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """`--insecure-network` is not needed."""
+    """With certificates, the option `--insecure-network` is not needed."""
     with_slurm(tmp_path, monkeypatch, "cp $1 job; echo Submitted batch job 7")
     options = f"  security: true\n  shared_temp_directory: {tmp_path}\n  interface: lo"
     run(opened(tmp_path, SLURM.replace("  scheduler_options: {host: 127.0.0.1}", options)))

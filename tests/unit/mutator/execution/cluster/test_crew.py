@@ -1,4 +1,4 @@
-"""Which workers may join a run, and what is reported about the others."""
+"""Which workers are allowed to join a run, and what is reported about the others."""
 
 import pytest
 
@@ -30,7 +30,7 @@ STRETCH = Stretch(python="CPython 3.11.7", packages={"numpy": "2.4.6"}, platform
     ],
 )
 def test_a_worker_with_other_versions_is_refused(change: dict[str, object], objection: str) -> None:
-    """The rules are those for resuming a run on another machine."""
+    """The same rules apply to resuming a run on another machine."""
     assert Crew(STRETCH, accept=False).objection(FACTS | change) == objection
 
 
@@ -40,8 +40,8 @@ def test_other_versions_can_be_accepted() -> None:
     assert crew.objection(FACTS | {"mutator": "0.0.1"})
 
 
-def test_rates_are_reported_by_machine() -> None:
-    """Refused workers are reported by number."""
+def test_the_rate_of_each_machine_is_reported() -> None:
+    """The number of refused workers is reported, too."""
     now = [0.0]
     crew = Crew(STRETCH, accept=False, now=lambda: now[0])
     for name, host in (("a", "alpha"), ("b", "alpha"), ("c", "beta")):
@@ -57,7 +57,6 @@ def test_rates_are_reported_by_machine() -> None:
 
 
 def test_a_worker_reports_its_machine_and_versions() -> None:
-    """The kernel of the worker's BLAS is reported, too."""
     assert describe("w", FACTS) == (
         f"w (alpha, AMD EPYC, CPython 3.11.7, mutator {VERSION}, openblas 0.3.31 (Zen))"
     )

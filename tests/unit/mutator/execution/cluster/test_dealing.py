@@ -1,4 +1,4 @@
-"""Work is dealt to workers that fail in many ways, and each failure is blamed on its true cause."""
+"""Work is distributed to workers that fail in many ways. Each failure is attributed to its cause."""
 
 import asyncio
 import json
@@ -49,7 +49,8 @@ def healthy(piece: Piece) -> Result:
 
 
 def sick(ending: Ending, deadly: str = "") -> Work:
-    """A worker on which every piece ends this way, or only the pieces with the experiment `deadly`."""
+    """Make a worker on which every piece, or only a piece with the experiment `deadly`, has the given
+    ending."""
 
     def work(piece: Piece) -> Result:
         if deadly and deadly not in piece.lines:
@@ -73,7 +74,7 @@ class Answer:
 
 
 class Workers:
-    """A substitute for a client of a scheduler with these workers, which answer soon."""
+    """A substitute for a Dask client whose scheduler has the given workers."""
 
     dashboard_link = None
 
@@ -81,7 +82,7 @@ class Workers:
         self.workers, self.scheduler, self.address = workers, self, "here"
         self.seconds: dict[str, float] = {}  # how long a worker takes for a piece
         self.began: list[str] = []  # the worker of each piece that began
-        self.cut_at = -1  # the number of pieces begun after which the scheduler forgets this client's tasks
+        self.cut_at = -1  # once this many pieces have begun, the scheduler forgets this client's tasks
         self._open: list[asyncio.Future[Any]] = []
 
     async def identity(self, n_workers: int) -> dict[str, Any]:
@@ -119,7 +120,7 @@ def folder(toycar: Workspace, tmp_path: Path) -> RunFolder:
 
 @pytest.fixture
 def session(toycar: Workspace, folder: RunFolder, monkeypatch: pytest.MonkeyPatch) -> Any:
-    """A session in which every experiment is pending. The workers' versions do not matter."""
+    """A session in which every experiment is pending, and the versions of workers are not checked."""
     monkeypatch.setattr(Bundle, "of", lambda *given: Bundle(b"", ""))
     monkeypatch.setattr(Crew, "objection", lambda *given: "")
     folder.head["stretches"] = [{"python": "", "packages": {}, "platform": ""}]
@@ -157,9 +158,11 @@ def errors(records: dict[str, Record]) -> list[str]:
 
 @pytest.mark.parametrize("ending", [Ending.DIED, Ending.FAILED, Ending.UNFIT, Ending.UNLIKE])
 def test_no_experiment_is_blamed_for_a_failing_worker(session: Any, ending: Ending) -> None:
-    """The other worker completes the pieces. The failing worker is refused by name with the reason."""
+    """The other worker completes the pieces. A remark names the failing worker and gives the reason."""
     workers = Workers(odd=sick(ending), alpha=healthy)
-    workers.seconds["alpha"] = 0.2  # or it has done everything before the other has failed often enough
+    workers.seconds["alpha"] = (
+        0.2  # otherwise, it finishes everything before the other has failed often enough
+    )
     records, remarks = dealt(session, workers)
     assert (len(records), errors(records), session.problem) == (12, [], "")
     assert [one for one in remarks if one.startswith("worker odd at ") and one.endswith("the reason")]
@@ -167,7 +170,7 @@ def test_no_experiment_is_blamed_for_a_failing_worker(session: Any, ending: Endi
 
 @pytest.mark.parametrize("ending", [Ending.DIED, Ending.FAILED])
 def test_an_experiment_that_fails_everywhere_is_a_harness_error(session: Any, ending: Ending) -> None:
-    """Both workers continue."""
+    """Both workers continue with the other experiments."""
     deadly = list(plan_file.ids(session.folder.path))[5]
     records, remarks = dealt(session, Workers(alpha=sick(ending, deadly), beta=sick(ending, deadly)))
     assert (len(records), errors(records), session.problem, remarks) == (12, [deadly], "", [])

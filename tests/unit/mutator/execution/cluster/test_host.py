@@ -1,4 +1,5 @@
-"""The worker's part of a run: a separate process runs the pieces and ends when it is no longer wanted."""
+"""The worker's part of a run: a separate process runs the pieces of work and ends when it is no longer
+needed."""
 
 import os
 import signal
@@ -23,7 +24,7 @@ from mutator.workspace import Workspace
 
 
 def children(host: Host) -> list[int]:
-    """The processes that run the host's pieces."""
+    """Return the ids of the processes that run the host's pieces."""
     words = str(host.folder).encode()
     found = []
     for path in Path("/proc").glob("[0-9]*/cmdline"):
@@ -37,7 +38,7 @@ def children(host: Host) -> list[int]:
 
 @contextmanager
 def attended(host: Host) -> Iterator[threading.Event]:
-    """Attend the host in a thread, until the event says that it is no longer wanted."""
+    """Attend the host in a thread until the event is set."""
     unwanted = threading.Event()
     thread = threading.Thread(target=host.attend, args=(lambda: not unwanted.is_set(),))
     thread.start()
@@ -68,7 +69,7 @@ def host(sent: tuple[Bundle, Piece], tmp_path: Path) -> Host:
 
 
 def test_the_process_and_its_folder_are_removed_with_the_host(host: Host, sent: tuple[Bundle, Piece]) -> None:
-    """Two pieces run in the same process."""
+    """Until then, all pieces run in the same process."""
     piece = sent[1]
     with attended(host):
         first = host.run(piece.packed(), lambda: True)
@@ -99,8 +100,8 @@ def _first(host: Host) -> int:
     return found[0]
 
 
-def test_a_process_that_does_not_start_blames_no_piece(host: Host, sent: tuple[Bundle, Piece]) -> None:
-    """The result says why, for example a full disk."""
+def test_if_the_process_does_not_start_no_piece_is_blamed(host: Host, sent: tuple[Bundle, Piece]) -> None:
+    """The result gives the reason, here a missing file."""
     (host.folder / "meta.json").unlink()
     with attended(host):
         result = host.run(sent[1].packed(), lambda: True)
@@ -163,7 +164,7 @@ def test_hosts_of_a_machine_share_golden_runs(
 def test_a_cached_golden_run_must_match_the_campaign(
     sent: tuple[Bundle, Piece], cache: Path, tmp_path: Path
 ) -> None:
-    """The digest must be the campaign's, and the sources must be the same."""
+    """Its digest must equal the one in the campaign, and the sources must be unchanged."""
     run_once(sent, tmp_path / "a")
     bundle.lay_out(sent[0].data, tmp_path / "site")
     site = Site(tmp_path / "site")

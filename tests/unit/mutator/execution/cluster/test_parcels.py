@@ -10,13 +10,13 @@ from mutator.execution.cluster.pieces import Ending, Result
 
 
 def test_parts_are_read_back_in_order() -> None:
-    """Parts may be empty or binary."""
+    """Parts can be empty or binary."""
     parts = {"a": b"", "b/c": bytes(range(256)), "line": b"x\ny"}
     assert unpack(pack(parts)) == parts
     assert list(unpack(pack(parts))) == list(parts)
 
 
-def test_any_damage_is_found() -> None:
+def test_any_damage_is_detected() -> None:
     data, draw = pack({"a": b"some bytes", "b": b"more"}), random.Random(1)
     for _ in range(100):
         at = draw.randrange(len(data))
@@ -26,7 +26,7 @@ def test_any_damage_is_found() -> None:
                 unpack(wrong)
 
 
-def test_a_result_is_read_back() -> None:
+def test_a_result_is_read_back_unchanged() -> None:
     result = Result(
         number=7,
         ending=Ending.DONE,

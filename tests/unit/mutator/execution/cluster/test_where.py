@@ -1,5 +1,4 @@
-"""Valid values of `WHERE`, refusals before anything starts, and connections that are opened and closed
-again."""
+"""The argument `WHERE`: its valid and invalid values, and the connections that it opens."""
 
 import json
 import os
@@ -31,7 +30,7 @@ def test_tcp_and_tls_addresses_are_accepted(address: str) -> None:
     assert parse(address) == Scheduler(address=address)
 
 
-def test_local_gives_the_number_of_workers() -> None:
+def test_local_is_followed_by_the_number_of_workers() -> None:
     assert parse("local:4") == Local(workers=4)
 
 
@@ -52,7 +51,7 @@ def test_an_invalid_where_is_refused(text: str) -> None:
 
 
 def test_parsing_needs_no_dask() -> None:
-    """The extra may be missing."""
+    """The `cluster` extra need not be installed."""
     code = (
         "import sys; from mutator.execution.cluster.where import parse; parse('local:2'); print(*sys.modules)"
     )
@@ -73,7 +72,7 @@ def test_the_address_is_read_from_a_scheduler_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "text", ["", "[]", "{}", '{"address": 7}', '{"address": "http://x:1"}', "\xff", "[" * 9999]
 )
-def test_an_invalid_scheduler_file_is_refused_by_name(text: str, tmp_path: Path) -> None:
+def test_the_error_names_an_invalid_scheduler_file(text: str, tmp_path: Path) -> None:
     file = tmp_path / "scheduler.json"
     with pytest.raises(MutatorError, match=r"scheduler.json: cannot be read"):
         parse(str(file))
@@ -97,7 +96,7 @@ def test_an_invalid_scheduler_file_is_refused_by_name(text: str, tmp_path: Path)
         ("tcp://[fe80::1]:1", False),
     ],
 )
-def test_only_loopback_and_tls_addresses_are_closed(address: str, closed: bool) -> None:
+def test_only_loopback_and_tls_addresses_are_private(address: str, closed: bool) -> None:
     assert connecting.is_closed(address) is closed
 
 
@@ -110,7 +109,7 @@ def test_an_open_network_is_refused_before_connecting(monkeypatch: pytest.Monkey
         run(opened(parse("tcp://10.0.0.1:8786")))
 
 
-def test_a_scheduler_that_listens_elsewhere_is_refused_over_the_loopback(
+def test_a_loopback_address_of_a_scheduler_that_listens_elsewhere_is_refused(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     @asynccontextmanager
@@ -130,7 +129,7 @@ def test_without_dask_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch)
             run(opened(parse(text)))
 
 
-def test_connecting_to_a_silent_scheduler_times_out(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_scheduler_that_does_not_answer_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(connecting, "CONNECT_S", 2.0)
     with socket.socket() as silent:
         silent.bind(("127.0.0.1", 0))  # no other process listens there
@@ -155,8 +154,8 @@ def test_missing_certificates_are_an_error_with_a_remedy() -> None:
 
 
 def test_local_workers_run_and_end() -> None:
-    """The cluster has one single-threaded worker process on the loopback, in a separate folder. Both are
-    removed afterwards."""
+    """The cluster has one single-threaded worker process, in a separate folder. The process and the folder
+    are removed when the cluster is closed."""
 
     async def used() -> tuple[str, dict[str, int], int, str]:
         async with parse("local:1").open(insecure=False) as client:
