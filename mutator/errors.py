@@ -30,7 +30,7 @@ class MutatorError(Exception):
     ) -> None:
         self.got = _short(got)  #: what was found
         self.where = str(where) if where is not None else None  #: the file with the error
-        self.line = line  #: its line
+        self.line = line  #: the number of the line with the error
         self.argument = argument  #: the name of the wrong argument, if the error is not in a file
         self.expected = _short(expected) if expected else None  #: what is valid
         self.remedy = _short(remedy) if remedy else None  #: what to do
@@ -72,6 +72,6 @@ def _rebuild(cls: type[MutatorError], got: str, state: dict[str, Any]) -> Mutato
 
 
 class CheckFailed(MutatorError):
-    """A check failed: a campaign cannot start, its results are not valid, or a gate found something."""
+    """A check failed: a campaign cannot start, its results are invalid, or a comparison failed a gate."""
 
     exit_code = EXIT_CHECK_FAILED  #: exit code of a command that ends with this error

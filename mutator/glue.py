@@ -1,7 +1,7 @@
 """Glue between a controller and the harness: runs the loop step by step and writes the results.
 
 A target's entry module contains a class that builds the loop and simulates one step, and two lines that
-start it:
+start the run:
 
     from mutator.glue import Run
 
@@ -52,7 +52,7 @@ class Scenario(dict[str, Any]):
         self.path = path
 
     def __missing__(self, key: str) -> Any:
-        raise GlueError(f"{self.path}: no '{key}', only {', '.join(self) or 'an empty file'}")
+        raise GlueError(f"{self.path}: no key '{key}'; the file has {', '.join(self) or 'no keys'}")
 
 
 class Run:
@@ -60,7 +60,7 @@ class Run:
 
     A subclass defines `__init__(self, scenario, seed)`, which builds the loop, and `step(self)`, which
     advances it by `step_s` and ends with `self.record(...)`. `scenario` is a `Scenario`, `seed` an int.
-    Global generators are not seeded; see `seed_globals`. A subclass may use any name except `step_s`, `t`,
+    Global generators are not seeded; see `seed_globals`. A subclass can use any name except `step_s`, `t`,
     `done`, `end`, `record`, `recorded`, `hazard`, `alert`, `write`, `open` and `main`.
     """
 
@@ -85,7 +85,7 @@ class Run:
 
     @property
     def step_s(self) -> float:
-        """Length of a step in s. If steps differ, set it in each step before you call `record`."""
+        """Length of a step in s. If it varies, set it in each step before you call `record`."""
         return self.__step_s
 
     @step_s.setter
@@ -103,7 +103,7 @@ class Run:
 
     @property
     def done(self) -> bool:
-        """Whether no step is left."""
+        """Whether the run has ended."""
         return self.__ended or len(self.__rows) >= self.__steps
 
     def end(self) -> None:
@@ -120,7 +120,8 @@ class Run:
         if channels.keys() != set(self.__channels) or TIME in channels:
             odd = sorted(channels.keys() ^ set(self.__channels)) or [TIME]
             raise GlueError(
-                f"at {self.t:g} s: channels {', '.join(odd)}; expected the same in each step, without {TIME}"
+                f"at {self.t:g} s: missing or unexpected channels: {', '.join(odd)}; "
+                f"expected the same channels in each step, without {TIME}"
             )
         at = f"at {self.t:g} s: "
         self.__rows.append((self.t, *(_number(at + name, channels[name]) for name in self.__channels)))
@@ -159,7 +160,7 @@ class Run:
 
     @classmethod
     def open(cls, arguments: Sequence[str]) -> Self:
-        """Return the run for `--scenario FILE --seed N --out DIR` before its first step.
+        """Build the run from the arguments `--scenario FILE --seed N --out DIR`; run no step.
 
         The manifest names this method in `stepwise`. Any other `--key value` replaces the scenario's value of
         that key, and `--key` alone sets it to true, so changes of a scenario need no code.
@@ -198,8 +199,7 @@ def seed_globals(seed: int) -> None:
 def read_scenario(path: Path) -> Scenario:
     """Read a scenario file: `key: value` in each line, `#` before a comment.
 
-    This is a subset of YAML. A value is written as in JSON; anything else is text. GlueError for any other
-    line.
+    This is a subset of YAML. A value that is not valid JSON is text. Any other line raises GlueError.
     """
     found: dict[str, Any] = {}
     for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):

@@ -16,7 +16,7 @@ OPERATORS = "operators"  # the module of faults made by mutation operators
 
 
 class AnchorKind(StrEnum):
-    """Where a snippet goes relative to a statement, or, in VALUE_ANCHORS, which value changes."""
+    """Where a snippet is inserted, or, for VALUE_ANCHORS and FIXED_ANCHORS, which value changes."""
 
     AFTER_ASSIGN = "after_assign"
     BEFORE_ASSIGN = "before_assign"
@@ -50,7 +50,7 @@ FIXED_ANCHORS = frozenset((AnchorKind.CONSTANT, AnchorKind.DEFAULT))  # values t
 class Hold(StrEnum):
     """How long a fault stays active once its trigger fires."""
 
-    WHILE = "while"  # as long as the condition holds, each time it holds
+    WHILE = "while"  # whenever the condition holds
     FOR = "for"  # for a fixed time after the condition first holds
     TO_END = "to_end"  # from when the condition first holds to the end of the run
 
@@ -63,7 +63,7 @@ class Method(StrEnum):
 
 
 class AfterHazard(StrEnum):
-    """Whether a run continues after a terminal hazard has ended its drive."""
+    """Whether a run continues after a terminal hazard."""
 
     GO_ON = "go_on"
     STOP = "stop"
@@ -75,14 +75,14 @@ class Status(StrEnum):
     OK = "ok"  #: the run ended normally
     CRASHED = "crashed"  #: the controller raised an error or died
     TIMEOUT = "timeout"  #: the run reached its limit of time, steps or disk
-    INVALID_MUTANT = "invalid_mutant"  #: the mutant does not compile
+    INVALID_MUTANT = "invalid_mutant"  #: the mutant does not compile, or an injected line raised an error
     HARNESS_ERROR = "harness_error"  #: the harness failed; `mutator.run` tries it again
 
 
 class Outcome(StrEnum):
     """What the fault did, for experiments that ran."""
 
-    NOT_ACTIVATED = "not_activated"  #: no injected statement ran while triggered
+    NOT_ACTIVATED = "not_activated"  #: no injected statement ran while the fault was active
     MASKED = "masked"  #: activated; no compared channel left its tolerance, no hazard
     SDC = "sdc"  #: a compared channel left its tolerance, no hazard
     HAZARD = "hazard"  #: a hazard followed
@@ -123,8 +123,8 @@ class FaultLocation:
 class Injection:
     """One fault model applied at one location. `params` are sorted (name, value) pairs.
 
-    With `where`, it acts only in executions in which this condition holds. They are counted from the fault's
-    activation. With `call`, it acts only in that one of them; with `every`, in every n-th one.
+    With `where`, only executions of the location in which this condition holds are affected. With `call`,
+    only the n-th such execution since the fault's activation is affected; with `every`, every n-th.
     """
 
     location: FaultLocation
@@ -140,10 +140,10 @@ class Trigger:
     """When a fault is active. A random time is the condition `t >= T` with hold `to_end`."""
 
     name: str  #: name of the trigger: the name of a context, `always`, or a time
-    condition: str  #: expression over time `t` and what the target observes
+    condition: str  #: expression over time `t` and the observed variables
     hold: Hold = Hold.WHILE  #: how long the fault stays active: `while`, `for` or `to_end`
-    hold_s: float | None = None  #: how long in s, for the hold `for`
-    armed_after_s: float = 0.0  #: time in s from which the condition can fire
+    hold_s: float | None = None  #: duration in s of the hold `for`
+    armed_after_s: float = 0.0  #: time in s from which the trigger can fire
 
 
 def fault_label(spec: str, value: Value, unit: str) -> str:
@@ -190,7 +190,7 @@ class Fault:
 
 @dataclass(frozen=True)
 class Experiment:
-    """One run: a fault, in a scenario, under a trigger, with a seed."""
+    """One run: a fault, a scenario, a trigger and a seed."""
 
     fault: Fault  #: what is injected
     scenario: str  #: name of the scenario
@@ -199,7 +199,7 @@ class Experiment:
     trigger: Trigger  #: when the fault is active
     seed: int  #: seed of the simulation
     setting: tuple[str, ...] = ()  #: changes of the scenario that the campaign makes for all its experiments
-    #: whether the run goes on after a terminal hazard: `go_on` or `stop`
+    #: whether the run continues after a terminal hazard: `go_on` or `stop`
     after_hazard: AfterHazard = added(AfterHazard.GO_ON)
 
     @cached_property
@@ -246,7 +246,7 @@ class Limits:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Activation:
-    """When and how often an injected statement ran while triggered. Times in s."""
+    """When and how often injected statements ran while the fault was active. Times in s."""
 
     first: float
     last: float
@@ -267,7 +267,7 @@ class RunError:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Record:
-    """Everything that is stored for one experiment. Times are seconds of simulation; None: did not happen."""
+    """The stored result of one experiment. Times are in s of simulation time; None: no such event."""
 
     experiment_id: str  #: id of the experiment
     status: Status  #: whether the experiment itself worked
@@ -276,7 +276,7 @@ class Record:
     tree: str  #: digest of the source tree that ran
     activation: Activation | None  #: when and how often injected statements ran; None: never
     t_manifest: float | None  #: when a compared channel first left its tolerance, in s
-    max_dev: tuple[tuple[str, float], ...]  #: largest deviation from golden of each compared channel
+    max_dev: tuple[tuple[str, float], ...]  #: largest deviation of each compared channel
     #: (name, first time in s) of each hazard after the activation, sorted by time
     hazards: tuple[tuple[str, float], ...]
     #: (name, first time in s) of each alert after the activation, sorted by time
@@ -288,5 +288,5 @@ class Record:
     dev: tuple[tuple[str, float], ...] = added(())  #: `max_dev` up to `t_end`; empty without `t_end`
     #: metrics of the manifest and margins of its hazards, if they have a value
     metrics: tuple[tuple[str, float], ...] = added(())
-    #: (channel, first time in s, largest deviation) of each channel that left golden before the end
+    #: (channel, first time in s, largest deviation) of each channel that left its tolerance in the drive
     left: tuple[tuple[str, float, float], ...] = added(())

@@ -65,8 +65,8 @@ class Workspace:
     ) -> "Workspace":
         """Find library, templates and target, each in the first of these places that names or contains it: 1.
         the argument, or `root`, which holds library and templates; 2. MUTATOR_LIBRARY, MUTATOR_TEMPLATES and
-        MUTATOR_TARGET, or MUTATOR_ROOT; 3. the nearest folder upward that holds fault_library/; 4. what ships
-        with the harness.
+        MUTATOR_TARGET, or MUTATOR_ROOT; 3. the current folder or its nearest parent that holds
+        fault_library/; 4. the copies that ship with the harness.
 
         MutatorError if a named folder does not exist.
         """
@@ -219,7 +219,7 @@ class Workspace:
         return self._files("stpa/contexts")
 
     def context_table(self, name: str | Path, variables: Collection[str] | None = None) -> ContextTable:
-        """The context table `name`, or the one in that file; `variables` are what a target observes."""
+        """The context table `name`, or the one in that file; `variables` are those that a target observes."""
         return load_context_table(self._file("stpa/contexts", name, "context table"), variables)
 
     def hazards(self) -> HazardList | None:

@@ -1,1 +1,1 @@
-"""Helpers that know nothing of faults, targets or campaigns: files, hashing, locks, text, tables."""
+"""Helpers that do not depend on faults, targets or campaigns: files, hashing, locks, text, tables."""

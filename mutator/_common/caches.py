@@ -46,7 +46,7 @@ class Entry:
 
 
 def folder() -> Path:
-    """The folder of all caches. It may not exist; without a home directory, it cannot."""
+    """The folder of all caches, which need not exist."""
     named = Path(os.environ.get("XDG_CACHE_HOME", ""))
     if named.is_absolute():
         return named / "mutator"
@@ -82,7 +82,7 @@ def of_target(name: str) -> Path:
 
 
 def entries() -> list[Entry]:
-    """List the cached entries: each campaign's checks, each verified run, each file that a target keeps."""
+    """List all cached entries. Each file that a target keeps is an entry."""
     found = [_entry(CHECKS, path) for path in _children(of_checks())]
     found += [_entry(GOLDENS, path) for path in _children(of_goldens())]
     found += [_entry(RUNS, path) for path in _children(of_runs())]
@@ -94,7 +94,7 @@ def entries() -> list[Entry]:
 
 
 def prune(most: int) -> list[Entry]:
-    """Delete the least recently used entries until at most `most` bytes remain; return those deleted."""
+    """Delete the least recently used entries until at most `most` bytes remain; return the deleted ones."""
     return _pruned(entries(), most)
 
 

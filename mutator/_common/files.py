@@ -1,4 +1,4 @@
-"""The harness's own files. Schemas are checked on reading, and writes are atomic."""
+"""Read and write the harness's own files. Reads check schemas, and writes are atomic."""
 
 import errno
 import json
@@ -72,9 +72,7 @@ def raising_disk_full(where: Path) -> Iterator[None]:
 
 
 def check_is_text(path: Path) -> None:
-    """Raise MutatorError for a path that this environment cannot encode, because digests and tables must
-    contain it.
-    """
+    """Raise MutatorError for a path that this environment cannot encode: digests and tables contain paths."""
     try:
         str(path).encode()
     except UnicodeEncodeError:
@@ -180,7 +178,7 @@ def write_atomic(path: Path, data: bytes) -> None:
 
 @contextmanager
 def half_written(path: Path) -> Iterator[Path]:
-    """Yield a path to which to write in pieces. It becomes the file at `path`, unless the block raises."""
+    """Yield a temporary path to write to. It is renamed to `path` unless the block raises."""
     if path.is_dir():
         raise MutatorError("a folder", where=path, expected="a file to write", remedy="name a file in it")
     temporary = path.with_name(f".{path.name}.{threading.get_native_id()}")
@@ -203,7 +201,7 @@ def writing_atomic(path: Path) -> Iterator[BinaryIO]:
 
 
 def is_half_written(name: str) -> bool:
-    """Whether a file of that name is what a killed `write_atomic` or `half_written` left."""
+    """Whether a killed `write_atomic` or `half_written` left the file of that name."""
     return complete(name) != name
 
 

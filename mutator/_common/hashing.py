@@ -27,7 +27,7 @@ def added(default: Any) -> Any:
 
 def added_values(record: Any) -> dict[str, Any]:
     """The `added` fields of a dataclass instance that differ from their defaults, as `plain` values."""
-    _, later = _fields(type(record))  # type: ignore[arg-type]  # classes are hashable, says Python
+    _, later = _fields(type(record))  # type: ignore[arg-type]  # classes are hashable
     if not later:
         return {}
     changed = [name for name, default in later if getattr(record, name) != default]
@@ -53,7 +53,7 @@ def plain(value: Any) -> Any:
     """Convert records, tuples and enums into JSON types, omitting `added` fields that have their defaults."""
     if type(value) in _SCALARS:
         return value
-    if isinstance(value, Enum):  # test first, because it takes long to find that an enum has no fields
+    if isinstance(value, Enum):  # tested first, because `is_dataclass` is slow for enums
         return value.value
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         found = {}
@@ -68,7 +68,7 @@ def plain(value: Any) -> Any:
     return value
 
 
-# `plain` converts only types that JSON does not have, because a plan has a million ids
+# for speed, as a plan can have a million ids, `plain` converts only types that JSON does not have
 _ENCODER = json.JSONEncoder(default=plain, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
 
 
@@ -78,7 +78,7 @@ def canonical(value: Any) -> str:
 
 
 def digest(value: Any) -> str:
-    """The SHA-256 of `value` in hex: of bytes directly, of other values in their canonical text."""
+    """The SHA-256 in hex of `value` itself if it is bytes, of its canonical text otherwise."""
     data = value if isinstance(value, bytes) else canonical(value).encode()
     return hashlib.sha256(data).hexdigest()
 

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM. Both stop the work in an orderly way, but never during a parse."""
+"""Handle Ctrl-C and SIGTERM: both stop the work in an orderly way, but never during a parse."""
 
 import signal
 from collections.abc import Iterator
@@ -45,9 +45,9 @@ def terminable() -> Iterator[None]:
 
 @contextmanager
 def held() -> Iterator[None]:
-    """Delay an interruption to the end of the block.
+    """Delay an interruption until the end of the block.
 
-    Otherwise native code that calls Python would replace the exception by another.
+    Native code that calls Python, such as a parser, would replace KeyboardInterrupt with another exception.
     """
     _state.held += 1
     try:

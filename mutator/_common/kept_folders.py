@@ -1,4 +1,4 @@
-"""Folders kept in the cache. They are written completely or not at all, and verified before use."""
+"""Folders in the cache, written completely or not at all, and verified before use."""
 
 import shutil
 import tempfile
@@ -11,7 +11,10 @@ _SUM = "sum"  # the file with the digest of all others
 
 
 def fetch(place: Path, to: Path) -> None:
-    """Replace the folder `to` by a copy of the one kept at `place`. OSError if that is missing or damaged."""
+    """Replace the folder `to` with a copy of the cached folder `place`.
+
+    OSError if the cached folder is missing or damaged.
+    """
     shutil.rmtree(to, ignore_errors=True)
     shutil.copytree(place, to)
     kept = to / _SUM
@@ -22,7 +25,7 @@ def fetch(place: Path, to: Path) -> None:
 
 
 def store(place: Path, fill: Callable[[Path], object]) -> None:
-    """Keep the folder that `fill` writes at `place`. If the cache is unwritable, nothing is kept."""
+    """Let `fill` write a folder, and store it at `place`. Do nothing if the cache is unwritable."""
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".", dir=place.parent) as scratch:

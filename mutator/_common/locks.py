@@ -1,4 +1,4 @@
-"""Locks of a run folder, for one command at a time. They are flocks, which end with their process."""
+"""Locks that let only one command use a run folder. They are flocks, which end with their process."""
 
 import fcntl
 import os
@@ -17,7 +17,7 @@ _PATIENCE_S = 15.0  # workers of a dead command exit well within this time
 
 @contextmanager
 def owned(run: Path, patience_s: float = _PATIENCE_S) -> Iterator[None]:
-    """Own the existing folder `run`; MutatorError while another command or its workers use it."""
+    """Lock the existing folder `run`; MutatorError while another command or its workers use it."""
     with raising_disk_full(run):
         fd = _opened(run / OWNER, os.O_CREAT)
     try:
@@ -35,14 +35,14 @@ def owned(run: Path, patience_s: float = _PATIENCE_S) -> Iterator[None]:
             raise MutatorError(
                 f"workers of an earlier run are still running (processes {', '.join(map(str, living))})",
                 where=run,
-                expected="a folder with no workers in it",
+                expected="no workers in this folder",
                 remedy="wait for them or end them, then run the same command again",
             )
         try:
             yield
         finally:
             living_workers(run)
-            with suppress(OSError):  # some are still ending, or there were none
+            with suppress(OSError):  # some workers are still ending, or there were none
                 (run / WORKERS).rmdir()
     finally:
         os.close(fd)
@@ -50,7 +50,7 @@ def owned(run: Path, patience_s: float = _PATIENCE_S) -> Iterator[None]:
 
 @contextmanager
 def alone_in(folder: Path) -> Iterator[None]:
-    """Wait until nobody else works in an existing folder, then keep others out. Nothing is written."""
+    """Wait for an exclusive lock on an existing folder. Nothing is written."""
     fd = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         fcntl.flock(fd, fcntl.LOCK_EX)
@@ -88,7 +88,7 @@ def living_workers(run: Path) -> list[int]:
 
 
 def wait_for_workers(run: Path, patience_s: float = _PATIENCE_S) -> list[int]:
-    """Wait until no worker is left in `run`; return the process ids of those left at the end."""
+    """Wait until no worker is left in `run`; return the process ids of workers that outlive `patience_s`."""
     deadline = time.monotonic() + patience_s
     while (living := living_workers(run)) and time.monotonic() <= deadline:
         time.sleep(0.1)

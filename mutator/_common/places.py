@@ -14,15 +14,15 @@ _Given = str | Path | None
 
 
 def library_folder(root: _Given = None, library: _Given = None) -> Path:
-    """The fault library: from an argument, the environment, the nearest folder upward, or the shipped
-    library. It may not exist.
+    """The fault library: from an argument, the environment, the current folder or a parent, or the shipped
+    library. It need not exist.
     """
     named = _named(library, root, _LIBRARY, "MUTATOR_LIBRARY")
     return named or (_upward(_LIBRARY) or shipped_folder()) / _LIBRARY
 
 
 def templates_folder(root: _Given = None, templates: _Given = None) -> Path:
-    """The templates folder, found like `library_folder`. It may not exist."""
+    """The templates folder, found like `library_folder`. It need not exist."""
     named = _named(templates, root, _TEMPLATES, "MUTATOR_TEMPLATES")
     return named or (_upward(_LIBRARY, _TEMPLATES) or shipped_folder()) / _TEMPLATES
 
@@ -40,7 +40,7 @@ def library_files(library: Path, folder: str) -> dict[str, Path]:
 
 
 def run_folders(root: Path) -> list[Path]:
-    """The run folders in runs/, here and under `root`, the most recently used first."""
+    """The run folders in runs/ of the current folder and of `root`, the most recently used first."""
     bases = {base.resolve() for base in (RUNS, root / RUNS)}
     heads = [head for base in bases for head in base.glob(f"*/{RUN_HEAD}")]
     heads.sort(key=lambda head: (head.stat().st_mtime_ns, str(head)), reverse=True)
@@ -55,7 +55,9 @@ def _named(folder: _Given, root: _Given, name: str, variable: str) -> Path | Non
 
 
 def _upward(*folders: str) -> Path | None:
-    """The nearest folder upward that contains fault_library/; None if it lacks one of `folders`."""
+    """The current folder or its nearest parent that contains fault_library/; None if it lacks one of
+    `folders`.
+    """
     here = Path.cwd()
     nearest = next((p for p in (here, *here.parents) if (p / _LIBRARY).is_dir()), None)
     return nearest if nearest and all((nearest / name).is_dir() for name in folders) else None

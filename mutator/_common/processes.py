@@ -1,4 +1,4 @@
-"""Share work among forked processes. Results keep the order of the work."""
+"""Share work among forked processes. Results are in the order of the items."""
 
 import gc
 import os
@@ -13,8 +13,8 @@ from typing import Any, TypeVar
 from mutator._common.cores import usable_cores
 from mutator.errors import MutatorError
 
-_MOST = 2  # most processes, because each needs memory
-_WORTH = 20_000  # experiments for which a second process is worth starting
+_MOST = 2  # the maximum number of processes, because each needs memory
+_WORTH = 20_000  # the smallest number of experiments for which a second process is worth starting
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -41,9 +41,9 @@ def shared(made: Callable[[T], R], items: Sequence[T], processes: int) -> Iterat
 
 @contextmanager
 def beside(work: Callable[[], R], processes: int) -> Iterator[Callable[[], R]]:
-    """Run `work` in another process during the block, which receives a function that waits for the result.
+    """Run `work` in another process during the block. Yield a function that waits for its result.
 
-    That function raises what `work` raised. With fewer than two processes, it does the work itself.
+    The function raises what `work` raised. With fewer than two processes, `work` itself is yielded.
     """
     if processes < 2:
         yield work
@@ -54,7 +54,7 @@ def beside(work: Callable[[], R], processes: int) -> Iterator[Callable[[], R]]:
 
 @contextmanager
 def _workers(made: Callable[[T], R], items: Sequence[T], processes: int) -> Iterator[list[Connection]]:
-    """Start processes, end them with the block, and yield the connections to their results."""
+    """Start worker processes, which end with the block, and yield the connections to their results."""
     context = get_context("fork")
     pipes = [context.Pipe(duplex=False) for _ in range(processes)]
     workers = [
@@ -83,9 +83,9 @@ def _work(
     number: int,
 ) -> None:
     gc.disable()  # results have no cycles, and a collection would copy shared memory
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all; the first one ends the others
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all processes; the parent ends its workers
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    for receiver, _ in pipes:  # otherwise no process would notice that the first one died
+    for receiver, _ in pipes:  # otherwise no worker would notice that the parent died
         receiver.close()
     sender = pipes[number][1]
     try:

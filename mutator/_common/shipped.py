@@ -1,7 +1,7 @@
 """The shipped controller, fault library and templates.
 
-A clone has them next to the package. A wheel has them in an archive, since pip would compile a target's
-sources and make `selfdrive` importable. It is unpacked once into $XDG_DATA_HOME or ~/.local/share.
+A clone has them next to the package. A wheel has them in an archive, because pip would compile a target's
+sources and make `selfdrive` importable. The archive is unpacked once into $XDG_DATA_HOME or ~/.local/share.
 """
 
 import os
@@ -19,7 +19,7 @@ CLONE = Path(__file__).resolve().parents[2]
 SHIPPED_TARGET = "shipped:target"  # value of `root` in a manifest
 _README = Path(__file__).with_name("new_library.md")
 _ROOT_IN_CLONE = "root: ../../target\n"
-_SHOWN = 3  # the most changed files that an error names
+_SHOWN = 3  # the maximum number of changed files that an error names
 
 
 def shipped_folder() -> Path:
@@ -45,7 +45,7 @@ def refuse_shipped(path: Path) -> None:
 def write_library(folder: Path) -> None:
     """Write an editable library, templates and a README into a new or empty `folder`; MutatorError otherwise.
 
-    Its manifest says `root: shipped:target`, so it works in any place and with any installed mutator.
+    The library's manifest says `root: shipped:target`, so it works in any folder.
     """
     shipped = shipped_folder()
     make_empty(folder)
@@ -107,7 +107,7 @@ def _unpack(archive: Path, folder: Path) -> None:
         if folder.is_dir():
             return  # another process was faster
         raise MutatorError(
-            f"cannot unpack what ships with mutator ({err.strerror})",
+            f"cannot unpack the files that ship with mutator ({err.strerror})",
             where=folder,
             expected="a data folder that you can write to",
             remedy="set XDG_DATA_HOME to one, or work in a clone",

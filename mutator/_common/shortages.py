@@ -1,4 +1,4 @@
-"""Errors of a machine that has run out of memory, files or processes, which a user can fix."""
+"""Errors of a machine that has run out of memory, open files or processes. A user can fix them."""
 
 import errno
 import os
@@ -7,12 +7,15 @@ from mutator.errors import EXIT_HARNESS_ERRORS, MutatorError
 
 _FILES = (errno.EMFILE, errno.ENFILE)
 _PROCESSES = "can't start new thread"
-_LOADING = ("failed to map segment", "cannot allocate memory")  # reports of libraries that do not fit
+_LOADING = (
+    "failed to map segment",
+    "cannot allocate memory",
+)  # errors of a library for which memory is lacking
 _AGAIN = "run the same command again; finished experiments are kept and not repeated"
 
 
 class Shortage(MutatorError):
-    """The machine, or a limit of this process, is exhausted. Finished work is kept."""
+    """The machine is out of a resource, or this process has reached a limit. Finished work is kept."""
 
     exit_code = EXIT_HARNESS_ERRORS
 
@@ -32,12 +35,12 @@ def shortage(err: BaseException | None) -> Shortage | None:
             return Shortage(
                 "too many open files",
                 expected="a higher limit (`ulimit -n`)",
-                remedy=f"raise it, say to 1024, then {_AGAIN}",
+                remedy=f"raise the limit, for example to 1024, then {_AGAIN}",
             )
         if number == errno.EAGAIN or _PROCESSES in str(err):
             return Shortage(
                 "no more processes or threads",
-                expected="fewer of them on this machine, or a higher limit (`ulimit -u`)",
+                expected="fewer processes and threads on this machine, or a higher limit (`ulimit -u`)",
                 remedy=f"end other programs, raise the limit, or use fewer workers; then {_AGAIN}",
             )
         err = err.__cause__ or err.__context__

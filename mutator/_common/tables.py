@@ -16,7 +16,7 @@ _MARKUP = re.compile(r"`[^`]*`|<(?=[A-Za-z/!?])|\*(?=\S)|(?<=\S)\*|(?<![A-Za-z0-
 class Table:
     """A table of texts, with one cell per head in each row. Columns in `right` are right-aligned.
 
-    Markup in a cell, e.g. a link, is not escaped in HTML. With `named`, the first cell of a row is its head.
+    Markup in a cell, e.g. a link, is not escaped in HTML. With `named`, the first cell of a row is a heading.
     """
 
     heads: Sequence[str]
@@ -35,7 +35,7 @@ class Table:
         return "  ".join(c.rjust(w) if i in self.right else c.ljust(w) for i, (c, w) in pairs).rstrip()
 
     def as_markdown(self, *, escape: bool = True) -> str:
-        """The table in Markdown; with `escape=False`, the cells are Markdown already."""
+        """The table in Markdown; with `escape=False`, the cells are already Markdown."""
 
         def line(cells: Sequence[str]) -> str:
             texts = [markdown_line(c).replace("|", "\\|") for c in cells] if escape else cells

@@ -1,4 +1,4 @@
-"""Text for people: counts, values in errors, suggestions."""
+"""Text for users: counts, values in errors, suggestions."""
 
 import difflib
 import re
@@ -33,7 +33,7 @@ _QUOTED = re.compile(r"\"[^\"]*\"|'[^']*'")
 
 
 def operator_hint(text: str) -> str:
-    """What to write instead of an operator of another language in an expression; '' if there is none."""
+    """Return which Python operators to write instead of e.g. `&&`; '' if there are no such operators."""
     found = dict.fromkeys(_WRONG.findall(_QUOTED.sub("", text)))
     return ", ".join(f"write '{_OPERATORS[one]}' for '{one}'" for one in found)
 
@@ -47,7 +47,7 @@ def folded(text: str, width: int) -> str:
     """Break lines between words to at most `width` characters. Longer words and commands in backticks stay
     whole.
 
-    Continuation lines are indented, in a line `name  value` up to the value.
+    Continuation lines are indented; in a line `name  value`, they align with the value.
     """
     return "\n".join(_folded_line(line, width) if len(line) > width else line for line in text.split("\n"))
 

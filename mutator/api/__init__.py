@@ -1,3 +1,3 @@
-"""The public Python API, which the command line also calls. It never prints, asks questions or ends the
+"""The public Python API, on which the command line is built. It never prints, asks questions or ends the
 process.
 """

@@ -1,4 +1,4 @@
-"""Audits: check that a run folder is unchanged and follows from its plan and sources."""
+"""Audits: check that a run folder is unchanged, and that its content follows from its plan and sources."""
 
 import re
 from collections.abc import Mapping
@@ -28,10 +28,10 @@ class Audit:
     """The result of an audit of a run folder."""
 
     run: Path  #: the run folder
-    facts: Mapping[str, str]  #: what was audited, by name
-    checks: tuple[Check, ...]  #: what was checked: `what`, `count` and `differences` of each
+    facts: Mapping[str, str]  #: facts about the run, by name
+    checks: tuple[Check, ...]  #: the checks: `what`, `count` and `differences` of each
     seal: str | None  #: the seal computed from the content; None: not finished, or not verifiable
-    repaired: tuple[str, ...] = ()  #: what was set aside
+    repaired: tuple[str, ...] = ()  #: the damaged parts that were set aside
 
     def __repr__(self) -> str:
         return f"<Audit of {self.run.name}: {self._outcome}>"
@@ -39,7 +39,7 @@ class Audit:
     def __str__(self) -> str:
         width = max(map(len, self.facts))
         rows = [(check.what, str(check.count), str(len(check.differences))) for check in self.checks]
-        table = Table(heads=("checked", "of", "differences"), rows=rows, right=(1, 2))
+        table = Table(heads=("checked", "count", "differences"), rows=rows, right=(1, 2))
         found = [str(one).replace(f"{self.run}/", "") for one in self.differences[:SHOWN]]
         more = len(self.differences) - SHOWN
         listed = [*found, *([f"and {more} more"] if more > 0 else [])]
@@ -122,7 +122,7 @@ def _rerun(folder: RunFolder, workspace: Workspace | None, count: int, facts: di
         ids = drawn(folder, count)
     except MutatorError as err:
         return Check(what=what, count=0, differences=(err,))
-    facts["drawn by lot"] = ", ".join(ids)
+    facts["drawn at random"] = ", ".join(ids)
     return Check.of(what, len(ids), driven_again(workspace, folder, ids))
 
 

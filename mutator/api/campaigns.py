@@ -33,13 +33,13 @@ def run(
 ) -> Run:
     """Run a campaign (a name in the library, or a file) in the run folder `out`, or resume it there.
 
-    Experiments that have a result are not rerun. A frozen plan in `out` is used, with its choices for those
-    that you do not give.
+    Experiments that have a result are not rerun. If `out` holds a frozen plan, this plan is used; its choices
+    apply where you give none.
 
     * `workers`: number of processes; 0: only this one.
     * `engine`: a name from `mutator.engines.kinds`; None: the fastest that is worthwhile.
     * `reviewed`: refuse to run mutants without an approval.
-    * `accept_versions`: resume with another Python or other packages than before, and note it.
+    * `accept_versions`: resume although versions of Python or packages have changed, and record the change.
     * `cluster`: the address of a Dask scheduler, its scheduler file, `local:N`, or a cluster file. Its
       workers run the experiments; `workers` then applies only to the checks before the campaign.
     * `insecure_network`: accept a scheduler that others on the network can reach.

@@ -61,8 +61,8 @@ class RunComparison:
 
     @cached_property
     def pairs(self) -> "pd.DataFrame":
-        """One row for each experiment that both runs have, with the columns of pairs.csv; those of the runs
-        end in `_a` and `_b`. Times are in s since the start of the simulation.
+        """One row for each experiment that both runs have, with the columns of pairs.csv. Columns of a single
+        run end in `_a` or `_b`. Times are in s since the start of the simulation.
         """
         return _frame(self.comparison.pairs)
 
@@ -75,7 +75,7 @@ class RunComparison:
     def tables(self) -> "dict[str, pd.DataFrame]":
         """The tables by name: endings, changes, and rates and times with paired statistics.
 
-        A share takes five columns: count, of, rate and both ends of its interval.
+        A share has five columns: count, of, rate and both ends of its interval.
         """
         return {sheet.name: sheet.frame() for sheet in self.comparison.sheets}
 

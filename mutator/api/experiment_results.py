@@ -1,4 +1,4 @@
-"""One experiment: what was injected, the verdict, golden and faulty run."""
+"""One experiment: what was injected, the verdict, and the golden and the faulty run."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class TraceFrames:
-    """Golden and faulty run as pandas frames: one column per channel, indexed by time in s.
+    """The golden and the faulty run as pandas frames: one column per channel, indexed by time in s.
 
-    `attrs["units"]` of a frame maps the channels that the manifest names to units.
+    `attrs["units"]` of a frame maps each channel in the manifest to its unit.
     """
 
     golden: "pd.DataFrame"  #: the golden run
@@ -99,7 +99,7 @@ class ExperimentResult(ABC):
 
     @property
     def verdict(self) -> dict[str, Any]:
-        """The verdict as plain data; times in s of simulation, None: did not happen."""
+        """The verdict as plain data. Times are in s of simulation time; None: no such event."""
         return verdict(self.record, self.scale) if self.record else {"status": None}
 
     @property
@@ -130,7 +130,7 @@ class ExperimentResult(ABC):
         return pd.DataFrame(rows, columns=heads).set_index("channel")
 
     def plot(self) -> "Figure":
-        """Plot golden and faulty run, one panel for each channel of the manifest, with marks for events."""
+        """Plot the golden and the faulty run: one panel for each channel of the manifest, and event marks."""
         golden, faulty = self._load_traces()
         facts = describe(self.experiment)
         title = f"{facts['fault']}   {facts['scenario']}   {facts['trigger']}   [{self.id}]"
@@ -151,7 +151,7 @@ class ExperimentResult(ABC):
 def trace_frame(trace: Trace, manifest: TargetManifest) -> "pd.DataFrame":
     """Return a trace as a frame by time in s; `attrs["units"]` has the units of the manifest's channels.
 
-    A channel without a value at a time keeps its newest one.
+    A channel without a value at a given time keeps its last value.
     """
     import pandas as pd
 
@@ -183,7 +183,7 @@ def describe(experiment: Experiment) -> dict[str, Any]:
 
 
 def verdict(record: Record, scale: Scale | None) -> dict[str, Any]:
-    """Return the verdict, for printing and as JSON. Times in s of simulation; None: did not happen.
+    """Return the verdict, for printing and as JSON. Times are in s of simulation time; None: no such event.
 
     `largest_difference` covers the whole run, `difference_in_drive` only the time up to the end of the drive.
     """

@@ -9,7 +9,7 @@ _COLOURS = {"+": "#116329", "-": "#a40e26", "@": "#0550ae"}
 
 
 def facts_html(facts: Iterable[tuple[str, object]]) -> str:
-    """Return names and values as a table of two columns, without None."""
+    """Return a table of names and values, without the values that are None."""
     rows = [[name, str(value)] for name, value in facts if value is not None]
     return str(Table(heads=("", ""), rows=rows).as_html())
 

@@ -29,7 +29,7 @@ from mutator.workspace import Workspace
 
 
 def init_library(folder: str | Path, *, target: str | PathLike[str] | None = None) -> Path:
-    """Write a fault library to edit into a new or empty folder, and return the folder.
+    """Write an editable fault library into a new or empty folder, and return the folder.
 
     `target` is a controller's source folder or `installed:NAME`. With it, write a first library for that
     controller: manifest, entry, scenario, fault and campaign, with places to fill in. The source is read,
@@ -51,10 +51,10 @@ def unfilled_places(folder: str | Path) -> list[MutatorError]:
 
 
 def upgrade_manifest(path: str | Path) -> Upgrade | None:
-    """Rewrite a target's manifest of an older schema in the current one; return None if it is current.
+    """Rewrite a target's manifest of an older schema in the current schema; return None if it is up to date.
 
-    Unaffected lines stay. `lost` of the result lists comments inside rewritten lines. MutatorError for a file
-    that is not a manifest.
+    Unaffected lines are unchanged. The result's `lost` lists the comments that rewritten lines lost.
+    MutatorError for a file that is not a manifest.
     """
     upgrade = manifest_files.upgrade_manifest(Path(path))
     if upgrade is not None:
@@ -77,7 +77,7 @@ def find_places(
     """Return the places where faults can be injected in a file of the target, or in a function
     (`FILE::FUNCTION`): line, anchor and fault models of each, from top to bottom.
 
-    MutatorError for a file that must not get faults, and for an unknown function.
+    MutatorError for a file in which faults are not allowed, and for an unknown function.
     """
     found = open_workspace(workspace)
     manifest = found.manifest(found.target_name(target))
@@ -93,13 +93,13 @@ def check_target(
     drive: bool = False,
     scenarios: Sequence[str] = (),
 ) -> list[Finding]:
-    """Check a target and its faults before a campaign: what prevents them from running on the fork engines,
-    and entries of `draw` that no injection uses.
+    """Check a target and its faults before a campaign: report what prevents them from running on the fork
+    engines, and entries of `draw` that no injection uses.
 
-    With `drive`, also make golden runs of `scenarios` (default: those of the library's campaigns, or all).
-    Then also check whether the target is deterministic, whether a run reaches the statements of all faults
-    and triggers, and whether canaries reach their hazard. `target` names a manifest; default: the library's
-    only one. MutatorError for a library with problems, which `check_library` lists.
+    With `drive`, also make golden runs of `scenarios` (default: those of the library's campaigns, or all),
+    and check whether the target is deterministic, whether the runs reach the statements and triggers of all
+    faults, and whether canaries reach their hazard. `target` names a manifest; default: the library's only
+    one. MutatorError for a library with problems, which `check_library` lists.
     """
     found = open_workspace(workspace)
     name = found.target_name(target)
@@ -131,7 +131,7 @@ def doctor(workspace: "Workspace | str | PathLike[str] | MutatorError | None" = 
     """Check whether this machine can run campaigns: interpreter, packages, machine, library and target.
 
     Each finding has `name`, `level` (`ok`, `warning`, `failed`), `found`, `places` and `remedy`. `workspace`
-    may be the error raised by the search for a library.
+    can be the error raised by the search for a library.
     """
     if isinstance(workspace, MutatorError):
         return examine(workspace)

@@ -78,7 +78,7 @@ class MutantSet:
 
     bench: Bench  #: workspace and target
     pairs: tuple[Pair, ...]  #: each fault with its trigger
-    told: str = ""  #: for operators: the number of mutants, and what was left out
+    told: str = ""  #: for operators: how many mutants were chosen and left out
 
     def __repr__(self) -> str:
         return f"<MutantSet: {counted(len(self), 'mutant')} of {self.bench.manifest.name}>"

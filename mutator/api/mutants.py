@@ -73,7 +73,7 @@ def build_mutant(
     """Build a fault into the target's source, without running or writing anything.
 
     `fault` is a Fault, a spec (`sensor/bias`), one of its variants (`sensor/bias/distance`), or a spec file.
-    The fault gets `value`, in the spec's unit, or else the middle one of the drawn values. `trigger` is a
+    The fault gets `value`, in the spec's unit; default: the middle one of the drawn values. `trigger` is a
     Trigger, a context (`C2`), a time in s, `always`, or a condition (`gap <= 2`). `target` names a manifest;
     default: the library's only one.
 

@@ -1,4 +1,4 @@
-"""Mutants from mutation operators, without a spec."""
+"""Mutants from mutation operators, which need no spec."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from mutator.operators.names import operators_named
 class OperatorChoice:
     """A choice of mutants of mutation operators.
 
-    The `sample` is drawn in proportion for each operator and function.
+    In each function, each operator is sampled in proportion to its mutants.
     """
 
     operators: Sequence[str]  #: names of mutation operators

@@ -42,7 +42,7 @@ class ReviewedGroups:
         )
 
     def reread(self) -> "ReviewedGroups":
-        """Return the same groups with the decisions that are stored now."""
+        """Return the same groups with the decisions that are currently stored."""
         return replace(self, review=load_decisions(self.workspace, self.review.target))
 
     def matching(self, only: str | None = None, exclude: str | None = None) -> "ReviewedGroups":
@@ -55,15 +55,15 @@ class ReviewedGroups:
         return replace(self, groups=groups)
 
     def find(self, starts: Sequence[str]) -> list[Group]:
-        """Return the groups whose ids start with `starts`; MutatorError unless each start fits one group."""
+        """Return the groups whose ids start with `starts`; MutatorError unless each fits one group."""
         found: dict[str, Group] = {}
         for start in starts:
             hits = [group for group in self.groups if group.id.startswith(start)]
             if len(hits) != 1 or not start:
                 raise MutatorError(
                     f"{len(hits)} groups start with '{start}'" if hits else f"no group '{start}'",
-                    expected="an id from `mutator review`, or a start that fits only one",
-                    remedy="write more of the id" if hits else "choose the group's campaign or spec",
+                    expected="an id from `mutator review`, or the start of only one id",
+                    remedy="give more of the id" if hits else "choose the group's campaign or spec",
                 )
             found[hits[0].id] = hits[0]
         return list(found.values())
@@ -118,7 +118,7 @@ def load_review(
     campaign's. MutatorError for a campaign together with specs, and for mistakes in them.
     """
     if campaign and specs:
-        raise MutatorError("together with specs", argument="campaign", expected="one or the other")
+        raise MutatorError("given together with specs", argument="campaign", expected="one or the other")
     found = open_workspace(workspace)
     if campaign:
         plan = make_plan(found, campaign, Choices(seed=seed, reading=reading))
@@ -138,7 +138,7 @@ def load_review(
 
 
 def facts(review: Review, group: Group) -> dict[str, object]:
-    """Return the columns that filters can use for a group; several values are separated by commas."""
+    """Return the columns that filters can use for a group. Commas separate several values."""
     decision = review.decision(group.id)
     return {
         "group": group.id,

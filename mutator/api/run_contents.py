@@ -86,7 +86,7 @@ class RunContents:
         """Return one row for each channel of an experiment that differs from golden: the columns of
         propagation.parquet.
 
-        MutatorError for a run of an older version that did not record it.
+        MutatorError for a run of an older version that did not record these differences.
         """
         return Results.up_to_date(self.path).propagation()
 
@@ -118,7 +118,7 @@ class RunContents:
 
     @cached_property
     def traces(self) -> Traces:
-        """The traces kept in the run folder; others are made when needed."""
+        """The traces. Those that the run folder lacks are made when needed."""
         return Traces(self.workspace, self.folder)
 
     def _workspace_if_any(self) -> Workspace | None:

@@ -1,4 +1,4 @@
-"""An experiment of a run folder: its traces, patch and fault path, and how to rerun it."""
+"""An experiment of a run folder: its traces, patch, fault path and rerun."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -42,10 +42,10 @@ class RunExperiment(ExperimentResult):
         return self.run.folder.scale
 
     def traces(self, *, exact: bool = False) -> TraceFrames:
-        """Return golden and faulty run as pandas frames.
+        """Return the golden and the faulty run as pandas frames.
 
         By default, they are the experiment's series: the manifest's channels, at most 20 values a second (10
-        for the controller's beliefs), to six digits, so short events may be missing. With `exact`, the
+        for the controller's beliefs), to six digits, so short events can be missing. With `exact`, the
         experiment is rerun, and the frames have all channels in every step. An experiment without a series is
         also rerun, and its series is then kept.
 
@@ -89,8 +89,8 @@ class RunExperiment(ExperimentResult):
         return trial
 
     def film(self, shots: Sequence[Shot]) -> bool:
-        """Rerun golden and faulty, write videos or stills, and return whether the record equals the
-        campaign's.
+        """Rerun the golden and the faulty run, write videos or stills, and return whether the record equals
+        the campaign's.
 
         MutatorError for a target that cannot be filmed, and for a faulty run that left no film.
         """
@@ -98,7 +98,7 @@ class RunExperiment(ExperimentResult):
 
     @property
     def stretch(self) -> Stretch | None:
-        """The versions and machine that the experiment ran with; None until it has run."""
+        """The versions and the machine of the experiment's run; None until it has run."""
         return self.run.folder.stretch_of(self.id)
 
     @property

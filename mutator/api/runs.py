@@ -65,8 +65,8 @@ def newest_run(root: Path) -> Path:
 def merge_runs(shards: Sequence[str | Path], out: str | Path, *, accept_versions: bool = False) -> "Run":
     """Merge the shards of a plan into the run folder `out`, with the same results as from a single machine.
 
-    MutatorError unless the shards are finished and make up one whole plan, and for other versions of Python
-    or packages, unless `accept_versions`. CheckFailed if their golden runs differ.
+    MutatorError unless the shards are finished and make up one whole plan, and, without `accept_versions`, if
+    their versions of Python or packages differ. CheckFailed if their golden runs differ.
     """
     if isinstance(shards, str | Path):
         raise MutatorError(repr(str(shards)), argument="shards", expected="a list of run folders")
@@ -177,10 +177,10 @@ class Run(RunContents):
 
     def take_stills(self, progress: Notify | None = None, *, workers: int = 1) -> str:
         """Rerun the worst camera experiments, and keep the frames at the activation, the first alert and the
-        first hazard for the report. Takes one in 20 planned experiments, at most ten, `workers` at a time,
-        and starts none after two minutes.
+        first hazard for the report. One in 20 planned experiments is rerun, at most ten, `workers` at a time;
+        none is started after two minutes.
 
-        Returns the reason for the first experiment without stills; empty if all have stills.
+        Return the reason for the first experiment without stills; empty if all have stills.
         """
         notify = progress or (lambda _: None)
         return take_stills(self.workspace, self.folder, workers=workers, notify=notify)
@@ -196,8 +196,8 @@ class Run(RunContents):
     ) -> Path:
         """Export the run for other tools, and return the path; default: in exports/ of the run folder.
 
-        `failures` are the endings that JUnit shows as failures. `only` is a filter over the columns of the
-        results, for MCAP, which is a folder of files. `table` is the table for CSV and Parquet.
+        `failures` are the endings that JUnit shows as failures. `only`, for MCAP, is a filter over the
+        columns of the results. `table` is the table for CSV and Parquet. An MCAP export is a folder of files.
         """
         for name, value, kind in (("format", format, Format), ("table", table, ExportedTable)):
             if value not in (known := [one.value for one in kind]):
@@ -224,7 +224,7 @@ class Run(RunContents):
         cleaning.clean(self.path)
 
     def finish_deletion(self) -> bool:
-        """Finish a deletion that another command has begun; returns whether the folder is gone."""
+        """Finish a deletion that another command has started; return whether the folder is gone."""
         return cleaning.finish_deletion(self.path)
 
 

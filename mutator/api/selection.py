@@ -1,4 +1,4 @@
-"""Resolve what a user types to a workspace, a target, faults and triggers."""
+"""Find the workspace, target, faults and triggers that a user names."""
 
 import dataclasses
 import warnings
@@ -36,7 +36,7 @@ def open_workspace(given: WorkspaceLike) -> Workspace:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FaultChoice:
-    """Chooses faults of one spec, a name or a file. `value` replaces the drawn values."""
+    """A choice of faults of one spec, named or in a file. `value` replaces the drawn values."""
 
     spec: str
     variant: str | None = None

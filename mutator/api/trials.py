@@ -22,14 +22,14 @@ from mutator.targets.severity import Scale
 class Trial(ExperimentResult):
     """An experiment that has just run, with its golden run.
 
-    The output is in `folder`; a temporary one lives as long as this object.
+    The output is in `folder`; a temporary folder is deleted with this object.
     """
 
     record: Record  #: the record of the run
     single: Single  #: the run and its files
     manifest: TargetManifest  #: the target's manifest
-    scale: Scale | None = None  #: classes of severity of the target; None: it has none
-    #: whether the record equals the campaign's; None: there is none to compare with
+    scale: Scale | None = None  #: the severity scale; None for a target without one
+    #: whether the record equals the campaign's; None: the campaign has none
     same_as_record: bool | None = None
     _temporary: ScratchFolder | None = field(default=None)
 
@@ -62,7 +62,7 @@ class Trial(ExperimentResult):
         return tuple(sorted(judged.hazards, key=lambda hazard: hazard[1]))
 
     def traces(self) -> TraceFrames:
-        """Return golden and faulty run as pandas frames; MutatorError if the faulty run left no trace."""
+        """Return the golden and the faulty run as pandas frames; MutatorError without a faulty trace."""
         golden, faulty = self._load_traces()
         return TraceFrames(
             golden=trace_frame(golden, self.manifest), faulty=trace_frame(faulty, self.manifest)
@@ -103,7 +103,7 @@ def try_fault(
     workspace: WorkspaceLike = None,
     out: str | Path | None = None,
 ) -> Trial:
-    """Inject one fault and run the scenario twice: fault-free and faulty.
+    """Inject one fault and run the scenario twice, once without the fault.
 
     `fault` and `trigger` are as for `build_mutant`; contexts, `always` and conditions are armed after
     `armed_after_s` (s; default: the manifest's). `scenario` is a name or a file. Output goes to a new folder

@@ -139,7 +139,7 @@ for module in (
 
 def program() -> int:
     """Run `mutator`. With unfinished experiments, end the process without the interpreter's cleanup, which
-    may crash after a lack of memory.
+    can crash after memory has run out.
     """
     code = main()
     if code == EXIT_HARNESS_ERRORS:
@@ -153,7 +153,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one command line and return its exit code."""
     _open_streams()
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="backslashreplace")  # standard error does the same
+        sys.stdout.reconfigure(errors="backslashreplace")  # as standard error does by default
     try:
         code = _answer(sys.argv[1:] if argv is None else argv)
         sys.stdout.flush()  # at exit, the interpreter would report a closed pipe as an error
@@ -164,8 +164,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _open_streams() -> None:
-    """Replace closed standard streams by null devices. Otherwise a file opened later could get the number of
-    a standard stream, and its output.
+    """Replace closed standard streams with null devices. Otherwise a file opened later could get the number
+    of a standard stream, and its output.
     """
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is None:
@@ -178,7 +178,7 @@ def _open_streams() -> None:
 
 
 def _answer(words: Sequence[str]) -> int:
-    """Run one command line and report errors; BrokenPipeError when nobody reads the output."""
+    """Run one command line and report errors; BrokenPipeError if nobody reads the output."""
     try:
         # Not `app()`, which has its own handling of errors, interrupts and closed pipes.
         command = get_command(app)
@@ -261,7 +261,7 @@ def _usage(error: typer.TyperException) -> int:
 
 def _defect() -> int:
     _say(traceback.format_exc().rstrip())
-    _say("this is a defect of mutator, not of your input; please report it together with the lines above")
+    _say("this is a bug in mutator, not in your input; please report it together with the lines above")
     return EXIT_HARNESS_ERRORS
 
 

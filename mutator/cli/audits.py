@@ -42,7 +42,7 @@ def verify(
     *,
     place: Place,
 ) -> None:
-    """Audit a run folder and print one page to keep.
+    """Audit a run folder and print the result on one page.
 
     The exit code is 1 if anything was changed or does not follow from the plan and the sources.
     """

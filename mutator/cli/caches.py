@@ -1,4 +1,4 @@
-"""`cache`: list and delete what is cached between commands."""
+"""`cache`: list and delete cached data."""
 
 import re
 from collections.abc import Sequence
@@ -36,17 +36,19 @@ def cache(
     most: Annotated[
         str | None,
         typer.Option(
-            "--max", metavar="SIZE", help="Delete the least recently used entries down to this size."
+            "--max",
+            metavar="SIZE",
+            help="Delete the least recently used entries until the cache has at most this size.",
         ),
     ] = None,
     clear: Annotated[bool, typer.Option("--clear", help="Delete everything.")] = False,
     as_json: Json = False,
 ) -> None:
-    """List or delete what is cached on this machine.
+    """List or delete the cached data on this machine.
 
     The cache holds passed checks of campaigns, golden runs, the target's frames and detections, the lines
-    that golden runs execute, previews of image effects, and which finished runs were verified. It is in
-    XDG_CACHE_HOME or ~/.cache. Results never depend on it; without it, runs take longer.
+    that golden runs execute, previews of image effects, and a list of verified runs. It is in XDG_CACHE_HOME
+    or ~/.cache. Results never depend on the cache; without it, runs take longer.
     """
     if path + clear + (most is not None) > 1:
         raise MutatorError("--path, --max and --clear together", expected="one of them")

@@ -129,11 +129,11 @@ def _print_plan(terminal: Terminal, made: "mutator.Plan", cost: "Cost", anew: di
     for text in made.told:
         terminal.say(text)
     if len(made.seeds) > 1:
-        terminal.say(f"{seeds_text(made.seeds)}: {len(made.goldens())} golden runs, as each seed has its own")
+        terminal.say(f"{seeds_text(made.seeds)}: {len(made.goldens())} golden runs (each seed has its own)")
     if shared := len(made.experiments) - made.runs:
-        terminal.say(f"{made.runs} runs: {shared} are the same run as one in another scenario, and share it")
+        terminal.say(f"{made.runs} runs: {shared} experiments share the identical run of another scenario")
     for why, variants in _by_reason(anew).items():
-        terminal.say(f"on the reference engine: {', '.join(variants)}: {why}")
+        terminal.say(f"only the reference engine can run {', '.join(variants)}: {why}")
     terminal.say(f"expected: {_cost_line(cost)}")
 
 
@@ -190,8 +190,8 @@ def run(
     stills: Annotated[
         bool,
         typer.Option(
-            help="Rerun the worst camera experiments to add stills to the report: one in 20, at most ten, "
-            "about two minutes."
+            help="Rerun the worst camera experiments to add stills to the report: one in 20, at most ten. "
+            "Takes about two minutes."
         ),
     ] = True,
     as_json: Json = False,

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 NAMED = 20  # experiments listed in the terminal; the written comparison lists all of them
 GATES = (
     "new-hazard, other-hazard, higher-severity, earlier-hazard, lost-alert, worse, new-crash, harness-error, "
-    "unmatched, severity:CLASS (S0 to S3: a contact of that class or worse, after a milder one or none)"
+    "unmatched, severity:CLASS (S0 to S3: RUN_B has a contact of that class or worse, RUN_A a milder one or "
+    "none)"
 )
 
 
@@ -33,7 +34,7 @@ Examples:
   mutator compare runs/main runs/change --fail-on new-hazard,new-crash,harness-error
   mutator compare runs/main runs/change --fail-on severity:S2
 
-With --fail-on, the exit code is 1 if anything of that kind is found (each is named). Otherwise it is 3 if
+With --fail-on, the exit code is 1 if such a change is found; each is printed. Otherwise it is 3 if
 experiments lack a result in either run, because the comparison is then incomplete.
 """
 

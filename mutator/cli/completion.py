@@ -1,4 +1,4 @@
-"""Shell completion of names in the library, run folders and experiment ids, fast because it reads little."""
+"""Shell completion of names in the library, run folders and experiment ids. Reads little, to be fast."""
 
 import csv
 from collections.abc import Callable, Iterable

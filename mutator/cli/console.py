@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table as RichTable
 
-NO_BREAK = "\u00a0"  # in folded text: printed as a space, at which no line ends
+NO_BREAK = "\u00a0"  # printed as a space at which text is not folded
 PIPE_COLUMNS = 100  # line width outside a terminal, unless COLUMNS is set
 
 STYLES = {
@@ -160,7 +160,7 @@ def option(argument: str) -> str:
 
 
 def with_options(error: MutatorError, own: Mapping[str, str] = MappingProxyType({})) -> MutatorError:
-    """Return the error with options instead of API arguments; `own` has this command's other names."""
+    """Return the error with options instead of API arguments; `own` has options of a single command."""
     if error.argument is None:
         return error
 

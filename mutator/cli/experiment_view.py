@@ -130,7 +130,7 @@ def _values(values: Iterable[tuple[str, float]], units: Mapping[str, str]) -> st
 
 
 def _no_alert(record: "Record", manifest: "TargetManifest") -> str:
-    """Return a sentence if no alert came, or none before the first hazard; empty otherwise."""
+    """Return a note if there was no alert, or none before the first hazard; empty otherwise."""
     if not (manifest.alerts and record.outcome and record.activation):
         return ""
     if not record.hazards:
@@ -146,11 +146,11 @@ def print_path(terminal: Terminal, found: "RunExperiment") -> None:
     for stage in path.stages:
         terminal.say(f"  {_stage(stage)}")
     stopped = f", stopped at {' and '.join(path.stopped_at)}" if path.stopped_at else ""
-    terminal.say(f"reached: {path.reached or 'nothing that is recorded'}{stopped}")
+    terminal.say(f"reached: {path.reached or 'no recorded component'}{stopped}")
 
 
 def _stage(stage: "Stage") -> str:
-    """Return e.g. `brakes: reached at 3.50 s`. Injected components get no time: feedback may change them."""
+    """Return e.g. `brakes: reached at 3.50 s`; for a component with an injection, no time."""
     what = f"{stage.component}: {stage.state.value}"
     if stage.state.value == "injected":
         return what
@@ -192,7 +192,7 @@ def show_trial(terminal: Terminal, trial: "Trial") -> None:
     print_verdict(terminal, trial)
     if trial.golden_hazards:
         reached = ", ".join(f"{name} at {t:.2f} s" for name, t in trial.golden_hazards)
-        terminal.say(f"the fault-free run also reaches {reached}: the fault may not be the cause")
+        terminal.say(f"the fault-free run also reaches {reached}: the fault is not necessarily the cause")
     if trial.log.strip() and trial.record.detail:
         terminal.say("last lines of the run:")
         terminal.say(trial.log.strip(), whole=True)

@@ -31,7 +31,7 @@ Examples:
   mutator show                               the ten worst experiments
   mutator show --only 'severity >= "S2"' --limit 30
   mutator show 3f9a --patch | (cd target && patch -p1)
-  mutator show 3f9a --video 3f9a.mp4         rerun golden and faulty, and film them
+  mutator show 3f9a --video 3f9a.mp4         rerun and film the golden and the faulty run
   mutator show 3f9a --still 14.5             one frame of the film, for the report
   mutator show 3f9a --still 14.5=early.png --still 20=late.png
 """
@@ -43,22 +43,24 @@ def show(
         str | None,
         typer.Argument(
             metavar="[EXPERIMENT]",
-            help="Id of an experiment, or its start. Default: list the worst.",
+            help="An experiment's id, or the start of the id. Default: list the worst.",
             show_default=False,
             autocompletion=completion.experiments,
         ),
     ] = None,
     run: Run = None,
     plot: Annotated[
-        bool, typer.Option(help="Plot golden and faulty (reruns the experiment if no trace was kept).")
+        bool,
+        typer.Option(help="Plot the golden and the faulty run; rerun the experiment if no trace was kept."),
     ] = True,
     video: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Film golden next to faulty: a .mp4 or .gif.")
+        Path | None,
+        typer.Option(metavar="FILE", help="Film the golden and the faulty run side by side: a .mp4 or .gif."),
     ] = None,
     still: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="T=FILE", help="One frame of that film, at T seconds: a .png or .jpg; repeatable."
+            metavar="T=FILE", help="One frame of the film, at T seconds: a .png or .jpg; repeatable."
         ),
     ] = None,
     only: Annotated[
@@ -148,7 +150,7 @@ def _film(terminal: Terminal, found: "RunExperiment", video: Path | None, stills
 
 
 def _still(text: str, found: "RunExperiment") -> "mutator.Shot":
-    """Parse `T=FILE`, or `T` alone, whose still goes next to the plots, where the report finds it."""
+    """Parse `T=FILE` or `T`. The still of `T` is written next to the plots, where the report finds it."""
     t, named, name = text.partition("=")
     try:
         time = float(t)
@@ -205,7 +207,7 @@ def rerun(
 
 def _comparison(same: bool | None) -> str:
     if same is None:
-        return "no record to compare with: the campaign has not run it yet"
+        return "no record to compare with: the campaign has not run this experiment yet"
     return (
         "the same as the campaign's record, byte for byte" if same else "DIFFERS from the campaign's record"
     )

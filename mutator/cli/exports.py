@@ -60,8 +60,8 @@ def export(
 ) -> None:
     """Export a run: mutation report, JUnit, CSV, Parquet, MCAP.
 
-    MCAP writes one file for each experiment, with events, units, and a set of topics each for the golden and
-    the faulty run.
+    MCAP writes one file for each experiment, with events, units, and separate topics for the golden and the
+    faulty run.
     """
     terminal = Terminal(as_json)
     workspace = place.workspace() if format is Format.MUTATION_ELEMENTS else None

@@ -138,7 +138,7 @@ def diff(
 ) -> None:
     """Show what a fault changes in the source.
 
-    For a spec, prints one diff for each variant. The values of a variant share its diff.
+    For a spec, prints one diff for each variant: all values of a variant have the same diff.
     """
     terminal = Terminal(as_json)
     workspace = place.workspace()
@@ -182,7 +182,7 @@ Examples:
   mutator generate 'radar/*' --out mutants --trees --trigger C2  also whole source trees
   mutator generate --campaign quickstart --out mutants           the mutants of a campaign
   mutator generate --operators arithmetic,constant --in 'pkg/**::Car.*' -s S1 --out mutants
-                                                                 mutation operators, without a spec
+                                                                 mutation operators, which need no spec
 """
 
 
@@ -232,7 +232,9 @@ def generate(
     ] = False,
     sample: Annotated[
         int | None,
-        typer.Option(min=1, help="With --operators: draw this many, by operator and function, from --seed."),
+        typer.Option(
+            min=1, help="With --operators: draw this many mutants, in proportion by operator and function."
+        ),
     ] = None,
     seed: Seed = None,
     reading: Reading = None,
@@ -268,7 +270,7 @@ def generate(
         index = mutants.write(out, trees=trees, step=step)
     if as_json:
         terminal.emit(index)
-    terminal.say(f"{counted(len(index), 'mutant')} in {out}; the list of them is {out / 'index.csv'}")
+    terminal.say(f"{counted(len(index), 'mutant')} in {out}, listed in {out / 'index.csv'}")
     first = out / index[0]["patch"]
     root = mutants.bench.manifest.root
     if mutants.bench.manifest.overlay is None:  # otherwise a patch spans two folders
@@ -295,7 +297,7 @@ def _operator_choice(
         return None
     if others or not places or (scenario is None) is not all_lines:
         raise MutatorError(
-            "--operators",
+            "unsuitable options with --operators",
             where="generate",
             expected="no specs and no campaign, at least one --in, and either --scenario or --all-lines",
         )

@@ -147,8 +147,8 @@ def _show_table(terminal: Terminal, table: "ContextTable") -> None:
 def _coverage(table: "ContextTable") -> str:
     found = table.coverage
     if found.beyond:
-        return f"cannot prove that they cover everything exactly once: {found.beyond}"
-    return f"they cover everything exactly once: proved in {found.cells} cells"
+        return f"cannot prove that the contexts cover everything exactly once: {found.beyond}"
+    return f"the contexts cover everything exactly once: proved in {found.cells} cells"
 
 
 def _contexts(names: list[str]) -> str:

@@ -149,7 +149,7 @@ def check(
     drive: Annotated[
         bool,
         typer.Option(
-            "--drive", help="Also make golden runs: how they end, and whether they are deterministic."
+            "--drive", help="Also make golden runs, and check how they end and that they are deterministic."
         ),
     ] = False,
     scenario: Annotated[

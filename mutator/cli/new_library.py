@@ -32,11 +32,11 @@ def init(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Write a fault library to edit.
+    """Write an editable fault library.
 
     With --target, writes a first library for that controller: manifest, entry, scenario, fault and campaign,
-    with places to fill in. It reads the controller's source and never runs it. Without --target, copies the
-    library and templates that ship with mutator. In DIR and below, mutator uses the new library.
+    with places to fill in. The controller's source is read, never run. Without --target, copies the library
+    and templates that ship with mutator. In DIR and below, mutator uses the new library.
     """
     from mutator.api.libraries import unfilled_places
 
@@ -62,8 +62,8 @@ def upgrade(
 ) -> None:
     """Rewrite an older manifest in the current schema.
 
-    Lines that mean the same stay unchanged. Comments inside rewritten lines are printed, so that you can put
-    them back.
+    Lines that are the same in both schemas stay unchanged. Comments inside rewritten lines are printed, so
+    that you can put them back.
     """
     terminal = Terminal(as_json)
     done = mutator.upgrade_manifest(file)

@@ -47,7 +47,7 @@ ExperimentId = Annotated[
     str,
     typer.Argument(
         metavar="EXPERIMENT",
-        help="Id of an experiment, or its start.",
+        help="An experiment's id, or the start of the id.",
         autocompletion=completion.experiments,
     ),
 ]
@@ -60,12 +60,13 @@ Limit = Annotated[
     int | None,
     typer.Option(
         min=1,
-        help="At most this many experiments, spread over the plan. Guided and random ones stay in pairs.",
+        help="At most this many experiments, spread over the plan. Guided and random experiments stay in "
+        "pairs.",
     ),
 ]
 ShardOf = Annotated[
     str | None,
-    typer.Option("--shard", metavar="K/N", help="Run share K of N of the plan; see `merge`."),
+    typer.Option("--shard", metavar="K/N", help="Run shard K of N; see `merge`."),
 ]
 SeriesMb = Annotated[
     int | None,
@@ -81,12 +82,12 @@ Engine = Annotated[
     typer.Option(
         metavar="NAME",
         help="; ".join(f"{kind.name}: {kind.about}" for kind in ENGINES.values())
-        + f". The results are the same. Default: {FORK}, where possible and worthwhile.",
+        + f". All give the same results. Default: {FORK}, where possible and worthwhile.",
     ),
 ]
 AcceptVersions = Annotated[
     bool,
-    typer.Option("--accept-versions", help="Accept other versions of Python or packages, and note them."),
+    typer.Option("--accept-versions", help="Accept other versions of Python or packages, and record them."),
 ]
 Cluster = Annotated[
     str | None,

@@ -19,9 +19,11 @@ if TYPE_CHECKING:
 
 SomeGroups = Annotated[
     list[str] | None,
-    typer.Argument(metavar="[GROUP...]", help="Ids of groups, or the start of each; leave out with --only."),
+    typer.Argument(metavar="[GROUP...]", help="Ids of groups, or the start of each id; not with --only."),
 ]
-Yes = Annotated[bool, typer.Option("--yes", "-y", help="Decide all groups that --only finds without asking.")]
+Yes = Annotated[
+    bool, typer.Option("--yes", "-y", help="Decide without asking on the groups that --only finds.")
+]
 Remark = Annotated[str, typer.Option(metavar="TEXT", help="Add this remark to each group.")]
 
 

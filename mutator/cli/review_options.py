@@ -26,7 +26,9 @@ OnlyGroups = Annotated[
 ExcludeGroups = Annotated[
     str | None, typer.Option("--exclude", metavar="EXPR", help="Leave out groups that match.")
 ]
-Groups = Annotated[list[str], typer.Argument(metavar="GROUP...", help="Ids of groups, or the start of each.")]
+Groups = Annotated[
+    list[str], typer.Argument(metavar="GROUP...", help="Ids of groups, or the start of each id.")
+]
 By = Annotated[
     str | None, typer.Option("--by", metavar="NAME", help="The reviewer. Default: git's user.name.")
 ]
@@ -64,6 +66,6 @@ def reviewer(place: Place, by: str | None) -> str:
             "no reviewer",
             argument="by",
             expected="the reviewer's name",
-            remedy="add `by`, or set git's: `git config user.name NAME`",
+            remedy="add `by`, or set git's user name: `git config user.name NAME`",
         )
     return name

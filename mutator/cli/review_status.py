@@ -1,4 +1,4 @@
-"""`review status`: the progress of a review, and what a campaign lacks."""
+"""`review status`: the progress of a review, and the approvals that a campaign lacks."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -28,9 +28,9 @@ def print_status(terminal: Terminal, found: "mutator.ReviewedGroups", campaign: 
     flags = [(group, review.flag(group.id)) for group in found.groups]
     _list(terminal, "flagged", [(group, f"by {flag.by}") for group, flag in flags if flag])
     if campaign:
-        _list(terminal, f"{campaign} lacks", found.lacking)
+        _list(terminal, f"approvals that {campaign} lacks", found.lacking)
         if not found.lacking:
-            terminal.say(f"all of {campaign} is approved", style="green")
+            terminal.say(f"all groups of {campaign} are approved", style="green")
 
 
 def _data(found: "mutator.ReviewedGroups") -> dict[str, Any]:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from mutator.review.decisions import Review
 
 STYLES = {"new": "yellow", "changed": "bold yellow", "rejected": "bold red", "approved": "green"}
-ROWS = 24  # of values shown in a terminal
+ROWS = 24  # rows of values shown in a terminal
 CONDITIONS = 6
 
 
@@ -59,7 +59,7 @@ def print_list(terminal: Terminal, review: "Review", groups: Sequence["Group"]) 
     terminal.say(f"{counted(len(groups), 'group')}: {counts(review, groups)}")
     gone = review.entries.keys() - {group.id for group in groups}
     if gone:
-        terminal.note(f"{len(gone)} blocks of the review file are about groups that are not listed")
+        terminal.note(f"{len(gone)} blocks of the review file belong to groups that are not listed")
 
 
 def _short(injection: str) -> str:
@@ -92,7 +92,9 @@ def print_changes(terminal: Terminal, review: "Review", group: "Group") -> None:
     elif review.changed(group):
         terminal.say("the diff that the reviewer saw was not kept")
     else:
-        terminal.say("nothing has changed since" if review.decision(group.id) else "no decision yet")
+        terminal.say(
+            "nothing has changed since the decision" if review.decision(group.id) else "no decision yet"
+        )
     terminal.say()
 
 

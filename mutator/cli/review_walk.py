@@ -24,7 +24,7 @@ def walk_through(
     """
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise MutatorError(
-            "no terminal to ask in",
+            "no terminal to ask for decisions",
             where="mutator review walk",
             remedy="use `mutator review approve GROUP... --by NAME`, or `reject`",
         )

@@ -37,7 +37,7 @@ Examples:
   mutator review approve 3f9a 77c0 --by "A. Reviewer" --remark "limits are right"
   mutator review approve --only 'state == "new" and model == "offset"'
   mutator review remark 3f9a --text "why not below 10 m?"
-  mutator review status --campaign quickstart      what is stale and why, what the campaign lacks
+  mutator review status --campaign quickstart      outdated decisions, and approvals that the campaign lacks
   mutator review walk --by "A. Reviewer"           all new and changed groups, one by one
   mutator review page --out review.html
 
@@ -162,7 +162,7 @@ def status(
     place: Place,
 ) -> None:
     """Show the review's progress: groups by state, changes since the decision, flags. With --campaign, also
-    what the campaign lacks to run."""
+    the approvals that the campaign lacks."""
     from mutator.cli.review_status import print_status
 
     terminal = Terminal(as_json)

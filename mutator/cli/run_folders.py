@@ -32,7 +32,7 @@ def show_counts(terminal: Terminal, run: "Run") -> None:
     score = run.mutation_totals()
     if score.rows:
         terminal.table(score.heads, score.rows, right=tuple(score.right))
-    with suppress(MutatorError):  # the library defines which alerts count
+    with suppress(MutatorError):  # the note needs the library
         if note := run.alerts_note():
             terminal.say(note)
     if run.folder.stop_note:
@@ -101,7 +101,7 @@ def report(
         _history(terminal, run)
         return
     loaded = mutator.load_run(run, workspace=library_if_any(place))
-    with terminal.wait("writing the report"):  # it may rerun a few experiments
+    with terminal.wait("writing the report"):  # this can rerun a few experiments
         written = loaded.report(anew=True)
     if as_json:
         terminal.emit({"markdown": str(written.markdown), "page": str(written.page), "rows": written.rows})
@@ -148,7 +148,7 @@ def clean(
 ) -> None:
     """Delete run folders.
 
-    Refuses a folder that holds anything that the run did not write, a link, and a run in progress.
+    Refuses a link, a run in progress, and a folder that holds anything that the run did not write.
     """
     from mutator.api.cleaning import check, delete
 

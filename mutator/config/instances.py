@@ -12,7 +12,7 @@ _PLAIN = (
 
 
 def instance_condition(text: str) -> str:
-    """Return the condition as it is written into a mutant.
+    """Return the condition in the form that mutants contain.
 
     ValueError unless it consists of names, attributes, items, constants, comparisons, `and`, `or` and `not`.
     """

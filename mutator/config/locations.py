@@ -35,7 +35,7 @@ class AtModel(StrictModel, title="A place"):
     after_call: str | None = Field(None, description="After the statement that calls this name.")
     before_call: str | None = Field(
         None,
-        description="Before the statement that calls this name. A model of kind `guard` wraps it.",
+        description="Before the statement that calls this name. A model of kind `guard` wraps the statement.",
     )
     before_return: str | None = Field(
         None, description="Before the `return` of this name; empty for a bare `return`."
@@ -58,13 +58,13 @@ class AtModel(StrictModel, title="A place"):
     )
     result: str | None = Field(None, description="The result of the call of this name, within an expression.")
     value: str | None = Field(
-        None, description="The value of this expression, as written; spaces and quotes do not matter."
+        None, description="The value of this expression; spaces and the kind of quotes do not matter."
     )
     constant: str | None = Field(
         None,
         description="A constant of the module (`LIMIT`) or of a class (`PIController.GAIN`), including the "
-        "default of a dataclass field. The fault sets it while active, also where other modules have "
-        "imported it by name, and restores it afterwards.",
+        "default of a dataclass field. The fault sets the constant while active, also in modules that "
+        "imported its name, and restores it afterwards.",
     )
     default: str | None = Field(
         None,
@@ -159,7 +159,7 @@ def _fits(kind: AnchorKind, name: str) -> bool:
 
 
 def is_expression(text: str) -> bool:
-    """Whether `text` is a Python expression without the probe."""
+    """Whether `text` is a Python expression that does not use the probe."""
     try:
         tree = ast.parse(text.strip(), mode="eval")
     except _NO_PYTHON:

@@ -15,7 +15,7 @@ _TYPES = {
     "int_from_float": ("a whole number", "write it without a fraction"),
     "string_type": ("text", "put it in quotes"),
     "bool_type": ("true or false", "write true or false"),
-    "list_type": ("a list", "write [a, b] or one item a line, each after a dash"),
+    "list_type": ("a list", "write [a, b], or one item per line after a dash"),
     "dict_type": ("a mapping", "write `key: value` lines beneath it"),
     "model_type": ("a mapping", "write `key: value` lines beneath it"),
     "finite_number": ("a finite number", "write an ordinary number"),
@@ -49,9 +49,9 @@ def explain(problem: ErrorDetails, model: type[BaseModel]) -> tuple[str, str, st
 
 
 def most_telling(found: Sequence[ErrorDetails]) -> ErrorDetails:
-    """Choose the error to report. An unknown key comes before a missing key, which it may misspell.
+    """Choose the error to report. Prefer an unknown key, which can be the misspelling of a missing one.
 
-    If a value may have several shapes, prefer an error about its actual shape.
+    If a value can have several shapes, prefer an error about its actual shape.
     """
     shapes = {p["loc"] for p in found if p["type"] in ("list_type", "dict_type", "model_type")}
     inside = {p["loc"][: len(loc) - 1] for loc in shapes for p in found if len(p["loc"]) > len(loc)}

@@ -31,7 +31,7 @@ _SCHEMA = re.compile(r"([a-z_]+)/(\d{1,6})\Z")
 _CORE = {
     "bool": ("tTfF", r"true|True|TRUE|false|False|FALSE"),
     "null": ("~nN\0", r"~|null|Null|NULL|"),
-    "int": ("-+0123456789", r"[-+]?[0-9]{1,300}"),  # longer ones are floats, infinite if too large
+    "int": ("-+0123456789", r"[-+]?[0-9]{1,300}"),  # longer integers are floats, infinite if too large
     "float": (
         "-+.0123456789",
         r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)",
@@ -170,7 +170,7 @@ def _check_events(text: str, path: Path) -> None:
                 "nested too deeply" if depth > MAX_DEPTH else "too many values",
                 where=path,
                 line=line,
-                expected=f"at most {MAX_VALUES} values, {MAX_DEPTH} deep",
+                expected=f"at most {MAX_VALUES} values, nested at most {MAX_DEPTH} deep",
                 remedy="flatten the file" if depth > MAX_DEPTH else "split it",
             )
 

@@ -34,7 +34,7 @@ class Observed:
         return np.array(self.values, dtype=float).T
 
     def step_of(self, observation: int) -> int:
-        """Return the step in which this observation was made. None is made before the first step."""
+        """Return the step of this observation. No observation is made before the first step."""
         return bisect_right(self.before, observation) - 1
 
 

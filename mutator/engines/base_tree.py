@@ -1,4 +1,4 @@
-"""The pristine tree to which the trees of runs are linked, because copying takes up to a tenth of a run."""
+"""The pristine tree to which the trees of runs are linked, as copying takes up to a tenth of a run's time."""
 
 import os
 import shutil
@@ -12,7 +12,7 @@ _Stamp = tuple[int, int, int, int]
 class BaseTree:
     """The pristine tree in `folder`, made by `prepare_base`.
 
-    A run may write through its links and so change this tree. The engine then restores the tree, and repeats
+    A run can write through its links and so change this tree. The engine then restores the tree, and repeats
     each run made meanwhile on a copy without links.
     """
 
@@ -47,7 +47,7 @@ class BaseTree:
             return False
 
     def _mend(self, path: Path) -> None:
-        """Replace the file atomically, because other processes may be linking it."""
+        """Replace the file atomically, because another process can be linking it."""
         whole = self._folder.with_name(f"{self._folder.name}-mended.{os.getpid()}")
         whole.write_bytes(self._files[path])
         whole.chmod(self._stamps[path][0])

@@ -43,8 +43,8 @@ class CodeSwap:
 
     The parts of `probe` run in order; `own` is the source of the first (`probe.parts_of`). `imports` are the
     modules that injected lines import. `settings` has modules and the code of their lines that set values in
-    the probe. These modules must already be loaded, because loading one runs those lines with its own
-    constants.
+    the probe. These modules must already be loaded, because loading a module runs those lines with the
+    module's own constants.
     """
 
     functions: tuple[FunctionSwap, ...]
@@ -57,7 +57,7 @@ class CodeSwap:
 def plan_swap(manifest: TargetManifest, files: Mapping[str, bytes], tree: str) -> CodeSwap:
     """Return what turns the pristine program, loaded from the folder `tree`, into the mutant with `files`.
 
-    Raises NotSwappable if the result might differ from a mutant that is started alone.
+    Raises NotSwappable if the result could differ from a mutant that is started alone.
     """
     functions: list[FunctionSwap] = []
     settings: list[tuple[str, CodeType]] = []

@@ -1,4 +1,4 @@
-"""The fork engine: each mutant is a fork of its golden run, made just before its fault is first active.
+"""The fork engine: each mutant is a fork of its golden run, made just before the fault is first active.
 
 Results equal the reference engine's byte for byte. The reference engine runs mutants that cannot be forked,
 and reruns those that crash. The `warm` engine forks before the first step. So does this engine if a run stops
@@ -67,7 +67,7 @@ class ForkEngine:
         self._pool: Pool | None = None
         self._pools = 0
         self._unfit = None if manifest.stepwise else Refused(f"target {manifest.name} is not stepwise")
-        self._seen: dict[_Key, Observed | Refused] = {}  # or the reason why there are none
+        self._seen: dict[_Key, Observed | Refused] = {}  # observations, or why there are none
 
     def run(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Execution]]:
         for job in jobs:
@@ -120,7 +120,7 @@ class ForkEngine:
         if self._warm:
             return self._from_the_start(job, folder, swap)
         seen = self._observed(job, job.golden)
-        if job.stop and job.golden_ends:  # the run may stop before the fault is active, where no fork is made
+        if job.stop and job.golden_ends:  # the run can stop before the fault is active, where no fork is made
             return self._from_the_start(job, folder, swap)
         start = first_active(swap.own, seen)
         if start is None:

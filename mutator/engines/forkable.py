@@ -18,7 +18,7 @@ def unfit(manifest: TargetManifest) -> Refused | None:
     """Return why the target cannot be forked here, as far as known without loading it."""
     why = not_forkable(manifest)
     stepwise = (
-        "" if manifest.stepwise else f"name a function that makes a run in steps in {manifest.path.name}"
+        "" if manifest.stepwise else f"in {manifest.path.name}, name a function that makes a run in steps"
     )
     return Refused(why, stepwise) if why else None
 
@@ -51,5 +51,5 @@ def not_forked(manifest: TargetManifest, models: FaultModels, faults: Iterable[F
         except NotSwappable as reason:
             found[name] = str(reason)
         except MutatorError:
-            continue  # an unbuildable fault never runs; preflight reports it
+            continue  # a fault that cannot be built never runs; the checks before a campaign report it
     return found

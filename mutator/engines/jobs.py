@@ -13,7 +13,7 @@ from mutator.targets.manifest import TargetManifest
 
 
 class RunMode(StrEnum):
-    """How a run was done."""
+    """How a run was executed."""
 
     REFERENCE = "reference"
     WARM = "warm"
@@ -57,7 +57,7 @@ Stack = tuple[tuple[str, int, int], ...]
 class Raised:
     """The exception that ended a run.
 
-    `stacks[0]` is its own stack. The others are those of its causes and of the exceptions in it.
+    `stacks[0]` is its own stack. The others are those of its causes and of the exceptions that it groups.
     """
 
     kind: str
@@ -85,10 +85,10 @@ class Execution:
     * `status`: how the run ended; `outcomes.blame` decides what caused it
     * `active`: whether an injection was active
     * `log`: the tail of what the run printed
-    * `why`: why another engine did it; `start`: the step where it left golden
-    * `stopped`: whether a terminal hazard ended it early
-    * `modules`: the third-party top-level modules that it imported
-    * `watched`, `lines` (from 1, by file): notes of the reference engine
+    * `why`: why another engine executed the job; `start`: the step at which the run was forked
+    * `stopped`: whether a terminal hazard ended the run early
+    * `modules`: the third-party top-level modules that the run imported
+    * `watched`, `lines` (from 1, by file): what the reference engine noted
     """
 
     status: Status
@@ -123,7 +123,7 @@ class Engine(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class Setting:
-    """What an engine is made from.
+    """The arguments of an engine's factory.
 
     `base` is a pristine tree made by `prepare_base`, and never written to. `work` is an existing scratch
     folder. If `parent` is a process id, the engine exits once that process is no longer its parent.

@@ -57,12 +57,12 @@ def check_limits(limits: Limits) -> None:
         soft, hard = resource.getrlimit(number)
         if hard != resource.RLIM_INFINITY and hard < least:
             try:
-                resource.setrlimit(number, (soft, least))  # as for runs by root
+                resource.setrlimit(number, (soft, least))  # only root can raise a hard limit
             except ValueError:
                 raise MutatorError(
-                    f"a limit of {hard} here (`{command}`), but runs may use {least} ({name})",
+                    f"the limit is {hard} here (`{command}`), but runs can use {least} ({name})",
                     expected="a limit at least as high as that of the runs",
-                    remedy=f"raise it, or lower {name} in the limits of the campaign",
+                    remedy=f"raise the limit, or lower {name} in the limits of the campaign",
                 ) from None
 
 
@@ -113,7 +113,7 @@ def raised_in(report: dict[str, Any]) -> Raised | None:
 
 
 def environment(hash_seed: int, folder: Path, more: Mapping[str, str] | None = None) -> dict[str, str]:
-    """Return the complete environment of a run. Only what Python needs to start comes from the user's."""
+    """Return the environment of a run. It takes from the user's only the variables that Python needs."""
     kept = {name: os.environ[name] for name in KEPT if name in os.environ}
     own = {**FIXED, "PYTHONHASHSEED": str(hash_seed), "TMPDIR": str(folder)}
     return {**kept, **(more or {}), **own}
@@ -139,7 +139,7 @@ def tail(path: Path) -> str:
 def read_report(path: Path, **more: type) -> dict[str, Any] | None:
     """Return the child's report; None if it is missing, incomplete or invalid.
 
-    Each field is checked, because a run may write anything to this file. `more` are the fields of one engine
+    Each field is checked, because a run can write anything to this file. `more` are fields of one engine
     only.
     """
     try:

@@ -44,11 +44,10 @@ _LONGEST = 4096  # size of the guard's report, in bytes
 
 
 class ReferenceEngine:
-    """Runs each job in a fresh interpreter on its own tree; nothing else of the package can be imported
-    there.
+    """Runs each job in a fresh interpreter on its own tree.
 
-    Parameters as in `Setting`. If the manifest supports it, runs of an `independent` engine use nothing that
-    other runs left. The same holds for mutants of files that decide what runs leave.
+    Parameters as in `Setting`. If the manifest supports it, runs of an `independent` engine use no data left
+    by other runs. The same holds for mutants that change a file in the manifest's `reads_itself`.
     """
 
     def __init__(
@@ -208,7 +207,7 @@ class ReferenceEngine:
         if report["outside"]:
             return f"the target was also imported from {', '.join(report['outside'])}"
         expected = self._pristine | {path: digest(data) for path, data in job.files.items()}
-        # a data cache may leave files there
+        # a data cache can leave other files there
         more = {path for path in report["files"] if path.endswith(".py")}
         for path in sorted(expected.keys() | more):
             if report["files"].get(path) != expected.get(path):

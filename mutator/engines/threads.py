@@ -2,16 +2,16 @@
 
 from collections.abc import Sequence
 
-_LISTED = 4  # names to list, because a pool may have dozens
+_LISTED = 4  # names to list, because a pool can have dozens
 _NUMBERS = "OMP_NUM_THREADS, OPENBLAS_NUM_THREADS"
 _KNOWN = (  # start of a thread's name, what the thread is, how to turn it off
     (
         "jemalloc_bg_thd",
         "of the memory allocator jemalloc",
-        'set `MALLOC_CONF: "background_thread:false"` under `env` of the manifest (that of pyarrow, '
-        "which comes with pandas, is off already)",
+        'set `MALLOC_CONF: "background_thread:false"` under `env` of the manifest (in pyarrow, which '
+        "comes with pandas, the thread is already off)",
     ),
-    ("ThreadPoolExecutor", "of a pool in Python", "do that work in the step itself"),
+    ("ThreadPoolExecutor", "of a pool in Python", "do the pool's work in the step itself"),
 )
 _UNNAMED = (
     "of a library",
@@ -19,7 +19,7 @@ _UNNAMED = (
     "and turn off the library's thread pool (`cv2.setNumThreads(0)`, `torch.set_num_threads(1)`, "
     "`use_threads=False` of pyarrow)",
 )
-_OTHER = ("", "start it after the run, or not at all")
+_OTHER = ("", "start the thread after the run, or not at all")
 
 
 def too_many(others: Sequence[str]) -> str:

@@ -6,8 +6,8 @@ from enum import StrEnum
 class Format(StrEnum):
     """The formats that a run can be written in."""
 
-    MUTATION_ELEMENTS = "mutation-elements"  #: JSON that viewers of mutation reports read
-    JUNIT = "junit"  #: JUnit XML, as CI servers read it
+    MUTATION_ELEMENTS = "mutation-elements"  #: JSON for viewers of mutation reports
+    JUNIT = "junit"  #: JUnit XML for CI servers
     CSV = "csv"  #: a table as CSV
     PARQUET = "parquet"  #: a table as Parquet
     MCAP = "mcap"  #: a folder of traces, one MCAP file per experiment

@@ -112,7 +112,7 @@ def _located(
 
 
 def _splice(file: ParsedFile, span: tuple[int, int], edits: Sequence[Edit]) -> dict[str, Any]:
-    """Replace all anchored lines (at a function's entry, the line there)."""
+    """Replace all anchored lines (at a function's entry, the line after the insertion)."""
     first = min(span[0], *(edit.index for edit in edits), len(file.lines) - 1)
     last = max(span[1], first + 1)
     lines, new, done = file.lines[first:last], list[bytes](), 0

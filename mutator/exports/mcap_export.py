@@ -2,7 +2,7 @@
 
 Each experiment has a file: `/golden/CHANNEL` and `/faulty/CHANNEL` with a message for each stored value, and
 `/events`. Messages are JSON with schemas; log times are simulated time in ns. Log times cannot be negative:
-if the run begins before 0, they start at its first message, whose simulated time is in the metadata `times`.
+if the run begins before 0, log time 0 is the first message, whose simulated time is in the metadata `times`.
 """
 
 import io
@@ -52,7 +52,7 @@ def write_experiments(
     """Write `<id>.mcap` into `out` for each experiment with a series or a kept trace that matches the filter
     `only`.
 
-    MutatorError if the package mcap is missing or no experiment has data; MutatorWarning for those without.
+    MutatorError if the package mcap is missing or no experiment has data; MutatorWarning if some have none.
     """
     content = Content(folder, workspace)
     wanted = _chosen(folder, only)
@@ -70,7 +70,7 @@ def write_experiments(
         missing = next(name for name in wanted if name not in found)
         warnings.warn(
             f"{len(wanted) - len(found)} of {counted(len(wanted), 'experiment')} have no series and are left "
-            f"out, {missing} first: {remedy.replace(wanted[0], missing)}",
+            f"out, for example {missing}: {remedy.replace(wanted[0], missing)}",
             MutatorWarning,
             stacklevel=2,
         )
@@ -81,7 +81,7 @@ def write_experiments(
 
 
 class Content:
-    """Build the files of a run folder's experiments."""
+    """Builds the files of a run folder's experiments."""
 
     def __init__(self, folder: RunFolder, workspace: Workspace | None) -> None:
         self._folder = folder
@@ -115,7 +115,7 @@ class Content:
 
     def _exact(self, experiment_id: str) -> tuple[Trace, Trace] | None:
         """The kept traces, if both runs have one. MutatorError if a trace does not match its record: using
-        the coarser series instead would hide this.
+        the coarser series instead would hide the mismatch.
         """
         kept = self._folder.path / "traces" / experiment_id
         if self._traces is None or not kept.is_dir() or experiment_id not in self._records:
@@ -172,7 +172,9 @@ class _Written:
             from mcap.writer import Writer
         except ImportError:
             raise MutatorError(
-                "no package mcap", expected="the package that writes MCAP files", remedy="pip install mcap"
+                "the package mcap is not installed",
+                expected="the package that writes MCAP files",
+                remedy="pip install mcap",
             ) from None
         self._data = io.BytesIO()
         self._writer = Writer(self._data)

@@ -36,16 +36,16 @@ def export(
     """Write the run folder `run` as `format` to `out` (default: RUN/exports/); return the file or folder.
 
     A mutation report needs the `workspace` with the target; MCAP uses it to read exact traces. MutatorError
-    for a target that has changed since.
+    for a target that has changed since the run.
     """
     folder = RunFolder.open(run)
     if parts.only is not None and format is not Format.MCAP:
-        raise MutatorError(f"only, for {format.value}", argument="only", remedy="leave `only` out")
+        raise MutatorError(f"not valid for {format.value}", argument="only", remedy="leave `only` out")
     if parts.table is not Table.RESULTS and format not in (Format.CSV, Format.PARQUET):
-        raise MutatorError(f"a table, for {format.value}", argument="table", remedy="leave `table` out")
+        raise MutatorError(f"not valid for {format.value}", argument="table", remedy="leave `table` out")
     if parts.failures and format is not Format.JUNIT:
         raise MutatorError(
-            f"failures, for {format.value}", argument="failures", remedy="leave `failures` out"
+            f"not valid for {format.value}", argument="failures", remedy="leave `failures` out"
         )
     place = out or folder.path / FOLDER / FILES.get(format, f"{parts.table.value}.{format.value}")
     if format is Format.MCAP:

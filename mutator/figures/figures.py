@@ -19,8 +19,8 @@ FOLDER = "figures"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drawing:
-    """One figure. `note` says what it shows, or why there is none. `codes` are lines of code to copy, each
-    with a description.
+    """One figure. `note` says what the figure shows, or why there is none. `codes` are lines of code to copy,
+    each with a description.
     """
 
     name: str
@@ -51,7 +51,7 @@ def write_drawings(made: Sequence[Drawing], out: Path) -> None:
         paths = [out / drawing.link(suffix) for suffix in ("svg", "png")]
         if drawing.figure is not None:
             save(drawing.figure, paths)
-        else:  # left by an earlier report with other results
+        else:  # an earlier report with other results may have written them
             for path in paths:
                 path.unlink(missing_ok=True)
 
@@ -60,8 +60,8 @@ def _hazards(frame: pd.DataFrame) -> Drawing:
     return Drawing(
         name="hazards_by_fault_type",
         title="Hazards by fault type",
-        note="Left: runs with a hazard among all injected. Right: their share of activated faults. Fault "
-        "types without a mark were never activated.",
+        note="Left: runs with a hazard among all injected. Right: hazards as a share of activated faults. "
+        "Fault types without a mark were never activated.",
         figure=hazards.draw(frame),
     )
 
@@ -70,7 +70,7 @@ def _propagation(frame: pd.DataFrame) -> Drawing:
     return Drawing(
         name="propagation_by_scenario",
         title="Propagation times by scenario",
-        note="Times between events, in runs with both (number above). Alert to hazard: "
+        note="Times between two events, in runs with both (number above). Alert to hazard: "
         "only if the alert came first. Runs that ended before the second event are not shown.",
         figure=propagation.draw(frame),
     )

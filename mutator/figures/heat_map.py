@@ -54,7 +54,7 @@ def _panel(axis: "Axes", frame: pd.DataFrame, kinds: list[str], scenarios: list[
 
 
 def _text_colour(rate: float) -> str:
-    """Return the text colour for a cell with this rate, or without colour (NaN)."""
+    """Return the text colour for a cell with this rate; NaN: a cell without colour."""
     if rate != rate:
         return "black"
     return "white" if rate < DARK_BELOW else "#010101"  # not pure black, which follows the theme

@@ -115,7 +115,7 @@ def _figure_type() -> type["Figure"]:
 def _panel(
     axis: "Axes", channel: Channel, golden: tuple[Any, Any], faulty: tuple[Any, Any], end: float
 ) -> None:
-    """Draw one channel, golden broad below faulty narrow, so that equal lines show both colours."""
+    """Draw one channel: a wide golden line below a narrow faulty line, so that equal lines show both."""
     looks = ((golden, GOLDEN_COLOUR, 2.4, 0.55, "golden"), (faulty, FAULTY_COLOUR, 1.1, 1.0, "faulty"))
     axis.margins(x=0.01, y=0.12)
     for (time, values), colour, width, alpha, label in looks:
@@ -144,7 +144,7 @@ def _decorate(
             axis.axvspan(end, right, color=LATER_COLOUR, alpha=0.15, linewidth=0)
     axes[0].set_xlim(left, right)
     top = axes[0]
-    # Names use three levels in rotation, because those of close marks would overlap.
+    # Labels rotate through three heights, so that those of close marks do not overlap.
     for i, (mark, colour) in enumerate(zip(marks, colours, strict=True)):
         top.annotate(
             f"{mark.label} {mark.t:.2f}",

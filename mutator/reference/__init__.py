@@ -1,1 +1,1 @@
-"""Generates the reference pages and JSON Schemas. A test compares the committed files."""
+"""Generates the reference pages and JSON Schemas. A test checks that the committed files are up to date."""

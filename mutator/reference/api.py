@@ -19,7 +19,7 @@ from mutator.workspace import Workspace
 
 _INTRO = """\
 `import mutator` offers the names on this page and no others. They are typed and stable: the
-[changelog](../../CHANGELOG.md) announces every change. Anything else below `mutator` may change at any time.
+[changelog](../../CHANGELOG.md) announces every change. Anything else below `mutator` can change at any time.
 The import is fast: a name loads what it needs when you first use it.
 
 No function prints. Invalid input raises [MutatorError](#mutatorerror).
@@ -218,7 +218,7 @@ def _type_of(value: Any) -> str:
 
 
 def _signature(node: Function, name: str, *, lines: bool = False) -> str:
-    """Return a call as written; with `lines`, typed and with one argument per line."""
+    """Return the signature as a call; with `lines`, typed and with one argument per line."""
     args = node.args
     positional = [*args.posonlyargs, *args.args]
     defaults: list[ast.expr | None] = [None] * (len(positional) - len(args.defaults))

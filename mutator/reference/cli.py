@@ -28,13 +28,13 @@ def command_line(workspace: Workspace) -> str:
         "\n## Exit codes\n",
         _markdown(("code", "meaning"), [(str(code), meaning) for code, meaning in EXIT_CODES.items()]),
         "\nCode 1 also means that a command found a difference that you asked it to look for. Code 3 also "
-        "means a defect of\nmutator itself, reported with a traceback.\n",
+        "means a bug in\nmutator itself, reported with a traceback.\n",
         "Errors go to standard error: file and line, what was found, what was expected, and what to do. "
         "Progress also goes\nto standard error. With `--json`, standard output is one JSON document.\n",
         "## Completion\n",
         "`mutator --install-completion` installs completion for the current shell: verbs, options, "
         "campaigns, specs,\nscenarios, targets, run folders in `runs/`, and experiments of the run that "
-        "`--run` names or of the newest run.\n`mutator --show-completion` prints what it would install.\n",
+        "`--run` names or of the newest run.\n`mutator --show-completion` prints its script.\n",
         "## Library, templates and target\n",
         _PLACES,
         *_options(command, [p for p in command.params if p.name in PLACE_OPTIONS]),

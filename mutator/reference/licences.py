@@ -20,10 +20,10 @@ _HEAD = """\
 <!-- Written by `python -m mutator.reference.licences`. -->
 
 `mutator` is under the MIT License. The packages below are installed with it. Each has its own licence, shown
-as the package states it. Binary wheels may include libraries under other licences: the wheels of `av` and
+as the package states it. Binary wheels can include libraries under other licences: the wheels of `av` and
 `opencv-python-headless` include FFmpeg. The `.dist-info` of such a wheel contains these licences.
 
-*Needed by* shows who requires a package: `mutator` itself, one of its extras (`test`, `dev`, `train`,
+*Needed by* shows what requires a package: `mutator` itself, one of its extras (`test`, `dev`, `train`,
 `examples`), or only other packages in this table.
 
 """

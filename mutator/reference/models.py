@@ -23,8 +23,8 @@ Write a parameter in *the variable's unit* in any unit of the same dimension. Le
 names the variable. Types of parameters:
 
 * A *variable* is a name that the anchor's function knows.
-* An *import* is the dotted name of a module of the target and of something defined in it. The injected lines
-  import it.
+* An *import* is a dotted name: a module of the target, then a name that the module defines. The injected
+  lines import it.
 * A *constant* is a number, `true`, `false`, `null` or a text.
 * A *unit* is a suffix from [the table of units](fault-spec.md#units).
 

@@ -76,7 +76,7 @@ def channels(workspace: Workspace) -> str:
         generated("Channels and units"),
         "This page lists what is observed, recorded and compared for each target of the library, as the "
         "target's [manifest](target-manifest.md) declares.\nInternally, all values are in SI units and "
-        "radians. Files and tables may "
+        "radians. Files and tables can "
         "use other units, which are part of the\nnames there ([units](fault-spec.md#units)).\n",
     ]
     for manifest in manifests:

@@ -73,7 +73,7 @@ def definitions(model: type[StrictModel]) -> dict[str, dict[str, Any]]:
     """Return the JSON Schema of every model in a file of `model`, by short name (`Variant`), the file's
     first.
 
-    It has the class's title, its docstring in one line, and descriptions of its properties.
+    Each has the class's title, its docstring in one line, and descriptions of its properties.
     """
     whole = model.model_json_schema(by_alias=True)
     parts = {model.__name__: whole} | whole.pop("$defs", {})
@@ -107,7 +107,7 @@ def _clean(value: Any) -> Any:
         for key, inner in value.items()
         if key not in ("title", "description", "properties")
     }
-    if "properties" in value:  # its keys are names, not JSON Schema keywords
+    if "properties" in value:  # the keys of `properties` are names, not JSON Schema keywords
         kept["properties"] = {key: _clean(inner) for key, inner in value["properties"].items()}
     if "$ref" in kept:
         kept["$ref"] = f"#/definitions/{short_name(kept['$ref'].rpartition('/')[2])}"
@@ -118,7 +118,7 @@ def editor_schema(kind: Format, models: FaultModels) -> dict[str, Any]:
     parts = definitions(kind.model)
     if "Injection" in parts:
         _with_models(parts["Injection"], models)
-    if "Variant" in parts:  # another library may declare other readings
+    if "Variant" in parts:  # another library can declare other readings
         parts["Variant"]["additionalProperties"] = {"$ref": "#/definitions/Reading"}
     for part in parts.values():
         part.pop("title", None)

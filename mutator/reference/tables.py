@@ -8,7 +8,7 @@ from mutator._common.tables import Table
 from mutator.config.yaml_files import StrictModel
 from mutator.reference.schemas import definitions
 
-# parts of several kinds of files, and the page with their section
+# models used in several kinds of files, and the page with their section
 _PAGES = {"Injection": "fault-spec.md", "At": "fault-spec.md"}
 _SIGNS = {
     "minimum": "at least",
@@ -32,8 +32,8 @@ def generated(title: str) -> str:
 def sections(page: str, *models: type[StrictModel], below: int = 1) -> Iterator[str]:
     """Yield a section for each model in files of `models`, each once, in the order of their keys.
 
-    Headings are one level below `below`, those of parts of several files two. Models of other pages are only
-    linked.
+    Headings are one level below `below`; with several `models`, those of their parts are two levels below it.
+    Models of other pages are only linked.
     """
     parts: dict[str, dict[str, Any]] = {}
     for model in models:

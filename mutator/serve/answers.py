@@ -1,4 +1,4 @@
-"""Responses: files, JSON and errors, all without paths on the disk."""
+"""Responses: files, JSON and errors. None shows a path of this machine."""
 
 import os
 import re
@@ -54,7 +54,7 @@ def without_places(text: str) -> str:
     """Shorten absolute paths in a text."""
     for folder, instead in ((Path.cwd(), ""), (Path.home(), "/_/"), (Path(tempfile.gettempdir()), "/_/")):
         if folder != Path("/"):
-            text = text.replace(f"{folder}/", instead)  # names may contain spaces
+            text = text.replace(f"{folder}/", instead)  # names can contain spaces
     return _FOLDERS.sub("", text)
 
 

@@ -12,7 +12,7 @@ from mutator.serve.orders import Desk
 from mutator.serve.reviews import Decisions, Moved, Reviews, Selection
 from mutator.serve.runs import Runs
 
-_MOST_WORDS = 100  # most parameters in an address
+_MOST_WORDS = 100  # the maximum number of parameters in an address
 
 
 class ReviewApi:
@@ -78,13 +78,13 @@ class JobApi:
 
 
 def asked(reviews: Reviews, request: Request) -> Selection:
-    """Return the selection of groups in an address."""
+    """Return the groups that an address selects."""
     given = parse_qsl(request.url.query, keep_blank_values=True)
     if len(given) > _MOST_WORDS:
         raise MutatorError(f"{len(given)} parameters in the address", expected=f"at most {_MOST_WORDS}")
     if strange := [name for name, _ in given if name not in ("campaign", "spec", "run")]:
         raise MutatorError(
-            f"'{strange[0]}' in the address", expected="campaign or spec; spec may be repeated"
+            f"'{strange[0]}' in the address", expected="campaign, or spec once or several times"
         )
     campaigns = [value for name, value in given if name == "campaign"]
     specs = [value for name, value in given if name == "spec"]

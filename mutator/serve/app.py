@@ -98,7 +98,7 @@ def _sent(answer: Callable[[Request, bytes], Response]) -> Answer:
     async def answered(request: Request) -> Response:
         kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
         if kind != "application/json":
-            raise HTTPException(415, "the type is not application/json")
+            raise HTTPException(415, "the content type is not application/json")
         return await run_in_threadpool(answer, request, await request.body())
 
     return answered

@@ -129,7 +129,7 @@ class Jobs:
         raise Absent(f"no job '{name}'", expected="the id of a job of this server")
 
     def cancel(self, name: str) -> None:
-        """Cancel a job with all its processes; raises Ended if it has already ended."""
+        """Cancel a job with all its processes; Ended if the job has already ended."""
         job = self.get(name)
         with self._lock:
             if job.ended:

@@ -1,6 +1,6 @@
 """Check requests for jobs, and build their command lines.
 
-A name must be in the library, and an id in a run's plan. No value is a path or looks like an option.
+A name must be in the library, and an id in a run's plan. No value can be a path or look like an option.
 """
 
 import math
@@ -25,11 +25,11 @@ from mutator.workspace import Workspace
 
 def _plain(text: str) -> str:
     if not text.strip() or text.startswith("-") or not text.isprintable():
-        raise ValueError("not plain text: empty, begins with `-`, or cannot be printed")
+        raise ValueError("not plain text: empty, with a leading `-`, or with unprintable characters")
     return text
 
 
-TRIES = "try"  # folder of single tries, next to the runs
+TRIES = "try"  # folder of the results of `try`, next to the runs
 Text = Annotated[str, Field(max_length=500), AfterValidator(_plain)]
 ExperimentId = Annotated[str, Field(pattern=r"^[0-9a-f]{16}$")]
 Seed = Annotated[int, Field(ge=0, lt=2**63)]
@@ -51,7 +51,7 @@ class Film(StrictModel):
 
 
 class Still(StrictModel):
-    """Take one frame of that film, at `t` s."""
+    """Take one frame of the film, at `t` s."""
 
     kind: Literal["still"]
     run: Text
@@ -224,7 +224,7 @@ class Desk:
             raise MutatorError(f"'{text}'", where="trigger", expected="a time in s")
 
     def _folder(self, key: str) -> Path:
-        """Return the run folder with this key, checked for writing."""
+        """Return the run folder with this key; MutatorError if it contains links."""
         folder = self.runs.folder(key)
         check_no_links(folder)
         return folder
@@ -232,7 +232,7 @@ class Desk:
     def _new(self, name: str) -> Path:
         folder = self.runs.new / name
         if folder.is_symlink():
-            raise MutatorError(f"a link, {name}", expected="a new folder", remedy="choose another name")
+            raise MutatorError(f"{name} is a link", expected="a new folder", remedy="choose another name")
         if folder.is_dir():
             check_no_links(folder)
         return folder.resolve()

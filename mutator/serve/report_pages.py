@@ -84,7 +84,7 @@ class Shown:
 
 
 def _series(run: Path, name: str) -> bytes:
-    """Open a file of series. As a script, it must equal the output of `write_script` for its data."""
+    """Read a script of series; Absent unless it equals the output of `write_script` for the same data."""
     data = _read(open_in_run(run, name))
     path = run / name
     try:

@@ -130,10 +130,10 @@ class Reviews:
         if strangers := [one.group for one in wanted.changes if one.group not in known]:
             raise Absent(f"no group '{strangers[0]}'", expected="the id of a group on the page")
         if unseen := [one.group for one in wanted.changes if one.group not in wanted.seen]:
-            raise MutatorError(f"no seen revision for group {unseen[0]}", where="seen")
+            raise MutatorError(f"no revision of group {unseen[0]}", where="seen")
         decided = [one.group for one in wanted.changes if one.kind in (Kind.APPROVE, Kind.REJECT)]
         if blind := [name for name in decided if name not in wanted.digests]:
-            raise MutatorError(f"no digest of the diff seen for group {blind[0]}", where="digests")
+            raise MutatorError(f"no digest of the diff of group {blind[0]}", where="digests")
         touched = [known[name] for name in dict.fromkeys(one.group for one in wanted.changes)]
         self._refuse_others(chosen, touched, wanted.digests)
         changes = [
@@ -207,8 +207,8 @@ def _files_in(place: Path) -> list[tuple[str, int, int]]:
     for folder, inner, names in os.walk(place):
         inner[:] = sorted({*inner} - _SKIPPED)
         for name in names:
-            path = os.path.join(folder, name)  # noqa: PTH118 - a thousand of them at each look
-            with suppress(OSError):  # the file may have been deleted in the meantime
+            path = os.path.join(folder, name)  # noqa: PTH118 - for speed
+            with suppress(OSError):  # the file has been deleted in the meantime
                 facts = os.lstat(path)
                 found.append((path, facts.st_mtime_ns, facts.st_size))
     return found

@@ -1,4 +1,4 @@
-"""The served run folders: finds them at each request, summarises them, and opens their files."""
+"""Find the served run folders at each request, summarise them, and open their files."""
 
 import os
 import stat
@@ -100,25 +100,25 @@ def told(key: str, path: Path) -> dict[str, Any]:
     except MutatorError as err:
         facts["problem"] = err.got
     except (LookupError, TypeError, ValueError):
-        facts["problem"] = "its run.json is damaged"
+        facts["problem"] = "run.json is damaged"
     return facts
 
 
 @lru_cache(maxsize=1000)
 def _outcomes(run: Path, mtime_ns: int, size: int) -> dict[str, int]:
-    """Count how the experiments ended; `mtime_ns` and `size` tell whether the table has changed."""
+    """Count how the experiments ended. `mtime_ns` and `size` of the table are only keys of the cache."""
     return outcome_counts(Results.of_run(run).texts())
 
 
 def check_no_links(run: Path) -> None:
-    """Raise MutatorError for a link in a run folder: commands would write to its target."""
+    """Raise MutatorError for a link in a run folder: commands would write to the link's target."""
     folders = [str(run)]
     while folders:
         with suppress(FileNotFoundError), os.scandir(folders.pop()) as entries:
             for entry in entries:
                 if entry.is_symlink():
                     raise MutatorError(
-                        f"a link, {Path(entry.path).relative_to(run)}",
+                        f"{Path(entry.path).relative_to(run)} is a link",
                         where=run.name,
                         expected="only files and folders",
                         remedy="delete the link",

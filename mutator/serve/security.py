@@ -1,8 +1,8 @@
 """Check every request, and limit what a browser may do with a response.
 
 Other pages in the user's browser and other users of the machine can reach a local port. So each request needs
-the token, in a cookie that other sites cannot send. It must name this server, because a page whose host name
-resolves to this machine could otherwise read responses. It must not come from a page of another origin.
+the token, in a cookie that other sites cannot send. The request must name this server, because a page whose
+host name resolves to this machine could otherwise read responses, and must not come from another origin.
 """
 
 import base64
@@ -52,13 +52,13 @@ class Guarded:
         headers, method = Headers(scope=scope), scope["method"]
         origins = headers.getlist("origin")
         if method not in _METHODS:
-            return _refusal(f"the method is none of {', '.join(_METHODS)}", 405)
+            return _refusal(f"the method is not one of {', '.join(_METHODS)}", 405)
         if len(hosts := headers.getlist("host")) != 1 or hosts[0] not in self._hosts:
             return _refusal("the request names another host")
         if len(origins) > 1 or any(origin != f"http://{hosts[0]}" for origin in origins):
             return _refusal("the request comes from another origin")
         if method == "POST" and not origins:
-            return _refusal("the request does not say where it comes from")
+            return _refusal("the request has no origin")
         if headers.get("sec-fetch-site", "none") not in _OWN_SITE:
             return _refusal("the request comes from another site")
         return None
@@ -137,7 +137,7 @@ def _with_policy(send: Send) -> Send:
 
 @cache
 def policy() -> str:
-    """Return the policy for pages: they may only run code from `mutator.web`, as files or inline by hash."""
+    """Return the policy for pages: they can run only code from `mutator.web`, as files or inline by hash."""
     scripts = [_hash(f"\n{asset(name)}") for name in assets(".js")] + [_hash(f"\n{pages.script()}\n")]
     styles = [_hash(f"\n{asset(name)}") for name in assets(".css")] + [_hash(f"\n{pages.style()}")]
     return "; ".join(

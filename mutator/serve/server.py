@@ -50,7 +50,9 @@ def listening(port: int) -> socket.socket:
     except OSError as err:
         listener.close()
         raise MutatorError(
-            f"cannot use port {port} ({err.strerror})", argument="port", remedy="choose another port, or none"
+            f"cannot use port {port} ({err.strerror})",
+            argument="port",
+            remedy="choose another port, or leave it out",
         ) from None
     listener.listen()
     return listener

@@ -160,7 +160,7 @@ def test_an_unexpected_error_is_a_defect_with_a_traceback(
     answer = cli("list", "specs")
     assert answer.code == 3
     assert "ZeroDivisionError: oops" in answer.err
-    assert "defect of mutator" in answer.err
+    assert "bug in mutator" in answer.err
 
 
 @pytest.mark.parametrize("words", ["list --json", "list targets", "--help"], ids=["long", "short", "help"])

@@ -160,7 +160,7 @@ def test_the_status_shows_what_is_left(cli: Cli, root: Path, known: dict[str, st
     gap = about(known, "offset(by, low, target=gap)")
     cli("review", "approve", *known, *JANE)
     cli("review", "flag", gap, *JANE)
-    assert "all of small is approved" in cli("review", "status", "--campaign", "small").out
+    assert "all groups of small are approved" in cli("review", "status", "--campaign", "small").out
     spec = root / "fault_library/faults/sensor/distance.yaml"
     spec.write_text(spec.read_text().replace("[450, 459]", "[500, 509]"))
     changed = "values (by: -509 to -400; approved -459 to -400)"
@@ -211,7 +211,7 @@ def test_a_walk_needs_a_terminal(cli: Cli, root: Path) -> None:
     """The error names the commands that work without one."""
     answer = cli("review", "walk", *JANE)
     assert answer.code == 2
-    assert "no terminal to ask in" in answer.err
+    assert "no terminal to ask for decisions" in answer.err
     assert "mutator review approve" in answer.err
 
 

@@ -18,7 +18,7 @@ def test_the_analysis_is_printed_and_drawn(cli: Cli, nowhere: Path) -> None:
         "accidents (3)",
         "hazards (3)",
         "hwt > 2.0 and rs > 0.0",
-        "they cover everything exactly once: proved in 9 cells",
+        "the contexts cover everything exactly once: proved in 9 cells",
         "unsafe control actions (14)",
         "vision_output/camera_unavailable",
         "none: Drivers are not simulated",

@@ -36,7 +36,7 @@ def test_try_reports_hazards_of_the_fault_free_run(cli: Cli, root: Path) -> None
     scenario = root / "fault_library" / "scenarios" / "A.yaml"
     scenario.write_text(scenario.read_text().replace("\nspeed: 20", "\nspeed: 36"))
     assert [line for line in cli(*words).out.splitlines() if said in line] == [
-        "the fault-free run also reaches TOO_FAST at 0.00 s: the fault may not be the cause"
+        "the fault-free run also reaches TOO_FAST at 0.00 s: the fault is not necessarily the cause"
     ]
     assert cli(*words, "--json").json["golden_hazards_s"] == {"TOO_FAST": 0.0}
 

@@ -43,7 +43,7 @@ def test_an_audit_is_printed_on_one_page(cli: Cli, sealed: str) -> None:
     assert found.out.rstrip().endswith("no difference") and len(found.out.splitlines()) < 50
     facts = dict(re.findall(r"^(\S[^\n]*?)  +(\S.*)$", found.out.split("\n\n")[0], re.MULTILINE))
     assert facts["seal"] == sealed and "Python 3." in facts["python"] and facts["mutator"].startswith("0.")
-    assert {"platform", "packages", "drawn by lot"} <= facts.keys()
+    assert {"platform", "packages", "drawn at random"} <= facts.keys()
     as_json = cli("verify", "run", "--json").json
     assert (as_json["passed"], as_json["seal"]) == (True, sealed)
     assert sum(check["count"] for check in as_json["checks"]) > 20

@@ -189,7 +189,7 @@ class Misbehaving:
         """Return what is wrong with a campaign, apart from its misdeeds, or an empty text."""
         if came.left:
             return came.left
-        if "Traceback" in came.said or "defect of mutator" in came.said:
+        if "Traceback" in came.said or "bug in mutator" in came.said:
             return "a traceback"
         wanted = EXIT_HARNESS_ERRORS if Status.HARNESS_ERROR in came.status.values() else EXIT_OK
         if came.code != wanted:

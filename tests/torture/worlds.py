@@ -94,7 +94,7 @@ def kinds_of(home: Path) -> dict[str, list[str]]:
 
 
 def judged(told: Told, right: Told, touched: Iterable[str]) -> tuple[End, str]:
-    if "Traceback" in told.said or "defect of mutator" in told.said:
+    if "Traceback" in told.said or "bug in mutator" in told.said:
         return End.WRONG, "a traceback"
     if told.code == 0:
         same = told.result == right.result

@@ -1,9 +1,9 @@
 """A loaded target that forks: `python -P -s fork_server.py SOCKET START.marshal`. Standard library only.
 
-Each process waits between two steps of a golden run; the first waits before any run. It answers on its own
-socket with marshalled dicts, each preceded by its length. While it has only one thread, it forks on request:
-a mutant, or a process that waits at a later step. It ends when the other end closes its socket, or when the
-first process ends (guard.py).
+Each process waits between two steps of a golden run; the first waits before any run. A process answers on its
+own socket with marshalled dicts, each preceded by its length. While it has only one thread, it forks on
+request: a mutant, or a process that waits at a later step. It ends when the other end closes its socket, or
+when the first process ends (guard.py).
 """
 
 import array
@@ -115,7 +115,7 @@ class Process:
         """Fork a process that waits before `step` of this golden run, or of a new one with the arguments
         `args`.
 
-        The reply carries its socket.
+        The reply carries the new process's socket.
         """
         ours, theirs = socket.socketpair()
         get_ready()
@@ -212,7 +212,7 @@ class Process:
             swap.run_settings(job["settings"], probe)
             probe.limit(job["steps"])
             child.note_activation(probe, job["inactive"])
-            # the state of a probe that was there from the start
+            # the state of a probe that observed from the start
             holder, state = job["probe_state"]
             for name, value in state.items():
                 setattr(getattr(probe, holder), name, value)

@@ -1,7 +1,7 @@
 """Run code in a separate process within limits, and end everything it started. Standard library only.
 
-The waiting process is a subreaper: it adopts whatever its descendants leave in any session, and kills it. As
-a script, `guard.py PARENT PROGRAM WORDS...` becomes that program, but dies with its parent.
+The waiting process is a subreaper: it adopts the processes that its descendants leave in any session, and
+kills them. As a script, `guard.py PARENT PROGRAM WORDS...` becomes that program, but dies with its parent.
 """
 
 import ctypes
@@ -22,7 +22,7 @@ _PR_SET_PDEATHSIG = 1
 _PR_SET_CHILD_SUBREAPER = 36
 _MINDED = signal.valid_signals() - {signal.SIGKILL, signal.SIGSTOP, signal.SIGPIPE, signal.SIGXFSZ}
 _LOOK_S = 0.2  # interval between two checks of the space used
-_LOOK_SHARE = 20  # the checks may take at most one part in this many of the time
+_LOOK_SHARE = 20  # the checks take at most 1/_LOOK_SHARE of the time
 _BLOCK = 512  # bytes; the unit of st_blocks
 _libc = ctypes.CDLL(None)
 
@@ -138,7 +138,7 @@ def _ask_to_end(pid: int, patience_s: float) -> None:
 
 def _end_what_is_left() -> None:
     """Kill and reap children in other sessions, with all their descendants."""
-    session, spared = os.getsid(0), set[int]()  # spared: root's, which may not be killed
+    session, spared = os.getsid(0), set[int]()  # spared: processes of root, which cannot be killed
     while left := [pid for pid in _children(os.getpid()) if os.getsid(pid) != session and pid not in spared]:
         for pid in _with_descendants(left):
             try:
@@ -161,7 +161,7 @@ def _with_descendants(pids: Iterable[int]) -> list[int]:
 def _children(pid: int) -> list[int]:
     """Return the children of `pid`, including dead ones that are not reaped."""
     found: list[int] = []
-    with suppress(OSError), os.scandir(f"/proc/{pid}/task") as threads:  # the process may end meanwhile
+    with suppress(OSError), os.scandir(f"/proc/{pid}/task") as threads:  # the process can end meanwhile
         for thread in threads:
             with io.FileIO(f"{thread.path}/children") as file:
                 found += map(int, file.read().split())

@@ -1,7 +1,7 @@
 """Note which lines of a tree run from the first observation on. Standard library only.
 
-From Python 3.12 on, `sys.monitoring` reports each line once. Older versions trace the tree's functions, which
-is slower and misses other threads.
+In Python 3.12 and later, `sys.monitoring` reports each line once. In older versions, the tree's functions are
+traced, which is slower and misses other threads.
 """
 
 import os
@@ -17,7 +17,7 @@ _TOOL = 1  # the tool id that `sys.monitoring` reserves for coverage
 class Lines:
     """Notes lines of the tree at `tree`, once a line in `since` of the file `path` has run.
 
-    A fault cannot act in lines that run only before that.
+    A fault cannot act in lines that run only earlier.
     """
 
     def __init__(self, tree: str, path: str, since: Iterable[int]) -> None:

@@ -68,7 +68,9 @@ def _draw(names: dict[str, Any]) -> None:
         own = {**names, "_fi": SimpleNamespace(on=on, call=call, every=every, active=_yes, kept=_made)}
         exec("\n".join(lines), own)
         after.append(_picture(own))
-        exec(f"{ASKED['picture']} = _before", {**own, "_before": before.copy()})  # it may be an attribute
+        exec(
+            f"{ASKED['picture']} = _before", {**own, "_before": before.copy()}
+        )  # the picture can be an attribute
     np.savez(_folder / FILE, before=before, **{f"after_{i}": one for i, one in enumerate(after)})
 
 

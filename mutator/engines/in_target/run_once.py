@@ -1,7 +1,7 @@
 """Run a target once in a fresh interpreter: `python -P -s run_once.py job.json SOCKET`.
 
 Standard library only, because the harness must not change what the target does. The script forks. The parent
-guards the run (see guard.py) and sends the ending over the socket. The child limits itself, puts the tree
+guards the run (see guard.py) and reports over the socket how it ended. The child limits itself, puts the tree
 first on sys.path, runs the entry module as `__main__`, and writes report.json.
 """
 
@@ -25,7 +25,7 @@ from typing import Any
 
 _NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
 _LONGEST = 2000  # characters stored of an exception
-_MOST_ERRORS = 50  # exceptions stored: the one raised and those behind it
+_MOST_ERRORS = 50  # exceptions stored: the one raised, its causes and those that it groups
 
 
 def beside(name: str) -> Any:
@@ -142,7 +142,7 @@ def run_until(job: dict[str, Any]) -> bool:
 
 
 def note_activation(probe: Any, inactive: str) -> None:
-    """Let the first activation delete the file `inactive`, so that it is known however the run ends."""
+    """Let the first activation delete the file `inactive`, so that it is known even if the run crashes."""
     active = probe.active
 
     def first_active(fi: str) -> Any:
@@ -189,12 +189,12 @@ def text(thing: object) -> str:
 
 
 def of_full_disk(err: BaseException) -> bool:
-    """Return whether an error reports a full disk or quota, also if a library raised it."""
+    """Return whether an error reports a full disk or quota, even if a library raised it."""
     return getattr(err, "errno", None) in _NO_SPACE or any(os.strerror(n) in text(err) for n in _NO_SPACE)
 
 
 def origins(err: BaseException) -> list[BaseException]:
-    """Return the exception, its causes, and the exceptions in it, without duplicates."""
+    """Return the exception, its causes, and the exceptions that it groups, without duplicates."""
     found: dict[int, BaseException] = {}
     todo: list[BaseException | None] = [err]
     while todo and len(found) < _MOST_ERRORS:
@@ -260,7 +260,7 @@ def third_party(known: set[str], packages: Iterable[str]) -> list[str]:
 def mapped() -> Iterator[str]:
     """Yield the names, relative to module folders, of files mapped into memory.
 
-    They include libraries that are used without an import of their package.
+    These include libraries that are used without an import of their package.
     """
     folders = sorted((f"{folder}/" for folder in sys.path if folder), key=len, reverse=True)
     with suppress(OSError):

@@ -1,6 +1,6 @@
 """Put a mutant's code into the loaded modules of this process. Standard library only.
 
-`mutator.engines.code_swap` decides what may be swapped; this module checks that the loaded program is the one
+`mutator.engines.code_swap` decides what can be swapped; this module checks that the loaded program is the one
 that was analysed.
 """
 
@@ -86,7 +86,7 @@ def _mangled(holder: Any, name: str) -> str:
 
 
 def keep_observations(probe: Any, holder: str, names: Sequence[str]) -> list[tuple[float, ...]]:
-    """Make the probe keep its observations; return their list: the time, then `names`.
+    """Make the probe keep its observations; return the list of them: the time, then the values of `names`.
 
     `holder` is the name of the object in which the probe keeps the time.
     """

@@ -10,7 +10,7 @@ _TASKS = Path("/proc/self/task")
 
 
 def others() -> list[str]:
-    """Return the names of all threads except the main one, also of libraries; "" for no name."""
+    """Return the names of all threads but the main one, including those of libraries; "" for no name."""
     threading: Any = sys.modules.get("threading")
     known = {one.native_id: one.name for one in threading.enumerate()} if threading else {}
     try:  # listed instead of counted by the folder's link count, which some kernels do not keep up to date

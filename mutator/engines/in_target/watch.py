@@ -2,7 +2,7 @@
 
 Standard library and numpy only. Functions are replaced before the target imports them, so results of watched
 runs are not used. The noted line is the innermost one of the tree on the stack, even if a library made the
-call. Calls made while that library is imported are ignored.
+call. Calls made during the import of a library are ignored.
 """
 
 import builtins
@@ -27,7 +27,7 @@ threads: Any = importlib.util.module_from_spec(_spec)
 _spec.loader.exec_module(threads)
 
 CLOCK, DRAW, THREAD, HASH, PROCESS = "clock", "draw", "thread", "hash", "process"
-_MOST = 200  # most lines to note
+_MOST = 200  # the maximum number of noted lines
 _CLOCKS = ("time", "monotonic", "perf_counter", "process_time", "thread_time", "clock_gettime")
 _STILL = ("localtime", "gmtime", "strftime", "ctime")  # functions that read a clock unless a time is passed
 _IMPORTING = "<frozen importlib"
@@ -45,7 +45,7 @@ class Watcher:
         self._seeded: set[Any] = set()  # shared generators that have a seed
 
     def begin(self) -> None:
-        self._watch_numpy()  # first, because watching it may use `secrets`
+        self._watch_numpy()  # first, because watching numpy can use `secrets`
         for name in _CLOCKS:
             for one in (name, f"{name}_ns"):
                 self._watch(time, one, CLOCK, f"time.{one}() reads the clock")
@@ -56,12 +56,14 @@ class Watcher:
         self._watch(os, "urandom", DRAW, "os.urandom() draws from the system")
         setattr(random, "_urandom", os.urandom)  # noqa: B010
         for name in ("uuid1", "uuid4"):
-            self._watch(uuid, name, DRAW, f"uuid.{name}() makes another id in each run")
+            self._watch(uuid, name, DRAW, f"uuid.{name}() returns a different id in each run")
         for name in ("token_bytes", "token_hex", "token_urlsafe", "choice", "randbelow", "randbits"):
             self._watch(secrets, name, DRAW, f"secrets.{name}() draws from the system")
-        self._watch(os, "getpid", PROCESS, "os.getpid() is another number in each run", direct=True)
-        self._watch(builtins, "hash", HASH, "hash() of texts follows PYTHONHASHSEED", _is_salted, direct=True)
-        self._watch(builtins, "id", PROCESS, "id() is an address, another one in each run", direct=True)
+        self._watch(os, "getpid", PROCESS, "os.getpid() differs in each run", direct=True)
+        self._watch(
+            builtins, "hash", HASH, "hash() of text depends on PYTHONHASHSEED", _is_salted, direct=True
+        )
+        self._watch(builtins, "id", PROCESS, "id() is an address, which differs in each run", direct=True)
         self._watch_threads()
         self._watch_shared(random, random._inst, "random")
         self._watch_seed(random.Random)
@@ -112,7 +114,7 @@ class Watcher:
         *,
         direct: bool = False,
     ) -> None:
-        """Replace a function by one that notes its caller if `counts` accepts the call."""
+        """Replace a function with one that notes its caller if `counts` accepts the call."""
         original = getattr(home, name, None)
         if original is None:
             return
@@ -124,7 +126,7 @@ class Watcher:
         setattr(home, name, _Watched(original, before))
 
     def _watch_dates(self) -> None:
-        """Replace the date classes, which cannot be changed, by similar ones in a module that only the tree
+        """Replace the date classes, which cannot be changed, with similar ones in a module that only the tree
         imports.
 
         Compiled code such as that of pandas crashes if it gets another class.
@@ -169,7 +171,7 @@ class Watcher:
 
     def _watch_shared(self, module: Any, generator: Any, named: str) -> None:
         """Watch a module's functions that draw from one shared generator, until it has a seed."""
-        shared = f"draws from the generator that all of {named} share, which has no seed"
+        shared = f"draws from the shared generator of {named}, which has no seed"
         for name in dir(module):
             original = getattr(module, name)
             if name in ("seed", "setstate", "set_state"):
@@ -211,7 +213,7 @@ class Watcher:
         def make(generator: Any, seed: Any = None) -> None:
             if seed is None:
                 self.note(DRAW, what)
-            self._quiet = True  # the constructor draws a seed even if it has one
+            self._quiet = True  # the constructor draws a seed even if it is given one
             try:
                 kind.__init__(generator, seed)
             finally:

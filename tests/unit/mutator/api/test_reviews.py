@@ -23,5 +23,5 @@ def test_a_decision_is_stored(toycar: Workspace, tmp_path: Path) -> None:
 
 
 def test_a_campaign_together_with_specs_is_refused(toycar: Workspace) -> None:
-    with pytest.raises(MutatorError, match=r"^campaign: together with specs"):
+    with pytest.raises(MutatorError, match=r"^campaign: given together with specs"):
         mutator.load_review(campaign="small", specs=["sensor/lane"], workspace=toycar)

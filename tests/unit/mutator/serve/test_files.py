@@ -123,7 +123,7 @@ def test_linked_folders_are_not_followed(client: Client, linked: Path, name: str
         assert client.get(f"/runs/linked/{path}").status in (400, 404)
     refused = client.post("/api/jobs", {"kind": "report", "run": "linked"})
     assert refused.status == 400
-    assert refused.json["error"]["got"] == f"a link, {name}"
+    assert refused.json["error"]["got"] == f"{name} is a link"
     assert sorted(outside.iterdir()) == before
     assert not client.get("/api/jobs").json["jobs"]
 
@@ -136,7 +136,7 @@ def test_no_command_is_started_on_a_run_folder_with_a_link(client: Client, linke
     (linked / name).symlink_to(end)
     refused = client.post("/api/jobs", {"kind": "report", "run": "linked"})
     assert refused.status == 400
-    assert refused.json["error"]["got"] == f"a link, {name}"
+    assert refused.json["error"]["got"] == f"{name} is a link"
     assert client.get("/runs/linked/report/index.html").status == 400
     assert end.read_text() == SECRET
 

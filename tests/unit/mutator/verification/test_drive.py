@@ -140,7 +140,7 @@ def test_a_thread_pool_is_reported_with_its_line(
     (place,) = fast.places
     line = line_of(toy, "self.pool.submit")
     assert str(place).startswith(f"toycar/driver.py:{line} in Driver.drive: starts the thread 'ThreadPool")
-    assert "do that work in the step itself" in fast.remedy
+    assert "do the pool's work in the step itself" in fast.remedy
     assert "--drive" not in fast.remedy  # the timeout under test
 
 
