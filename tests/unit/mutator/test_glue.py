@@ -99,7 +99,7 @@ def test_flags_replace_keys_of_the_scenario(arguments: list[str], flags: list[st
 @pytest.mark.parametrize(
     ("flags", "words"),
     [
-        (["--heigth_m", "3"], "drop.yaml: no 'heigth_m', only about, duration_s, height_m, caught"),
+        (["--heigth_m", "3"], "drop.yaml: no key 'heigth_m'; the file has about, duration_s, height_m, caught"),
         (["3"], "argument '3'"),
         (["--seed", "-1"], "--seed -1; expected a whole number"),
         (["--seed"], "no --seed"),
@@ -144,7 +144,7 @@ def test_an_invalid_scenario_file_is_an_error(tmp_path: Path, line: str) -> None
 def test_each_step_has_the_same_channels(later: dict[str, float]) -> None:
     run = Run(step_s=0.5, duration_s=1.0)
     run.record(a=1.0)
-    with pytest.raises(GlueError, match=r"at 0.5 s: channels [ab]"):
+    with pytest.raises(GlueError, match=r"at 0.5 s: missing or unexpected channels: [ab]"):
         run.record(**later)
 
 

@@ -423,5 +423,5 @@ def test_resource_limits_below_those_of_the_campaign_are_refused(
         raise ValueError("not allowed to raise maximum limit")
 
     monkeypatch.setattr(resource, "setrlimit", refuse)
-    with pytest.raises(MutatorError, match=rf"a limit of 1 here \(`ulimit -.`\).*{name}.*raise it"):
+    with pytest.raises(MutatorError, match=rf"the limit is 1 here \(`ulimit -.`\).*{name}.*raise the limit"):
         ReferenceEngine(manifest, tmp_path, tmp_path, LIMITS)

@@ -32,7 +32,7 @@ def test_the_names_of_all_other_threads_are_found() -> None:
     [
         (["jemalloc_bg_thd"], r"2 .* 'jemalloc_bg_thd' \(of the memory allocator jemalloc\)$", "MALLOC_CONF"),
         (["", ""], r"3 .* besides the main one, one without a name \(of a library\)$", "OMP_NUM_THREADS"),
-        (["poll"], "2 .* besides the main one, 'poll'$", "start it after the run"),
+        (["poll"], "2 .* besides the main one, 'poll'$", "start the thread after the run"),
         (
             ["ThreadPoolExecutor-0_0"],
             r"'ThreadPoolExecutor-0_0' \(of a pool in Python\)$",

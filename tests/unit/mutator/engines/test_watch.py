@@ -26,7 +26,7 @@ NOTED = {
     "np.random.default_rng()": "a generator of numpy.random is made without a seed",
     "np.random.RandomState()": "a generator of numpy.random is made without a seed",
     "os.urandom(2)": "os.urandom() draws from the system",
-    "uuid.uuid4()": "uuid.uuid4() makes another id",
+    "uuid.uuid4()": "uuid.uuid4() returns a different id",
     "hash('x')": "hash() of text depends on PYTHONHASHSEED",
     "threading.Thread(target=int, name='poll').start()": "starts the thread 'poll'",
     "ThreadPoolExecutor(1).submit(int).result()": "starts the thread 'ThreadPoolExecutor-",
