@@ -239,7 +239,7 @@ class Controller:
     def pytest_internalerror(self, excinfo: pytest.ExceptionInfo[BaseException]) -> None:
         self._note(str(shortage(excinfo.value) or ""))
 
-    @pytest.hookimpl(trylast=True)  # after xdist has seen its workers end
+    @pytest.hookimpl(trylast=True)  # after xdist has ended its workers
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
         if self._worker is not None:
             self._worker.close()

@@ -89,9 +89,9 @@ class Example:
 class FaultModel:
     """A fault model: template text, parameter schema, examples.
 
-    `raises`: its injected lines raise on purpose, so an exception in them counts as a crash of the target.
-    `expression` is the template of a changed value, or None if the model cannot change an expression. Not
-    every kind of anchor can provide what the templates need (`needs`).
+    `raises`: the injected lines raise on purpose, so an exception in them is a crash of the target.
+    `expression` is the template of a changed value, or None if the model cannot change an expression.
+    `needs`: what the templates need, which not every kind of anchor provides.
     """
 
     name: str
@@ -131,7 +131,7 @@ class FaultModels:
     folder: Path
     models: Mapping[str, FaultModel]
     probe: str
-    digest: str  # covers what decides a mutant's text and how its exceptions count
+    digest: str  # of everything that determines a mutant's text, and which models raise
 
     def __iter__(self) -> Iterator[FaultModel]:
         return iter(self.models.values())
@@ -141,7 +141,8 @@ class FaultModels:
             raise MutatorError(
                 f"unknown fault model '{name}'",
                 expected=f"one of {', '.join(self.models)}",
-                remedy=f"correct it, or add it to {self.folder}" + suggestion(name, list(self.models)),
+                remedy=f"correct the name, or add the model to {self.folder}"
+                + suggestion(name, list(self.models)),
             )
         return self.models[name]
 
@@ -151,7 +152,7 @@ class _ParamModel(StrictModel, title="A parameter"):
 
     type: ParamType = Field(
         description="The type of a value. `variable`: a name in the function. `import`: a dotted name to "
-        "import. `number`, `integer`, `boolean`: such a value. `constant`: a number, truth value,"
+        "import. `number`, `integer`, `boolean`: a value of that type. `constant`: a number, truth value,"
         " text or null. `choice`: one of the terms in `choices`. `unit`: the suffix of a unit. "
         "`seed`: drawn during expansion; a spec cannot set it."
     )
@@ -164,8 +165,8 @@ class _ParamModel(StrictModel, title="A parameter"):
     optional: bool = Field(
         False, description="Whether a spec can omit the parameter. The template then gets `none`."
     )
-    min: float | None = Field(None, description="The minimum, in that unit.")
-    max: float | None = Field(None, description="The maximum, in that unit.")
+    min: float | None = Field(None, description="The minimum, in the parameter's unit.")
+    max: float | None = Field(None, description="The maximum, in the parameter's unit.")
     neutral: float | None = Field(
         None, description="The value with which a fault changes nothing. Plans and `try` warn about it."
     )
@@ -175,7 +176,7 @@ class _ParamModel(StrictModel, title="A parameter"):
 
 
 class _ExampleModel(StrictModel, title="An example"):
-    """Shown on this page, and run as a test: `mutator check` compares the result."""
+    """This page shows each example, and `mutator check` runs it as a test."""
 
     about: str = Field(description="What the example shows. The page prints this after *For example,*.")
     injection: InjectionModel = Field(description="An injection, written as in a spec.")
@@ -200,8 +201,8 @@ class FaultModelModel(StrictModel, title="The file"):
     about: str = Field(description="What the model does, in one sentence.")
     raises: bool = Field(
         False,
-        description="Whether the model's lines raise on purpose. An exception in them then counts as a crash "
-        "of the target; otherwise the mutant is invalid.",
+        description="Whether the model's lines raise on purpose. If so, an exception in them is a crash of "
+        "the target; otherwise it makes the mutant invalid.",
     )
     needs: Literal["call", "statement", "next_statement"] | None = Field(
         None,

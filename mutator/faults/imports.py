@@ -10,7 +10,7 @@ from mutator.targets.manifest import TargetManifest
 
 
 def check_import(manifest: TargetManifest, dotted: str) -> None:
-    """Raise MutatorError unless `dotted` is a module of the target and a name defined in it.
+    """Raise MutatorError unless `dotted` names something that a module of the target defines.
 
     The caller adds file and line to the error.
     """

@@ -82,7 +82,7 @@ class InjectionModel(StrictModel, title="An injection"):
     where: str | None = Field(
         None,
         description="A condition that selects one instance among several: `index == 2`, `self.name == "
-        "'left'`, `item is self.items[0]`. It may use names that the function knows, attributes, "
+        "'left'`, `item is self.items[0]`. It can use names that the function knows, attributes, "
         "items, constants, comparisons, `and`, `or` and `not`. It is evaluated only while the "
         "fault is active.",
     )
@@ -90,7 +90,7 @@ class InjectionModel(StrictModel, title="An injection"):
         None,
         ge=1,
         description="The fault acts only in this execution of the place. Executions are counted from 1 at "
-        "each activation; with `where`, only those that satisfy it count.",
+        "each activation; with `where`, only those that satisfy the condition are counted.",
     )
     every: int | None = Field(
         None, ge=1, description="The fault acts in every n-th execution of the place, counted as for `call`."
@@ -103,7 +103,7 @@ class InjectionModel(StrictModel, title="An injection"):
                 (*keys, "unit"),
                 f"unit '{self.unit}'",
                 expected=f"one of {units.KNOWN}, or '1' for a plain number",
-                remedy="name the variable's unit in the source",
+                remedy="name the unit that the variable has in the source",
             )
         params = []
         for key, value in self.params.items():
@@ -182,7 +182,7 @@ def reference(text: str) -> Drawn | None:
 
 
 def quantity(drawn: Drawn, number: float, unit: units.Unit, target: units.Unit) -> float:
-    """Convert the drawn `number` from `unit` to the parameter's `target`; ValueError if incompatible."""
+    """Convert the drawn `number` from `unit` to `target`; ValueError if the units are incompatible."""
     number = math.copysign(1.0, drawn.sign) * number
     if drawn.written_in and drawn.read_as:
         number = units.convert(number, unit, units.UNITS[drawn.written_in])

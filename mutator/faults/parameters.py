@@ -41,7 +41,7 @@ def resolve(
             raise source.error(
                 param.keys,
                 f"'{param.value}' for '{param.key}' at `{spec.location.anchor.kind.value}`",
-                expected="none: the anchored expression changes",
+                expected="no target, because the anchored expression is changed",
                 remedy="leave it out, or anchor at a statement",
             )
     for schema in model.params:
@@ -104,12 +104,12 @@ class _Resolver:
                 param.keys,
                 f"'{param.key}'" + (f" (a unit of {given.dimension})" if given else " (no unit)"),
                 expected=self.key(schema),
-                remedy="end the key in the number's unit",
+                remedy="end the key with the number's unit",
             )
         return schema
 
     def is_plain(self, param: ParamSpec, schema: ParamSchema) -> bool:
-        """Return whether it is a truth value, None, or a text other than the draw's name."""
+        """Return whether a constant is a truth value, None, or a text other than the draw's name."""
         if schema.type != "constant" or param.unit:
             return False
         if not isinstance(param.value, str):
@@ -175,7 +175,7 @@ class _Resolver:
         return number
 
     def _constant(self, param: ParamSpec) -> Value:
-        """Return the value; MutatorError for a text that resembles the draw's name, a likely typing error."""
+        """Return the value; MutatorError for a text that resembles the draw's name, a likely typo."""
         assert not isinstance(param.value, Drawn)
         if isinstance(param.value, str) and self.draw and suggestion(param.value, [self.draw.name]):
             raise self._wrong(param, f"'{self.draw.name}', the draw, or a less similar text")

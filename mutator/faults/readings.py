@@ -38,8 +38,8 @@ class Readings:
 UNDECLARED = Readings(
     names=("as_described", "as_coded"),
     about=(
-        "The injections, as the text that describes the fault means them.",
-        "The injections, as the code that was published with it has them.",
+        "The injections according to the text that describes the fault.",
+        "The injections according to the code that was published with that text.",
     ),
 )
 """The readings of a library without a file `readings.yaml`."""

@@ -71,7 +71,7 @@ class Variant:
         return self.readings[self._written(reading)]
 
     def hold(self, reading: str) -> Hold | None:
-        """Return how long the fault stays active; None: as long as its trigger."""
+        """Return how long the fault stays active; None: the trigger decides."""
         return self.holds[self._written(reading)]
 
     def _written(self, reading: str) -> str:
@@ -114,8 +114,8 @@ _Number = Annotated[float, Field(ge=-_LARGEST, le=_LARGEST, allow_inf_nan=False)
 
 
 class SweepModel(StrictModel, title="A sweep"):
-    """Ranges of equal width at equal distances. `{first: [15, 24], step: 10, last: [245, 254]}` is the 24
-    ranges [15, 24], [25, 34] ... [245, 254]; one value is drawn from each, both ends included."""
+    """Ranges of equal width at equal distances. `{first: [15, 24], step: 10, last: [245, 254]}` gives the
+    24 ranges [15, 24], [25, 34] ... [245, 254]. One value is drawn from each range, both ends included."""
 
     first: list[_Number] = Field(description="The first range, [low, high].")
     step: float = Field(gt=0.0, allow_inf_nan=False, description="The distance from one range to the next.")
@@ -163,7 +163,7 @@ class _DrawModel(StrictModel, title="A draw"):
 
 
 _LATCHES = (
-    "How long the fault stays active, if that differs from the trigger: `to_end` for a fault that latches"
+    "How long the fault stays active, if the trigger does not determine it: `to_end` for a fault that latches"
 )
 
 
@@ -172,14 +172,14 @@ class _ReadingModel(StrictModel, title="A reading"):
         None, description=f"{_LATCHES} in this reading; default: the variant's `hold`."
     )
     injections: list[InjectionModel] = Field(
-        description="At least one. The fault is activated when any of them is executed while triggered."
+        description="At least one. The fault is activated if any of them runs while the fault is active."
     )
 
 
 class _VariantBase(StrictModel, title="A variant"):
     """A variant is one row of the library: its injections share one trigger, one draw and one aim."""
 
-    aim: str = Field(description="The hazard that the fault is meant to cause, one of the target's.")
+    aim: str = Field(description="The hazard that the fault is meant to cause, one of the target's hazards.")
     about: str = Field(description="What this variant does.")
     changes: list[str] = Field(
         default_factory=list,

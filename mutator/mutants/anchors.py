@@ -1,4 +1,4 @@
-"""Resolves anchors: a function's qualified name and a statement, to lines of a source file."""
+"""Resolves anchors, such as an assignment in a function, to lines of a source file."""
 
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field
@@ -30,7 +30,7 @@ class Site:
     last: int
     after: bool
     alone: bool
-    reindent: int  # lines that a guard may indent: all, or only the first if a string spans lines
+    reindent: int  # lines that a guard can indent: all, or only the first if a string spans lines
     indent: bytes
     names: frozenset[str]  # used in the function
 
@@ -43,7 +43,7 @@ class ParsedFile:
     encoding: str
     newline: bytes
     indent_unit: bytes
-    import_line: int  # an import may be inserted before it
+    import_line: int  # imports are inserted before it
     functions: Mapping[str, tuple[Function, ...]]
     places: frozenset[Place]  # according to `ast`
     expressions: Mapping[str, tuple[Expression, ...]]  # by function
@@ -140,7 +140,7 @@ def functions_named(file: ParsedFile, function: str) -> tuple[Function, ...]:
         raise MutatorError(
             f"no function '{function}'",
             where=file.where,
-            expected=f"one of {', '.join(known) or 'none: the file has no function'}",
+            expected=f"a function of the file: {', '.join(known) or 'it has none'}",
             remedy="correct the qualified name" + suggestion(name, known),
         )
     return functions
@@ -227,7 +227,7 @@ def _choose(
     verb = anchor.kind.partition("_")[2]
     name = as_written(anchor.name)
     pairs = [(f, s) for f in functions for s in f.statements if name in s.names(verb)]
-    # heads of blocks are numbered last, so that existing numbers still select the same statements
+    # heads of blocks are numbered last, so that `nth` in older specs selects the same statements
     hits = sorted(
         (pair for pair in pairs if pair[1].reason is None), key=lambda pair: pair[1].opens is not None
     )
@@ -265,7 +265,7 @@ def _no_single_hit(
         remedy = "anchor at another statement"
     else:
         got, line, expected = f"no {what} {place}", functions[0].line, _candidates(functions, verb)
-        remedy = "correct the name as it is written in the source"
+        remedy = "write the name exactly as in the source"
     return MutatorError(got, where=file.where, line=line + 1, expected=expected, remedy=remedy)
 
 

@@ -11,7 +11,7 @@ from mutator.mutants.splicing import Edit, Rank, apply_edits, in_order, joined
 
 
 def compile_changed(file: ParsedFile, edits: Iterable[Edit], key: ReuseKey) -> bool:
-    """Return whether the file certainly compiles with these edits and with all other edits of their key.
+    """Return whether the file certainly compiles with these edits and with all others of the same key.
 
     True if the changed functions compile, both with these edits and with normalized ones, and the file
     compiles with the import of the probe. False is inconclusive.

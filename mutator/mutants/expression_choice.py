@@ -13,7 +13,7 @@ _MOST = 12  # candidates listed in an error
 
 
 def as_written(name: str) -> str:
-    """Return the normalized text that anchors compare, or invalid text unchanged."""
+    """Return the normalized text by which anchors are compared; invalid text is unchanged."""
     try:
         return ast.unparse(ast.parse(name.strip(), mode="eval"))
     except (SyntaxError, ValueError, RecursionError, MemoryError):
@@ -49,7 +49,7 @@ def choose_expression(
         where=where,
         line=line + 1,
         expected=_candidates(known, kind, name),
-        remedy="correct the text as it is written in the source",
+        remedy="write the expression exactly as in the source",
     )
 
 

@@ -117,7 +117,7 @@ def _base(node: ast.expr) -> _Pairs:
 
 def _of(node: ast.expr, *roles: Role) -> _Pairs:
     if isinstance(node, ast.JoinedStr):
-        yield node, roles  # nested ones have positions only from Python 3.12 on
+        yield node, roles  # expressions in it have positions only in Python 3.12 and later
         return
     if isinstance(node, ast.Call):
         roles = (*roles, (AnchorKind.RESULT, source_of(node.func), None))

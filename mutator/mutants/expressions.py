@@ -1,6 +1,6 @@
 """Finds expressions whose value can be changed in place, such as returned values and arguments.
 
-Python's parser finds them; LibCST must see an expression in the same place. Expressions are skipped if they
+Python's parser finds them; LibCST must find an expression in the same place. Expressions are skipped if they
 begin or end on a line that cannot end in a tag, because it ends inside a string or in a backslash.
 """
 
@@ -155,7 +155,7 @@ NO_PARTS: dict[str, object] = {"left": None, "right": None, "called": None, "arg
 
 
 def parts_of(expression: Expression) -> dict[str, object]:
-    """Return the parts of an expression that templates may use, None or empty if missing.
+    """Return the parts of an expression that templates can use, None or empty if missing.
 
     `left` and `right` are operands, `called` is a call's function.
     """

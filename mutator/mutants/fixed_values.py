@@ -34,7 +34,7 @@ class FixedValue:
     name: str  # `LIMIT`, `Class.LIMIT` or a parameter of `function`
     first: int
     last: int
-    index: int  # the tagged line goes before this line, indented by `indent`
+    index: int  # the tagged line is inserted before this line, indented by `indent`
     indent: bytes
     path: str  # dotted path from the module, in the compiler's spelling
     reason: str | None = None  # why the value cannot be set
@@ -203,7 +203,7 @@ def choose_fixed(known: Sequence[FixedValue], location: FaultLocation, where: Pa
             f"no {what}",
             where=where,
             expected=f"one of {', '.join(names)}" if names else "another anchor: there is none of this kind",
-            remedy="correct the name as it is written in the source" + suggestion(name, names),
+            remedy="write the name exactly as in the source" + suggestion(name, names),
         )
     if found.reason:
         raise MutatorError(

@@ -44,7 +44,7 @@ def importers(tree: SourceTree, path: str, name: str) -> tuple[str, ...]:
     files = [tree.derived(file, _imports) for file in tree.files if file.endswith(".py")]
     exported = {file.module: file.exported for file in files}
     found, refused = [(module_name(path), name)], set[str]()
-    for known in found:  # grows during the loop: an imported name may be imported again
+    for known in found:  # grows during the loop: an imported name can be imported again
         for file in files:
             for one in file.names:
                 if (one.module, one.name) not in (known, (known[0], _ALL)):

@@ -15,7 +15,7 @@ from mutator.model import Injection
 IMPORT_TAG = "probe"  # on the line that imports the probe
 OBSERVE_TAG = "observe"  # on the statement that passes the ground truth to the probe
 ORIGINAL = "original"  # the original value in a line that sets a value
-# an id in quotes, in a name or in a tag, which may have several ids; not a number of eight digits
+# an id in quotes, in a name or in a tag, which can have several ids; not a number of eight digits
 INJECTION_ID = (
     r"(?:(?:(?<=[\"'_])|(?<=fi:))[0-9a-f]{8}(?![0-9A-Za-z.])"
     r"|(?<=[0-9a-f]\+)[0-9a-f]{8}(?=(?:\+[0-9a-f]{8})* was:))"
@@ -200,7 +200,7 @@ def adds_fault(hunk: str) -> bool:
 
 
 def settings(patch: str, begin: int, end: int) -> Iterator[tuple[int, int, str]]:
-    """Yield begin, end and name of each setting that differs between probes."""
+    """Yield begin, end and name of each setting that can differ between probes."""
     for match in _SETTING.finditer(patch, begin, _end_of_settings(patch, begin, end)):
         name = match.lastgroup or ""
         yield *match.span(name), name

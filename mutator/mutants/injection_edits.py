@@ -38,8 +38,8 @@ def injection_edit(
 ) -> Edit | ValueEdit:
     """Return the edit of one injection in its file, tagged with `name`.
 
-    `tree` has the files that may import a constant. MutatorError for a missing anchor, a name unknown in the
-    function, and lines that would change what the target's names mean while the fault is inactive.
+    `tree` has the files that might import a constant. MutatorError for a missing anchor, a name unknown in
+    the function, and lines that would change what the target's names mean while the fault is inactive.
     """
     model = models.get(injection.model)
     if injection.location.anchor.kind in VALUE_ANCHORS:
@@ -106,7 +106,7 @@ def _set_within(node: ast.AST) -> set[str]:
 def _needs_more(file: ParsedFile, model: FaultModel, line: int) -> MutatorError:
     wanted = {
         None: f"an expression that has {', '.join(sorted(model.parts))}",
-        Needs.CALL: "a call: an anchor `result`, or another whose expression is a call",
+        Needs.CALL: "a call: an anchor `result`, or another anchor whose expression is a call",
         Needs.STATEMENT: "a statement, or an expression in a function",
         Needs.NEXT_STATEMENT: "a statement, and another one after it",
     }
@@ -209,5 +209,5 @@ def _check_scopes(file: ParsedFile, site: Site, edit: Edit) -> None:
             where=file.where,
             line=site.first + 1,
             expected="a variable that the function sets itself, or declares `global` or `nonlocal`",
-            remedy="inject where the variable is set, or into a variable that is set from it",
+            remedy="inject where the variable is set, or into another variable that is computed from it",
         )

@@ -79,7 +79,7 @@ class _Lister:
         try:
             site = self.file.resolve(location)
         except MutatorError:
-            return  # it shares its line, or nothing follows it
+            return  # for example, because the statement shares its line
         models = tuple(model.name for model in self.models if self.fits(model, kind, site))
         if models:
             yield ListedPlace(

@@ -6,8 +6,8 @@ compiles, so does every source that normalizes to it:
 * A number becomes 0, or 0.0 if it has a point or an exponent. Only whole literals as `repr` writes them are
   replaced, up to a length that Python always accepts. So every token keeps its kind. Where the compiler
   compares values (a mapping pattern must not repeat a key), equal numbers are the worst case.
-* An id (hex digits) becomes one that is neither a token alone (`0f...`) nor a character (`\\U0f...`). So
-  normalized source compiles only if its ids are in strings, comments or names, where any id compiles.
+* An id (hex digits) becomes one that is neither a valid token (`0f...`) nor a valid character (`\\U0f...`).
+  So normalized source compiles only if its ids are in strings, comments or names, where any id compiles.
   Equal ids stay equal, and different ids stay different.
 """
 

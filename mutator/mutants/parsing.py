@@ -87,7 +87,7 @@ def libcst_module(data: bytes, where: Path) -> tuple[cst.Module, Positions]:
 
 
 def import_line(module: cst.Module, positions: Positions) -> int:
-    """Return the index of the line before which an import goes: after docstring and `__future__` imports."""
+    """Return the index of the line before which to insert an import: after docstring and `__future__`."""
     after = None
     for i, node in enumerate(module.body):
         if not isinstance(node, cst.SimpleStatementLine):

@@ -129,7 +129,7 @@ def silent_report(mutant: str | None) -> dict[str, Any]:
 def report_problem(report: object, mutant: str, injections: Sequence[str]) -> str:
     """Return what is wrong with a probe's report for a mutant with these injections; empty if it is valid.
 
-    Nothing in the report is trusted, because a mutant may have overwritten anything in its probe.
+    Nothing in the report is trusted, because a mutant can overwrite anything in its probe.
     """
     if not isinstance(report, dict):
         return "its probe has no report"
@@ -160,7 +160,7 @@ def was_triggered(report: Mapping[str, Any] | None) -> bool:
 
 
 def activation_of(report: Mapping[str, Any]) -> Activation | None:
-    """Return first and last execution of all injections together, and their number; None if nothing ran."""
+    """Return the first and last execution of any injection, and their number; None if there is none."""
     injections = report.get("injections")
     ran = [i for i in injections.values() if i and i["count"]] if isinstance(injections, dict) else []
     if not ran:

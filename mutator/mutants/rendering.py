@@ -67,7 +67,7 @@ def exchanged(arguments: Sequence[str], first: int, second: int) -> list[str]:
         if part is None or first == second or part["value"].startswith("*"):
             raise MutatorError(
                 f"arguments {first} and {second} of {len(parts)}: {', '.join(arguments) or 'none'}",
-                expected="two different ones, counted from 1, without stars",
+                expected="two different arguments, counted from 1, without stars",
                 remedy="correct the numbers",
             )
     values = [part["value"] for part in parts if part]

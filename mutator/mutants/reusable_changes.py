@@ -71,11 +71,11 @@ def inserted_lines(edits: Sequence[Edit]) -> list[bytes]:
 
 
 def always_compiles(file: ParsedFile, change: ReusableChange, key: ReuseKey) -> bool:
-    """Return whether the change compiles with all lines of this key, i.e. with normalized ones.
+    """Return whether the change compiles with all lines that have this key, i.e. with normalized ones.
 
     It then un-splices too, because that depends only on the tags, which are part of the key.
     """
-    texts = (text.rstrip("\r\n") for *_, text in key)  # the file's last line may have no end
+    texts = (text.rstrip("\r\n") for *_, text in key)  # the file's last line can lack a line end
     lines = "\n".join(texts).encode(file.encoding).splitlines()
     return compiles(change.filled(lines).data)
 

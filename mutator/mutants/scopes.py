@@ -1,4 +1,4 @@
-"""What names mean in the functions of a source, according to the compiler.
+"""What names mean in the functions of a source file, according to the compiler.
 
 An assignment anywhere in a function makes the name local to the whole function, even if it never runs.
 """

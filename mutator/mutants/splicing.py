@@ -115,7 +115,7 @@ def value_change(
 
 
 def in_lines(file: ParsedFile, edits: Iterable[Edit | ValueEdit]) -> list[Edit]:
-    """Convert edits of values to edits that replace whole lines of the target; other edits stay."""
+    """Convert edits of values to edits that replace whole lines of the target; other edits are unchanged."""
     edits = list(edits)
     values = sorted((e for e in edits if isinstance(e, ValueEdit)), key=lambda e: e.start)
     for one, other in pairwise(values):
@@ -152,7 +152,7 @@ def probe_import(file: ParsedFile, package: str | None) -> Edit:
             where=file.where,
             line=1,
             expected="a comment or docstring there, or no mark",
-            remedy="save the file without byte order mark",
+            remedy="save the file without a byte order mark",
         )
     line = import_statement(package).encode(file.encoding)
     return Edit(index=file.import_line, rank=Rank.BEFORE, lines=(line + file.newline,))
@@ -191,7 +191,7 @@ def _encoded(file: ParsedFile, text: str, line: int) -> bytes:
 def in_order(edits: Iterable[Edit]) -> list[Edit]:
     """Sort edits from the top of the file to its end; edits of equal index and rank keep their order.
 
-    An exception: lines after a whole class come after lines after its last function.
+    Exception: lines inserted after a class follow those inserted after its last function.
     """
     return sorted(edits, key=lambda e: (e.index, e.rank, -_depth(e)))
 
@@ -210,7 +210,7 @@ def apply_edits(file: ParsedFile, edits: Iterable[Edit]) -> tuple[Piece, ...]:
                 "two guards around one statement, or an injection inside a guarded one",
                 where=file.where,
                 line=edit.index + 1,
-                expected="one guard a statement, and nothing else in it",
+                expected="one guard per statement, and no other injection in it",
                 remedy="remove one of the injections",
             )
         _keep(pieces, file.lines[done : edit.index])

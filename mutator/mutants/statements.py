@@ -239,7 +239,7 @@ def _effects(
 def _that_stay(names: Sequence[str]) -> Iterator[str]:
     """Yield the assigned names without duplicates, and without items whose index is assigned later.
 
-    In `a[i], i = 1, 2`, `a[i]` is another item afterwards.
+    In `a[i], i = 1, 2`, `a[i]` names another item afterwards.
     """
     unique = list(dict.fromkeys(names))
     for place, name in enumerate(unique, 1):

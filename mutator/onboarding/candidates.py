@@ -38,7 +38,7 @@ class ValueCandidate:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoopCandidate:
-    """A function that a loop may call in each step, and the values that it computes, likeliest first."""
+    """A function that might be the step of a loop, and the values that it computes, likeliest first."""
 
     module: str
     path: str
@@ -57,7 +57,7 @@ class LoopCandidate:
 
 
 def loop_candidates(found: Survey) -> tuple[LoopCandidate, ...]:
-    """Return public functions that may be the step of a loop, likeliest first."""
+    """Return public functions that might be the step of a loop, likeliest first."""
     looped = Counter(name for module in found.modules for name in _called_in_loops(module.tree))
     candidates = [one for module in found.modules for one in _of_module(module, looped)]
     return tuple(sorted(candidates, key=lambda one: (-one.score, one.path, one.line)))

@@ -122,7 +122,9 @@ def _of_loop(best: LoopCandidate | None) -> dict[str, Any]:
         "path": best.path,
         "function": best.name,
         "value": first,
-        "others": f"Others of {best.name}: {places}" if places else f"{best.path}:{best.line} has no other",
+        "others": f"Other values of {best.name}: {places}"
+        if places
+        else f"No other value is computed at {best.path}:{best.line}",
     }
 
 

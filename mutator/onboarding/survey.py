@@ -69,7 +69,7 @@ def _installed(name: str) -> Survey:
         raise MutatorError(
             f"no installed package '{name}'",
             argument="target",
-            expected="its import name in Python",
+            expected="the import name of a package",
             remedy="install it in mutator's environment, or correct the name",
         )
     return replace(_of(place.parent, (place.name,)), installed=name, requires=_distribution(name))

@@ -131,7 +131,7 @@ def _paths(manifest: TargetManifest, path: str) -> list[str]:
         raise MutatorError(
             f"no file of target {manifest.name} matches '{path}'",
             argument="in",
-            expected="PATH or PATH::FUNCTION of files that may be changed; `*` is a wildcard, `**` also "
+            expected="PATH or PATH::FUNCTION, in files that can be changed; `*` is a wildcard, `**` also "
             "matches across folders",
             remedy="correct the place",
         )

@@ -93,7 +93,9 @@ def _omissions(file: ParsedFile, facts: Facts, function: str) -> Iterator[Mutati
 
 
 def _can_be_left_out(statement: Statement, facts: Facts, function: int) -> bool:
-    """Return False for the first binding of a local name: without it, later uses of the name would fail."""
+    """Return whether a statement can be omitted. The first binding of a local name cannot, because later
+    uses of the name would fail.
+    """
     if not statement.alone or statement.is_return:
         return False
     names = [name for name in statement.assigns if name.isidentifier()]

@@ -1,4 +1,4 @@
-"""Finds the lines that golden runs execute, each run measured once in a separate process and cached.
+"""Finds the lines that golden runs execute. Each run is measured once, in a separate process, and cached.
 
 Lines executed before the first observation are ignored, because no fault can be active then.
 """
@@ -34,7 +34,7 @@ class GoldenDrive:
 
 
 def lines_of(manifest: TargetManifest, drives: Sequence[GoldenDrive], limits: Limits) -> list[Executed]:
-    """Return the executed lines of each drive, measured unless cached. MutatorError if a drive fails."""
+    """Return the lines that each golden run executes, measured unless cached. MutatorError if a run fails."""
     found = [_recalled(_key(manifest, drive)) for drive in drives]
     if any(lines is None for lines in found):
         with ScratchFolder("mutator-lines-") as scratch:

@@ -15,7 +15,7 @@ _OWN_NAMES: dict[type[ast.AST], str] = {ast.comprehension: "target", ast.Lambda:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Facts:
-    """Statements of a file's functions. Line numbers start at 1.
+    """Facts about the statements of a file's functions. Line numbers start at 1.
 
     * `augmented`: the operator of an augmented assignment, by the extent of its right-hand side
     * `texts`: the source of simple statements, by first line

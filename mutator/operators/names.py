@@ -12,7 +12,7 @@ MODELS = (*(f"operator_{name}" for name in _OWN), "omission")  # fault models th
 
 
 class Operator(StrEnum):
-    """The mutation operators. If two make the same change, the first one gets it."""
+    """The mutation operators. A change that two operators make belongs to the first."""
 
     ARITHMETIC = "arithmetic"
     COMPARISON = "comparison"
@@ -29,7 +29,7 @@ def operator_of(fault: Fault) -> Operator | None:
 
 
 def operators_named(names: Iterable[str]) -> tuple[Operator, ...]:
-    """Return the named operators without duplicates. MutatorError for an unknown name, or for none."""
+    """Return the named operators without duplicates. MutatorError for an unknown name, or without names."""
     known = [one.value for one in Operator]
     found: dict[Operator, None] = {}
     for name in names:
@@ -37,10 +37,10 @@ def operators_named(names: Iterable[str]) -> tuple[Operator, ...]:
             raise MutatorError(
                 f"no operator '{name}'",
                 argument="operators",
-                expected=f"some of {', '.join(known)}",
+                expected=f"one or more of {', '.join(known)}",
                 remedy="correct the name" + suggestion(name, known),
             )
         found[Operator(name)] = None
     if not found:
-        raise MutatorError("no operator given", argument="operators", expected=f"some of {', '.join(known)}")
+        raise MutatorError("no operator", argument="operators", expected=f"one or more of {', '.join(known)}")
     return tuple(found)

@@ -53,7 +53,7 @@ def rules_for(expression: Expression, augmented: ast.operator | None) -> Iterato
     """
     node = expression.node
     if any(isinstance(inner, _UNCALCULATED) for inner in ast.walk(node)):
-        return  # computing it twice would suspend the function
+        return  # templates refuse `yield`
     yield from _arithmetic(node, augmented)
     yield from _comparison(node)
     for value in _constants(node):

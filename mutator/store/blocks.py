@@ -1,4 +1,4 @@
-"""Files of checksummed blocks of bytes, each with one process that appends. They hold patches and series.
+"""Files of checksummed blocks of bytes, which hold patches and series. One process appends to each file.
 
 A block consists of a head of 19 bytes, a key (text) and the content. The head is little-endian: the mark
 `FIB1`, a kind (1 byte), the length of the key (2) and of the content (4), and the first 8 bytes of the
@@ -17,7 +17,7 @@ from mutator._common.files import raising_disk_full
 
 _MARK = b"FIB1"
 _HEAD, _CHECK = struct.Struct("<4sBHI"), 8
-_BATCH, _BATCH_S = 32, 2.0  # the most blocks, and seconds, between two syncs
+_BATCH, _BATCH_S = 32, 2.0  # at most this many blocks, and seconds, between two syncs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,7 +34,7 @@ class Block:
 class Blocks:
     """The content of a block file.
 
-    A last block that a kill cut short is not damage.
+    An incomplete last block, which a killed process leaves, is not damage.
     """
 
     path: Path

@@ -23,11 +23,11 @@ def clean(path: Path) -> None:
     check(path)
     with owned(path, patience_s=0.0):
         found = check(path)  # check again, because now nobody else can write to the folder
-        _delete(path, sorted(found, key=lambda file: file == path / HEAD))  # run.json goes last
+        _delete(path, sorted(found, key=lambda file: file == path / HEAD))  # run.json is deleted last
 
 
 def clear(path: Path) -> None:
-    """Delete the files that a killed command left in an unfinished run folder; other files stay.
+    """Delete the files that a killed command left in an unfinished run folder, and no other files.
 
     run.json is deleted first. Half-written files, which show that a command was killed, are deleted last.
     """
@@ -36,7 +36,7 @@ def clear(path: Path) -> None:
 
 
 def finish_deletion(path: Path) -> bool:
-    """Wait for a command that may be deleting the run folder, then delete what was written meanwhile.
+    """Wait for a command that might be deleting the run folder, then delete files written in the meantime.
 
     Return whether the folder is gone.
     """
@@ -69,7 +69,7 @@ def check(path: Path) -> list[Path]:
         raise MutatorError(
             f"a link to {path.readlink()}",
             where=path,
-            expected="a run folder itself",
+            expected="a run folder, not a link to one",
             remedy="name the link's target",
         )
     if not RunFolder.exists(path):

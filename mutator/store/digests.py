@@ -1,7 +1,7 @@
 """`digests.json`: size and SHA-256 of every verified file of a run folder, used to detect changes.
 
-Only the folder's owner writes it. Before a file is rewritten, its old and new digest are announced;
-afterwards they are confirmed. If the process is killed in between, each file matches one of the two.
+Only the folder's owner writes it. Before a file is rewritten, its old and new digests are announced;
+afterwards the new one is confirmed. If the process is killed in between, each file matches one of the two.
 """
 
 import hashlib
@@ -27,8 +27,8 @@ from mutator.errors import MutatorError
 from mutator.store.lines import read_segment
 
 SCHEMA, FILE = "digests/1", "digests.json"
-_WORTH_THREADS = 20_000_000  # bytes
-SEGMENTS = ("records", "proof")  # folders of append-only files; a file is entered when it is closed
+_WORTH_THREADS = 20_000_000  # bytes from which threads save time
+SEGMENTS = ("records", "proof")  # folders of append-only files; their digests are added when they are closed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,7 +93,7 @@ class DigestingFile:
 
 
 def sha256(path: Path) -> str:
-    """Return the SHA-256 of a file, which may be larger than memory; '' if it is missing."""
+    """Return the SHA-256 of a file, which can be larger than memory; '' if it is missing."""
     found = Digest.of_file(path)
     return found.sha256 if found else ""
 
@@ -111,7 +111,7 @@ class Ledger:
     finished: bool = False
 
     def accepts(self, name: str, found: Digest | None) -> bool:
-        """Return whether a file may have this digest. A file being rewritten may be old, new or missing."""
+        """Return whether a digest of a file is valid. A file being rewritten can be old, new or missing."""
         known = self.files.get(name)
         if name not in self.rewriting:
             return known.is_of(found) if known else found is None
@@ -133,7 +133,10 @@ def read(run: Path) -> Ledger:
     as_written = path.read_bytes() == json_bytes(data)
     if data.pop("sum", None) != digest(data) or not as_written:
         raise MutatorError(
-            "changed since it was written", where=path, expected="its own checksum", remedy=remedy
+            "changed since it was written",
+            where=path,
+            expected="content that matches its checksum",
+            remedy=remedy,
         )
     try:
         return Ledger(
@@ -163,7 +166,7 @@ def _plain(one: Digest) -> dict[str, Any]:
 def rewriting(
     run: Path, coming: Mapping[str, Digest | None], *, finished: bool | None = None
 ) -> Iterator[None]:
-    """Announce that the block changes these files (None: deletes them), and confirm the changes at the end.
+    """Announce that the `with` block changes files (None: deletes them); confirm the changes at its end.
 
     If the process is killed within the block, the folder still opens, and the files can be rewritten.
     `finished` is as in `close_segments`, but applies from the start of the block.
@@ -195,9 +198,9 @@ def settled(run: Path) -> Ledger:
 
 
 def close_segments(run: Path, *, finished: bool | None = None) -> None:
-    """Enter the complete segments into the ledger, without a torn last line.
+    """Cut a torn last line off each new segment, and add the segment's digest to the ledger.
 
-    `finished`: whether the run is finished from now on; None: as before. MutatorError for a damaged line.
+    `finished`: whether the run is now finished; None: as before. MutatorError for a damaged line.
     """
     before = settled(run)
     files = dict(before.files)

@@ -1,6 +1,6 @@
-"""Lines of checksummed files, indexed by experiment. All are verified together; each is parsed when read.
+"""Lines of checksummed files, indexed by experiment. A line is parsed when it is read.
 
-For a million experiments this takes some 200 MB; their records as objects would take 5 GB.
+The index of a million experiments takes about 200 MB; their records as objects would take 5 GB.
 """
 
 import json
@@ -25,7 +25,7 @@ T = TypeVar("T")
 class IndexedLines(Mapping[str, T], Generic[T]):
     """Map each experiment to the object that `made` creates from its line, in order of first appearance.
 
-    `replaces(line, known)` decides whether a second line of an experiment replaces the first, and may raise.
+    `replaces(line, known)` decides whether a second line of an experiment replaces the first, and can raise.
     MutatorError for a damaged line or unexpected content.
     """
 
@@ -67,7 +67,7 @@ class IndexedLines(Mapping[str, T], Generic[T]):
         return Line(self._files.paths[file], self._number[at], data)
 
     def __getitem__(self, name: str) -> T:
-        last = self._last  # another thread may replace it in the meantime
+        last = self._last  # another thread can replace it in the meantime
         if last is None or last[0] != name:
             self._last = last = name, self._read_one(name)
         return last[1]

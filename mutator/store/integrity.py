@@ -23,7 +23,7 @@ from mutator.store.shards import Shard
 SEALED = ("plan", "golden", *digests.SEGMENTS)  # folders in which a finished run has no unknown files
 WHOLE = (HEAD, CAMPAIGN, plan_file.EXPERIMENTS, plan_file.FAULTS)  # files that cannot be recreated
 TOP = (HEAD, CAMPAIGN, "plan.csv", "checks.json", "reviewed.json")
-_MANY = 5  # the most experiments that one message names
+_MANY = 5  # at most this many experiments are named in one message
 
 
 def problems(
@@ -83,7 +83,7 @@ def digests_of(run: Path, ledger: Ledger) -> dict[str, Digest | None]:
 
 
 def key_of(run: Path, found: Mapping[str, Digest | None]) -> str:
-    """Return the `verified_runs.key_of` of these files and the list of required files."""
+    """Return the `verified_runs.key_of` of these files and the ledger."""
     ledger = Digest.of_file(run / digests.FILE)
     told = {**found, digests.FILE: ledger}
     return verified_runs.key_of({name: one.sha256 if one else None for name, one in told.items()})
@@ -161,12 +161,12 @@ def _told(one: Digest) -> str:
 
 def _remedy(run: Path, name: str) -> str:
     if name in WHOLE:
-        return "take it from a copy of the run folder, or use a new one"
-    return f"`mutator verify {run} --repair` puts it aside; the same `mutator run` then fills the gap"
+        return "restore it from a copy of the run folder, or use a new folder"
+    return f"`mutator verify {run} --repair` sets damage aside; the same `mutator run` then fills the gap"
 
 
 def _open_segments(run: Path, ledger: Ledger) -> Iterator[MutatorError]:
-    """Yield the damaged lines of segments that are in use or were left by a killed command."""
+    """Yield a problem for each damaged line of segments that are in use or that a killed command left."""
     for name in digests.segments(run):
         if name not in ledger.files:
             try:
@@ -218,7 +218,7 @@ def id_problems(
             yield MutatorError(
                 f"no record of {', '.join(missing[:_MANY])}{more}",
                 where=run / kind,
-                expected="a record of each planned experiment, because the run is finished",
+                expected="a record of each planned experiment, because the run is marked as finished",
                 remedy=_remedy(run, ""),
             )
 

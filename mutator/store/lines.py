@@ -1,8 +1,8 @@
-"""Files of checksummed lines, each with one process that appends. Bytes are verified before they are parsed.
+"""Files of checksummed lines. One process appends to each file. Bytes are verified before they are parsed.
 
 A line is a JSON object that begins with its checksum, `{"sum":"<16 hex>",...}`: a shortened SHA-256 of the
 previous line's checksum and of all bytes after its own checksum. A changed, missing, duplicate or moved line
-is therefore detected by its number, and the lines after it can still be verified.
+is therefore detected, and the lines after it can still be verified.
 """
 
 import json
@@ -28,9 +28,9 @@ _BODY = len(_KEY) + _WIDTH + len(_AFTER)
 class LineWriter:
     """Append checksummed JSON lines to a new file, synced in batches.
 
-    The first line is `head`, which has the schema, with the file's name added. `first` is called before each
-    sync, to sync the data to which the lines refer. If a line does not fit on the disk, it is removed again,
-    and DiskFull is raised.
+    The first line is `head`, which contains the schema, with the file's name added. `first` is called before
+    each sync, to sync the data to which the lines refer. If a line does not fit on the disk, it is removed
+    again, and DiskFull is raised.
     """
 
     def __init__(self, path: Path, head: Mapping[str, Any], first: Callable[[], None] = lambda: None) -> None:
@@ -91,7 +91,7 @@ class Segment:
     """The content of a line file: intact lines by number from 1, numbers of damaged lines, and the end of the
     last complete line.
 
-    Bytes after that end belong to a line that a kill cut short.
+    Bytes after that end are an incomplete line, which a killed process leaves.
     """
 
     path: Path
@@ -102,13 +102,13 @@ class Segment:
 
     def problem(self, number: int) -> MutatorError:
         run = self.path.parent.parent
-        mend = f"`mutator verify {run} --repair` puts it aside; the same `mutator run` then fills the gap"
+        mend = f"`mutator verify {run} --repair` sets it aside; the same `mutator run` then fills the gap"
         return MutatorError(
             "a damaged line",
             where=self.path,
             line=number,
             expected="bytes that match its checksum" if self.checksums else "a whole JSON object",
-            remedy=mend if self.checksums else "take the file from a copy of the run folder",
+            remedy=mend if self.checksums else "restore the file from a copy of the run folder",
         )
 
     def content(self, number: int) -> dict[str, Any]:
@@ -136,7 +136,7 @@ class Segment:
         head = self.content(1)
         check_schema(head.get("schema"), schema, self.path)
         if self.checksums != (head["schema"] == schema):
-            raise MutatorError(f"schema {head['schema']!r} in a run folder of another", where=self.path)
+            raise MutatorError(f"schema {head['schema']!r} in a folder of another schema", where=self.path)
         if self.checksums and head.get("file") != _name(self.path):
             raise MutatorError(
                 f"was written as {head.get('file')}",
@@ -184,7 +184,7 @@ def verified_lines(path: Path, schema: str, *, checksums: bool) -> Iterator[tupl
     last, offset = b"", 0
     with _no_pipe(path).open("rb") as file:
         for number, line in enumerate(file, start=1):
-            if not line.endswith(b"\n"):  # a kill cut this line short
+            if not line.endswith(b"\n"):  # incomplete, because the process was killed
                 return
             data = line[:-1]
             if checksums and not _is_intact(last, data):
@@ -228,7 +228,7 @@ def _no_pipe(path: Path) -> Path:
         "no file",
         where=path,
         expected="lines",
-        remedy="take it from a copy of the run folder, or delete it: `mutator verify` lists what is lost",
+        remedy="restore it from a copy of the run folder, or delete it; `mutator verify` lists what is lost",
     )
 
 

@@ -81,7 +81,7 @@ class _Whole:
 
 @dataclass(frozen=True, slots=True)
 class _Place:
-    """A patch's file, its block, and the complete patch that it depends on or is itself."""
+    """A patch's file and block, and the complete patch on which it depends (itself, if complete)."""
 
     path: Path
     block: Block
@@ -127,8 +127,8 @@ class Patches:
     def file(self, experiment_id: str, worker: str = "") -> Path:
         """Return the file that contains, or should contain, an experiment's patch.
 
-        Without a stored patch, this is a damaged file; if there is none, the file of the `worker` in the
-        record, if known.
+        If the patch is not stored, return a damaged file; if none is damaged, the file of `worker`, if given,
+        or else the folder.
         """
         place = self._places.get(experiment_id)
         if place is not None:

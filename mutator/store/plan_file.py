@@ -31,7 +31,7 @@ from mutator.store.plan_lines import experiment_as_written
 
 EXPERIMENTS = "plan/experiments.jsonl"
 FAULTS = "plan/faults.jsonl"
-_REMEDY = "the plan is damaged: take the file from a copy of the run folder, or plan into a new one"
+_REMEDY = "the plan is damaged: restore the file from a copy of the run folder, or plan into a new one"
 
 _ID = re.compile(rb'\{(?:"after_hazard":"[a-z_]+",)?"fault":"[0-9a-f]{16}","id":"([0-9a-f]{16})",')
 _HASHED = ("fault", "scenario", "scenario_digest", "method", "trigger", "seed", "setting")  # as Experiment.id
@@ -141,7 +141,7 @@ def read_all(run: Path) -> tuple[Experiment, ...]:
 
 
 class ExperimentsInOrder(Sequence[Experiment]):
-    """Every experiment in plan order, read on access, because a plan may have a million experiments."""
+    """Every experiment in plan order, read on access, because a plan can have a million experiments."""
 
     def __init__(self, run: Path, chunks: Sequence[Chunk]) -> None:
         self._run, self._chunks = run, chunks
@@ -312,7 +312,7 @@ def _injection_from(data: Mapping[str, Any]) -> Injection:
 
 
 def _make(kind: type[_T], data: Mapping[str, Any], /, **read: Any) -> _T:
-    """Create a record from its line and the values `read` already. Missing fields get their defaults."""
+    """Create an object from its plain data and the converted values `read`. Missing fields get defaults."""
     if unknown := sorted(data.keys() - _known(kind)):  # type: ignore[arg-type]
         raise MutatorError(
             f"{kind.__name__.lower()} has '{unknown[0]}', which this version of mutator does not know",

@@ -20,7 +20,7 @@ _FIELDS = {field.name for field in fields(Trigger)}
 def experiment_as_written(line: bytes, faults: Mapping[str, Fault]) -> Experiment | None:
     """Read the experiment on a line in canonical JSON.
 
-    Return None for other lines, and if the id does not match. The general reader handles those.
+    Return None for other lines, and if the id does not match; `plan_file` then parses the line.
     """
     if not (found := _LINE.fullmatch(line)):
         return None

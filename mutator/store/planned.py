@@ -46,7 +46,7 @@ class Planned(Mapping[str, Experiment]):
 
 
 def _id(line: bytes) -> str | None:
-    """Return the id on a line; None if it cannot be read, which is reported when the line is read."""
+    """Return the id on a line; None for a damaged line, which is reported when it is read."""
     if found := _ID.search(line):
         return found[1].decode()
     try:

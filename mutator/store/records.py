@@ -1,4 +1,4 @@
-"""Records on disk. Each worker appends to its own file, which is readable after any kill."""
+"""Records on disk. Each worker appends to its own file, which stays readable if the worker is killed."""
 
 import json
 import re
@@ -14,7 +14,7 @@ from mutator.store.indexed_lines import IndexedLines, Line
 SCHEMA = "records/2"
 TIMINGS_SCHEMA = "timings/2"
 _NAMES = tuple(field.name for field in fields(Record))
-_RECORDS = ("activation", "error")  # fields that contain records
+_RECORDS = ("activation", "error")  # fields that contain dataclasses
 
 
 def line_of(record: Record) -> dict[str, Any]:

@@ -21,12 +21,12 @@ from mutator.store.shards import Shard
 from mutator.store.stretches import Stretch, read_stretches
 from mutator.targets.severity import Scale
 
-STOP_NOTE = "Runs end at their first terminal hazard: hazards and alerts after it were not seen."
+STOP_NOTE = "Runs end at their first terminal hazard: later hazards and alerts are not recorded."
 SERIES_MB = 500  # budget of a run's series, unless the plan sets another
 _LOOKS = 3  # attempts to read a folder that its owner is writing
 SCRATCH = "work"
 _TABLES = ("results", "propagation", "timings")
-CONTENT = (  # all files that a run folder may contain; * stands for any text, including folders
+CONTENT = (  # all files that a run folder can contain; * matches any text, including folders
     *(HEAD, digests.FILE, "campaign.yaml", "plan.csv", "plan/*.jsonl", "reviewed.json", "checks.json"),
     *(
         "golden/*/*",
@@ -49,7 +49,7 @@ CONTENT = (  # all files that a run folder may contain; * stands for any text, i
 
 
 class GoldenRun(NamedTuple):
-    """A fault-free run: scenario, changes and, if the run has several seeds, its seed (else None)."""
+    """A fault-free run: scenario, changes and, if the plan has several seeds, its seed (else None)."""
 
     scenario: str
     changes: tuple[str, ...] = ()
@@ -199,7 +199,7 @@ class RunFolder:
 
     @property
     def has_alerts(self) -> bool:
-        """Whether the target has alerts. True for an old folder, which does not record it."""
+        """Whether the target has alerts. True for old folders, which do not record this."""
         return bool(self.head.get("alerts", True))
 
     @property
@@ -267,7 +267,7 @@ class RunFolder:
 
     @property
     def work(self) -> Path:
-        """Scratch folder. It may be deleted while no command owns the run folder."""
+        """Scratch folder. It can be deleted while no command owns the run folder."""
         return self.path / SCRATCH
 
     @property
@@ -283,7 +283,7 @@ class RunFolder:
             raise MutatorError(
                 got,
                 where=self.path,
-                expected="an id in plan.csv, or the beginning of only one",
+                expected="an id in plan.csv, or the beginning of exactly one",
                 remedy="give more of the id" if hits else "see plan.csv or results.csv",
             )
         return hits[0]

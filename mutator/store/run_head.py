@@ -1,4 +1,4 @@
-"""Read and check `run.json`. Damage is reported by its key, whichever version wrote the file."""
+"""Read and check `run.json`. Damage is reported with its key, whichever version wrote the file."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import fields
@@ -13,7 +13,7 @@ from mutator.model import Limits
 
 SCHEMA, FIRST_SCHEMA = "run/3", "run/1"  # the first schema had neither digests nor checksums
 HEAD, CAMPAIGN = RUN_HEAD, "campaign.yaml"
-REMEDY = "the run folder is damaged: take the file from a copy of it"
+REMEDY = "the run folder is damaged: restore the file from a copy of it"
 _TEXTS = {str: str}
 # Types of values: `[x]` a list of x; `{str: x}` names with x; `{"a": x}` an x under `a`; `(x, y)` either.
 _STRETCH = {

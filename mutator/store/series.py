@@ -113,7 +113,7 @@ class SeriesFolder:
         return sorted(path.stem for path in (self.path / KEPT).glob("*.js"))
 
     def read(self, experiment_id: str) -> tuple[Series, Series] | None:
-        """Return (golden, faulty) of an experiment; None without a series. MutatorError for damage."""
+        """Return the golden and the faulty series of an experiment, or None. MutatorError for damage."""
         try:
             return self._read(experiment_id)
         except MutatorError as err:
@@ -122,7 +122,7 @@ class SeriesFolder:
             raise MutatorError(err.got, where=where, expected=err.expected, remedy=remedy) from None
 
     def _read(self, experiment_id: str) -> tuple[Series, Series] | None:
-        if (path := self.kept(experiment_id)).exists():  # rerun, perhaps because the packed one is damaged
+        if (path := self.kept(experiment_id)).exists():  # of a rerun; the packed series can be damaged
             return read_kept(path)
         index = self.index
         if index is None or experiment_id not in index.entries:
@@ -160,7 +160,7 @@ def making_again(run: Path, experiment_id: str = "ID") -> str:
 
 def putting_aside(run: Path) -> str:
     """Return the remedy for a damaged file of series."""
-    aside = f"`mutator verify {run} --repair` puts it aside"
+    aside = f"`mutator verify {run} --repair` sets the file aside"
     return f"{aside}; {making_again(run)} recreates the series of an experiment"
 
 

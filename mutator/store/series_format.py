@@ -1,8 +1,8 @@
 """The byte format of a run's series, `series/1`: channels at common times, single precision, compressed.
 
-For a faulty run, only channels that differ from its golden run are stored, as the number of single-precision
-values in between. The second differences over time are split into byte planes and compressed; see
-docs/reference/formats.md.
+For a faulty run, only channels that differ from its golden run are stored: for each value, the number of
+single-precision values between it and the golden value. The second differences over time are split into byte
+planes and compressed; see docs/reference/formats.md.
 """
 
 import gzip

@@ -1,6 +1,6 @@
-"""Pack the series that workers appended into a run's chunks, the highest worth first, up to the budget.
+"""Pack the series that workers appended into a run's chunks, the most valuable first, up to the budget.
 
-The files do not depend on the workers and their order.
+The files do not depend on the workers or their order.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -16,7 +16,7 @@ from mutator.store.series_script import name_of, size_in_script, write_script
 
 SUFFIX = ".blocks"  # suffix of the workers' files in series/
 GOLDEN, EXPERIMENT = 0, 1  # kinds of blocks
-CHUNK_BYTES = 256_000  # of a chunk's content without its last entry: a page loads it in about 30 ms
+CHUNK_BYTES = 256_000  # size at which a chunk is complete; a page loads it in about 30 ms
 _MB = 1_000_000
 
 
@@ -101,7 +101,7 @@ def segments(run: Path) -> list[Path]:
 def pack(run: Path, plan: str, worth: Worth, budget_mb: int, *, others: tuple[Path, ...] = ()) -> None:
     """Pack the series of a run folder, and those of the run folders `others`.
 
-    `worth` has every experiment that ended normally. Damaged series are left out. Packing can be repeated
+    `worth` ranks all experiments that ended normally. Damaged series are left out. Packing can be repeated
     after a kill.
     """
     appended = segments(run)
@@ -121,7 +121,7 @@ def pack(run: Path, plan: str, worth: Worth, budget_mb: int, *, others: tuple[Pa
 
 
 def pack_again(run: Path, index: Index) -> None:
-    """Repack the content of `index`, without damaged and missing parts. The workers' files stay."""
+    """Repack the content of `index`, without damaged and missing parts. The workers' files are kept."""
     worth = {name: place for place, name in enumerate(index.entries)}
     found = _packed(SeriesFolder(run))
     ended = len(worth) + index.left_out
@@ -217,7 +217,7 @@ def _written(folder: Path, plan: str, found: _Found, worth: Worth, budget_mb: in
 def _kept(found: _Found, worth: Worth, budget: int) -> list[str]:
     """Return the experiments, best first, that fit into `budget` bytes together with their golden runs.
 
-    One that does not fit in one session does not fit in any later one.
+    An experiment that does not fit now will not fit in a later session.
     """
     there = [name for name in found.experiments if name in worth]
     kept: list[str] = []

@@ -8,7 +8,7 @@ from mutator.errors import MutatorError
 
 @dataclass(frozen=True, slots=True)
 class Shard:
-    """Share `number` (from 1) of `of`: every `of`-th chunk, so that each share is representative."""
+    """One of `of` shares, with the `number` (from 1): every `of`-th chunk, to be representative."""
 
     number: int
     of: int

@@ -10,7 +10,7 @@ from mutator.errors import MutatorError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stretch:
-    """What one session ran with.
+    """The software and machine that one session used.
 
     `python` and `packages` must stay the same during a run, unless the user accepts other versions
     (`accepted`). The other fields are only recorded, because golden runs show whether machines compute the
@@ -22,7 +22,7 @@ class Stretch:
     platform: str  # operating system, kernel, kind of processor
     cpu: str | None = None  # the processor's model
     blas: Sequence[Mapping[str, Any]] = ()  # `library`, `version`, `kernel`, `threads` of what numpy loads
-    threads: Mapping[str, str] = field(default_factory=dict)  # in the environment of the target's process
+    threads: Mapping[str, str] = field(default_factory=dict)  # settings in the target's environment
     # `commit` and `changed` of the git clones of mutator, library, templates and target
     git: Mapping[str, Mapping[str, Any]] | None = None
     records: str = "*"  # glob of the session's files in records/, timings/ and proof/, without suffix
@@ -35,7 +35,7 @@ class Stretch:
 
 
 def read_stretches(head: Mapping[str, Any]) -> tuple[Stretch, ...]:
-    """Return the stretches of work in a run.json, oldest first. Old files have only that of planning."""
+    """Return the stretches of work in a run.json, oldest first. Old files have one, for the planning."""
     if "stretches" not in head:
         planned = head["provenance"]
         return (Stretch(python=planned["python"], packages=planned["packages"], platform=planned["machine"]),)

@@ -1,8 +1,8 @@
 """Conditions and formulas over observed values: check, convert and evaluate them.
 
 Ids are made from a condition's canonical text (`gap <= 2.0 and closing > 0.0`). All numbers are floats and
-division cannot raise, so a condition is True or False for every observation. A formula yields a number; its
-language also has choices (`a / b if b > 0 else inf`).
+division cannot raise, so a condition is True or False for every observation. A formula yields a number; it
+can also contain choices (`a / b if b > 0 else inf`).
 """
 
 import ast
@@ -78,7 +78,7 @@ def names_in(text: str) -> tuple[str, ...]:
 
 
 def to_code(text: str, *, number: bool = False) -> str:
-    """Convert a checked condition or formula to Python that cannot raise, with `_div` and `math`."""
+    """Convert a checked condition or formula to Python that cannot raise and uses `_div` and `math`."""
     writer = _Writer(text, {}, None, divide="_div({}, {})", infinity="math.inf", hypot="math.hypot")
     return writer.number(parse(text)) if number else writer.boolean(parse(text))
 
@@ -90,7 +90,7 @@ def evaluate(condition: str, values: Mapping[str, float]) -> bool:
 
 
 def divide(a: float, b: float) -> float:
-    """Divide by IEEE 754: infinite or NaN at b = 0. The probe contains the same function."""
+    """Divide as IEEE 754 does: infinite or NaN for b = 0. The probe contains the same function."""
     if b:
         return a / b
     return math.nan if a == 0.0 or a != a else math.copysign(math.inf, a) * math.copysign(1.0, b)
@@ -217,7 +217,7 @@ class _Writer:
         if name not in _NAMES and (self.variables is None or name in self.variables):
             return name
         remedy = (
-            f"known constants here: {', '.join(self.constants)}" if self.constants else "check its spelling"
+            f"the known constants are {', '.join(self.constants)}" if self.constants else "check its spelling"
         )
         raise self._refuse(f"unknown name '{name}'", remedy)
 

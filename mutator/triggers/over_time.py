@@ -1,4 +1,4 @@
-"""Evaluate conditions and formulas over a whole trace, to a value for each step."""
+"""Evaluate conditions and formulas at each step of a whole trace."""
 
 import ast
 from collections.abc import Mapping

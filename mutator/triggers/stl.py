@@ -46,7 +46,7 @@ def robustness(formula: str, values: Mapping[str, np.ndarray], step_s: float) ->
         raise MutatorError(
             f"a step of {lengths[uneven[0]]:g} s at {time[uneven[0]]:g} s, but {formula!r} counts steps",
             expected=f"steps of {step_s:g} s, the manifest's `step_s`",
-            remedy="record even steps, or write the hazard with `when`",
+            remedy="record steps of equal length, or write the hazard with `when`",
         )
     return _evaluated(formula, values, step_s)
 
@@ -61,7 +61,7 @@ def _evaluated(formula: str, values: Mapping[str, np.ndarray], step_s: float) ->
         _parse(specification, formula, names)
         ahead = _ahead(specification.ast.specs[-1], specification.offline_interpreter)
         told = specification.evaluate({**rows, "time": [*range(steps + 1)]}) if steps else []
-    except Exception as error:  # from rtamt: KeyError, ValueError, its own, and any arithmetic error
+    except Exception as error:  # rtamt raises KeyError, ValueError, errors of its own, and arithmetic errors
         raise _refusal(error, formula, values, step_s) from None
     judged = [number for _, number in told[: max(0, steps - ahead)]]
     return np.array([np.inf] * min(ahead, steps) + judged, dtype=float)
@@ -107,7 +107,7 @@ def _ahead(node: Any, interpreter: Any) -> int:
         return below + (kind in _NEXT)
     begin, end = interpreter.time_unit_transformer(node)
     if begin > end:
-        raise ValueError("a time that ends before it begins")
+        raise ValueError("an interval that ends before it begins")
     return below + (int(end) if kind in _BOUNDED else 0)
 
 

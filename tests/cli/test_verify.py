@@ -109,7 +109,7 @@ def test_rerun_restores_damaged_series(
     found = cli("verify", "run")
     assert found.code == 1 and "1 difference" in found.out
     told = " ".join(found.out.split())
-    assert f"- series/{became.name}: " in told and "--repair` puts it aside" in told
+    assert f"- series/{became.name}: " in told and "--repair` sets the file aside" in told
     assert "`mutator rerun ID --trace" in told
     if what != "index":
         assert f"the series of {name} and {len(others)} more cannot be read" in told

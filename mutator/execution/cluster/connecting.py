@@ -44,7 +44,7 @@ def checked_address(address: str, *, where: Path | None = None) -> str:
 
 
 def is_closed(address: str) -> bool:
-    """Return whether others cannot connect or read the traffic: it uses TLS or stays on this machine.
+    """Return whether others cannot connect or read the traffic, which uses TLS or stays on this machine.
 
     Host names except `localhost` are not looked up.
     """

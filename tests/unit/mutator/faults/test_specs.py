@@ -154,12 +154,12 @@ def edited(workspace: Workspace, old: str, new: str) -> str:
         (
             "params: {by_m: error}",
             "params: {by_deg: error}",
-            "17: 'by_deg' (a unit of angle); expected `by_m`; end the key in the number's unit",
+            "17: 'by_deg' (a unit of angle); expected `by_m`; end the key with the number's unit",
         ),
         (
             "params: {by_m: error}",
             "params: {by: error}",
-            "17: 'by' (no unit); expected `by_m`; end the key in the number's unit",
+            "17: 'by' (no unit); expected `by_m`; end the key with the number's unit",
         ),
         (
             "params: {by_m: error}",
@@ -185,8 +185,8 @@ def edited(workspace: Workspace, old: str, new: str) -> str:
             "after_assign: gap}\n          model: offset\n          unit: m\n          params: {by_m: error}",
             "assigned_value: gap}\n          model: offset\n          unit: m\n"
             "          params: {by_m: error, target: gap}",
-            "17: 'gap' for 'target' at `assigned_value`; expected none: the anchored expression "
-            "changes; leave it out, or anchor at a statement",
+            "17: 'gap' for 'target' at `assigned_value`; expected no target, because the anchored "
+            "expression is changed; leave it out, or anchor at a statement",
         ),
         (
             "model: offset\n          unit: m\n          params: {by_m: error}",
@@ -239,7 +239,7 @@ def edited(workspace: Workspace, old: str, new: str) -> str:
             "          unit: m\n",
             "          unit: feet\n",
             "16: unit 'feet'; expected one of {KNOWN}, or '1' "
-            "for a plain number; name the variable's unit in the source",
+            "for a plain number; name the unit that the variable has in the source",
         ),
         (
             "by_kph: -error",

@@ -206,7 +206,7 @@ def test_two_arguments_are_swapped(toy: Make) -> None:
 def test_only_two_different_arguments_without_stars_can_be_swapped(
     toy: Make, call: str, first: int, second: int
 ) -> None:
-    with pytest.raises(MutatorError, match="expected two different ones, counted from 1, without stars"):
+    with pytest.raises(MutatorError, match="expected two different arguments, counted from 1, without stars"):
         toy(
             f"def f(x, y):\n    return {call}\n",
             AnchorKind.RESULT,

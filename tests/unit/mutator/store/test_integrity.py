@@ -196,7 +196,7 @@ def test_a_folder_disguised_as_an_older_version_is_refused(run: Path) -> None:
     (run / digests.FILE).unlink()
     folder = RunFolder.unverified(run)
     assert not folder.verifiable
-    with pytest.raises(MutatorError, match="schema 'records/2' in a run folder of another"):
+    with pytest.raises(MutatorError, match="schema 'records/2' in a folder of another schema"):
         folder.records()
 
 

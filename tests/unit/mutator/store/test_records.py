@@ -118,7 +118,7 @@ def test_records_of_the_earlier_schema_are_read(tmp_path: Path, record: MakeReco
         read_records(tmp_path)
     path.unlink()
     write(tmp_path, "0001-gw0.jsonl", record())
-    with pytest.raises(MutatorError, match="schema 'records/2' in a run folder of another"):
+    with pytest.raises(MutatorError, match="schema 'records/2' in a folder of another schema"):
         read_records(tmp_path, checksums=False)
 
 

@@ -124,7 +124,7 @@ def test_uneven_steps_are_refused(third: float) -> None:
         ("x < 3 or", "an unexpected end in 'x < 3 or'"),
         ("(x < 3) ) and y", r"unexpected '\) and y' in"),
         ("always[0:0.7](x < 3)", r"not a multiple of the step, 0.5 s.*use a multiple"),
-        ("once[2:1](x < 3)", "a time that ends before it begins"),
+        ("once[2:1](x < 3)", "an interval that ends before it begins"),
     ],
 )
 def test_an_invalid_formula_raises_and_prints_nothing(
