@@ -82,7 +82,7 @@ def lines(kind: AnchorKind, name: str, function: str = "A.run", nth: int | None 
 def test_anchors_find_statements_of_every_form(
     kind: AnchorKind, name: str, nth: int | None, line: int
 ) -> None:
-    """The forms are assignments, calls that are the value of a statement, and returns."""
+    """The forms are assignments, calls, and returns."""
     assert lines(kind, name, nth=nth) == (line, line)
 
 
@@ -96,8 +96,8 @@ def test_anchors_find_statements_of_every_form(
         ("a['i'], i, a[j]", ["a['i']", "i", "a[j]"]),
     ],
 )
-def test_an_item_whose_index_is_set_later_has_no_name(targets: str, named: list[str]) -> None:
-    """The index's value at the item is unknown afterwards."""
+def test_an_item_whose_index_the_statement_changes_has_no_name(targets: str, named: list[str]) -> None:
+    """After the statement, the index's earlier value is unknown."""
     for source in (
         f"def f(self):\n    {targets} = g()\n",
         f"def f(self):\n    for {targets} in g():\n        h()\n",
@@ -107,7 +107,7 @@ def test_an_item_whose_index_is_set_later_has_no_name(targets: str, named: list[
 
 
 def test_the_head_of_a_block_is_the_last_candidate() -> None:
-    """An anchor from before heads were candidates, with or without `nth`, keeps its statement."""
+    """Older anchors, from before heads were candidates, therefore keep their statements."""
     source = "def f(xs):\n    for x in xs:\n        pass\n    x = 1\n"
     source += "    with xs as y:\n        y = 2\n        y = 3\n"
 
@@ -119,8 +119,8 @@ def test_the_head_of_a_block_is_the_last_candidate() -> None:
     assert (line("y", 1), line("y", 2), line("y", 3)) == (6, 7, 5)
 
 
-def test_functions_are_found_by_qualified_name() -> None:
-    """The qualified name of a nested function may be written with or without `<locals>`."""
+def test_a_function_is_found_by_its_qualified_name() -> None:
+    """The qualified name of a nested function can be written with or without `<locals>`."""
     assert lines(AnchorKind.AFTER_ASSIGN, "a", "A.run.inner") == (28, 28)
     assert lines(AnchorKind.AFTER_ASSIGN, "a", "A.run.<locals>.inner") == (28, 28)
     assert lines(AnchorKind.AFTER_ASSIGN, "self._width", "A.width") == (11, 11)
@@ -156,7 +156,7 @@ def test_functions_are_found_by_qualified_name() -> None:
         (AnchorKind.BEFORE_CALL, "x", "empty", None, ["another anchor: there is none of this kind"]),
     ],
 )  # fmt: skip
-def test_no_match_or_several_is_an_error(
+def test_an_anchor_with_no_match_or_several_is_an_error(
     kind: AnchorKind, name: str, function: str, nth: int | None, pieces: list[str]
 ) -> None:
     """The error names the place, the candidates or the reason, and a remedy."""
@@ -166,7 +166,7 @@ def test_no_match_or_several_is_an_error(
         assert piece in str(caught.value)
 
 
-def test_entry_goes_below_the_docstring() -> None:
+def test_the_entry_of_a_function_is_below_its_docstring() -> None:
     assert lines(AnchorKind.ENTRY, "") == (15, 14)
     assert lines(AnchorKind.ENTRY, "", "empty") == (37, 36)
     assert lines(AnchorKind.ENTRY, "", "A.width", 2) == (11, 10)
@@ -185,8 +185,8 @@ def test_entry_goes_below_the_docstring() -> None:
         ("", 1),
     ],
 )
-def test_the_import_goes_below_the_head_of_the_file(source: str, line: int) -> None:
-    """The head has the docstring, comments and `from __future__` imports."""
+def test_the_probe_is_imported_below_the_head_of_the_file(source: str, line: int) -> None:
+    """The head consists of the docstring, comments and `from __future__` imports."""
     assert parsed(source).import_line + 1 == line
 
 
@@ -201,7 +201,7 @@ def test_the_import_goes_below_the_head_of_the_file(source: str, line: int) -> N
         (b"import os\n\nx = 1  # fi:ab12\n", "m.py:3: the name _fi or a `# fi:` tag is in use"),
     ],
 )
-def test_an_invalid_or_injected_file_is_refused_by_name(source: bytes, piece: str) -> None:
+def test_an_invalid_or_already_injected_file_is_refused(source: bytes, piece: str) -> None:
     with pytest.raises(MutatorError) as caught:
         parse_file("m.py", source, Path("root"))
     assert piece in str(caught.value)

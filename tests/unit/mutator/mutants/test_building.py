@@ -36,7 +36,7 @@ def build(toy: Workspace, fault: Fault | None, trigger: Trigger = CLOSING) -> Mu
 
 
 def one(**location: object) -> Fault:
-    """A fault written by hand, `gap = 3.0`, at a given location."""
+    """A handwritten fault, `gap = 3.0`, at a given location."""
     anchor = Anchor(kind=AnchorKind.AFTER_ASSIGN, name="gap")
     values = {"path": "toycar/sensor.py", "function": "Sensor.measure", "anchor": anchor, **location}
     params = (("target", "gap"), ("value", 3.0))
@@ -54,8 +54,8 @@ def one(**location: object) -> Fault:
 
 
 @pytest.mark.parametrize("variant", ["longer", "silent", "both", "null"])
-def test_diffs_equal_the_stored_ones(toy: Workspace, variant: str) -> None:
-    """Of the probe, only the head is compared."""
+def test_diffs_equal_the_stored_diffs(toy: Workspace, variant: str) -> None:
+    """Only the beginning of the probe is compared."""
     fault = None if variant == "null" else toy_faults(toy)[variant]
     made = build(toy, fault)
     patch = made.patch.replace(made.id, "<id>")
@@ -89,8 +89,8 @@ def test_a_module_with_the_probes_name_is_refused(toy: Workspace, name: str) -> 
         build(toy, None)
 
 
-def test_patch_tree_and_digest_agree(toy: Workspace, tmp_path: Path) -> None:
-    """The target is unchanged."""
+def test_the_patch_the_tree_and_the_digest_agree(toy: Workspace, tmp_path: Path) -> None:
+    """The target itself remains unchanged."""
     manifest = toy.manifest("toy")
     before = manifest.tree.digest
     made = build(toy, toy_faults(toy)["both"])
@@ -104,8 +104,8 @@ def test_patch_tree_and_digest_agree(toy: Workspace, tmp_path: Path) -> None:
     assert toy.manifest("toy").tree.digest == before
 
 
-def test_ids_depend_on_everything_that_makes_a_mutant(toy: Workspace) -> None:
-    """The fault, the trigger, the target and the templates determine the id. Equal ids mean equal bytes."""
+def test_ids_depend_on_everything_that_determines_a_mutant(toy: Workspace) -> None:
+    """Here, the fault, the trigger and the target vary."""
     faults = toy_faults(toy)
     first = build(toy, faults["longer"])
     assert first == build(toy, faults["longer"])
@@ -122,7 +122,7 @@ def test_ids_depend_on_everything_that_makes_a_mutant(toy: Workspace) -> None:
     assert len({first.tree_digest, *(m.tree_digest for m in others)}) == 6
 
 
-def test_a_fault_that_latches_overrides_the_trigger(toy: Workspace) -> None:
+def test_the_hold_of_a_fault_overrides_the_hold_of_the_trigger(toy: Workspace) -> None:
     assert b'HOLD = "while"' in build(toy, toy_faults(toy)["longer"]).files["toycar/_fi.py"]
     assert b'HOLD = "to_end"' in build(toy, toy_faults(toy)["silent"]).files["toycar/_fi.py"]
 
@@ -141,8 +141,8 @@ def run(toy: Workspace, made: Mutant, place: Path, steps: int = 100) -> dict[str
     return dict(json.loads(done.stdout))
 
 
-def test_faults_act_from_their_trigger_on(toy: Workspace, tmp_path: Path) -> None:
-    """The null mutant changes nothing and observes its trigger."""
+def test_faults_are_active_once_their_trigger_fires(toy: Workspace, tmp_path: Path) -> None:
+    """The null mutant changes nothing, but its probe evaluates the trigger."""
     null = run(toy, build(toy, None), tmp_path / "null")
     assert null["report"]["injections"] == {}
     assert null["report"]["triggered"]["first"] == 0.5
@@ -170,15 +170,17 @@ def test_faults_act_from_their_trigger_on(toy: Workspace, tmp_path: Path) -> Non
         ),
     ],
 )
-def test_locations_are_checked_again(toy: Workspace, location: dict[str, object], said: str) -> None:
-    """The fault was not expanded from a spec, which would have checked it."""
+def test_locations_of_handwritten_faults_are_checked(
+    toy: Workspace, location: dict[str, object], said: str
+) -> None:
+    """Locations in specs are checked when the spec is expanded."""
     with pytest.raises(MutatorError) as caught:
         build(toy, one(**location))
     assert said in str(caught.value)
 
 
-def test_lines_that_do_not_compile_make_an_invalid_mutant(toy: Workspace, tmp_path: Path) -> None:
-    """The error names line and file."""
+def test_a_mutant_that_does_not_compile_is_invalid(toy: Workspace, tmp_path: Path) -> None:
+    """The error names the file and the line."""
     templates = Path(shutil.copytree(toy.templates, tmp_path / "templates"))
     (templates / "stuck.py.j2").write_text("nonlocal {{ target }}\n")
     broken = Workspace(library=toy.library, templates=templates)
@@ -189,7 +191,7 @@ def test_lines_that_do_not_compile_make_an_invalid_mutant(toy: Workspace, tmp_pa
 
 
 def test_an_invalid_trigger_is_refused(toy: Workspace) -> None:
-    """A condition is invalid, or a hold for a time has no length."""
+    """Either the condition is invalid, or the hold `for` has no duration."""
     with pytest.raises(MutatorError, match="is not a truth value"):
         build(toy, None, Trigger(name="x", condition="__import__('os')"))
     with pytest.raises(MutatorError, match="without a time; expected hold_s"):

@@ -1,4 +1,4 @@
-"""Compiling only the changed functions shows whether a changed file compiles."""
+"""Compiling only the changed functions of a file shows whether the file compiles."""
 
 from pathlib import Path
 
@@ -42,7 +42,7 @@ def file() -> ParsedFile:
         (6, b"\tx = 2  # fi:0a\n", False),
         (13, b"def f(a): return await a  # fi:0a\n", False),
         (13, b"def f(a): return -a  # fi:0a\n", True),
-        (0, b"LIMIT = 2  # fi:0a\n", False),  # outside all functions, so undecided
+        (0, b"LIMIT = 2  # fi:0a\n", False),  # outside all functions, so not decided
     ],
 )
 def test_compiling_a_changed_function_shows_whether_the_file_compiles(

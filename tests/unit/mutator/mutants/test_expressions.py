@@ -1,5 +1,4 @@
-"""Expressions: which ones anchors can name, how they are named, and how a changed value is written in the
-source."""
+"""Expressions: which ones anchors can name, how anchors name them, and how a mutant changes their values."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -62,8 +61,8 @@ def changed(source: str, *changes: tuple[FaultLocation, str]) -> str:
 
 
 def test_every_value_has_a_name_for_each_role() -> None:
-    """Exceptions are values that name an object, values in a string, and values that begin or end where no
-    tag fits."""
+    """Exceptions are names of objects whose members are used, values inside strings, and values that begin or
+    end on a line that cannot get a tag."""
     named = {
         kind: [
             (name, which) if which else name
@@ -127,8 +126,8 @@ def test_an_anchor_matches_regardless_of_spaces_and_quotes(place: FaultLocation,
         (location("value", "a", function="deeper"), ["no function 'deeper'"]),
     ],
 )
-def test_no_match_or_several_is_an_error(place: FaultLocation, pieces: Iterable[str]) -> None:
-    """The error names the line, the candidates, and what to do."""
+def test_an_anchor_with_no_match_or_several_is_an_error(place: FaultLocation, pieces: Iterable[str]) -> None:
+    """The error names the line, the candidates, and a remedy."""
     with pytest.raises(MutatorError) as caught:
         parsed().resolve_value(place)
     assert all(piece in str(caught.value) for piece in pieces), str(caught.value)
@@ -167,7 +166,7 @@ def test_a_changed_expression_stays_in_its_place() -> None:
     ],
 )
 def test_a_tuple_is_changed_as_a_whole(value: str, kept: str) -> None:
-    """A tuple may be an index, span several lines, and have parentheses around its elements or none."""
+    """A tuple can be an index, span several lines, and have or lack parentheses."""
     place = location("return_value", "", function="f")
     line = changed(f"def f(a, b):\n    return {value}\n", (place, "0")).splitlines()[1]
     assert line == f'    return (0 if _fi.active("a0") else {kept})  # fi:a0 was:    return {value}'
@@ -194,15 +193,15 @@ def test_two_injections_into_one_expression_are_refused() -> None:
         changed(SOURCE, (location("value", "gap - LIMIT"), "0"), (location("value", "LIMIT"), "0"))
 
 
-def test_functions_with_the_same_name_have_separate_names() -> None:
-    """Examples are the functions of a property."""
+def test_functions_with_the_same_name_have_separate_variables() -> None:
+    """The getter and setter of a property have the same name."""
     source = "class A:\n    def x(self): return self.a\n    def x(self, value): return value + 1\n"
     file = parse_file("m.py", source.encode(), Path())
     first, second = (location("return_value", "", nth=nth, function="A.x") for nth in (1, 2))
     assert (file.names(first), file.names(second)) == ({"self"}, {"self", "value"})
 
 
-def test_columns_count_bytes_of_the_files_encoding() -> None:
+def test_files_in_other_encodings_are_changed_at_the_right_column() -> None:
     source = '# coding: latin-1\ndef f(é):\n    return "ü" + é + 1\n'
     file = parse_file("m.py", source.encode("latin-1"), Path())
     place = location("value", "'ü' + é", function="f")
@@ -222,7 +221,7 @@ def test_an_f_string_is_changed_as_a_whole() -> None:
 
 
 def test_a_named_expression_as_a_condition_has_an_anchor() -> None:
-    """While no fault is active, `:=` sets its name as before."""
+    """While no fault is active, `:=` still sets its name."""
     source = "def f(a):\n    while n := a.pop():\n        if (m := n + 1): return g(k := m)\n"
     places = [
         location("condition", "(n := a.pop())", function="f"),

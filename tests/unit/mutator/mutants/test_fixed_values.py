@@ -1,5 +1,5 @@
-"""Constants and defaults: which ones can be changed, which are refused, and how the probe changes them in
-a run."""
+"""Constants and defaults: which of them faults can change, which are refused, and how the probe changes them
+during a run."""
 
 import sys
 import types
@@ -111,8 +111,8 @@ def mutant(clone: Workspace, *locations: FaultLocation) -> bytes:
 
 @pytest.fixture
 def load(clone: Workspace) -> Iterator[Callable[..., tuple[Any, Any]]]:
-    """Load the module with these injections. Return it and its probe, with time `t` and the condition `t <
-    2`."""
+    """Load the module with injections at the given locations. Return the module and its probe, whose trigger
+    is active from 1 s to 3 s."""
     names = ("_fi", "fixed_values_m")
 
     def made(*locations: FaultLocation) -> tuple[Any, Any]:
@@ -136,8 +136,8 @@ def load(clone: Workspace) -> Iterator[Callable[..., tuple[Any, Any]]]:
 def test_a_fixed_value_changes_while_the_fault_is_active(
     load: Callable[..., tuple[Any, Any]], place: str
 ) -> None:
-    """The value is restored at the next inactive step and when a run starts again. Each active step counts
-    once."""
+    """The value is restored at the next inactive step and when a run starts again. Each active step is
+    counted once."""
     location, value = PLACES[place]
     module, fi = load(location)
     original, seen = value(module), []
@@ -150,7 +150,6 @@ def test_a_fixed_value_changes_while_the_fault_is_active(
 
 
 def test_tagged_lines_follow_the_statement_that_sets_the_value(clone: Workspace) -> None:
-    """If there are several in a block, the innermost comes first."""
     lines = mutant(clone, *dict.fromkeys(one for one, _ in PLACES.values())).decode().splitlines()
     tagged = [i for i, line in enumerate(lines) if "# fi:" in line][1:]
     assert [lines[i - 1].strip() for i in tagged if i - 1 not in tagged] == [
@@ -181,14 +180,14 @@ def test_tagged_lines_follow_the_statement_that_sets_the_value(clone: Workspace)
     ],
 )
 def test_an_unsuitable_value_is_refused(clone: Workspace, location: FaultLocation, words: str) -> None:
-    """The error for a missing value lists the existing ones. A value that the program sets in another way is
+    """The error for an unknown name lists the existing ones. A value that cannot be changed reliably is
     refused with the reason."""
     with pytest.raises(MutatorError, match=words):
         mutant(clone, location)
 
 
 def test_a_model_that_changes_no_value_is_refused(clone: Workspace) -> None:
-    """A parameter that names a variable is refused, too, because a constant belongs to no function."""
+    """A parameter that names a variable is also refused."""
     file = parse_file("m.py", SOURCE.encode(), Path("x"))
     for model, params in (("omission", ()), ("offset", (("by", 1.0), ("target", "LOW")))):
         with pytest.raises(MutatorError, match=r"cannot change the value|expected no variable"):
@@ -198,7 +197,7 @@ def test_a_model_that_changes_no_value_is_refused(clone: Workspace) -> None:
 
 
 def test_modules_that_import_a_constant_are_found(tmp_path: Path) -> None:
-    """Modules may import a constant through other modules. Imports inside functions are ignored."""
+    """A module can import a constant through another module. Imports inside functions are ignored."""
     files = {
         "pkg/__init__.py": "from .limits import LIMIT\n",
         "pkg/limits.py": "LIMIT = 5\n",
@@ -218,8 +217,8 @@ def test_modules_that_import_a_constant_are_found(tmp_path: Path) -> None:
 
 
 def test_importers_that_cannot_be_set_are_listed(tmp_path: Path) -> None:
-    """A star import, a class, and a name that the module sets itself are reported in one error, each with its
-    line."""
+    """The error lists, each with its line, a star import, an import into a class, and an imported name that
+    the module sets again."""
     texts = {
         "limits": "LIMIT = 5\n",
         "a": "from limits import *\n",
@@ -229,7 +228,7 @@ def test_importers_that_cannot_be_set_are_listed(tmp_path: Path) -> None:
     texts |= {"kept": "__all__ = ['other']\nLIMIT, other = 1, 2\n", "d": "from kept import *\n"}
     for name, text in texts.items():
         (tmp_path / f"{name}.py").write_text(text)
-    assert importers(read_tree(tmp_path, ["**"]), "kept.py", "LIMIT") == (), "`*` does not stand for it"
+    assert importers(read_tree(tmp_path, ["**"]), "kept.py", "LIMIT") == (), "`*` does not include it"
     words = (
         "a.py:1 imports \\*; b.py:2 imports it into a class; c.py:1 imports it, and sets LIMIT in another way"
     )

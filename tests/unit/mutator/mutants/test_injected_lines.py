@@ -1,4 +1,4 @@
-"""Injected lines are recognized in a mutant's source."""
+"""How injected lines are recognized in a mutant's source."""
 
 import re
 
@@ -7,7 +7,7 @@ from mutator.web import asset
 from mutator.workspace import Workspace
 
 
-def test_injected_lines_are_recognized(clone: Workspace) -> None:
+def test_injected_lines_are_recognized_by_their_tags(clone: Workspace) -> None:
     lines = {
         injected_lines.import_statement("car"): ("probe", 0, False),
         injected_lines.tagged(injected_lines.observe_call([("t", "now.time")]), injected_lines.OBSERVE_TAG): (
@@ -32,7 +32,7 @@ def test_injected_lines_are_recognized(clone: Workspace) -> None:
 
 
 def test_a_similar_comment_is_not_a_tag(clone: Workspace) -> None:
-    """A tag is lower-case text at the end of a line."""
+    """A tag is lowercase and ends its line."""
     for line in (
         b"x = 1",
         b"x = 1  # fi",
@@ -45,8 +45,8 @@ def test_a_similar_comment_is_not_a_tag(clone: Workspace) -> None:
     assert injected_lines.instrumented_line(b"wi_fi = 1\nx_fi = 2  # fi:A\n") is None
 
 
-def test_pages_get_the_tags_from_python() -> None:
-    """The script that shows diffs contains no tag."""
+def test_pages_use_the_tags_defined_in_python() -> None:
+    """The script that shows diffs contains no tags of its own."""
     words = injected_lines.tag_words()
     for tag in words["probe"]:
         assert injected_lines.tagged("x", tag) == f"x  {words['mark']}{tag}"

@@ -1,4 +1,4 @@
-"""Injections that would disturb a name of the target are refused before a mutant is built."""
+"""Injections that would change the meaning of a name in the target are refused before a mutant is built."""
 
 import shutil
 from pathlib import Path
@@ -92,7 +92,7 @@ def test_setting_an_unknown_or_outer_variable_is_refused(
         ("_Car.drive", None, "self.__gap"),
     ],
 )
-def test_local_declared_and_attribute_names_may_be_set(
+def test_local_declared_and_attribute_names_can_be_set(
     function: str, anchor: Anchor | None, target: str
 ) -> None:
     line = f"{target} = _fi.like({target}, 1.0)  # fi:ab12\n"
@@ -110,8 +110,8 @@ def models(tmp_path: Path) -> FaultModels:
     return Workspace(library=workspace.library, templates=templates).fault_models()
 
 
-def test_a_template_may_set_its_own_names(models: FaultModels) -> None:
-    """The function must not use the same names."""
+def test_a_template_can_set_its_own_names(models: FaultModels) -> None:
+    """It is refused if the function uses the same names."""
     assert "for y in [1]:" in injected(models, "outer", target="x")
     with pytest.raises(
         MutatorError, match=r"root/m.py:6: .* set 'y', a name that the function uses"
@@ -124,7 +124,7 @@ def test_a_template_may_set_its_own_names(models: FaultModels) -> None:
 
 
 def test_an_expression_that_sets_a_name_is_refused(tmp_path: Path) -> None:
-    """The name would become a local one of the function."""
+    """The name would become local to the function."""
     templates = Path(shutil.copytree(MODELS.folder, tmp_path / "templates"))
     (templates / "sign_flip.py.j2").write_text("(limit := -{{ original }})\n")
     place = Anchor(kind=AnchorKind.RETURN_VALUE)
@@ -133,7 +133,7 @@ def test_an_expression_that_sets_a_name_is_refused(tmp_path: Path) -> None:
 
 
 def test_an_imported_name_that_the_function_uses_is_refused() -> None:
-    """An image effect imports a class."""
+    """An image effect imports its class."""
     params = {"amount": 1.0, "camera": None, "scene": None, "seed": 1, "target": "x"}
     params |= {"camera": "x", "scene": "x"}
     with pytest.raises(MutatorError, match="set 'Rain', a name that the function uses"):

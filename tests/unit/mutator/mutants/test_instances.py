@@ -44,8 +44,8 @@ def mutant(clone: Workspace, anchor: Anchor, model: str = "offset", **given: Any
 
 
 def drive(clone: Workspace, data: bytes, times: tuple[float, ...]) -> tuple[list[list[int]], Any]:
-    """Run steps at these times with a fault active from 1 to 3. Return the three lanes of each step and the
-    probe's report."""
+    """Run steps at the given times, with a fault that is active from 1 s to 3 s. Return the three gaps of
+    each step and the probe's report."""
     nowhere = FaultLocation(path="", function="f", anchor=Anchor(kind=AnchorKind.ENTRY))
     observation = Observation(location=nowhere, time="t", values=(), derived=())
     trigger = Trigger(name="test", condition="t >= 1 and t < 3")
@@ -76,11 +76,11 @@ def drive(clone: Workspace, data: bytes, times: tuple[float, ...]) -> tuple[list
         ({"where": "index > 0", "every": 3}, [[1, 2, 3], [1, 12, 3]], 1),
     ],
 )
-def test_a_fault_acts_on_selected_instances_and_executions(
+def test_a_fault_can_be_limited_to_instances_and_executions(
     clone: Workspace, anchor: Anchor, given: dict[str, Any], active: list[list[int]], count: int
 ) -> None:
-    """Executions count from the activation, only for instances for which the condition holds, and only
-    executions that acted count as activations."""
+    """Executions are numbered from the activation, and only for instances that meet the condition. Only
+    executions with a change are counted as activations."""
     seen, told = drive(clone, mutant(clone, anchor, **given), (0.0, 1.0, 2.0, 3.0))
     assert seen == [[1, 2, 3], *active, [1, 2, 3]]
     assert told["count"] == count
@@ -89,7 +89,7 @@ def test_a_fault_acts_on_selected_instances_and_executions(
 def test_executions_are_counted_from_zero_in_each_active_period(clone: Workspace) -> None:
     seen, told = drive(clone, mutant(clone, AFTER, call=2), (0.0, 1.0, 3.0, 0.0, 1.0, 2.0))
     assert [step[1] for step in seen] == [2, 12, 2, 2, 12, 2]
-    assert told["count"] == 1, "of the newest run"
+    assert told["count"] == 1, "only the last run is counted"
 
 
 def test_a_guard_omits_one_instance(clone: Workspace) -> None:
@@ -98,7 +98,7 @@ def test_a_guard_omits_one_instance(clone: Workspace) -> None:
 
 
 def test_the_injected_line_checks_the_fault_first(clone: Workspace) -> None:
-    """The condition's names are read only while the fault is active. The probe counts an execution after all
+    """The condition is evaluated only while the fault is active. The probe counts an execution after all
     other checks."""
     lines = {
         AFTER: b'if _fi.on() and (index == 2) and _fi.every("a", 5) and _fi.active("a"):  # fi:a',
@@ -112,8 +112,8 @@ def test_the_injected_line_checks_the_fault_first(clone: Workspace) -> None:
     assert b'        if not (_fi.call("a", 3) and _fi.active("a")):  # fi:a guard:1' in guarded
 
 
-def test_the_tag_of_a_selecting_line_asks_the_probe(clone: Workspace) -> None:
-    """The selection belongs to the injected part of the line."""
+def test_lines_with_a_selection_are_recognized_as_checking_the_probe(clone: Workspace) -> None:
+    """The selection is part of the line's injected text."""
     for anchor, model in ((AFTER, "offset"), (SENT, "omission")):
         data = mutant(clone, anchor, model, where="lane['gap'] == 2 or (index == 1)", call=2)
         tags = [tag for line in data.splitlines() if (tag := injected_lines.tag_of(line)) and tag.id == "a"]
@@ -143,13 +143,14 @@ def test_the_tag_of_a_selecting_line_asks_the_probe(clone: Workspace) -> None:
     ],
 )
 def test_a_condition_with_side_effects_is_refused(text: str) -> None:
-    """A condition must not call, calculate or set anything, or use the probe."""
+    """A condition must not call a function, calculate, assign a name, or use the probe."""
     with pytest.raises(ValueError, match=r".*"):
         instance_condition(text)
 
 
-def test_unknown_names_and_lasting_models_are_refused(clone: Workspace) -> None:
-    """The error lists the known names. A lasting model acts longer than the fault is active."""
+def test_unknown_names_and_models_with_lasting_effects_are_refused(clone: Workspace) -> None:
+    """The error for an unknown name lists the known ones. A lasting effect would outlive the active time of
+    the fault."""
     with pytest.raises(MutatorError, match=r"m.py:3: 'side' in `where` is not known in drive; .*index"):
         mutant(clone, AFTER, where="side == 'left'")
     params = (("per_step", 1.0), ("stays", True), ("target", "gap"))
@@ -182,6 +183,6 @@ def test_a_condition_is_stored_in_canonical_form() -> None:
     ],
 )
 def test_invalid_selections_in_yaml_are_refused(given: dict[str, Any], words: str) -> None:
-    """Invalid conditions, contradictions, and settings that select all instances are refused."""
+    """Invalid conditions, contradictions, and selections at constants and defaults are refused."""
     with pytest.raises(MutatorError, match=words):
         read(**given)

@@ -100,7 +100,7 @@ def test_each_listed_anchor_finds_its_own_line(listed: list[ListedPlace]) -> Non
     assert max(Counter(one.location for one in listed).values()) == 1
 
 
-def test_models_work_where_they_are_listed(shipped: Workspace, listed: list[ListedPlace]) -> None:
+def test_models_work_at_the_places_that_list_them(shipped: Workspace, listed: list[ListedPlace]) -> None:
     file, models, tried = parse_file("m.py", SOURCE, Path("x")), shipped.fault_models(), Counter[bool]()
     for one in listed:
         if one.location.function == "other":
@@ -108,7 +108,7 @@ def test_models_work_where_they_are_listed(shipped: Workspace, listed: list[List
         kind = one.location.anchor.kind
         for model in models:
             if model.name in ("ghost_object", "image_effect") or "exchanged" in model.template:
-                continue  # these models need more names than one place gives
+                continue  # these models need more names than a place has
             at_value = kind in VALUE_ANCHORS | FIXED_ANCHORS
             params = {p.name: value(p) for p in model.params if not (at_value and p.name == "target")}
             given = tuple(sorted(params.items()))
@@ -122,8 +122,8 @@ def test_models_work_where_they_are_listed(shipped: Workspace, listed: list[List
     assert tried[True] > 300
 
 
-def test_places_of_one_function(shipped: Workspace) -> None:
-    """The error for an unknown function lists the existing ones."""
+def test_the_places_of_one_function_can_be_listed(shipped: Workspace) -> None:
+    """The error for an unknown function suggests a similar name."""
     file = parse_file("m.py", SOURCE, Path("x"))
     found = places_of(file, shipped.fault_models(), "other")
     assert {one.location.function for one in found} == {"other"}
@@ -131,8 +131,8 @@ def test_places_of_one_function(shipped: Workspace) -> None:
         places_of(file, shipped.fault_models(), "Sensor.mesure")
 
 
-def test_models_that_repeat_a_yield_are_not_listed(shipped: Workspace) -> None:
-    """The order of yields matters."""
+def test_models_that_repeat_or_move_a_yield_are_not_listed(shipped: Workspace) -> None:
+    """They would change what the generator yields."""
     file = parse_file("m.py", b"def f(a):\n    b = yield a\n    c = b\n    return c\n", Path("x"))
     places = [one for one in places_of(file, shipped.fault_models()) if "before_assign" in one.at]
     models = {one.line: one.models for one in places}

@@ -1,4 +1,4 @@
-"""What fault models do, step by step, to a small function that runs with the probe."""
+"""The effects of fault models, step by step, on a small function that runs with the probe."""
 
 import types
 from collections.abc import Callable
@@ -22,7 +22,7 @@ Make = Callable[..., "Toy"]
 
 
 class Toy:
-    """The function `f` of a source with one injection. `names` are its globals."""
+    """A function `f` with one injection. `names` are its globals."""
 
     def __init__(self, clone: Workspace, source: str, anchor: Anchor, model: str, **params: Value) -> None:
         models = clone.fault_models()
@@ -42,8 +42,8 @@ class Toy:
         self.steps = 0
 
     def run(self, marks: str, *arguments: Any) -> list[Any]:
-        """Return the result of `f` in each step. The fault is active in a step marked `x`. Each argument
-        is called to get its value."""
+        """Return the result of `f` in each step. The fault is active in steps marked `x`. Each argument is a
+        function that returns the value to pass."""
         found = []
         for mark in marks:
             lead = 15.0 if mark == "x" else 20.0
@@ -76,28 +76,28 @@ def counting() -> Callable[[], int]:
     [(AnchorKind.AFTER_ASSIGN, "y"), (AnchorKind.ASSIGNED_VALUE, "y"), (AnchorKind.VALUE, "x")],
 )
 def test_a_stale_value_is_two_steps_old(toy: Make, kind: AnchorKind, name: str) -> None:
-    """The first value is used until then. Each active period starts again."""
+    """Until a value is two steps old, the first value is used. Each active period starts anew."""
     params = {"target": "y"} if kind is AnchorKind.AFTER_ASSIGN else {}
     made = toy("def f(x):\n    y = x\n    return y\n", kind, name, "stale", steps=2, **params)
     assert made.run(".xxxx.xx", counting()) == [1, 2, 2, 2, 3, 6, 7, 7]
 
 
-def test_staleness_counts_steps_and_not_executions(toy: Make) -> None:
-    """The newest value of an earlier step is used."""
+def test_staleness_is_counted_in_steps_and_not_in_executions(toy: Make) -> None:
+    """The last value of the earlier step is used."""
     made = toy("def f(x):\n    return x\n", AnchorKind.RETURN_VALUE, "x", "stale", steps=1)
     count, f = counting(), made.names["f"]
     made.names["f"] = lambda x: (f(x), f(count()))
     assert made.run("xxx", count) == [(1, 1), (2, 2), (4, 4)]
 
 
-def test_a_slow_call_returns_its_result_when_it_ends(toy: Make) -> None:
-    """No other call is made until then."""
+def test_a_slow_call_returns_its_result_after_its_duration(toy: Make) -> None:
+    """Until then, no other call is made."""
     made = toy("def f(get):\n    return get()\n", AnchorKind.RESULT, "get", "slow_call", duration=2 * STEP_S)
     count = counting()
     assert made.run("..xxxxxx..xxx", lambda: count) == [1, 2, 3, 3, 3, 3, 4, 4, 6, 7, 8, 8, 8]
 
 
-def test_a_failed_call_is_repeated_in_the_next_step(toy: Make) -> None:
+def test_a_slow_call_that_fails_is_repeated_in_the_next_step(toy: Make) -> None:
     """The exception propagates."""
     made = toy("def f(get):\n    return get()\n", AnchorKind.RESULT, "get", "slow_call", duration=1.0)
     with pytest.raises(ZeroDivisionError):
@@ -106,7 +106,7 @@ def test_a_failed_call_is_repeated_in_the_next_step(toy: Make) -> None:
 
 
 @pytest.mark.parametrize("kind", [AnchorKind.BEFORE_CALL, AnchorKind.AFTER_CALL])
-def test_a_message_is_sent_twice(toy: Make, kind: AnchorKind) -> None:
+def test_a_repeated_call_sends_its_message_twice(toy: Make, kind: AnchorKind) -> None:
     sent: list[int] = []
     made = toy("def f(x):\n    put(\n        x  # it\n    )\n", kind, "put", "repetition")
     made.names["put"] = sent.append
@@ -119,13 +119,13 @@ def test_a_repeated_assignment_sets_only_its_own_names(toy: Make) -> None:
     assert made.run(".x", lambda: 0) == [1, 2]
 
 
-def test_the_second_of_two_calculations_is_used(toy: Make) -> None:
+def test_a_repeated_expression_uses_its_second_result(toy: Make) -> None:
     made = toy("def f(get):\n    return get()\n", AnchorKind.RESULT, "get", "repetition")
     count = counting()
     assert made.run(".x.", lambda: count) == [1, 3, 4]
 
 
-def test_a_dropped_message_is_not_sent(toy: Make) -> None:
+def test_an_omitted_call_sends_no_message(toy: Make) -> None:
     sent: list[int] = []
     made = toy("def f(x):\n    put(x)\n", AnchorKind.BEFORE_CALL, "put", "omission")
     made.names["put"] = sent.append
@@ -147,7 +147,7 @@ REORDERED = """def f(x):
 """
 
 
-def test_two_statements_are_exchanged(toy: Make) -> None:
+def test_the_anchored_statement_and_the_next_are_exchanged(toy: Make) -> None:
     source = REORDERED.replace("y = x", "x = x * 2").replace("y = y +", "y = x +")
     made = toy(source, AnchorKind.BEFORE_ASSIGN, "x", "reordering")
     assert made.run(".x.", lambda: 1) == [12, 11, 12]
@@ -186,14 +186,13 @@ def test_the_entry_of_a_function_cannot_be_repeated(toy: Make) -> None:
         toy("def f(x):\n    return x\n", AnchorKind.ENTRY, "", "repetition")
 
 
-def test_a_return_is_not_repeated(toy: Make) -> None:
-    """The result of a return statement can be repeated."""
+def test_a_return_statement_cannot_be_repeated(toy: Make) -> None:
     with pytest.raises(MutatorError, match=r"`return g\(x\)` ends its block"):
         toy("def f(x):\n    return g(x)\n", AnchorKind.BEFORE_CALL, "g", "repetition")
 
 
 def test_two_arguments_are_swapped(toy: Make) -> None:
-    """Arguments may have keywords. The other arguments keep their order."""
+    """Arguments can have keywords. The other arguments keep their order."""
     source = "def f(x):\n    return dict(a=x, b=x + 1, c=(x == 1))\n"
     made = toy(source, AnchorKind.RESULT, "dict", "swapped_arguments", first=1, second=3)
     assert made.run(".x", lambda: 1) == [{"a": 1, "b": 2, "c": True}, {"a": True, "b": 2, "c": 1}]
@@ -252,7 +251,7 @@ def test_a_branch_condition_is_negated_or_fixed(toy: Make, holds: str, taken: li
     ],
 )
 def test_an_exception_is_raised_while_active(toy: Make, kind: AnchorKind, name: str) -> None:
-    """The anchor may be a statement or an expression."""
+    """The anchor can be a statement or an expression."""
     made = toy("def f(x):\n    return x\n", kind, name, "exception", error="TimeoutError")
     assert made.run(".", lambda: 1) == [1]
     with pytest.raises(TimeoutError, match="injected fault"):
@@ -265,8 +264,8 @@ def test_a_call_returns_none_while_active(toy: Make) -> None:
     assert made.run(".x.", lambda: count) == [1, None, 3]
 
 
-def test_the_drift_of_an_expression_grows(toy: Make) -> None:
-    """A drift that stays after the fault needs a statement."""
+def test_the_drift_of_an_expression_grows_with_each_active_step(toy: Make) -> None:
+    """A drift that remains after the fault needs a statement as its anchor."""
     source = "def f(x):\n    return x\n"
     made = toy(source, AnchorKind.RETURN_VALUE, "", "drift", per_step=0.5)
     assert made.run(".xx.x", lambda: 1) == [1, 1.5, 2.0, 1, 2.5]
@@ -307,7 +306,7 @@ def test_contradicting_parameters_are_refused(
     ("value", "index"), [(b"ab", 2), (b"ab", -3), (b"", 0), ("ab", 0), (3, 0), (bytearray(), 0)]
 )
 def test_a_missing_byte_is_an_error(toy: Make, value: Any, index: int) -> None:
-    """The value is not passed on unchanged."""
+    """Otherwise the value would silently stay unchanged."""
     made = toy(
         "def f(x):\n    return x\n", AnchorKind.RETURN_VALUE, "", "byte_corruption", index=index, mask=1
     )

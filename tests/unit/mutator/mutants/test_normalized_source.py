@@ -1,4 +1,4 @@
-"""Either all sources with the same normalized source compile, or none."""
+"""If a normalized source compiles, so does every source with this normalized form."""
 
 import pytest
 from hypothesis import example, given, settings
@@ -29,8 +29,8 @@ IDS = st.text("0123456789abcdef", min_size=8, max_size=8)
         ("é5 = 5", "é5 = 0"),
     ],
 )
-def test_usual_decimal_integers_become_zero(text: str, kept: str) -> None:
-    """The zero has the same form. All other text is unchanged."""
+def test_plain_decimal_numbers_become_zero(text: str, kept: str) -> None:
+    """An integer becomes 0 and a float becomes 0.0. All other text is unchanged."""
     assert normalized(text, ()) == kept
 
 
@@ -41,14 +41,14 @@ def test_different_ids_stay_different() -> None:
     assert normalized(text, ids) != normalized("a('00000001'); b('00000001', 'deadbeef')", ids)
 
 
-def test_the_normalized_form_of_a_source_that_needs_its_numbers_does_not_compile() -> None:
+def test_if_a_source_depends_on_its_numbers_its_normalized_form_does_not_compile() -> None:
     assert compiles(b"x = 12345678")
     assert not compiles(normalized("x = 12345678", ["12345678"]).encode())
     assert not compiles(normalized("match x:\n    case {1: a, 2: b}:\n        pass", ()).encode())
     assert not compiles(normalized(r"x = '\U0000abcd'", ["0000abcd"]).encode())
 
 
-@pytest.mark.filterwarnings("ignore")  # about escapes in the generated texts
+@pytest.mark.filterwarnings("ignore")  # warnings about escapes in the generated texts
 @settings(deadline=None)
 @given(st.sampled_from(AROUND), NUMBERS)
 @example("x = {}", "07")
@@ -58,7 +58,7 @@ def test_a_source_compiles_with_any_number_if_its_normalized_form_does(around: s
         compile(text, "x", "exec")
 
 
-@pytest.mark.filterwarnings("ignore")  # about escapes in the generated texts
+@pytest.mark.filterwarnings("ignore")  # warnings about escapes in the generated texts
 @settings(deadline=None)
 @given(st.sampled_from(AROUND), IDS)
 @example("x = {}", "12345678")

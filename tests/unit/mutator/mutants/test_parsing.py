@@ -1,4 +1,4 @@
-"""A file is refused if Python or LibCST cannot read it, or if LibCST loses part of it."""
+"""A file is refused if Python or LibCST cannot read it, or if LibCST does not reproduce all of it."""
 
 from pathlib import Path
 
@@ -54,5 +54,5 @@ def test_unreadable_files_are_refused(source: str, line: int | None, said: str) 
     ],
 )
 def test_unusual_files_are_accepted(source: str) -> None:
-    """LibCST preserves byte order marks, CRLF, continued lines, form feeds and odd spaces."""
+    """LibCST preserves byte order marks, CRLF, line continuations, form feeds and unusual spaces."""
     assert parse_file("m.py", source.encode(), Path("root")).data == source.encode()

@@ -61,7 +61,7 @@ def test_gnu_patch_applies_and_reverses_a_patch(
 
 
 def test_close_changes_share_a_hunk() -> None:
-    """Up to six lines may lie between them."""
+    """A hunk shows three lines before and after each change."""
     far, _ = make(f"{LONG}def f():\n    x = 1\n{BODY}    z = 3\n{LONG}".encode(), ["x", "z"], False)
     near, _ = make(f"{LONG}def f():\n    x = 1\n    y = 2\n    z = 3\n{LONG}".encode(), ["x", "z"], False)
     assert far.count("@@ -") == 3
@@ -75,6 +75,6 @@ def test_a_tab_follows_a_file_name_with_a_space() -> None:
 
 @pytest.mark.parametrize(("end", "told"), [("\n", ""), ("", "\\ No newline at end of file\n")])
 def test_every_line_of_a_new_file_is_added(end: str, told: str) -> None:
-    """A missing line end is marked."""
+    """A missing newline at the end of the file is marked."""
     head = "diff --git a/m.py b/m.py\nnew file mode 100644\n--- /dev/null\n+++ b/m.py\n@@ -0,0 +1,3 @@\n"
     assert patches.new_file("m.py", f"a = 1\n\nb = 2{end}") == f"{head}+a = 1\n+\n+b = 2\n{told}"

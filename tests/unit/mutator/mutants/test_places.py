@@ -1,4 +1,4 @@
-"""LibCST and `ast` must agree on the place of a statement. Otherwise the statement cannot be an anchor."""
+"""LibCST and `ast` must agree on the place of a statement, or the statement cannot be an anchor."""
 
 import ast
 from pathlib import Path
@@ -30,7 +30,7 @@ def parsed(source: str = SOURCE) -> ParsedFile:
 
 
 def test_both_parsers_agree_on_places() -> None:
-    """Anything may precede a statement on its line."""
+    """Other statements can precede a statement on its line."""
     file = parsed()
     told = [f.place for functions in file.functions.values() for f in functions]
     told += [
@@ -44,8 +44,10 @@ def test_both_parsers_agree_on_places() -> None:
 
 
 @pytest.mark.parametrize("kind", [AnchorKind.AFTER_ASSIGN, AnchorKind.BEFORE_RETURN, AnchorKind.ENTRY])
-def test_a_statement_at_another_line_is_refused(kind: AnchorKind, monkeypatch: pytest.MonkeyPatch) -> None:
-    """`ast` finds the anchored statement one line further down."""
+def test_a_statement_that_the_parsers_place_on_different_lines_is_refused(
+    kind: AnchorKind, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The test makes `ast` find the anchored statement one line further down."""
     later = places_by_ast(ast.parse("\ndef f(x):\n    x = 1\n    return x\n"))
     monkeypatch.setattr("mutator.mutants.anchors.places_by_ast", lambda tree: later)
     file = parsed("def f(x):\n    x = 1\n    return x\n")
@@ -56,8 +58,8 @@ def test_a_statement_at_another_line_is_refused(kind: AnchorKind, monkeypatch: p
     assert caught.value.line == {"after_assign": 2, "before_return": 3, "entry": 1}[kind]
 
 
-def test_a_line_that_libcst_loses_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The check of the whole file's bytes is left out."""
+def test_a_line_that_libcst_loses_is_detected_by_the_places(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The test turns off the check that LibCST reproduces the file's bytes."""
 
     def unchecked(data: bytes, where: Path) -> object:
         module = cst.parse_module(data)

@@ -33,8 +33,8 @@ def probe(
 
 
 def drive(fi: Any, lead_speeds: str, start: float = 0.0) -> str:
-    """Observe one step per character. At an `x`, the lead is slower than the car. Return the active steps
-    as `x`."""
+    """Observe one step per character. At an `x`, the lead is slower than the car. Return a text in which `x`
+    marks the active steps."""
     seen = ""
     for i, mark in enumerate(lead_speeds):
         fi.observe(t=start + i * 0.1, d_rel=40.0, v_ego=20.0, v_lead=15.0 if mark == "x" else 20.0)
@@ -56,8 +56,7 @@ def drive(fi: Any, lead_speeds: str, start: float = 0.0) -> str:
 def test_a_fault_is_held_as_requested(
     clone: Workspace, hold: Hold, seconds: float, armed: float, expected: str
 ) -> None:
-    """Once armed, a fault is active while its condition holds, for a time after that, or to the end of the
-    run."""
+    """Once armed, a fault is active while its condition holds, for a fixed time, or to the end of the run."""
     fi = probe(clone, hold=hold.value, hold_s=seconds, armed_after_s=armed)
     assert drive(fi, "..xxx..xx.") == expected
 
@@ -83,7 +82,7 @@ def test_no_fault_is_active_before_the_first_observation(clone: Workspace) -> No
 
 
 def test_a_new_run_discards_the_state_of_the_previous_one(clone: Workspace) -> None:
-    """A run is new if time goes back to the previous run's start or earlier."""
+    """A run is new if its time goes back to the previous run's start or earlier."""
     fi = probe(clone, hold="to_end")
     assert drive(fi, ".x.", start=0.9) == ".xx"
     assert drive(fi, "..x", start=0.9) == "..x"
@@ -105,7 +104,7 @@ def test_a_new_run_discards_the_state_of_the_previous_one(clone: Workspace) -> N
 def test_time_that_does_not_advance_is_an_error(
     clone: Workspace, times: tuple[float, ...], said: str
 ) -> None:
-    """The error is also in the report, in case the target catches it."""
+    """The error is raised again when the report is requested, in case the target catches it."""
     fi = probe(clone)
     *before, last = times
     for t in before:
@@ -117,7 +116,7 @@ def test_time_that_does_not_advance_is_an_error(
 
 
 def test_an_observed_value_that_is_not_a_number_is_an_error(clone: Workspace) -> None:
-    """The error is also in the report."""
+    """The error is raised again when the report is requested."""
     fi = probe(clone)
     with pytest.raises(TypeError, match="NoneType"):
         fi.observe(t=0.0, d_rel=None, v_ego=20.0, v_lead=15.0)
@@ -135,7 +134,7 @@ def test_a_run_stops_in_the_step_after_its_limit(clone: Workspace) -> None:
     assert drive(fi, "...") == "..."
 
 
-def test_observed_values_may_be_named_like_variables_of_the_probe(clone: Workspace) -> None:
+def test_observed_values_can_be_named_like_variables_of_the_probe(clone: Workspace) -> None:
     names = ("run", "values", "error", "active", "float", "map")
     read = tuple(Value(name=name, text=f"now.{name}", unit="-", about="x") for name in names)
     observed = replace(clone.manifest("openpilot").observation, values=read, derived=())
@@ -146,7 +145,7 @@ def test_observed_values_may_be_named_like_variables_of_the_probe(clone: Workspa
     assert fi.active("a")
 
 
-def test_derived_variables(clone: Workspace) -> None:
+def test_derived_variables_are_computed(clone: Workspace) -> None:
     """Headway is infinite at standstill, relative speed is the car's speed minus the lead's, and division
     never raises."""
     fi = probe(clone, condition="hwt > 1e6 and rs == -3 and 1 / v_ego > 5")
@@ -154,8 +153,7 @@ def test_derived_variables(clone: Workspace) -> None:
     assert fi.active("a")
 
 
-def test_the_probe_decides_as_the_planner_does(clone: Workspace) -> None:
-    """The reference is `trigger.evaluate`."""
+def test_the_probe_evaluates_conditions_like_the_harness(clone: Workspace) -> None:
     stream = random.Random(1)
     conditions = ["hwt <= 2 and rs > 0", "d_rel / rs < 3 or not t > 1", "1 <= v_ego / v_lead < abs(rs) * 2"]
     for condition in conditions:
@@ -190,7 +188,7 @@ def test_stored_values_are_reset_at_each_activation(clone: Workspace) -> None:
     assert seen == [(1, 0.0), (1, 0.1), (1, 0.2), (5, 0.0), (5, 0.1)]
 
 
-def test_the_delay_becomes_constant(clone: Workspace) -> None:
+def test_delayed_values_are_as_old_as_the_delay(clone: Workspace) -> None:
     """The first value is returned until another value is old enough."""
     fi = probe(clone, condition="t >= 0.2")
     seen = []
@@ -201,8 +199,8 @@ def test_the_delay_becomes_constant(clone: Workspace) -> None:
     assert seen == [2, 2, 2, 3, 4, 5]
 
 
-def test_stored_values_of_a_run_outlast_an_activation(clone: Workspace) -> None:
-    """Values of other injections are separate. All stored values are discarded at the end of the run."""
+def test_values_stored_for_a_run_outlast_an_activation(clone: Workspace) -> None:
+    """Each injection has its own values. All of them are discarded at the end of the run."""
     fi = probe(clone)
     made = iter(range(10))
     seen = []
@@ -215,7 +213,7 @@ def test_stored_values_of_a_run_outlast_an_activation(clone: Workspace) -> None:
 
 
 def test_noise_depends_only_on_its_seed(clone: Workspace) -> None:
-    """The shared generator is unchanged."""
+    """The shared generator of `random` is unchanged."""
     fi = probe(clone, condition="True")
     state = random.getstate()
     runs = []
@@ -280,7 +278,7 @@ def test_a_bit_flip_keeps_the_type(clone: Workspace, value: Any, bit: int, resul
     ],
 )
 def test_a_bit_outside_the_type_is_an_error(clone: Workspace, value: Any, bit: int) -> None:
-    """A value without such a type is an error, too."""
+    """Types whose bits cannot be flipped cause the same error."""
     with pytest.raises(ValueError, match=f"{value.dtype.name} has no bit {bit} to flip"):
         probe(clone).flip_bit(value, bit)
 
@@ -307,7 +305,7 @@ def test_a_bit_outside_the_type_is_an_error(clone: Workspace, value: Any, bit: i
 def test_a_whole_number_takes_the_type_of_an_integer_value(
     clone: Workspace, value: Any, number: float, kind: type
 ) -> None:
-    """The value may be an integer, a numpy integer, or an array of integers."""
+    """The value can be an integer, a numpy integer, or an array of integers."""
     found = probe(clone).like(value, number)
     assert type(found) is kind
     assert found == number or math.isnan(number)

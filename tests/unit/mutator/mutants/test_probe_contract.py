@@ -73,7 +73,7 @@ def test_probes_of_two_triggers_differ_only_in_their_settings(clone: Workspace) 
     }
 
 
-def test_holding_for_a_time_needs_the_time(clone: Workspace) -> None:
+def test_holding_a_fault_for_a_time_needs_the_time(clone: Workspace) -> None:
     observation = clone.manifest("openpilot").observation
     with pytest.raises(MutatorError, match="without a time"):
         contract.template_values("m", Trigger(name="x", condition="True"), Hold.FOR, (), observation, 0.1)
@@ -92,12 +92,12 @@ RAN = {"first": 0.5, "last": 2.0, "count": 3}
 @pytest.mark.parametrize(
     "report", [{}, {"injections": {}}, {"injections": {"a": NEVER}}, {"injections": None}]
 )
-def test_a_report_without_activation_has_none(report: dict[str, Any]) -> None:
+def test_a_report_without_an_active_injection_has_no_activation(report: dict[str, Any]) -> None:
     assert contract.activation_of(report) is None
 
 
 def test_activations_of_all_injections_are_added(clone: Workspace) -> None:
-    """The report of a mutant that never triggers is read like a probe's report."""
+    """The harness's own report for a mutant that never triggers is read in the same way."""
     early = {"first": 0.25, "last": 0.75, "count": 1}
     report = {"injections": {"a": RAN, "b": early, "c": NEVER}}
     assert contract.activation_of(report) == Activation(first=0.25, last=2.0, count=4)
@@ -153,7 +153,7 @@ def test_valid_reports_have_no_findings(clone: Workspace) -> None:
         ({"triggered": None}, "its trigger was not"),
     ],
 )
-def test_damaged_reports_are_found(change: Any, said: str) -> None:
-    """Keys, types and numbers may be wrong, or contradict each other."""
+def test_damaged_reports_are_detected(change: Any, said: str) -> None:
+    """Keys, types and numbers can be wrong, or contradict each other."""
     report = SOUND | change if isinstance(change, dict) else change
     assert said in contract.report_problem(report, "m", ("a", "b"))

@@ -69,7 +69,7 @@ def test_numbers_become_exact_literals(value: float, plain: str, added: str) -> 
 @pytest.mark.parametrize(
     "name", ["x y", "x;y", "import", "x.class", "1x", "", "_fi.active", "x\ny", 3.0, None]
 )
-def test_a_variable_is_a_chain_of_identifiers(name: Value) -> None:
+def test_a_variable_must_be_a_chain_of_identifiers(name: Value) -> None:
     with pytest.raises(MutatorError):
         rendered("{{ target }} = 1\n", target=name)
 
@@ -142,7 +142,7 @@ def test_a_guard_opens_a_block() -> None:
     ],
 )
 def test_an_expression_stays_one_operand(template: str, text: str) -> None:
-    """Brackets are added if needed."""
+    """Parentheses are added if needed."""
     made = replace(model(template, SnippetKind.VALUE), expression=template)
     assert changed_value(made, {"by": 1.0}, "ab12", "y") == text
 
@@ -250,10 +250,10 @@ def test_constants_are_written_with_repr(given: dict[str, Value], line: str) -> 
         ("wrong_branch", {"holds": "never"}, True, False),
     ],
 )
-def test_integers_stay_integers(
+def test_a_models_result_has_the_expected_value_and_type(
     clone: Workspace, name: str, params: dict[str, Value], value: Any, result: Any
 ) -> None:
-    """The parameters must be whole numbers."""
+    """Integers stay integers if the parameters are whole numbers."""
     models = clone.fault_models()
     given = {"target": "x", **{key: int(v) if key == "bit" else v for key, v in params.items()}}
     given = {key: v for key, v in given.items() if v is not None or key == "value"}

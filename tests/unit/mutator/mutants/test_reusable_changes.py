@@ -61,8 +61,8 @@ def test_a_reusable_change_equals_the_spliced_one(text: str, guard: bool) -> Non
 
 
 @pytest.mark.parametrize("text", TEXTS)
-def test_a_value_changes_in_the_line_before_inserted_lines(text: str) -> None:
-    """The line may be the last one of the file."""
+def test_a_change_of_a_value_and_inserted_lines_can_be_reused_together(text: str) -> None:
+    """The changed line can be the last one of the file."""
     file = parse_file("m.py", text.encode("latin-1" if "latin" in text else "utf-8"), Path("root"))
 
     def changed(name: str, value: str) -> tuple[ReusableChange, Change, list[bytes]]:
@@ -105,7 +105,7 @@ def fault(value: Value, **location: object) -> Fault:
 
 
 def test_a_change_is_reused_for_another_number(toy: Workspace) -> None:
-    """Another sign, another type or a non-finite value needs a new change."""
+    """A different sign, a different type or a non-finite value needs a new change."""
     manifest, models = toy.manifest("toy"), toy.fault_models()
     known = known_changes(manifest.tree, SENSOR)
     counts = []

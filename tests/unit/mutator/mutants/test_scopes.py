@@ -17,7 +17,7 @@ def genexpr(x=(i for i in 'ab')): return (µ for µ in x)
 """
 
 
-def test_names_of_functions() -> None:
+def test_a_function_knows_its_own_and_outer_names() -> None:
     """Names that only inner functions use are unknown."""
     names = function_names(SOURCE.encode())
     go = names[4, "go"]
@@ -28,7 +28,7 @@ def test_names_of_functions() -> None:
 
 
 def test_the_files_encoding_is_used() -> None:
-    """A byte order mark may declare the encoding."""
+    """A byte order mark can declare the encoding."""
     latin = "# coding: latin-1\ndef f(\xe9): return \xe9\n".encode("latin-1")
     assert function_names(latin) == {(2, "f"): {"\xe9"}}
     assert function_names("\ufeffdef f(\xe9): pass\r\n".encode()) == {(1, "f"): {"\xe9"}}
@@ -70,11 +70,11 @@ CLASS = "class C:\n    def f(self):\n        #\n        return __x\n"
         (CLASS, "__y = 1", None),
     ],
 )  # fmt: skip
-def test_any_binding_makes_a_name_local(
+def test_an_inserted_binding_can_change_the_scope_of_a_name(
     source: str, inserted: str, moved: tuple[str, str, str, str] | None
 ) -> None:
-    """The binding also hides the name from inner functions, unless it was local or declared before.
-    Attributes, arguments and comprehensions have separate names."""
+    """A name that was already local or declared keeps its scope. Attributes, keyword arguments and
+    comprehension variables do not bind names of the function."""
     place = next(i for i, line in enumerate(source.splitlines(), 1) if line.strip() == "#")
     made = source.replace("#", inserted)
     found = next(moved_names(source.replace("#", "pass").encode(), made.encode(), {place}), None)

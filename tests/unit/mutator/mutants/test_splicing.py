@@ -1,4 +1,4 @@
-"""The splicer, on the shapes of source found in real trees."""
+"""Splicing lines into sources of many forms."""
 
 from pathlib import Path
 
@@ -26,7 +26,7 @@ def edit(
 
 
 def spliced(text: str | bytes, kind: AnchorKind, name: str = "x", *, guard: bool = False) -> bytes:
-    """The mutated bytes, which must compile and allow the original to be restored."""
+    """Return the mutated bytes, after checking that they compile and that the original can be restored."""
     file = parsed(text)
     result = splicing.joined(splicing.apply_edits(file, [edit(file, kind, name, guard=guard)]))
     compile(result, "m.py", "exec")
@@ -35,7 +35,7 @@ def spliced(text: str | bytes, kind: AnchorKind, name: str = "x", *, guard: bool
 
 
 def test_lines_are_inserted_next_to_the_statement() -> None:
-    """Lines have the statement's indentation and a tag each."""
+    """Each line has the statement's indentation and a tag."""
     text = "def f(x):\n    # why\n    x = 1  # set\n    # then\n    return x\n"
     assert spliced(text, AnchorKind.AFTER_ASSIGN).decode() == (
         "def f(x):\n    # why\n    x = 1  # set\n"
@@ -137,8 +137,8 @@ def test_only_a_statement_alone_on_its_lines_can_be_wrapped(text: str, kind: Anc
         edit(file, kind, "" if kind is AnchorKind.ENTRY else "g", guard=True)
 
 
-def test_edits_at_one_boundary() -> None:
-    """A guard stays with its statement."""
+def test_several_edits_at_one_statement_can_be_combined() -> None:
+    """A guard stays directly above its statement."""
     file = parsed("def f(x):\n    if x:\n        x = 1\n    g(1)\n    return x\n")
     edits = [
         edit(file, AnchorKind.BEFORE_CALL, "g", guard=True),
@@ -161,7 +161,7 @@ def test_two_guards_around_one_statement_are_refused() -> None:
         splicing.apply_edits(file, [guard, guard])
 
 
-def test_two_edits_at_the_end_of_a_file_without_newline() -> None:
+def test_two_edits_at_the_end_of_a_file_without_a_newline_can_be_undone() -> None:
     file = parsed("def f(x):\n    x = g(1)")
     edits = [edit(file, AnchorKind.AFTER_ASSIGN), edit(file, AnchorKind.AFTER_CALL, "g")]
     result = splicing.joined(splicing.apply_edits(file, edits))
@@ -169,7 +169,7 @@ def test_two_edits_at_the_end_of_a_file_without_newline() -> None:
     assert splicing.unsplice(result) == file.data
 
 
-def test_a_snippet_that_the_encoding_lacks_is_refused() -> None:
+def test_a_snippet_that_the_files_encoding_cannot_represent_is_refused() -> None:
     file = parsed("# coding: ascii\ndef f(x):\n    x = 1\n")
     site = file.resolve(
         FaultLocation(path="m.py", function="f", anchor=Anchor(kind=AnchorKind.AFTER_ASSIGN, name="x"))
@@ -179,7 +179,7 @@ def test_a_snippet_that_the_encoding_lacks_is_refused() -> None:
 
 
 def test_the_import_of_the_probe_is_tagged() -> None:
-    """The import goes below the docstring and `__future__` imports."""
+    """The import is inserted below the docstring and `__future__` imports."""
     file = parsed('"""Doc."""\nfrom __future__ import annotations\n\nimport os\n')
     result = splicing.joined(splicing.apply_edits(file, [splicing.probe_import(file, "pack")]))
     assert result.decode() == (
@@ -188,7 +188,7 @@ def test_the_import_of_the_probe_is_tagged() -> None:
 
 
 def test_a_byte_order_mark_stays_first() -> None:
-    """An import below a docstring is allowed; any other is refused."""
+    """The probe's import is inserted below the docstring. Without a docstring, it is refused."""
     file = parsed(b"\xef\xbb\xbf'Doc.'\nx = 1\n")
     result = splicing.joined(splicing.apply_edits(file, [splicing.probe_import(file, "pack")]))
     compile(result, "m.py", "exec")

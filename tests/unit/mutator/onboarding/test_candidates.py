@@ -1,4 +1,4 @@
-"""Guesses of a controller's step function and of the values worth a fault."""
+"""How the harness guesses a controller's step function and useful places for faults."""
 
 import ast
 
@@ -60,23 +60,23 @@ def candidates(**sources: str) -> tuple[LoopCandidate, ...]:
 
 
 def test_the_controllers_step_ranks_first() -> None:
-    """A method with a step's name, in a class with state and called in a loop, ranks before the world or a
-    helper."""
+    """A method with a step's name, in a class with state and called in a loop, ranks before methods of the
+    world and helpers."""
     first, *others = candidates(car=CAR)
     assert (first.name, first.path, first.line) == ("SpeedController.update", "car.py", 14)
     assert {one.name for one in others} == {"World.advance", "clip", "run"}
 
 
 def test_required_arguments_are_listed() -> None:
-    """Arguments of the step and of the constructor are listed, keyword ones included."""
+    """Arguments of the step and of the constructor are listed, including keyword-only arguments."""
     first, *_ = candidates(car=CAR)
     assert first.needs == ("speed", "wanted", "dt")
     assert first.builds == ("gain", "limit")
 
 
-def test_values_are_named_numbers() -> None:
-    """Texts, items and unpacked tuples are not listed. Arithmetic on a name that is assigned once comes
-    first. A name that is assigned several times is distinguished."""
+def test_only_numbers_with_a_name_are_listed_as_values() -> None:
+    """Texts, items and unpacked tuples are not listed. Names that are assigned once come first. The
+    assignments of other names are numbered."""
     first, *_ = candidates(car=CAR)
     assert [(value.name, value.line, value.nth) for value in first.values] == [
         ("error", 16, None),
@@ -95,7 +95,7 @@ def test_values_of_inner_functions_are_left_out() -> None:
     assert {value.name for value in step.values} == {"x", "y", "z"}
 
 
-def test_of_two_equal_functions_the_one_in_a_controllers_file_ranks_first() -> None:
+def test_a_function_in_a_file_named_like_a_controller_ranks_first() -> None:
     source = "def step(x):\n    y = x + 1\n    return y\n"
     assert [one.path for one in candidates(a=source, pilot=source)] == ["pilot.py", "a.py"]
 
@@ -111,5 +111,5 @@ def test_of_two_equal_functions_the_one_in_a_controllers_file_ranks_first() -> N
     ],
 )
 def test_modules_without_a_step_have_no_candidate(source: str) -> None:
-    """A coroutine is no candidate, because calling it runs nothing."""
+    """A coroutine is not a candidate, because calling it runs nothing."""
     assert candidates(a=source) == ()

@@ -105,7 +105,7 @@ def test_environments_and_hidden_folders_are_left_out(tree: Tree) -> None:
 
 
 def test_an_installed_package_is_found_without_importing_it() -> None:
-    """The package's requirement is added."""
+    """The survey also gives the requirement for the package."""
     found = look_at("installed:typer")
     assert found.packages == ("typer",)
     assert found.requires and found.requires.startswith("typer>=")
@@ -121,7 +121,7 @@ def test_an_installed_package_is_found_without_importing_it() -> None:
         ("installed:math", "no installed package 'math'"),
     ],
 )
-def test_a_missing_folder_or_package_is_a_users_error(target: str, words: str) -> None:
+def test_a_missing_folder_or_package_is_an_error_with_a_remedy(target: str, words: str) -> None:
     with pytest.raises(MutatorError, match=words) as told:
         look_at(target)
     assert told.value.remedy

@@ -21,7 +21,7 @@ def _number(path: Path, text: str) -> int:
 
 
 def test_lines_are_recorded_from_the_first_observation_on(toycar: Workspace, tmp_path: Path) -> None:
-    """Lines of constructors are left out. The run equals the golden run byte for byte."""
+    """Lines of constructors are therefore left out. The trace is the same as without recording."""
     manifest = toycar.manifest("toycar")
     base = prepare_base(manifest, tmp_path / "base")
     engine = ReferenceEngine(manifest, base, tmp_path, LIMITS)

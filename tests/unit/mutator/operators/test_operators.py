@@ -68,7 +68,9 @@ CHANGES = {
         "a(b)": ["a(b) -> left out"],
         "c = b": [],  # the first value of `c`, without which the name would not exist
         "if a: b = c": [],
-        "a([c for c in b])\n    c = b": ["a([c for c in b]) -> left out"],  # the `c` inside is another name
+        "a([c for c in b])\n    c = b": [
+            "a([c for c in b]) -> left out"
+        ],  # the `c` inside is a different variable
     },
     "return": {
         "return a": ["a -> None", "a -> 0", "a -> -a"],
@@ -92,7 +94,7 @@ CHANGES = {
 
 @pytest.fixture
 def make(tmp_path: Path, clone: Workspace) -> Make:
-    """The mutations of a function `f` with this source as its body, by all operators or by the given ones."""
+    """Return the mutations of a function `f` with the given body, by the given operators or by all."""
     models = clone.fault_models()
 
     def made(body: str, *operators: str, head: str = "def f(self, a, b):") -> list[Mutation]:
@@ -110,7 +112,7 @@ def test_each_operator_makes_its_changes(operator: str, make: Make) -> None:
         assert [one.text for one in make(body, operator)] == expected, body
 
 
-def test_a_yield_is_not_evaluated_twice(make: Make) -> None:
+def test_an_expression_with_a_yield_has_no_mutations(make: Make) -> None:
     assert not make("return (yield a) + b", "arithmetic", "return")
 
 
@@ -123,8 +125,9 @@ def test_mutations_to_equal_code_are_dropped(make: Make) -> None:
     ]
 
 
-def test_functions_with_the_same_name_keep_their_first_values(make: Make) -> None:
-    """A property and its setter share a name. Each keeps the first value of its local names."""
+def test_first_values_are_kept_in_functions_with_the_same_name(make: Make) -> None:
+    """A property and its setter share a name. In each, the assignment that gives a local name its first value
+    is not left out."""
     setter = "@f.setter\n    def f(self, a):\n        c = a\n        self.a = c"
     made = make(
         f"@property\n    def f(self):\n        c = 1\n        return c\n    {setter}",
@@ -142,12 +145,12 @@ def test_mutants_of_a_file_with_a_byte_order_mark_compile(tmp_path: Path, clone:
     assert made and not distinct(file, made).invalid
 
 
-def test_long_change_shows_what_differs(make: Make) -> None:
+def test_a_long_change_is_shortened_to_the_part_that_differs(make: Make) -> None:
     [long] = make(f"{'a' * 80}(b, limit=a)", "argument")
     assert long.text == ".. aaaaaaaaaaaaaaaaaa(b, limit=a) -> .. aaaaaaaaaaaaaaaaaa(b)"
 
 
-def test_places_are_files_and_functions_with_globs(toycar: Workspace) -> None:
+def test_places_can_be_files_functions_and_globs(toycar: Workspace) -> None:
     """Lines that are not executed are left out and counted."""
     manifest, models = toycar.manifest("toycar"), toycar.fault_models()
 
@@ -172,7 +175,7 @@ def test_places_are_files_and_functions_with_globs(toycar: Workspace) -> None:
 
 
 def test_samples_are_stratified_and_reproducible(toycar: Workspace) -> None:
-    """A sample has each operator's share in each function, to within one mutant."""
+    """In each function, each operator is sampled in proportion to its mutants."""
     manifest, models = toycar.manifest("toycar"), toycar.fault_models()
     found = find_mutations(manifest, models, list(Operator), ["toycar/**"])
     drawn = sampled(found, len(found.mutations) // 3, 4)
@@ -184,7 +187,7 @@ def test_samples_are_stratified_and_reproducible(toycar: Workspace) -> None:
 
 
 def test_every_mutant_of_the_toy_can_be_built(toycar: Workspace) -> None:
-    """The bytes are those of a direct build. The ids are all different."""
+    """A direct build gives the same bytes. All ids differ."""
     manifest, models = toycar.manifest("toycar"), toycar.fault_models()
     found = find_mutations(manifest, models, list(Operator), ["toycar/sensing.py", "toycar/driver.py"])
     faults = [one.fault("as_described") for one in found.mutations]

@@ -1,4 +1,4 @@
-"""Who is blamed for a run that ends badly. The lines on the stack and the time decide."""
+"""Whether a run that ends with an error is blamed on the target, the mutant or the harness."""
 
 from pathlib import Path
 
@@ -59,10 +59,10 @@ def execution(
         ((PROBE, ELSEWHERE), Status.HARNESS_ERROR),
     ],
 )
-def test_the_lines_on_the_stack_decide(stack: Stack, status: Status) -> None:
+def test_the_lines_on_the_stack_determine_the_blame(stack: Stack, status: Status) -> None:
     """An exception in the target's own code is a crash. If the exception is in an injected line, in a probe
-    helper that it calls, or in target code that it calls, the mutant is invalid. Observing and asking the
-    probe are not the target's code."""
+    helper that it calls, or in target code that it calls, the mutant is invalid. An exception in a line that
+    only observes or checks the probe is a harness error."""
     assert assign_blame(execution(stack), FILES, ())[0] is status
 
 
@@ -87,9 +87,9 @@ CHANGED = {
         ((("car/radar.py", 2, -1),), Status.CRASHED),
     ],
 )
-def test_only_the_injected_part_of_a_line_is_the_injection(stack: Stack, status: Status) -> None:
-    """An exception in the rest of the line belongs to the target, and one raised by asking the probe to the
-    harness."""
+def test_the_mutant_is_blamed_only_for_the_injected_part_of_a_line(stack: Stack, status: Status) -> None:
+    """An exception in the rest of the line is blamed on the target, and one raised by checking the probe on
+    the harness."""
     assert assign_blame(execution(stack), CHANGED, ())[0] is status
 
 
@@ -110,9 +110,9 @@ TWO = b"""def say(x):
     ("data", "of_fault"),
     [(IN_A_STRING, "None.x"), (LATIN, "1 / 0"), (TWO, "no()"), (TWO, "1 / 0")],
 )
-def test_columns_count_bytes_of_utf_8(data: bytes, of_fault: str) -> None:
-    """The line begins inside a string, or has letters of another encoding. Code before or after the injected
-    part belongs to the target."""
+def test_columns_of_the_injected_part_are_counted_in_utf_8_bytes(data: bytes, of_fault: str) -> None:
+    """The line begins inside a string, has non-ASCII letters, or has two injections. Code before or after the
+    injected part belongs to the target."""
     encoding = "latin-1" if b"latin" in data else "utf-8"
     number = 1 + next(n for n, line in enumerate(data.splitlines()) if b"# fi:" in line)
     line = data.splitlines()[number - 1].decode(encoding)
@@ -150,7 +150,7 @@ def test_the_message_names_the_line_or_the_reason() -> None:
 
 
 def test_an_intended_exception_is_a_crash() -> None:
-    """The exception does not excuse another injection."""
+    """The exception of any other injection makes the mutant invalid."""
     assert assign_blame(execution((INJECTED,)), FILES, ("0a1b2c3d",))[0] is Status.CRASHED
     assert assign_blame(execution((INJECTED,)), FILES, ("ffffffff",))[0] is Status.INVALID_MUTANT
     assert assign_blame(execution((PROBE, GUARD)), FILES, ("0a1b2c3d",))[0] is Status.HARNESS_ERROR
@@ -165,7 +165,7 @@ def test_a_fault_is_not_blamed_before_its_activation(status: Status, stacks: tup
 
 
 def test_a_run_without_an_exception_keeps_its_status() -> None:
-    """A run may time out or end silently after the activation, or be a harness error at any time."""
+    """A run can time out or end silently after the activation, or be a harness error at any time."""
     for status in (Status.CRASHED, Status.TIMEOUT):
         assert assign_blame(execution(status=status, probe=False), FILES, ()) == (status, "why")
     told = assign_blame(execution(status=Status.HARNESS_ERROR, active=False), FILES, ())
@@ -173,15 +173,16 @@ def test_a_run_without_an_exception_keeps_its_status() -> None:
 
 
 def test_the_first_of_chained_exceptions_is_blamed() -> None:
-    """The target catches an exception of an injected line or of the probe and raises another one. The probe
-    takes precedence."""
+    """The target catches an exception of an injected line or of the probe and raises a different one. An
+    exception of the probe takes precedence."""
     assert assign_blame(execution((TARGET,), (ELSEWHERE,)), FILES, ())[0] is Status.CRASHED
     assert assign_blame(execution((TARGET,), (INJECTED,)), FILES, ())[0] is Status.INVALID_MUTANT
     assert assign_blame(execution((INJECTED,), (OBSERVES,)), FILES, ())[0] is Status.HARNESS_ERROR
 
 
-def test_endless_recursion_is_the_targets_fault() -> None:
-    """An injected line may have made the last call."""
+def test_endless_recursion_is_blamed_on_the_target() -> None:
+    """This holds even if an injected line made the last call, but not if an injected line called the code
+    that failed."""
     for top in ((INJECTED,), (PROBE, INJECTED), (GUARD,), (PROBE, GUARD)):
         deep = execution((*top, TARGET, ELSEWHERE), kind="RecursionError")
         assert assign_blame(deep, FILES, ())[0] is Status.CRASHED

@@ -1,4 +1,4 @@
-"""The columns of the results follow from the manifest alone."""
+"""The columns of the results, which depend only on the manifest."""
 
 from pathlib import Path
 
@@ -20,7 +20,7 @@ def names(hazards: list[str], compared: list[str]) -> list[str]:
     return [column.name for column in result_columns(hazards, compared)]
 
 
-def test_the_shipped_target_has_these_columns_in_this_order(clone: Workspace) -> None:
+def test_the_shipped_target_has_the_expected_columns_in_order(clone: Workspace) -> None:
     manifest = clone.manifest("openpilot")
     made = names(list(manifest.hazards), [channel.name for channel in manifest.compared])
     assert ", ".join(made) == OF_OPENPILOT
@@ -35,8 +35,8 @@ def test_another_target_has_its_own_columns() -> None:
     assert not {"h1", "t_h1", "max_dev_gas", "max_dev_brake", "max_dev_steer"} & {*made}
 
 
-def test_a_target_may_have_no_hazards() -> None:
-    """None of the fixed columns is read as a hazard."""
+def test_a_target_can_have_no_hazards() -> None:
+    """No fixed column is mistaken for a hazard."""
     made = names([], [])
     assert hazards_in(made) == ()
     assert not [name for name in made if name.startswith("max_dev_")]
@@ -54,7 +54,7 @@ def test_hazard_columns_keep_the_order_of_the_manifest() -> None:
     ],
 )
 def test_deviation_columns_use_the_first_word_of_a_channel(channels: list[str], columns: list[str]) -> None:
-    """The word must be unique."""
+    """If that word is not unique, the whole name is used."""
     assert list(deviation_columns(channels).values()) == columns
 
 
@@ -70,7 +70,7 @@ def test_deviation_columns_use_the_first_word_of_a_channel(channels: list[str], 
     ],
 )
 def test_names_are_read_as_text(column: str, text: bool) -> None:
-    """Names may look like numbers. The columns that a target adds are numbers."""
+    """Names can look like numbers. The columns that a target adds contain numbers."""
     assert is_text(column) is text
 
 
@@ -111,7 +111,7 @@ def test_a_metric_with_an_existing_column_is_refused(toy: Workspace, metrics: li
 
 
 @pytest.mark.parametrize("name", ["h1", "H2", "too_fast"])
-def test_all_other_names_are_valid(toy: Workspace, name: str) -> None:
+def test_other_hazard_names_are_valid(toy: Workspace, name: str) -> None:
     path = toy.library / "targets" / "toy.yaml"
     path.write_text(path.read_text().replace("hazards: [H1]", f"hazards: [{name}]"))
     assert toy.manifest("toy").hazards == (name,)

@@ -1,4 +1,4 @@
-"""What the fault-free runs of a run folder do without any fault."""
+"""The hazards, alerts and channel ranges of fault-free runs."""
 
 import json
 from pathlib import Path
@@ -30,7 +30,7 @@ MANIFEST: Any = SimpleNamespace(
 
 
 def folder(path: Path, runs: dict[tuple[str, str], dict]) -> RunFolder:
-    """A run folder with these records of golden runs, by scenario and change."""
+    """Create a run folder whose golden runs have the given records, by scenario and change."""
     goldens = [[scenario, [change] if change else []] for scenario, change in runs]
     (path / "run.json").write_text(json.dumps({"schema": "run/1", "goldens": goldens}))
     made = RunFolder.unverified(path)
@@ -42,8 +42,8 @@ def folder(path: Path, runs: dict[tuple[str, str], dict]) -> RunFolder:
     return made
 
 
-def test_first_times_of_events_and_ranges_of_channels(tmp_path: Path) -> None:
-    """Values that are not recorded are left out."""
+def test_the_table_has_first_times_of_events_and_ranges_of_channels(tmp_path: Path) -> None:
+    """Channels and alerts that are not declared or recorded are left out."""
     raised = [{"name": "fcw", "t": 3.5}, {"name": "fcw", "t": 9.0}, {"name": "chime", "t": 1.0}]
     runs = fault_free_runs(
         folder(
@@ -60,7 +60,7 @@ def test_first_times_of_events_and_ranges_of_channels(tmp_path: Path) -> None:
     assert list(table.rows[1]) == ["B", "fcw at 3.50 s", "H1 at 7.00 s", "-1 to 2"]
 
 
-def test_the_sentence_names_alerts_and_scenarios_once(tmp_path: Path) -> None:
+def test_the_sentence_names_each_alert_once_with_its_scenarios(tmp_path: Path) -> None:
     fcw = {"hazards": {}, "alerts": [{"name": "fcw", "t": 3.5}]}
     late = {"hazards": {}, "alerts": [{"name": "late", "t": 3.5}]}
     runs = fault_free_runs(
