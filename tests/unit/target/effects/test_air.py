@@ -1,4 +1,4 @@
-"""Fog follows Koschmieder's law, with the distances that the camera sees."""
+"""Fog attenuates each pixel by Koschmieder's law, according to the pixel's distance."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ UDACITY = CameraModel.from_view(width=640, rows=480, horizon=200.0, focal=600.0,
 
 
 @pytest.mark.parametrize("model", [CameraModel(), UDACITY])
-def test_way_of_light_is_the_distance_to_the_road(model):
+def test_the_light_path_of_a_road_pixel_is_its_distance(model):
     """Straight ahead, the path's length follows from the camera's height and the distance on the road."""
     way = ways(model)
     for x in (5.0, 20.0, 60.0):
@@ -22,8 +22,8 @@ def test_way_of_light_is_the_distance_to_the_road(model):
 
 
 @pytest.mark.parametrize("visibility", [20.0, 40.0])
-def test_contrast_at_visibility_is_5_percent(visibility, camera, moment):
-    """At the visibility, 5 % of a mark's contrast is left. At half of it, the root of 5 % is left."""
+def test_at_the_visibility_5_percent_of_the_contrast_is_left(visibility, camera, moment):
+    """At half the visibility, the square root of 5 % of the contrast is left."""
     dark = np.full((camera.rows, camera.width), 50, np.uint8)
     dark[:170] = 200
     bright = dark.copy()
@@ -38,7 +38,7 @@ def test_contrast_at_visibility_is_5_percent(visibility, camera, moment):
         assert left[there].mean() / 200.0 == pytest.approx(expected, rel=0.05)
 
 
-def test_fog_follows_the_law_in_every_row(camera, moment, road):
+def test_fog_follows_koschmieders_law_in_every_row(camera, moment, road):
     """Every pixel is attenuated light plus airlight. High above the horizon only airlight remains."""
     visibility = 60.0
     seen = Fog(visibility, 0, camera).apply(road, moment()).astype(float)

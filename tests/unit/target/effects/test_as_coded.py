@@ -15,7 +15,7 @@ def black(camera):
 
 
 @pytest.mark.parametrize("effect", EFFECTS)
-def test_each_picture_is_drawn_anew(effect, camera, moment, road):
+def test_each_frame_number_has_its_own_drawing(effect, camera, moment, road):
     """A frame number gives the same drawing in every run. Different numbers give unrelated drawings."""
     one, other = effect(7, 3, camera), effect(7, 3, camera)
     later = other.apply(road, moment(5))
@@ -26,8 +26,8 @@ def test_each_picture_is_drawn_anew(effect, camera, moment, road):
 
 
 @pytest.mark.parametrize("level", [2, 10])
-def test_rain_covers_what_a_quarter_of_the_streaks_do(camera, moment, black, level):
-    """For each level there are 1,000 streaks of 32 pixels on four times the image area. Overlaps add up."""
+def test_rain_covers_the_expected_share_of_the_image(camera, moment, black, level):
+    """Each level adds 1,000 streaks of 32 pixels, spread over four times the area of the image."""
     rain = CodedRain(level, 3, camera).apply(black, moment())
     assert rain[rain > 0].min() == round(255 * 0.11)
     expected = 1000 * level * 31 / (4 * black.size)  # a streak has one pixel in each row
@@ -35,10 +35,10 @@ def test_rain_covers_what_a_quarter_of_the_streaks_do(camera, moment, black, lev
 
 
 @pytest.mark.parametrize("level", [3, 10])
-def test_fog_is_white_pixels_blurred(camera, moment, black, level):
-    """Each level has 15,000 white pixels, some at the same place.
+def test_fog_is_made_of_blurred_white_pixels(camera, moment, black, level):
+    """Each level adds 15,000 white pixels, some at the same place.
 
-    The road's share of the light is 0.9 - 0.05 t.
+    The road keeps 0.9 - 0.05 * level of its light.
     """
     fog = CodedFog(level, 3, camera).apply(black, moment())
     covered = 1.0 - np.exp(-15_000 * level / black.size)
@@ -48,18 +48,15 @@ def test_fog_is_white_pixels_blurred(camera, moment, black, level):
 
 
 @pytest.mark.parametrize("level", [1, 10])
-def test_snow_is_fog_and_blocks(camera, moment, black, level):
-    """Each level has 250 blocks of 2 x 2 pixels. Blurring keeps their total light."""
+def test_snow_is_made_of_fog_and_blocks(camera, moment, black, level):
+    """Each level adds 250 blocks of 2 x 2 pixels. Blurring does not change their total light."""
     snow, fog = (effect(level, 3, camera).apply(black, moment()) for effect in (CodedSnow, CodedFog))
     blocks = (snow.mean() - fog.mean()) * black.size / (4 * 255)
     assert blocks == pytest.approx(250 * level, rel=0.15)
 
 
 def test_occlusion_lies_on_the_road_and_has_a_rim(camera, moment, road):
-    """Black blobs lie in the lower half and have a rim of up to grey 150.
-
-    The rest of the road is unchanged.
-    """
+    """Black blobs lie in the lower half and have a rim with grey levels up to 150."""
     seen = CodedOcclusion(10, 3, camera).apply(road, moment())
     changed = seen != road
     assert changed.any() and not changed[: camera.rows // 2 - 60].any()
@@ -67,7 +64,7 @@ def test_occlusion_lies_on_the_road_and_has_a_rim(camera, moment, road):
 
 
 def test_a_flake_is_a_blurred_block():
-    """A flake has the levels of a blurred block in a large image, whatever the layer's blur."""
+    """A flake has the same pixels as a block that is blurred in a large image."""
     block = np.zeros((40, 40), np.uint8)
     block[19:21, 19:21] = 255
     for layer in range(1, 11):

@@ -1,4 +1,4 @@
-"""Effects compiled from C return the bits of the Python code, for any level, size and region."""
+"""Effects compiled from C return the same bits as the Python code, for any level, size and region."""
 
 import shutil
 import subprocess
@@ -69,7 +69,7 @@ def compile_effects(folder, *options):
 
 @pytest.fixture
 def both(folder):
-    """Return an effect in Python and in C. Skip the test if OpenCV computes other bits than the C code."""
+    """Build an effect in Python and in C. Skip the test if OpenCV computes other bits than the C code."""
 
     def made(kind, amount, seed, camera):
         compiled.use(None)
@@ -77,7 +77,7 @@ def both(folder):
         compiled.use(folder)
         fast = kind(amount, seed, camera).ready()
         if fast._key == plain._key:
-            pytest.skip("OpenCV calculates in another way here")
+            pytest.skip("OpenCV computes other bits than the C code")
         return plain, fast
 
     yield made
@@ -85,7 +85,7 @@ def both(folder):
 
 
 def pictures(random, shape):
-    """Noise, a smooth image, and black, white and grey."""
+    """Return noise, a smooth image, a black one and a white one."""
     noise = random.integers(0, 256, shape, np.uint8)
     return [
         noise,
@@ -116,8 +116,7 @@ def test_compiled_effects_have_the_same_bits(both, kind, size):
 
 
 @pytest.mark.parametrize("kind", [effects.CodedOcclusion, effects.PaperRain, effects.Rain])
-def test_processors_without_wide_vectors_draw_the_same(folder, tmp_path, camera, moment, kind):
-    """The bits do not depend on the processor's instruction set."""
+def test_results_do_not_depend_on_wide_vector_instructions(folder, tmp_path, camera, moment, kind):
     drawn = []
     noise = np.random.default_rng(2).integers(0, 256, (camera.rows, camera.width), np.uint8)
     for libraries in (folder, compile_effects(tmp_path, "-DIS_FAST=0")):
@@ -125,14 +124,14 @@ def test_processors_without_wide_vectors_draw_the_same(folder, tmp_path, camera,
         drawn.append(kind(LEVELS[kind][-1], 1, camera))
     compiled.use(None)
     if any(effect._key[-1] == "" for effect in drawn):
-        pytest.skip("OpenCV calculates in another way here")
+        pytest.skip("OpenCV computes other bits than the C code")
     assert drawn[0]._key != drawn[1]._key
     assert np.array_equal(*(effect.apply(noise, moment(3)) for effect in drawn))
 
 
 @pytest.mark.parametrize("speed", [np.float64(20.0), np.nan, np.inf, -5.0, 1e30])
-def test_impossible_speeds_are_drawn_alike(both, camera, speed):
-    """Impossible speeds, including NaN, give the same drawing, because a fault can cause them."""
+def test_impossible_speeds_give_the_same_drawing(both, camera, speed):
+    """A fault can cause impossible speeds."""
     plain, fast = both(effects.Snow, 10, 1, camera)
     picture = np.full((camera.rows, camera.width), 90, np.uint8)
     scene = Moment(3.0, 77.0, speed)
@@ -147,15 +146,15 @@ def test_compiled_blurs_have_the_same_bits(folder, sigma, size):
     fast, plain, random = build_gaussian(sigma, size), Gaussian(sigma, size), np.random.default_rng(3)
     compiled.use(None)
     if not isinstance(fast, CompiledGaussian):
-        pytest.skip("OpenCV calculates in another way here")
+        pytest.skip("OpenCV computes other bits than the C code")
     for shape in [(1, 1), (3, 90), (plain.size // 2 + 1,) * 2, (60, 80), *random.integers(1, 200, (12, 2))]:
         for picture in pictures(random, tuple(shape)):
             assert np.array_equal(fast(picture), plain(picture))
             assert np.array_equal(fast(picture[::-1, ::2]), plain(picture[::-1, ::2]))
 
 
-def test_droplets_are_numpys_whatever_was_drawn_before(folder):
-    """The random numbers are NumPy's, even if the generator has half a number left from before."""
+def test_droplets_use_numpys_random_numbers(folder):
+    """The numbers agree even if the generator still stores half of an earlier one."""
     compiled.use(folder)
     fast, by = compiled_scattered.build_scattered()
     compiled.use(None)
@@ -170,7 +169,7 @@ def test_droplets_are_numpys_whatever_was_drawn_before(folder):
 
 
 @pytest.mark.parametrize("source", C_SOURCES, ids=lambda source: source.stem)
-def test_an_edited_effect_is_drawn_by_python(folder, tmp_path, monkeypatch, source):
+def test_an_edited_effect_does_not_use_its_library(folder, tmp_path, monkeypatch, source):
     """If any Python file that the C code replaces has changed, the library is not used."""
     compiled.use(folder)
     assert compiled.library(source) is not None
@@ -186,8 +185,8 @@ def test_an_edited_effect_is_drawn_by_python(folder, tmp_path, monkeypatch, sour
     compiled.use(None)
 
 
-def test_another_opencv_is_left_alone(folder, monkeypatch):
-    """If OpenCV's bits differ from the compiled code's, Python calls OpenCV and the run names no library."""
+def test_the_library_is_not_used_if_opencv_computes_other_bits(folder, monkeypatch):
+    """If the bits differ, the effect calls OpenCV, and its key names no library."""
     compiled.use(folder)
     darker = Gaussian.__call__
     monkeypatch.setattr(Gaussian, "__call__", lambda blur, picture: darker(blur, picture) // 2)
@@ -206,8 +205,8 @@ def test_another_opencv_is_left_alone(folder, monkeypatch):
     compiled.use(None)
 
 
-def test_a_camera_of_numpys_numbers_is_left_to_python(folder):
-    """With NumPy scalars in the camera, Python draws, because NumPy then computes in double precision."""
+def test_a_camera_with_numpy_scalars_uses_python(folder):
+    """With NumPy scalars in the camera, NumPy computes in double precision."""
     compiled.use(folder)
     camera = replace(CameraModel(), cx=np.float64(317.9))
     assert precipitation.build_parts(camera)[1] == ""

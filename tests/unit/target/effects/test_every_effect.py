@@ -37,16 +37,16 @@ def fresh(effect, camera, seed=3):
     return effect(LEVELS[effect][-1], seed, camera)
 
 
-strongest = cache(fresh)  # for tests that may share one, like the frames of a run
+strongest = cache(fresh)  # for tests that can share an effect
 
 
-def test_levels_name_every_exported_effect():
-    """Every exported effect has levels, because pages and benchmarks use them."""
+def test_every_exported_effect_has_levels():
+    """Pages and benchmarks use the levels."""
     assert {effect.__name__ for effect in LEVELS} == set(effects.__all__)
 
 
 @every
-def test_any_order_gives_the_same_pictures(effect, camera, moment, road):
+def test_frames_are_the_same_in_any_order(effect, camera, moment, road):
     one, other = strongest(effect, camera), fresh(effect, camera)
     forwards = [one.apply(road, moment(number)) for number in range(4)]
     backwards = [other.apply(road, moment(number)) for number in reversed(range(4))][::-1]
@@ -55,8 +55,7 @@ def test_any_order_gives_the_same_pictures(effect, camera, moment, road):
 
 
 @every
-def test_input_stays_and_output_is_new(effect, camera, moment, road):
-    """A read-only image stays unchanged. The result is a new image of the same type and size."""
+def test_the_input_is_unchanged_and_the_output_is_a_new_image(effect, camera, moment, road):
     before = road.copy()
     after = strongest(effect, camera).apply(road, moment())
     assert after.dtype == np.uint8 and after.shape == road.shape
@@ -65,7 +64,7 @@ def test_input_stays_and_output_is_new(effect, camera, moment, road):
 
 
 @every
-def test_results_stay_as_later_pictures_are_made(effect, camera, moment, road):
+def test_later_frames_do_not_change_earlier_results(effect, camera, moment, road):
     made = strongest(effect, camera)
     first = made.apply(road, moment())
     kept = first.copy()
@@ -76,12 +75,14 @@ def test_results_stay_as_later_pictures_are_made(effect, camera, moment, road):
 CAMERAS = [
     CameraModel(),
     CameraModel.from_view(width=352, rows=264, horizon=90.0, focal=200.0, height=1.4),
-    CameraModel.from_view(width=333, rows=251, horizon=70.3, focal=180.0, height=1.4),  # no whole vectors
+    CameraModel.from_view(
+        width=333, rows=251, horizon=70.3, focal=180.0, height=1.4
+    ),  # not a multiple of a vector
 ]
 
 
 def regions(shape, random):
-    """Any rows and columns, including single pixels and the four corners."""
+    """Yield random rows and columns, and the pixels in the four corners."""
     for _ in range(6):
         top, left = (int(random.integers(size)) for size in shape)
         bottom, right = random.integers((top + 1, left + 1), (shape[0] + 1, shape[1] + 1)).tolist()
@@ -93,8 +94,8 @@ def regions(shape, random):
 
 @pytest.mark.parametrize("model", CAMERAS, ids=["640x480", "352x264", "333x251"])
 @every
-def test_a_part_is_that_of_the_whole(effect, model, moment):
-    """A region of a changed image has the same bits as in the whole image, even after two effects."""
+def test_a_region_has_the_same_bits_as_in_the_whole_image(effect, model, moment):
+    """The bits also agree after two effects."""
     random = np.random.default_rng(7)
     noise = random.integers(0, 256, (model.rows, model.width), np.uint8)
     for amount in (LEVELS[effect][0], LEVELS[effect][-1]):
@@ -111,8 +112,8 @@ def test_a_part_is_that_of_the_whole(effect, model, moment):
 
 
 @pytest.mark.parametrize("effect", RANDOM)
-def test_seed_decides_what_is_random(effect, camera, moment, road):
-    """Another seed gives another image, even if the seeds differ only beyond 32 bits."""
+def test_another_seed_gives_another_image(effect, camera, moment, road):
+    """Even seeds that differ only beyond 32 bits give different images."""
     one, other = (fresh(effect, camera, seed).apply(road, moment()) for seed in (1, 1 + 2**32))
     assert not np.array_equal(one, other)
 
@@ -131,7 +132,7 @@ def test_moving_effects_move(effect, camera, moment, road):
 
 @every
 @pytest.mark.parametrize("level", [0, 255])
-def test_black_and_white_pictures_do_not_wrap_round(effect, camera, moment, level):
+def test_grey_levels_do_not_wrap_around(effect, camera, moment, level):
     flat = np.full((camera.rows, camera.width), level, dtype=np.uint8)
     after = strongest(effect, camera).apply(flat, moment()).astype(int)
     grey = strongest(effect, camera).apply(np.full_like(flat, 128), moment()).astype(int)
@@ -154,22 +155,21 @@ def test_odd_sizes_work(effect, camera, moment):
 
 @every
 def test_wrong_amounts_are_refused(effect, camera):
-    """An amount outside the limits, or NaN, raises an error with the effect, the amount and the limits."""
+    """For an amount outside the limits, or NaN, the error names the effect, the amount and the limits."""
     for amount in (effect.LEAST - 1.0, 2.0 * effect.MOST + 1.0, nan, inf):
         with pytest.raises(ConfigError, match=f"{effect.__name__}: amount .*, expected .*{effect.MOST:g}"):
             effect(amount, 0, camera)
 
 
 @pytest.mark.parametrize("effect", [effects.PaperOcclusion, effects.AveragingBlur])
-def test_counted_amounts_are_whole(effect, camera):
-    """A number of blobs or pixels must be an integer."""
+def test_numbers_of_blobs_and_pixels_must_be_whole(effect, camera):
     with pytest.raises(ConfigError, match=r"amount 2\.5, expected a whole number"):
         effect(2.5, 0, camera)
 
 
 @pytest.mark.parametrize("effect", [effects.GaussianBlur, effects.MedianBlur])
-def test_kernels_with_a_middle_are_odd(effect, camera):
-    """A kernel size must be odd, because an even kernel has no middle."""
+def test_kernel_sizes_must_be_odd(effect, camera):
+    """An even kernel has no middle."""
     with pytest.raises(ConfigError, match="amount 4, expected an odd number"):
         effect(4, 0, camera)
 

@@ -1,5 +1,3 @@
-"""Runs without a fault do not import effects."""
-
 import subprocess
 import sys
 from pathlib import Path
@@ -13,7 +11,7 @@ print([name for name in sys.modules if "sim.effects" in name])
 """
 
 
-def test_pristine_runs_do_not_import_effects():
+def test_fault_free_runs_do_not_import_effects():
     done = subprocess.run(
         [sys.executable, "-c", SCRIPT], cwd=TARGET, capture_output=True, text=True, check=True
     )

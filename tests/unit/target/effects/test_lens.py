@@ -6,8 +6,8 @@ from selfdrive.sim.effects import LensMud
 
 
 @pytest.mark.parametrize("coverage", [0.0, 0.1, 0.5])
-def test_mud_covers_its_share(coverage, camera, moment):
-    """The amount is the share of light lost, apart from the mud's own brightness."""
+def test_the_amount_of_mud_is_the_share_of_light_lost(coverage, camera, moment):
+    """The mud's own brightness is subtracted."""
     mud = LensMud(coverage, 0, camera)
     flat = np.full((camera.rows, camera.width), 255, np.uint8)
     dark = np.zeros_like(flat)
@@ -15,6 +15,6 @@ def test_mud_covers_its_share(coverage, camera, moment):
     assert 1.0 - through.mean() == pytest.approx(coverage, abs=0.01)
 
 
-def test_more_mud_holds_all_of_less(camera, moment):
+def test_more_mud_includes_the_mud_of_a_lower_amount(camera, moment):
     less, more = (LensMud(coverage, 0, camera).ready()._open.astype(int) for coverage in (0.1, 0.4))
     assert (more <= less).all()

@@ -7,7 +7,10 @@ from selfdrive.sim.effects.light import level_rays
 
 
 def test_rays_meet_the_horizon(camera):
-    """The horizon's row has level rays. The ray of a road row falls by height over distance."""
+    """Rays of the horizon's row are level.
+
+    The rays of a lower row fall by the camera's height over the distance of the road.
+    """
     rays = level_rays(camera)
     fall = rays[:, round(camera.cx), 1] / rays[:, round(camera.cx), 2]
     assert np.interp(camera.horizon, np.arange(camera.rows), fall) == pytest.approx(0.0, abs=1e-4)
@@ -32,10 +35,10 @@ def test_glare_falls_off_with_the_square_of_the_angle(camera):
     assert np.median(more[lit.nonzero()] / veil[lit.nonzero()]) == pytest.approx(2.0, rel=0.15)
 
 
-def test_noise_is_that_of_electrons(camera, moment):
-    """The mean stays, and the spread is that of electrons and read noise.
+def test_noise_follows_the_number_of_electrons(camera, moment):
+    """The mean does not change.
 
-    The spread shrinks in bright light.
+    The spread is that of shot noise and read noise, and is smaller in bright light.
     """
     flat = np.full((camera.rows, camera.width), 128, np.uint8)
     for lux in (100000.0, 100.0, 20.0):
@@ -47,14 +50,13 @@ def test_noise_is_that_of_electrons(camera, moment):
         assert seen.std() == pytest.approx(np.hypot(expected, 0.29), rel=0.05)
 
 
-def test_darkness_comes_where_gain_ends(camera, moment, road):
-    """The image keeps its brightness down to the largest gain. In less light it becomes darker."""
+def test_the_image_darkens_only_beyond_the_largest_gain(camera, moment, road):
     means = [LowLight(lux, 0, camera).apply(road, moment()).mean() for lux in (300.0, 15.0, 5.0, 0.5)]
     assert means[0] == pytest.approx(road.mean(), abs=1.0) and means[1] == pytest.approx(road.mean(), abs=3.0)
     assert means[2] < 0.6 * means[1] and means[3] < 0.2 * means[1]
 
 
-def test_noise_is_new_in_every_picture(camera, moment):
+def test_each_frame_has_new_noise(camera, moment):
     flat = np.full((camera.rows, camera.width), 128, np.uint8)
     low = LowLight(20.0, 0, camera)
     first, second = (low.apply(flat, moment(number)).astype(float).ravel() for number in (0, 1))

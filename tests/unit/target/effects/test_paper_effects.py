@@ -1,4 +1,4 @@
-"""The paper's effects have its parameters, its motion and its numbers of streaks, blocks and blobs."""
+"""The paper's effects have the paper's parameters, motion, and numbers of streaks, blocks and blobs."""
 
 import numpy as np
 import pytest
@@ -13,15 +13,15 @@ def black(camera):
 
 @pytest.mark.parametrize("thickness", [1, 3, 10, 2.5])
 @pytest.mark.parametrize(("effect", "each"), [(PaperRain, 1000), (PaperSnow, 100)])
-def test_thickness_counts(effect, each, thickness, camera):
-    """Each unit of thickness adds 1,000 streaks and 100 blocks over all layers, so 10 has 10,000 streaks."""
+def test_thickness_sets_the_number_of_streaks_and_blocks(effect, each, thickness, camera):
+    """Each unit of thickness adds 1,000 streaks or 100 blocks, over all layers."""
     made = effect(thickness, 0, camera)
     assert {PaperRain: STREAKS, PaperSnow: BLOCKS}[effect] == each
     assert sum(made._count(each, layer, 5) for layer in range(5)) == each * thickness
 
 
-def test_sparse_streaks_can_be_counted(camera, moment, monkeypatch):
-    """The number of separate streaks is the requested number, less the streaks that touch."""
+def test_the_requested_number_of_streaks_is_drawn(camera, moment, monkeypatch):
+    """Streaks that touch are counted as one."""
     cv2 = pytest.importorskip("cv2")
     monkeypatch.setattr("selfdrive.sim.effects.paper_weather.STREAKS", 100)
     picture = PaperRain(1, 0, camera).apply(black(camera), moment())
@@ -30,8 +30,8 @@ def test_sparse_streaks_can_be_counted(camera, moment, monkeypatch):
 
 
 @pytest.mark.parametrize("effect", [PaperRain, PaperSnow])
-def test_falling_keeps_what_falls(effect, camera, moment):
-    """A drop that leaves the image enters it again at the other side, so a layer keeps its grey levels."""
+def test_falling_layers_wrap_around(effect, camera, moment):
+    """A drop that leaves the image enters it again on the opposite side, so a layer keeps its grey levels."""
     made = effect(3, 0, camera).ready()
     everything = whole((camera.rows, camera.width))
     for tile in made._tiles:
@@ -40,8 +40,8 @@ def test_falling_keeps_what_falls(effect, camera, moment):
 
 
 @pytest.mark.parametrize("effect", [PaperRain, PaperSnow])
-def test_drops_fall(effect, camera, moment):
-    """From frame to frame every layer moves down by less than half the image. Near layers move faster."""
+def test_every_layer_falls(effect, camera, moment):
+    """Between frames, a layer moves down by less than half the image. Near layers move faster."""
     made = effect(1, 0, camera).ready()
     ways = []
     for tile in made._tiles:
@@ -58,13 +58,13 @@ def test_drops_fall(effect, camera, moment):
     assert (np.diff(steps) > 0.0).all() and steps[0] > 5.0 and steps[-1] < camera.rows / 2
 
 
-def test_more_rain_holds_all_of_less(camera, moment):
+def test_more_snow_includes_the_blocks_of_less(camera, moment):
     less, more = (PaperSnow(level, 0, camera)._blocks(np.random.default_rng(1), 0) for level in (2, 6))
     assert (more >= less).all() and more.sum() > 2 * less.sum()
 
 
-def test_rain_dims_and_blurs_what_is_behind(camera, moment, road):
-    """Where no streak is, contrast is 0.75 of the original at thickness 1 and 0.65 at 10."""
+def test_rain_dims_the_background(camera, moment, road):
+    """Between the streaks, the image keeps 0.75 of its brightness at thickness 1 and 0.65 at 10."""
     for thickness, alpha in ((1, 0.75), (10, 0.65)):
         made = PaperRain(thickness, 0, camera)
         flat = np.full_like(road, 100)
@@ -82,7 +82,10 @@ def test_fog_reduces_contrast_evenly(camera, moment):
 
 
 def test_fog_noise_is_uniform_and_blurred(camera, moment):
-    """Fog 10 adds noise of 0 to 255 to all pixels. Blurring keeps its mean and smooths its grain."""
+    """Fog of thickness 10 adds noise of 0 to 255 to all pixels.
+
+    Blurring keeps its mean and smooths its grain.
+    """
     fog = PaperFog(10, 0, camera).apply(black(camera), moment()).astype(float)
     assert abs(fog.mean() - 127.5) < 1.0
     # 73.6 / (2 * sqrt(pi) * sigma) for sigma = 7
@@ -90,10 +93,10 @@ def test_fog_noise_is_uniform_and_blurred(camera, moment):
 
 
 @pytest.mark.parametrize("blobs", [1, 4, 10])
-def test_blobs_are_counted_and_of_the_papers_size(blobs, camera, moment):
+def test_blobs_have_the_papers_number_and_size(blobs, camera, moment):
     """There are at most as many dark blobs as requested, with radii of 5 to 50 px.
 
-    A higher number keeps all the fewer blobs.
+    A higher number includes the blobs of a lower one.
     """
     white = np.full((camera.rows, camera.width), 200, np.uint8)
     share = 1.0 - PaperOcclusion(blobs, 4, camera).apply(white, moment()).astype(float) / 200.0
@@ -111,7 +114,7 @@ def test_blobs_lie_on_the_road(camera, moment):
         assert (seen[: int(camera.horizon) - 70] == 200).all() and (seen < 100).any()
 
 
-def test_motion_smear_has_the_papers_length_and_angle():
+def test_motion_blur_has_the_papers_length_and_angle():
     """Snow's motion blur is 5 pixels long at 75 degrees: mostly up and slightly to the right."""
     kernel = motion_kernel(5, 75.0)
     rows, columns = np.nonzero(kernel > 0.01)

@@ -36,12 +36,12 @@ def test_drops_fall_at_their_terminal_speed(camera):
 
 
 def test_flakes_are_slow_and_large(camera):
-    """A flake of 1 mm of water falls at about 0.8 m/s and appears 2 to 3 mm wide."""
+    """A flake that melts to a drop of 1 mm falls at about 0.8 m/s and appears 2 to 3 mm wide."""
     sizes, speeds = Snow(1.0, 0, camera).flown(np.array([1.0]))
     assert 0.7 < speeds[0] < 1.1 and 0.002 < sizes[0] < 0.003
 
 
-def test_the_same_particles_come_nearer(camera, moment):
+def test_particles_ahead_come_nearer(camera, moment):
     """Particles ahead move away from the focus of expansion and grow, as their distance requires."""
     straight = replace(camera, pitch=0.0)
     particles = alone(straight)
@@ -72,7 +72,7 @@ def test_falling_particles_sink(camera, moment):
     assert followed > 20
 
 
-def test_streaks_are_the_way_in_the_exposure(camera, moment):
+def test_a_streak_is_the_motion_during_the_exposure(camera, moment):
     """A streak ends where the particle is when the shutter closes. At higher speed it is longer."""
     particles = alone(camera, speed=5.0)
     now = moment()
@@ -95,8 +95,8 @@ def test_boxes_repeat_without_gaps(camera, moment):
 
 
 @pytest.mark.parametrize("width", [0.4, 1.2, 2.0, 5.0])
-def test_streaks_take_the_light_of_their_area(width, camera):
-    """A particle takes the light of pi / 4 * width^2 pixels, on every grid."""
+def test_streaks_block_the_light_of_their_area(width, camera):
+    """A particle blocks the light of pi / 4 * width^2 pixels, wherever it lies between pixels."""
     start = np.array([[100.3, 300.0, 500.7], [200.1, 240.5, 300.9]], np.float32)
     streaks = Streaks(start, start + np.float32(6.3), np.full(3, width, np.float32))
     taken = Cover(camera).taken(streaks, whole((camera.rows, camera.width))).astype(float) / 255.0
@@ -116,7 +116,7 @@ def test_particles_show_the_sky(camera, moment):
     assert seen.min() >= 59 and np.percentile(seen, 99.5) > 90
 
 
-def test_standing_car_sees_longer_lived_drops(camera, moment, road):
+def test_snow_changes_less_between_frames_of_a_standing_car(camera, moment, road):
     snow = Snow(4.0, 0, camera)
 
     def change(speed):

@@ -18,8 +18,7 @@ def gauge(camera):
     return RoadGauge(camera, ((1.85, 0.0), (-1.85, 0.0)))
 
 
-def test_clean_pictures_lack_nothing(gauge, road):
-    """A clean image has no error, the painted contrast, and no edges between the lines."""
+def test_a_clean_image_has_no_error_full_contrast_and_no_false_edges(gauge, road):
     assert gauge.measure(road, road) == pytest.approx((inf, 120.0, 0.0))
 
 
@@ -30,8 +29,7 @@ def test_contrast_and_psnr_follow_the_levels(gauge, road):
     assert psnr == pytest.approx(10.0 * np.log10(255.0**2 / error.mean()))
 
 
-def test_false_edges_count_what_lies_between_the_lines(gauge, road, camera):
-    """Bright columns inside the lane are false edges. Bright columns outside are not counted."""
+def test_only_edges_between_the_lines_are_false_edges(gauge, road, camera):
     inside, outside = road.copy(), road.copy()
     inside[:, 310:330:8] = 215
     outside[:, :40:8] = 215
@@ -39,8 +37,7 @@ def test_false_edges_count_what_lies_between_the_lines(gauge, road, camera):
     assert gauge.measure(road, outside).false_edges == 0.0
 
 
-def test_weak_edges_count_where_marks_are_weak(gauge, road):
-    """Weak edges count between lines with a third of the contrast, but not next to strong lines."""
+def test_weak_edges_are_false_edges_only_between_weak_lines(gauge, road):
     weak = (road // 3).copy()
     strong = road.copy()
     weak[:, 310:330:8] = 60
@@ -49,8 +46,8 @@ def test_weak_edges_count_where_marks_are_weak(gauge, road):
     assert gauge.measure(road, strong).false_edges == 0.0
 
 
-def test_what_covers_the_road_is_what_changes_an_even_grey(gauge, road):
-    """A pixel is covered if an even grey changes by at least 8 levels. Uniform haze covers no pixel."""
+def test_pixels_are_covered_if_an_even_grey_changes_by_8_levels(gauge, road):
+    """Uniform haze covers no pixel."""
     grey = np.full_like(road, 100)
     assert gauge.covered(grey // 2) == 0.0
     half = grey.copy()

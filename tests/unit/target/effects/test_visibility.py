@@ -9,11 +9,8 @@ from selfdrive.sim.effects import Rain, Snow
 from selfdrive.sim.effects.visibility import BLOCK, DROP, REACH, fog, rain, snow
 
 
-def test_so_many_drops_are_near_the_camera(camera):
-    """At level 10 there are 10,000 drops of 1 mm and more within range.
-
-    The number in the view is that of Marshall and Palmer.
-    """
+def test_rain_has_the_papers_number_of_near_drops(camera):
+    """At level 10, 10,000 drops of 1 mm or more are within range, by Marshall and Palmer's distribution."""
     weather = rain(10, camera)
     fall = Rain(weather.rate, 0, camera)
     pyramid = REACH**3 / 3 * camera.width / camera.fx * camera.rows / camera.fy
@@ -21,7 +18,7 @@ def test_so_many_drops_are_near_the_camera(camera):
     assert 2 < rain(1, camera).rate < 5 and 50 < weather.rate < 100
 
 
-def test_so_many_flakes_look_as_large_as_a_block(camera):
+def test_snow_has_the_papers_number_of_block_sized_flakes(camera):
     """Level 10 has 1,000 flakes within the distance at which a flake appears as large as a block."""
     weather = snow(10, camera)
     fall = Snow(weather.rate, 0, camera)
@@ -34,22 +31,19 @@ def test_so_many_flakes_look_as_large_as_a_block(camera):
     assert count == pytest.approx(1_000, rel=0.01)
 
 
-def test_worse_weather_is_seen_less_far(camera):
+def test_higher_levels_have_a_shorter_visibility(camera):
     for kind in (rain, snow):
         weather = [kind(level, camera) for level in range(1, 11)]
         assert all(a.rate < b.rate and a.range > b.range for a, b in pairwise(weather))
 
 
-def test_fog_of_a_contrast():
-    """At the meteorological range 5 % of the contrast is left.
-
-    The middle of the measured road has the given contrast.
-    """
+def test_fog_leaves_the_given_contrast():
+    """The contrast applies to the middle of the measured road, at 17.5 m. At the visibility, it is 5 %."""
     assert fog(0.05).range == pytest.approx(17.5)
     assert fog(0.9).range > fog(0.4).range > 50.0
 
 
-def test_a_rate_out_of_reach_is_the_nearest():
-    """If a camera sees everything around it, the rate is the lowest possible one."""
+def test_a_rate_below_the_possible_ones_becomes_the_lowest():
+    """A camera with a very wide view would need a lower rate."""
     wide = CameraModel(fx=30.0, fy=30.0)
     assert snow(0.0001, wide).rate == pytest.approx(Snow.LEAST)

@@ -1,4 +1,4 @@
-"""Films of short runs, with ideal vision or with frames, and synthetic frames."""
+"""Films of short runs, with ideal vision or with camera frames, and synthetic frames."""
 
 from pathlib import Path
 
@@ -53,7 +53,7 @@ def seeing(tmp_path_factory):
 
 @pytest.fixture
 def frame():
-    """Build a frame in mid-lane with a lead 30 m ahead, with the given changes."""
+    """Build a frame in the middle of the lane with a lead 30 m ahead, with the given changes."""
     y = {"left": 1.85, "right": -1.85}
     usual = {
         "t": 0.0,
@@ -78,7 +78,7 @@ def frame():
 
 @pytest.fixture
 def reel(frame):
-    """Build a film of frames 50 ms apart, from the given values of each."""
+    """Build a film of frames 50 ms apart, with the given changes for each frame."""
 
     def make(*given):
         frames = tuple(frame(**{"t": 0.05 * i} | values) for i, values in enumerate(given))

@@ -22,7 +22,7 @@ EVENTS = {
 
 
 def pictures(count=8):
-    """Grey images that become brighter, with a bar in one of the sheet's colours."""
+    """Yield grey images that become brighter, with a bar in one of the sheet's colours."""
     for number in range(count):
         picture = np.full((180, 320, 3), 60 + 10 * number, np.uint8)
         picture[:40] = pen.FAULTY
@@ -38,7 +38,7 @@ def frames_of(path):
         found.append(picture)
 
 
-def test_an_mp4_shows_the_pictures(tmp_path):
+def test_an_mp4_shows_every_picture_at_20_per_second(tmp_path):
     write_video(pictures(), tmp_path / "a.mp4")
     found = frames_of(tmp_path / "a.mp4")
     assert [picture.shape for picture in found] == [(180, 320, 3)] * 8
@@ -48,7 +48,7 @@ def test_an_mp4_shows_the_pictures(tmp_path):
     assert cv2.VideoCapture(str(tmp_path / "a.mp4")).get(cv2.CAP_PROP_FPS) == 20
 
 
-def test_a_gif_moves_at_the_same_speed(tmp_path):
+def test_a_gif_plays_at_the_same_speed(tmp_path):
     """A GIF has every fourth frame, shown four times as long, in the sheet's colours."""
     write_video(pictures(), tmp_path / "a.gif")
     with Image.open(tmp_path / "a.gif") as gif:
@@ -64,15 +64,14 @@ def test_other_formats_are_refused(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_a_place_that_cannot_be_written_is_told(tmp_path):
+def test_an_error_names_a_file_that_cannot_be_written(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(ConfigError, match=r"a\.png"):
         write_still(next(pictures()), tmp_path / "file" / "a.png")
 
 
 @pytest.mark.parametrize(("name", "words"), [("a.gif", ()), ("a.png", ("--at", "0.3"))])
-def test_the_command_shows_two_films(drive, tmp_path, name, words):
-    """From two runs' films, the command writes a file with the same bytes each time."""
+def test_the_command_writes_the_same_bytes_each_time(drive, tmp_path, name, words):
     (tmp_path / "events.json").write_text(json.dumps(EVENTS))
     film = str(drive() / "film")
     for folder in ("x", "y"):
@@ -81,8 +80,7 @@ def test_the_command_shows_two_films(drive, tmp_path, name, words):
     assert (tmp_path / "x" / name).read_bytes() == (tmp_path / "y" / name).read_bytes()
 
 
-def test_the_command_tells_what_is_wrong(tmp_path, capsys):
-    """For invalid input, the command exits with code 2 and prints one line."""
+def test_invalid_input_gives_code_2_and_one_line_of_error(tmp_path, capsys):
     folder = str(tmp_path)
     words = ["--golden", folder, "--faulty", folder, "--events", folder, "--out", f"{folder}/a.mp4"]
     assert main(words) == 2
@@ -92,8 +90,7 @@ def test_the_command_tells_what_is_wrong(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("name", ["a.mp4", "a.gif", "a.png"])
-def test_a_full_disk_is_told_with_the_file(tmp_path, name):
-    """A file that cannot be written completely raises an error with its name. No partial file remains."""
+def test_an_error_names_the_file_if_the_disk_is_full(tmp_path, name):
     path = tmp_path / name
     path.symlink_to("/dev/full")
     with pytest.raises(ConfigError, match=f"{name}: No space left on device"):

@@ -21,12 +21,12 @@ def test_a_run_is_the_same_with_a_film(drive):
     assert outputs(drive()) == outputs(drive(film=False))
 
 
-def test_a_run_with_pictures_is_the_same_with_a_film(drive, seeing):
+def test_a_run_on_frames_is_the_same_with_a_film(drive, seeing):
     assert outputs(drive(*seeing)) == outputs(drive(*seeing, film=False))
 
 
-def test_one_frame_for_each_look_of_the_camera(drive):
-    """The film has twenty frames a second, with the times, speeds and distances of the trace."""
+def test_the_film_has_one_frame_for_each_camera_frame(drive):
+    """The film's times, speeds and distances are those of every fifth step of the trace."""
     folder = drive()
     reel, trace = read_reel(folder / "film"), np.load(folder / "trace.npz")
     assert [frame.t for frame in reel.frames] == list(trace["t"][::5])
@@ -35,26 +35,26 @@ def test_one_frame_for_each_look_of_the_camera(drive):
     assert all(frame.picture is None for frame in reel.frames)
 
 
-def test_what_was_seen_is_kept(drive):
-    """With ideal vision, the film shows both lines and the lead where they are."""
+def test_the_film_has_the_seen_lines_and_lead(drive):
+    """With ideal vision, both lines and the lead are at their true places."""
     frame = read_reel(drive() / "film").frames[-1]
     assert (frame.lines["left"].y[0], frame.lines["right"].y[0]) == (1.85, -1.85)
     assert frame.lines["left"].prob == 1.0
     assert frame.camera_lead == frame.d_rel
 
 
-def test_pictures_are_kept_as_the_detector_had_them(drive, seeing):
+def test_the_film_has_the_frames_that_the_detector_got(drive, seeing):
     frame = read_reel(drive(*seeing) / "film").frames[0]
     own = cv2.imread(f"{seeing[2]}/0.png", cv2.IMREAD_GRAYSCALE)
     assert np.abs(frame.image().astype(int) - own).mean() < 1.0
 
 
-def test_a_free_road_has_no_lead(drive):
+def test_a_film_of_a_free_road_has_no_lead(drive):
     assert read_reel(drive("--no-lead") / "film").frames[-1].d_rel is None
 
 
-def test_a_camera_that_says_nothing_has_seen_nothing(drive, monkeypatch):
-    """If visiond publishes nothing, the film shows no lines, not those of the previous message."""
+def test_without_a_camera_message_the_film_shows_no_lines(drive, monkeypatch):
+    """The lines of the previous message are not repeated."""
     publish = Visiond.publish
     monkeypatch.setattr(Visiond, "publish", lambda own, model: model.t < 0.2 and publish(own, model))
     frames = read_reel(drive() / "film").frames
@@ -62,7 +62,7 @@ def test_a_camera_that_says_nothing_has_seen_nothing(drive, monkeypatch):
     assert frames[-1].camera_lead is None
 
 
-def test_a_run_that_breaks_off_leaves_what_went_before(tmp_path, monkeypatch):
+def test_a_crashed_run_leaves_the_frames_before_the_crash(tmp_path, monkeypatch):
     publish = Visiond.publish
 
     def crash(own, model):
@@ -76,8 +76,8 @@ def test_a_run_that_breaks_off_leaves_what_went_before(tmp_path, monkeypatch):
     assert len(read_reel(tmp_path / "film").frames) == 4
 
 
-def test_a_film_that_cannot_be_written(tmp_path, capsys):
-    """If the folder cannot be created, the error names it and nothing runs."""
+def test_a_film_folder_that_cannot_be_created_is_an_error(tmp_path, capsys):
+    """The error names the folder, and nothing runs."""
     (tmp_path / "file").touch()
     words = ["--scenario", str(SCENARIOS / "S1.yaml"), "--out", str(tmp_path / "out")]
     assert main([*words, "--film", str(tmp_path / "file" / "film")]) == 2
@@ -85,8 +85,8 @@ def test_a_film_that_cannot_be_written(tmp_path, capsys):
     assert not (tmp_path / "out").exists()
 
 
-def test_a_film_that_cannot_be_kept_any_longer(tmp_path, seeing, capsys):
-    """If the disk is full at the second frame, the run ends with an error that names the folder."""
+def test_a_full_disk_ends_the_run_with_an_error(tmp_path, seeing, capsys):
+    """The error names the film's folder."""
     (tmp_path / "film").mkdir()
     (tmp_path / "film" / "00001.jpg").symlink_to("/dev/full")
     words = ["--scenario", str(SCENARIOS / "S1.yaml"), "--out", str(tmp_path / "out"), *seeing]
@@ -95,7 +95,7 @@ def test_a_film_that_cannot_be_kept_any_longer(tmp_path, seeing, capsys):
 
 
 @pytest.mark.parametrize("text", ["", "{}\n", '{"schema": "film/1", "camera": {}}\n', "not JSON\n"])
-def test_what_is_no_film_is_told(tmp_path, text):
+def test_an_invalid_film_file_is_an_error(tmp_path, text):
     (tmp_path / "film.jsonl").write_text(text)
     with pytest.raises(ConfigError, match=r"film\.jsonl: no film"):
         read_reel(tmp_path)

@@ -1,4 +1,4 @@
-"""The sheet shows two runs side by side, whatever a fault did to perception."""
+"""The sheet shows two runs side by side, even if a fault makes perception report impossible values."""
 
 import json
 from dataclasses import replace
@@ -26,8 +26,8 @@ def pane_of(sheet, side):
     return sheet[HEADING : HEADING + PANE[1], left : left + PANE[0]]
 
 
-def test_lines_lie_on_the_paint(frame):
-    """A line that is seen at its true place covers the painted one, so no yellow is left."""
+def test_detected_lines_lie_on_the_painted_ones(frame):
+    """A line detected at its true place covers the yellow painted line."""
     pane = CameraPane(CameraModel(), *PANE)
     without, with_lines = pane.draw(frame(lines=None, d_rel=None)), pane.draw(frame(d_rel=None))
     yellow = (without[..., 2].astype(int) - without[..., 0] > 90).sum()
@@ -36,7 +36,7 @@ def test_lines_lie_on_the_paint(frame):
     assert left < 0.35 * yellow
 
 
-def test_a_bend_moves_road_and_lines_alike(frame):
+def test_detected_lines_lie_on_the_painted_ones_in_a_bend(frame):
     bend = tuple(0.001 * x * x for x in range(0, 50, 7))
     lines = {"left": SeenLine(y=tuple(1.85 + y for y in bend), prob=1.0)}
     pane = CameraPane(CameraModel(), *PANE)
@@ -51,7 +51,7 @@ def wrong_lines(y, prob):
     return {"lines": dict.fromkeys(("left", "right"), SeenLine(y=(y,) * 8, prob=prob))}
 
 
-def test_whatever_a_fault_does_can_be_drawn(reel):
+def test_impossible_values_can_be_drawn(reel):
     """Missing, huge and NaN values are left out or drawn at the edge."""
     nan, infinite = float("nan"), float("inf")
     wrong = [
@@ -68,11 +68,8 @@ def test_whatever_a_fault_does_can_be_drawn(reel):
     assert [sheet.draw(index).shape for index in range(len(wrong))] == [(HEIGHT, WIDTH, 3)] * len(wrong)
 
 
-def test_hazards_and_alerts_show_on_the_side_where_they_are(reel):
-    """A red frame starts at the hazard.
-
-    An amber bar shows while the driver is warned. The golden run has neither.
-    """
+def test_hazards_and_alerts_are_shown_on_the_side_of_their_run(reel):
+    """A red frame appears at the hazard, and an amber bar while the driver is warned."""
     faulty = reel({}, {"hazards": ("H3",)}, {"alerts": ("steer_saturated",), "text": "Take control"})
     sheet = Sheet(reel({}, {}, {}), faulty, EVENTS)
     for index, colour in ((1, pen.HAZARD), (2, pen.ALERT)):
@@ -81,34 +78,33 @@ def test_hazards_and_alerts_show_on_the_side_where_they_are(reel):
         assert not is_drawn(foot["golden"], colour)
 
 
-def test_alerts_that_do_not_count_are_not_shown(reel):
+def test_the_startup_reminder_is_not_shown_as_an_alert(reel):
     plain, reminded = reel({}), reel({"alerts": ("startup",), "text": "Hands on the wheel"})
     sheet = Sheet(plain, reminded, EVENTS).draw(0)
     assert (pane_of(sheet, "faulty")[-60:] == pane_of(sheet, "golden")[-60:]).all()
 
 
-def test_the_fault_is_said_to_be_active_while_it_is(reel):
+def test_the_sheet_marks_the_time_in_which_the_fault_is_active(reel):
     events = Events(title="", outcome="sdc", active=(0.05, 0.05), marks=(), names={})
     sheet = Sheet(reel({}, {}, {}), reel({}, {}, {}), events)
     corners = [pane_of(sheet.draw(i), "faulty")[9:11, -100:-10] for i in range(3)]
     assert [bool((corner == pen.TRIGGER).all()) for corner in corners] == [False, True, False]
 
 
-def test_a_run_that_broke_off_stands_still(reel):
-    """When the shorter film ends, its last frame stays, darkened, while the other film continues."""
+def test_the_last_frame_of_a_shorter_film_stays(reel):
+    """The frame is darkened while the other film continues."""
     sheet = Sheet(reel({}, {}, {}), reel({}), EVENTS)
     assert sheet.count == 3
     assert pane_of(sheet.draw(2), "faulty").mean() < 0.7 * pane_of(sheet.draw(0), "faulty").mean()
     assert sheet.time(2) == pytest.approx(0.1)
 
 
-def test_a_moment_is_found(reel):
+def test_nearest_returns_the_frame_nearest_to_a_time(reel):
     sheet = Sheet(reel({}, {}, {}), reel({}, {}, {}), EVENTS)
     assert [sheet.nearest(t) for t in (-1.0, 0.06, 99.0)] == [0, 1, 2]
 
 
-def test_marks_stand_at_their_times(reel):
-    """The timeline has a line in the mark's colour at the mark's time, and nowhere else."""
+def test_marks_are_drawn_at_their_times(reel):
     frames = [{}] * 41
     marked = Events(
         title="", outcome="hazard", active=None, marks=(Mark(kind="hazard", t=1.0, label="H1"),), names={}
@@ -122,8 +118,8 @@ def test_marks_stand_at_their_times(reel):
     assert abs(columns.min() - middle) <= 2
 
 
-def test_what_comes_after_the_end_of_the_drive_is_grey(reel):
-    """After the end of the drive, both sides and the timeline are grey. Plots leave later values out."""
+def test_the_sheet_is_grey_after_the_end_of_the_drive(reel):
+    """Plots leave out the later values."""
     frames = [{"d_rel": 20.0}] * 21 + [{"d_rel": 500.0}] * 20
     ended, whole = (Sheet(reel(*frames), reel(*frames), replace(EVENTS, end=end)) for end in (1.0, None))
     assert (ended.draw(20)[:580] == whole.draw(20)[:580]).all()
@@ -145,8 +141,7 @@ def test_pictures_of_another_shape_fit(reel, tmp_path, frame):
     assert abs(int(pane[70, 5, 0]) - 128) < 3
 
 
-def test_events_are_read(tmp_path):
-    """Events that the harness wrote are read back. For any other content, the error names the file."""
+def test_events_are_read_and_other_content_is_refused(tmp_path):
     path = tmp_path / "events.json"
     mark = {"kind": "alert", "t": 3.0, "label": "fcw"}
     path.write_text(

@@ -1,4 +1,4 @@
-"""The compiled solvers return CasADi's bits, or CasADi's solvers are used instead."""
+"""The compiled solvers return the same bits as CasADi's, or CasADi's solvers are used instead."""
 
 import ctypes
 import math
@@ -50,7 +50,7 @@ def number(draw: random.Random, scale: float) -> float:
 
 
 def problem(name: str, draw: random.Random, wild: float) -> tuple[list[float], list[float]]:
-    """Return a first state and parameters. Their sizes are `wild` times those of a normal drive."""
+    """Return an initial state and parameters, `wild` times as large as in a normal drive."""
     if name == "longitudinal":
         speeds = [abs(number(draw, 30 * wild)) for _ in range(2)]
         gap = draw.choice((50.0, abs(number(draw, 100 * wild))))
@@ -64,7 +64,7 @@ def problem(name: str, draw: random.Random, wild: float) -> tuple[list[float], l
 
 
 def spoil(values: list[float], draw: random.Random) -> None:
-    """Sometimes replace a value by an implausible one."""
+    """Sometimes replace a value with an impossible one."""
     if draw.random() < 0.03:
         values[draw.randrange(len(values))] = draw.choice(NO_NUMBERS)
 
@@ -72,13 +72,13 @@ def spoil(values: list[float], draw: random.Random) -> None:
 @pytest.mark.usefixtures("use")
 @pytest.mark.parametrize("name", REFERENCES)
 @pytest.mark.parametrize("seed", range(40))
-def test_iterations_have_the_bits_of_the_reference(
+def test_compiled_iterations_have_the_bits_of_casadis(
     name: str, seed: int, references: dict[str, Solver]
 ) -> None:
-    """After 15 iterations, trajectory, next guess and flags have the same bytes.
+    """After each of 15 iterations, trajectory, next guess and flags have the same bytes.
 
-    This also holds for impossible problems and NaN. If results are not finite, the test only checks that
-    neither solver's are.
+    This also holds for impossible problems and NaN. If a result is not finite, the test only checks that the
+    other solver's is not finite either.
     """
     draw = random.Random(seed)
     wild = draw.choice((1.0, 3.0, 10.0, 1e3, 1e10, 1e100, 1e308)) if seed % 4 == 0 else 1.0
@@ -111,8 +111,8 @@ def test_iterations_have_the_bits_of_the_reference(
 
 @pytest.mark.usefixtures("use")
 @pytest.mark.parametrize("name", COMPILED)
-def test_a_solver_has_no_memory(name: str) -> None:
-    """The same problem gives the same bytes after impossible problems and in another solver."""
+def test_a_solvers_result_does_not_depend_on_earlier_problems(name: str) -> None:
+    """Neither earlier impossible problems nor a second solver change the bytes."""
     draw = random.Random(1)
     start, parameters = problem(name, draw, 1.0)
     solver = COMPILED[name]()
@@ -131,7 +131,7 @@ def test_a_solver_has_no_memory(name: str) -> None:
     assert run(iteration) == run(Iteration(solver)) == run(Iteration(COMPILED[name]())) == wanted
 
 
-def test_the_c_file_has_what_casadi_derives() -> None:
+def test_the_c_file_is_current() -> None:
     """The generated part of the C file matches this CasADi, and its weights match those of the problems."""
     assert casadi.__version__ == compiled_mpc.CASADI
     text = C_SOURCE.read_text()
@@ -142,8 +142,10 @@ def test_the_c_file_has_what_casadi_derives() -> None:
 
 @pytest.mark.usefixtures("use")
 @pytest.mark.parametrize("other", ["version", "function", "conduct"])
-def test_another_daqp_is_not_used(other: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The library is used only if CasADi's version, the function and a known solution match."""
+def test_the_library_is_not_used_with_another_version_of_daqp(
+    other: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The library requires a certain version of CasADi, DAQP's function, and a known solution."""
     compiled_mpc._daqp.cache_clear()
     if other == "version":
         monkeypatch.setattr(compiled_mpc, "CASADI", "3.7.0")
@@ -159,9 +161,7 @@ def test_another_daqp_is_not_used(other: str, monkeypatch: pytest.MonkeyPatch) -
 
 
 @pytest.mark.parametrize("edited", ["mpc.c", "mpc_solver.py", "long_ocp.py", "lateral_ocp.py", "horizon.py"])
-def test_an_edited_problem_is_solved_as_it_is_written(
-    all_compiled: Path, tmp_path: Path, edited: str
-) -> None:
+def test_an_edited_problem_is_solved_by_casadi(all_compiled: Path, tmp_path: Path, edited: str) -> None:
     """If a file that the C code replaces has changed, CasADi's solver is built."""
     target = tmp_path / "target"
     shutil.copytree(
@@ -186,8 +186,8 @@ def test_an_edited_problem_is_solved_as_it_is_written(
     assert ran.stdout.split() == ["Function", "Function"]
 
 
-def test_a_run_without_pictures_needs_no_casadi(all_compiled: Path) -> None:
-    """With compiled code, a run does not import CasADi, because the import is slow."""
+def test_a_compiled_run_without_frames_does_not_import_casadi(all_compiled: Path) -> None:
+    """Importing CasADi is slow."""
     code = (
         "import sys; from selfdrive.sim.run import open_run; "
         "open_run(['--scenario', %r, '--out', 'none', '--compiled', %r]).step(); "

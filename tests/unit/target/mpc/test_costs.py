@@ -1,4 +1,4 @@
-"""Both MPCs minimise the intended costs, which the tests state as plain formulas."""
+"""Both MPCs minimise the intended costs, which these tests state as plain formulas."""
 
 import math
 from itertools import pairwise
@@ -8,11 +8,11 @@ import pytest
 from selfdrive.controls.lib.lateral_mpc import Lanes
 from selfdrive.controls.lib.long_mpc import LEAD_DECAY
 
-FACTORS = np.array([1.0] * 5 + [3.0] * 15 + [1.0])  # long intervals weigh three times, the end once
+FACTORS = np.array([1.0] * 5 + [3.0] * 15 + [1.0])  # the long intervals have weight 3, the end has weight 1
 
 
 def flattest(cost, controls, scale):
-    """The slope of the cost along each control, relative to the slope at a plan slightly off.
+    """Return the largest slope of the cost along a control, relative to the slope at a plan slightly off.
 
     The slopes are central differences.
     """
@@ -43,7 +43,7 @@ def long_cost(jerks, v, a, x_lead, v_lead):
 
 @pytest.mark.parametrize(("v", "a", "gap", "v_lead"), [(20.0, -0.3, 45.0, 18.0), (25.0, 0.0, 60.0, 26.0)])
 def test_longitudinal_plan_minimises_its_cost(long_mpc, lead, v, a, gap, v_lead):
-    """The plan minimises gap, danger, acceleration and jerk residuals with weights 5, 0.1, 10 and 20."""
+    """The residuals of danger, gap, acceleration and jerk have weights 5, 0.1, 10 and 20."""
     for _ in range(50):
         long_mpc.set_cur_state(v, a)
         long_mpc.update(v, a, lead(gap, v_lead))
@@ -51,8 +51,8 @@ def test_longitudinal_plan_minimises_its_cost(long_mpc, lead, v, a, gap, v_lead)
     assert flattest(lambda u: long_cost(u, v, a, gap, v_lead), jerks, 1e-4) < 1e-3
 
 
-def test_first_guess_brakes_evenly_to_the_lead(long_mpc):
-    """For a new lead, the first plan brakes by 0.625 m/s^2 from 20 to 10 m/s over the 80 m between."""
+def test_the_first_guess_brakes_evenly_to_the_leads_speed(long_mpc):
+    """Over a gap of 80 m, braking from 20 to 10 m/s takes 0.625 m/s^2."""
     long_mpc.v_mpc = 20.0
     long_mpc._simulate(80.0, 10.0, 0.0, LEAD_DECAY)
     speeds = long_mpc._iteration.guess[1:126:6]
@@ -104,11 +104,8 @@ def rk4(z, rate):
 
 
 def test_lateral_plan_minimises_its_cost(lateral_mpc):
-    """The plan minimises its residuals.
-
-    These are path, both lanes, heading and steering rate with weights 1, 1, 1, 1 and 0.5.
-    """
-    for _ in range(60):  # from its own solution each time, not from a shifted one
+    """The residuals of path, both lanes, heading and steering rate have weights 1, 1, 1, 1 and 0.5."""
+    for _ in range(60):  # each time from the last solution, not shifted
         lateral_mpc._delta = 0.002
         lateral_mpc._iteration.guess[:] = lateral_mpc._iteration.solution
         lateral_mpc.update(ROAD, SPEED, 0.0, 0.0, FACTOR)

@@ -18,7 +18,7 @@ def drive(mpc, lanes, times=1, v=V, angle=0.0, offset=0.0):
 
 
 def settle(mpc, lanes, times=60):
-    """Update until the plan no longer changes, always from a straight wheel."""
+    """Update until the plan no longer changes, starting from a straight wheel each time."""
     for _ in range(times):
         mpc._delta = 0.0
         drive(mpc, lanes)
@@ -45,8 +45,8 @@ def test_steers_towards_the_path(lateral_mpc, lanes, side):
     assert list(lateral_mpc.delta_plan) == pytest.approx([side * x for x in left], abs=1e-6)
 
 
-def test_curve_ends_in_the_curves_wheel_angle(lateral_mpc):
-    """Along a curve of 500 m radius, the plan holds the wheel angle for that curvature."""
+def test_in_a_curve_the_plan_holds_the_wheel_angle(lateral_mpc):
+    """The curve has a radius of 500 m."""
     curve = (0.0, 1 / 1000, 0.0)
     road = Lanes((*curve, 1.85), (*curve, -1.85), (*curve, 0.0), 1.0, 1.0, 3.7)
     for _ in range(100):
@@ -54,7 +54,7 @@ def test_curve_ends_in_the_curves_wheel_angle(lateral_mpc):
     assert lateral_mpc.delta_desired * CURVATURE_FACTOR == pytest.approx(1 / 500, rel=0.1)
 
 
-def test_without_lanes_the_models_path_counts(lateral_mpc, lanes):
+def test_without_lines_the_models_path_is_followed(lateral_mpc, lanes):
     nowhere = lanes(0.5, left_prob=0.0, right_prob=0.0)
     nowhere.left_poly, nowhere.right_poly = (0.0, 0.0, 0.3, 9.0), (0.0, 0.0, -0.3, 9.0)
     settle(lateral_mpc, nowhere)
@@ -65,16 +65,16 @@ def test_without_lanes_the_models_path_counts(lateral_mpc, lanes):
     assert lateral_mpc.delta_desired > 1e-4
 
 
-def test_one_line_gives_the_lane_by_its_width(lateral_mpc, lanes):
-    """With the left line only, the middle is half a lane's width to its right."""
+def test_one_line_and_the_width_give_the_lane(lateral_mpc, lanes):
+    """If only the left line is seen, the middle is half a lane's width to its right."""
     one = lanes(0.4, right_prob=0.0)
     one.path_poly = (0.0, 0.0, 0.0, -5.0)
     settle(lateral_mpc, one)
     assert lateral_mpc.delta_desired > 1e-4
 
 
-def test_plan_keeps_rate_and_angle_limits(lateral_mpc, lanes):
-    """A car that hardly turns is steered at 0.1 rad/s at the road wheels up to 25 degrees, and no further."""
+def test_the_plan_keeps_the_rate_and_angle_limits(lateral_mpc, lanes):
+    """A car that hardly turns is steered at up to 0.1 rad/s and up to 25 degrees at the road wheels."""
     for _ in range(120):
         lateral_mpc.update(lanes(8.0), V, 0.0, 0.0, 0.02)
         plan = lateral_mpc.delta_plan
@@ -86,8 +86,7 @@ def test_plan_keeps_rate_and_angle_limits(lateral_mpc, lanes):
     assert max(plan) == pytest.approx(math.radians(25.0), abs=1e-4)
 
 
-def test_start_is_moved_on_by_the_actuation_delay(lateral_mpc, lanes):
-    """The plan starts at the position and heading that the car has when a command acts."""
+def test_the_plan_starts_after_the_actuation_delay(lateral_mpc, lanes):
     drive(lateral_mpc, lanes(), angle=0.26)
     delay = get_params().steer_actuator_delay
     x, y, heading, delta = lateral_mpc._iteration.solution[:4]
@@ -95,7 +94,7 @@ def test_start_is_moved_on_by_the_actuation_delay(lateral_mpc, lanes):
     assert heading == pytest.approx(V * CURVATURE_FACTOR * 0.26 / RATIO * delay)
 
 
-def test_plan_continues_from_its_own_angle(lateral_mpc, lanes):
+def test_the_plan_continues_from_its_own_angle(lateral_mpc, lanes):
     drive(lateral_mpc, lanes(1.0), offset=0.01)
     wanted = lateral_mpc.delta_desired
     assert lateral_mpc.angle_desired == pytest.approx(wanted * RATIO + 0.01)
@@ -104,14 +103,14 @@ def test_plan_continues_from_its_own_angle(lateral_mpc, lanes):
 
 
 def test_low_speed_is_planned_as_5_mps(lateral_mpc, lanes):
-    """Below 5 m/s the plan is that for 5 m/s, except for the distance until a command acts."""
+    """Below 5 m/s, the plan is the one for 5 m/s, except for the distance during the actuation delay."""
     drive(lateral_mpc, lanes(0.3), v=0.0)
     assert lateral_mpc._iteration.solution[4] == pytest.approx(5.0 * 0.05, abs=1e-3)
 
 
 @pytest.mark.parametrize("where", ["lane", "speed", "angle", "lanes too far"])
-def test_no_number_resets(lateral_mpc, lanes, where):
-    """Without a finite solution the angle is NaN once. The next plan starts at the measured angle."""
+def test_nan_resets_the_controller(lateral_mpc, lanes, where):
+    """If the solution is not finite, the angle is NaN once. The next plan starts at the measured angle."""
     drive(lateral_mpc, lanes(0.5), times=3)
     broken = lanes(400.0) if where == "lanes too far" else lanes()
     if where == "lane":
@@ -127,8 +126,8 @@ def test_no_number_resets(lateral_mpc, lanes, where):
         assert lateral_mpc.delta_plan[0] == 0.13 / RATIO
 
 
-def test_reset_after_no_number_is_complete(lateral_mpc, lanes):
-    """A discarded plan has no later effect. After two different pasts, the results have the same bytes."""
+def test_a_discarded_plan_has_no_later_effect(lateral_mpc, lanes):
+    """After two different pasts, the results have the same bytes."""
     outcomes = []
     for past in (lanes(1.0), lanes(-3.0)):
         lateral_mpc.reset()
@@ -139,11 +138,8 @@ def test_reset_after_no_number_is_complete(lateral_mpc, lanes):
     assert outcomes[0] == outcomes[1]
 
 
-def test_unsolvable_problem_keeps_the_planned_rates(lateral_mpc, lanes):
-    """A heading of more than 90 degrees has no solution.
-
-    The plan continues unchanged, and the failure is counted.
-    """
+def test_an_unsolvable_problem_keeps_the_planned_rates(lateral_mpc, lanes):
+    """A heading of more than 90 degrees has no solution. The failure is counted."""
     drive(lateral_mpc, lanes(2.0), times=3)
     planned = list(lateral_mpc._iteration.guess[84:])
     delta = lateral_mpc.delta_desired
@@ -153,8 +149,8 @@ def test_unsolvable_problem_keeps_the_planned_rates(lateral_mpc, lanes):
     assert lateral_mpc.delta_desired == pytest.approx(delta + 0.05 * planned[0], abs=1e-12)
 
 
-def test_reset_forgets_everything(lateral_mpc, lanes):
-    """After a reset, even from an unsolvable problem, an instance computes the same bytes as a new one."""
+def test_a_reset_instance_behaves_like_a_new_one(lateral_mpc, lanes):
+    """A reset also clears the effects of an unsolvable problem."""
     fresh = LateralMpc(get_params())
     drive(lateral_mpc, lanes(-3.0), times=5, angle=60.0)
     drive(lateral_mpc, lanes(math.nan))
@@ -166,7 +162,7 @@ def test_reset_forgets_everything(lateral_mpc, lanes):
         assert results(lateral_mpc) == results(fresh)
 
 
-def test_any_input_is_answered(lateral_mpc, lanes):
+def test_any_input_gives_a_result(lateral_mpc, lanes):
     rng = random.Random(2)
     for _ in range(300):
         road = lanes(rng.gauss(0, 30), rng.gauss(0, 1), rng.random(), rng.random())

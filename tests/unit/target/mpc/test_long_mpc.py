@@ -32,7 +32,7 @@ def results(mpc):
 
 @pytest.fixture
 def stop():
-    """Leads and plans of the original's run in S5, from 7.5 s to 22 s at 20 Hz.
+    """Leads and plans of openpilot's run in S5, from 7.5 s to 22 s at 20 Hz.
 
     A lead is (distance, speed, acceleration), a plan (speed, acceleration). The lead's speed is the relative
     speed plus the car's speed 0.1 s before, two rows up, because of the radar's delay.
@@ -51,13 +51,13 @@ def stop():
     return leads, plans
 
 
-def test_plan_follows_the_recorded_original(long_mpc, lead, stop):
-    """With the same leads, the plan equals the original's through a whole stop (openpilot v0.4.2)."""
+def test_the_plan_equals_the_recording_of_openpilot(long_mpc, lead, stop):
+    """With the same leads, the plan agrees with that of openpilot v0.4.2 through a whole stop."""
     leads, plans = stop
     (v, a), (_, a_next) = plans[:2]
     a -= 0.2 * (a_next - a)
     v -= 0.01 * a  # the record is 10 ms into each plan
-    drive(long_mpc, v, a, lead(*leads[0]), 10)  # it had followed this lead for some time
+    drive(long_mpc, v, a, lead(*leads[0]), 10)  # openpilot had followed this lead for some time
     off_v, off_a = 0.0, 0.0
     for seen, (v_plan, a_plan) in zip(leads, plans, strict=True):
         drive(long_mpc, v, a, lead(*seen), 1)
@@ -74,8 +74,8 @@ def test_plan_follows_the_recorded_original(long_mpc, lead, stop):
 
 
 @pytest.mark.parametrize("v", [0.0, 5.0, 15.0, 30.0])
-def test_steady_gap(long_mpc, lead, v):
-    """Behind a lead at the car's speed, with a gap of 4 m + 1.8 s, the plan keeps the speed."""
+def test_the_plan_keeps_the_speed_at_the_steady_gap(long_mpc, lead, v):
+    """The steady gap is 4 m plus the distance driven in 1.8 s."""
     drive(long_mpc, v, 0.0, lead(4.0 + 1.8 * v, v), 20)
     assert long_mpc.a_mpc == pytest.approx(0.0, abs=1e-6)
     assert list(long_mpc.v_plan) == pytest.approx([v] * 21, abs=1e-4)
@@ -88,7 +88,7 @@ def test_plan_closes_the_error_of_the_gap(long_mpc, lead, gap, sign):
     assert (long_mpc.v_mpc_future - 20.0) * sign > 0.1
 
 
-def test_no_lead_never_limits(long_mpc):
+def test_without_a_lead_the_plan_does_not_limit_the_speed(long_mpc):
     drive(long_mpc, 20.0, 0.0, None, 20)
     assert not long_mpc.prev_lead_status
     assert long_mpc.v_mpc_future > 20.0
@@ -96,7 +96,7 @@ def test_no_lead_never_limits(long_mpc):
     assert not long_mpc.prev_lead_status
 
 
-def test_new_lead_when_it_appears_or_jumps(long_mpc, lead):
+def test_a_lead_is_new_when_it_appears_or_jumps(long_mpc, lead):
     seen = []
     for d_rel in (50.0, 49.0, 51.5, 54.1, 54.1):
         drive(long_mpc, 20.0, 0.0, lead(d_rel, 18.0), 1)
@@ -108,14 +108,14 @@ def test_new_lead_when_it_appears_or_jumps(long_mpc, lead):
 
 
 @pytest.mark.parametrize(("v", "a"), [(0.09, 0.0), (2.0, -4.1), (-3.0, 0.0)])
-def test_slow_or_hard_braking_lead_counts_as_stopped(long_mpc, lead, v, a):
-    """A lead below 0.1 m/s, or one that stops within two seconds, counts as standing still."""
+def test_a_very_slow_or_hard_braking_lead_is_planned_as_stopped(long_mpc, lead, v, a):
+    """Leads below 0.1 m/s, and leads that stop within two seconds, are planned as standing still."""
     drive(long_mpc, 5.0, 0.0, lead(30.0, v, a), 1)
     assert list(long_mpc.x_lead_plan) == [30.0] * 21
 
 
-def test_braking_lead_stops_but_does_not_reverse(long_mpc, lead):
-    """The lead's deceleration fades, so its planned speed ends at zero."""
+def test_a_braking_lead_stops_but_does_not_reverse(long_mpc, lead):
+    """The lead's deceleration decays, so its planned speed ends at zero."""
     drive(long_mpc, 5.0, 0.0, lead(30.0, 2.0, -3.9), 1)
     steps = [b - a for a, b in zip(long_mpc.x_lead_plan, long_mpc.x_lead_plan[1:], strict=False)]
     assert min(steps) > -0.01
@@ -123,10 +123,13 @@ def test_braking_lead_stops_but_does_not_reverse(long_mpc, lead):
 
 
 def test_decay_of_the_leads_acceleration(long_mpc, lead):
-    """The decay is 1.5/s while the lead is steady. Otherwise it falls by a tenth with each update."""
+    """The decay is 1.5/s while the lead's acceleration is small.
+
+    Otherwise, it falls by a tenth with each update.
+    """
 
     def travelled(decay):
-        """RK4 of a decaying acceleration of 1 m/s^2, as the plan integrates it."""
+        """Integrate a decaying acceleration of 1 m/s^2 with RK4, as the plan does."""
         x, v, a, h = 0.0, 10.0, 1.0, 0.2
         for _ in range(50):
             z = decay * h
@@ -144,8 +147,7 @@ def test_decay_of_the_leads_acceleration(long_mpc, lead):
     assert long_mpc.x_lead_plan[-1] - 40.0 == pytest.approx(travelled(LEAD_DECAY * 0.9), abs=1e-9)
 
 
-def test_first_guess_for_a_new_lead_brakes_to_its_speed(make_long, lead):
-    """For a new lead, two instances with different pasts but equal planned speed plan the same."""
+def test_the_plan_for_a_new_lead_depends_only_on_the_planned_speed(make_long, lead):
     one, other = make_long(), make_long()
     drive(one, 20.0, 0.0, lead(20.0, 5.0), 5)
     drive(other, 25.0, 0.0, None, 3)
@@ -155,10 +157,9 @@ def test_first_guess_for_a_new_lead_brakes_to_its_speed(make_long, lead):
     assert results(one) == results(other)
 
 
-def test_plan_through_the_lead_is_thrown_away(long_mpc, lead):
-    """A plan that passes 50 m through the lead is discarded.
-
-    The car's own motion counts, and the next lead is new.
+def test_a_plan_through_the_lead_is_discarded(long_mpc, lead):
+    """If a plan passes the lead by more than 50 m, the measured speed and acceleration are used, and the next
+    lead is new.
     """
     drive(long_mpc, 20.0, 0.0, lead(30.0, 20.0), 3)
     long_mpc.set_cur_state(20.0, 0.0)
@@ -171,7 +172,7 @@ def test_plan_through_the_lead_is_thrown_away(long_mpc, lead):
     assert long_mpc.prev_lead_status
 
 
-def test_plan_backwards_is_thrown_away_only_with_a_lead(long_mpc, lead):
+def test_a_backward_plan_is_discarded_only_with_a_lead(long_mpc, lead):
     drive(long_mpc, -0.02, 0.0, None, 1)
     assert long_mpc.resets == 0
     drive(long_mpc, -0.009, 0.0, lead(10.0, 0.0), 1)
@@ -191,8 +192,8 @@ def test_standstill_is_feasible(long_mpc, lead, v, a, d_rel):
 
 @pytest.mark.parametrize("field", ["d_rel", "v_lead", "a_lead_k"])
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-def test_lead_that_is_no_number_never_raises(long_mpc, lead, field, value):
-    """A NaN lead never raises. The solution is used or discarded, and valid leads work again at once."""
+def test_a_lead_with_nan_raises_no_error(long_mpc, lead, field, value):
+    """The solution is used or discarded, and valid leads work again at once."""
     broken = lead(30.0, 20.0)
     setattr(broken, field, value)
     drive(long_mpc, 20.0, 0.0, broken, 3)
@@ -202,8 +203,8 @@ def test_lead_that_is_no_number_never_raises(long_mpc, lead, field, value):
     assert math.isfinite(long_mpc.a_mpc)
 
 
-def test_solution_that_is_no_number_is_thrown_away(long_mpc, lead):
-    """A NaN distance causes one reset per update. Speed and acceleration are then the car's own."""
+def test_a_solution_with_nan_is_discarded(long_mpc, lead):
+    """If a solution is discarded, speed and acceleration are those of the car."""
     drive(long_mpc, 20.0, 0.0, lead(40.0, 20.0), 2)
     before = long_mpc.a_plan.tobytes()
     long_mpc.update(19.0, 0.1, lead(math.nan, 20.0))
@@ -213,7 +214,7 @@ def test_solution_that_is_no_number_is_thrown_away(long_mpc, lead):
     assert not long_mpc.prev_lead_status
 
 
-def test_any_input_is_answered(make_long, lead):
+def test_any_input_gives_a_result(make_long, lead):
     rng = random.Random(1)
     mpc = make_long()
     for _ in range(500):
@@ -223,8 +224,7 @@ def test_any_input_is_answered(make_long, lead):
         assert math.isfinite(mpc.v_mpc + mpc.a_mpc + mpc.v_mpc_future)
 
 
-def test_reset_forgets_everything(make_long, lead):
-    """After a reset, an instance computes the same bytes as a new one, whatever came before."""
+def test_a_reset_instance_behaves_like_a_new_one(make_long, lead):
     used, fresh = make_long(), make_long()
     drive(used, 20.0, -1.0, lead(15.0, 5.0, -4.0), 5)
     drive(used, math.nan, 0.0, lead(15.0, 5.0), 1)
@@ -237,8 +237,8 @@ def test_reset_forgets_everything(make_long, lead):
         assert results(used) == results(fresh)
 
 
-def test_thrown_away_is_forgotten(make_long, lead):
-    """A discarded plan has no later effect. After two different causes, the results have the same bytes."""
+def test_a_discarded_plan_has_no_later_effect(make_long, lead):
+    """After two different causes, the results have the same bytes."""
     one, other = make_long(), make_long()
     one.update(20.0, 0.0, lead(math.nan, 20.0))
     drive(other, 20.0, 0.0, lead(40.0, 20.0), 5)
@@ -250,7 +250,7 @@ def test_thrown_away_is_forgotten(make_long, lead):
         assert results(one) == results(other)
 
 
-def test_shared_solver_carries_no_state(long_solver, lead):
+def test_a_shared_solver_has_no_state(long_solver, lead):
     together = [LongitudinalMpc(i, long_solver) for i in (1, 2)]
     alone = [LongitudinalMpc(i) for i in (1, 2)]
     leads = (lead(30.0, 15.0), lead(60.0, 25.0, -1.0))
@@ -261,6 +261,5 @@ def test_shared_solver_carries_no_state(long_solver, lead):
     assert [results(mpc) for mpc in together] == [results(mpc) for mpc in alone]
 
 
-def test_nodes():
-    """Five intervals of 0.2 s and fifteen of 0.6 s add up to 10 s."""
+def test_the_plan_has_21_nodes_over_10_s():
     assert pytest.approx((0.2,) * 5 + (0.6,) * 15) == NODE_STEPS

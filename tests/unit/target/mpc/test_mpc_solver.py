@@ -23,7 +23,7 @@ CASES = {
 
 
 def full_problem(ocp, start, param):
-    """Return trajectory, weighted residuals, dynamics defects and bounds, with no variable eliminated."""
+    """Return trajectory, weighted residuals, dynamics defects and bounds, without eliminating variables."""
     n, nx = ocp.n_control, ocp.n_state
     w, p = ca.SX.sym("w", ocp.n_trajectory), ca.DM(param)
     z, u, q = ca.SX.sym("z", nx), ca.SX.sym("u"), ca.SX.sym("q", ocp.n_param)
@@ -50,14 +50,14 @@ def full_problem(ocp, start, param):
 
 
 def first_guess(ocp, start, control):
-    """All nodes are at the start state, shifted slightly so that they violate the dynamics."""
+    """Put all nodes at the start state, shifted slightly so that they violate the dynamics."""
     nodes = [x + 0.01 * k for k in range(ocp.n_control + 1) for x in start]
     return array("d", nodes + [control] * ocp.n_control)
 
 
 @pytest.mark.parametrize("case", CASES)
 def test_one_iteration_is_the_full_gauss_newton_step(case):
-    """Condensing is exact: a step equals that of the full quadratic program in another solver."""
+    """A step of the condensed problem equals that of the full quadratic program in another solver."""
     ocp, start, param, control = CASES[case]
     w, residuals, defects, low, high = full_problem(ocp, start, param)
     guess = first_guess(ocp, start, control)
@@ -100,7 +100,7 @@ def test_iterations_converge_to_the_optimum(case):
 
 @pytest.mark.parametrize("case", CASES)
 def test_equal_input_gives_equal_bytes(case):
-    """The solver returns the same bytes after other problems, even infeasible ones, and in a second build."""
+    """Neither earlier problems, even infeasible ones, nor a second build change the bytes."""
     ocp, start, param, control = CASES[case]
     guess = first_guess(ocp, start, control)
     solver = build_solver(ocp)
@@ -121,7 +121,7 @@ def test_equal_input_gives_equal_bytes(case):
     assert run(Iteration(build_solver(ocp))) == wanted
 
 
-def test_infeasible_program_keeps_the_controls():
+def test_an_infeasible_program_keeps_the_controls():
     ocp, _, param, _ = CASES["lateral"]
     iteration = Iteration(build_solver(ocp))
     beyond = (0.0, 0.0, 0.0, math.radians(60.0))
@@ -144,7 +144,7 @@ def test_shift_moves_the_guess_by_one_interval():
     assert following[83] == pytest.approx(new[83] + 0.15 * new[103], abs=1e-12)
 
 
-def test_guess_is_kept_where_nothing_shifts():
+def test_the_longitudinal_guess_is_not_shifted():
     ocp, start, param, _ = CASES["longitudinal"]
     iteration = Iteration(build_solver(ocp))
     iteration.restart()
