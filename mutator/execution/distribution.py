@@ -15,7 +15,7 @@ _DASK = "mutator.execution.cluster.dask_workers:ClusterWorkers"
 class Distributor(Protocol):
     """Distributes the pieces of a prepared session until none is left, or the session must stop.
 
-    When `run` returns, finished work is in the run folder. If it ends early, it sets
+    When `run` returns, finished work is in the run folder. If `run` ends early, it sets
     `session.problem` or `session.interrupted`.
     """
 

@@ -250,7 +250,7 @@ class Controller:
 
 
 class PlainController(Controller):
-    """Controller for a user's pytest command: also plans, checks, and reports the end."""
+    """Controller for a user's pytest command: also plans, checks, and prints the summary."""
 
     def __init__(
         self,

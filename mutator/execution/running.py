@@ -35,8 +35,8 @@ def run_campaign(
     (`mutator.review.gate`). Without `accept_versions`, Python and packages must not change during a run.
     Another thread calls `notify` about twice a second.
 
-    Raises MutatorError for wrong input, other choices than the frozen ones, or a changed campaign file or
-    target. Raises CheckFailed if something is not approved, or a preflight or the equivalence check fails.
+    Raises MutatorError for wrong input, choices that differ from the frozen ones, or a changed campaign file
+    or target. Raises CheckFailed if something is not approved, or if a preflight or equivalence check fails.
     """
     with open_session(
         workspace,

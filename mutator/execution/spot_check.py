@@ -24,7 +24,7 @@ def drawn(folder: RunFolder, count: int) -> list[str]:
 
 
 def driven_again(workspace: Workspace, folder: RunFolder, ids: Sequence[str]) -> Iterator[MutatorError]:
-    """Rerun these experiments, and yield those whose records differ."""
+    """Rerun these experiments, and yield an error for each whose record differs."""
     manifest, records = manifest_of(workspace, folder), folder.records()
     experiments = {experiment.id: experiment for experiment in plan_file.read_all(folder.path)}
     with ScratchFolder("mutator-verify-") as scratch:

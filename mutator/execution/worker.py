@@ -34,8 +34,8 @@ from mutator.workspace import Workspace
 class Assignment:
     """The role of a worker.
 
-    `name` makes its file names in the run folder unique. `parent` is the process that it must not outlive
-    (None: the worker is the command itself).
+    `name` makes its file names in the run folder unique. `parent` is the process that the worker must not
+    outlive (None: the worker is the command itself).
     """
 
     run: Path

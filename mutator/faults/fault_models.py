@@ -185,7 +185,7 @@ class _ExampleModel(StrictModel, title="An example"):
 
 
 class FaultModelModel(StrictModel, title="The file"):
-    """Name, parameters and examples of a fault model. Its template is the file next to it."""
+    """Name, parameters and examples of a fault model. The template is in `NAME.py.j2`, next to this file."""
 
     name: str = Field(description="The name. It must match the file name without `.yaml`.")
     kind: Literal["insert", "guard", "value"] = Field(

@@ -26,7 +26,7 @@ class Draw:
     """How a variant's values are made: one draw from each range, or a list.
 
     Values are in `unit`, the suffix of the YAML key (None for plain numbers). `key` and the campaign's seed
-    determine the draw: equal keys and ranges draw equal values.
+    determine the draw: equal keys and ranges give equal values.
     """
 
     key: str
@@ -143,7 +143,7 @@ class SweepModel(StrictModel, title="A sweep"):
 class _DrawModel(StrictModel, title="A draw"):
     """The key of a draw is a name of your choice and a unit: `distance_m`. Parameters refer to the drawn
     value by that name without the unit, optionally with a minus sign: `by_m: -distance`. Give exactly one of
-    `integers_from`, `reals_from` and `values`. The same seed and key draw the same values.
+    `integers_from`, `reals_from` and `values`. The same seed and key give the same values.
     """
 
     integers_from: SweepModel | None = Field(None, description="One whole number from each range of a sweep.")

@@ -54,13 +54,13 @@ class ParsedFile:
     _sites: dict[tuple[str, Anchor], Site] = field(default_factory=dict, repr=False, compare=False)
 
     def resolve_value(self, location: FaultLocation) -> Expression:
-        """Return the named expression; MutatorError with candidates unless exactly one matches."""
+        """Return the expression at the location; MutatorError with candidates unless exactly one matches."""
         functions = functions_named(self, location.function)
         known = self.expressions.get(plain_name(location.function), ())
         return choose_expression(known, location, self.where, functions[0].line)
 
     def resolve_fixed(self, location: FaultLocation) -> FixedValue:
-        """Return the named constant or default; MutatorError with candidates if there is none."""
+        """Return the constant or default at the location; MutatorError with candidates if there is none."""
         if location.function:
             functions_named(self, location.function)
         return choose_fixed(self.fixed, location, self.where)
@@ -89,7 +89,7 @@ class ParsedFile:
         return max(above, key=lambda one: one.line).names
 
     def resolve(self, location: FaultLocation) -> Site:
-        """Return the named statement; MutatorError with candidates unless exactly one matches."""
+        """Return the statement at the location; MutatorError with candidates unless exactly one matches."""
         key = (location.function, location.anchor)
         if key not in self._sites:
             self._sites[key] = _resolve(self, location)

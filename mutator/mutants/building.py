@@ -197,7 +197,7 @@ class _ReusingSplicer(_Splicer):
         key = reuse_key(file, edits, ids)
         if key in known:
             found = known[key]
-            if isinstance(found, Change):  # not earlier, because most changes of an expression occur once
+            if isinstance(found, Change):  # only now, because most changes of an expression occur once
                 found = known[key] = ReusableChange.of(found)
             return found.filled(inserted_lines(edits))
         if compile_changed(file, edits, key):

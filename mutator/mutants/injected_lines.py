@@ -1,6 +1,6 @@
 """The syntax of injected lines: tags, calls of the probe, and how to find them in files and patches.
 
-Code inside a target's process cannot import this module, so engines pass it the values that it needs.
+Code inside a target's process cannot import this module, so engines pass the needed values to that code.
 """
 
 import ast
@@ -89,7 +89,7 @@ class Tag:
 def changed_parts(source: bytes) -> Iterator[tuple[str, int, int, int]]:
     """Yield injection id, line, start and end column of each changed value and instance check in a file.
 
-    Lines count from 1, columns in bytes of UTF-8, as in tracebacks.
+    Lines are counted from 1, columns in bytes of UTF-8, as in tracebacks.
     """
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.IfExp):

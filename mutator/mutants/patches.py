@@ -73,7 +73,7 @@ def _span(before: int, count: int) -> str:
 
 
 def _name(path: str) -> str:
-    """End a name that has a space with a tab; otherwise `patch` takes the part after the space for a date."""
+    """End a name that has a space with a tab; otherwise `patch` reads the part after the space as a date."""
     return f"{path}\t" if " " in path else path
 
 

@@ -1,6 +1,6 @@
 """The contract of the probe `_fi`, rendered from `templates/_fi.py.j2`: its path, template values and report.
 
-Code inside a target's process cannot import this module, so engines pass it the values that it needs.
+Code inside a target's process cannot import this module, so engines pass the needed values to that code.
 """
 
 import math

@@ -13,10 +13,10 @@ from mutator.mutants.scopes import FunctionNames, as_compiled
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Statement:
-    """A small statement, or another construct that binds or calls, described by `reason`.
+    """A small statement, or another construct that binds a name or calls; `reason` describes the latter.
 
-    Lines count from 0, `last` is exclusive. Names are dotted, as written. A statement that returns also has
-    the empty name in `returns`, which matches any return. `place` is None if there is a reason.
+    Lines are counted from 0, `last` is exclusive. Names are dotted, as written. A statement that returns also
+    has the empty name in `returns`, which matches any return. `place` is None if there is a reason.
     """
 
     first: int

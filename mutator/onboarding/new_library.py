@@ -17,7 +17,7 @@ from mutator.onboarding.candidates import LoopCandidate, loop_candidates
 from mutator.onboarding.marks import MARK
 from mutator.onboarding.survey import Survey
 
-MOST_SHOWN = 5  # most candidates for the loop, and most values of each
+MOST_SHOWN = 5  # at most this many candidates for the loop, and values of each
 _TIME_STEPS = ("dt", "delta_t", "time_step", "timestep")
 _FILES = {
     "README.md": "README.md",

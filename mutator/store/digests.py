@@ -102,8 +102,8 @@ def sha256(path: Path) -> str:
 class Ledger:
     """The content of `digests.json`.
 
-    `files` by their names in the run folder; `rewriting`: files that are being rewritten, with their new
-    digests (None: deleted); `finished`: whether every experiment has a final record.
+    `files`: digests by name in the run folder; `rewriting`: files that are being rewritten, with their
+    new digests (None: deleted); `finished`: whether every experiment has a final record.
     """
 
     files: Mapping[str, Digest]

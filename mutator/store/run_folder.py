@@ -246,7 +246,7 @@ class RunFolder:
         return self.patches.read(experiment_id)
 
     def records(self, kind: str = "records") -> Mapping[str, Record]:
-        """Return the records by experiment id, parsed on access. `proof`: of the equivalence check."""
+        """Return the records by experiment id, parsed on access; with kind `proof`, those of the proof."""
         return read_records(self.path, kind, checksums=self.verifiable)
 
     def comparable(self, record: Record) -> Record:

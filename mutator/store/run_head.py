@@ -15,7 +15,7 @@ SCHEMA, FIRST_SCHEMA = "run/3", "run/1"  # the first schema had neither digests 
 HEAD, CAMPAIGN = RUN_HEAD, "campaign.yaml"
 REMEDY = "the run folder is damaged: restore the file from a copy of it"
 _TEXTS = {str: str}
-# Types of values: `[x]` a list of x; `{str: x}` names with x; `{"a": x}` an x under `a`; `(x, y)` either.
+# Types of values: `[x]` a list of x; `{str: x}` x by name; `{"a": x}` an x under `a`; `(x, y)` either.
 _STRETCH = {
     "python": str,
     "packages": _TEXTS,

@@ -8,7 +8,7 @@ from mutator.errors import MutatorError
 
 @dataclass(frozen=True, slots=True)
 class Shard:
-    """One of `of` shares, with the `number` (from 1): every `of`-th chunk, to be representative."""
+    """Share `number` (from 1) of `of` shares. It has every `of`-th chunk, so that it is representative."""
 
     number: int
     of: int

@@ -55,7 +55,7 @@ def _evaluated(formula: str, values: Mapping[str, np.ndarray], step_s: float) ->
     specification = _specification(step_s)
     formula = " ".join(formula.split())
     names, steps = names_in(formula, values), len(values[TIME])
-    # rtamt needs at least two steps, so the last one is doubled and its second value dropped
+    # rtamt needs at least two steps, so the last one is repeated, and its second value is dropped
     rows = {name: [*values[name].tolist(), *values[name][-1:].tolist()] for name in names}
     try:
         _parse(specification, formula, names)
