@@ -39,7 +39,7 @@ def stretch(look: Look, given: Pair) -> tuple[float, float] | None:
         (6.0, None),  # as long as required
     ],
 )
-def test_braking_is_too_short_when_it_lasts_half_as_long_at_most(
+def test_braking_is_too_short_if_it_lasts_at_most_half_as_long(
     end: float, shown: tuple[float, float] | None
 ) -> None:
     given = pair({"brake": during(1, 6)}, {"brake": during(1, end)})
@@ -57,13 +57,13 @@ def test_braking_is_not_too_short_if_golden_does_not_brake() -> None:
         (5.0, 5.4, None),  # only for a moment
         (0.5, 1.9, None),  # before the activation
         (8.1, 9.9, None),  # after the hazard
-        (3.0, 4.0, None),  # golden shows the same
+        (3.0, 4.0, None),  # the golden run gives gas, too
     ],
 )
-def test_gas_is_at_a_wrong_time_where_golden_gives_none(
+def test_gas_that_the_golden_run_does_not_give_is_at_a_wrong_time(
     begin: float, end: float, shown: tuple[float, float] | None
 ) -> None:
-    """Wrong gas lasts at least half a second between activation and hazard."""
+    """Only gas of at least half a second, between the activation and the hazard, is reported."""
     given = pair({"gas": during(3, 4)}, {"gas": during(begin, end)})
     assert stretch(at_a_wrong_time("gas"), given) == shown
     assert at_a_wrong_time("brake")(given) is None
@@ -77,7 +77,7 @@ BOTH = {"gas": during(5, 7), "brake": during(1, 6)}
     [
         (BOTH, 4.5, (4.5, 9.9)),
         (BOTH, 5.5, None),  # more than 1 s after the alert
-        ({"brake": during(1, 6)}, 4.5, None),  # golden uses no gas
+        ({"brake": during(1, 6)}, 4.5, None),  # the golden run gives no gas
     ],
 )
 def test_gas_and_brake_are_unavailable_if_they_end_soon_after_the_alert(
@@ -90,7 +90,7 @@ def test_gas_and_brake_are_unavailable_if_they_end_soon_after_the_alert(
 
 
 def test_runs_are_compared_up_to_the_end_of_the_shorter_one(record: Callable[..., Record]) -> None:
-    """Hazard, activation and first alert are those of the record."""
+    """The activation, the hazard and the first alert are taken from the record."""
     found = record(hazards=(("H3", 4.0), ("H1", 5.0)), alerts=(("a", 3.5), ("b", 3.0)))
     long, short = {"t": T, "gas": NONE}, {"t": T[:70], "gas": NONE[:70]}
     for golden, faulty in ((long, short), (short, long)):

@@ -76,7 +76,7 @@ def test_an_experiment_is_found_and_drawn_without_a_run(driven: Path) -> None:
     assert (len(brake.patches), len(gap.patches)) == (1, 0)
 
 
-def test_a_report_is_rewritten_without_a_process(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rewriting_a_report_starts_no_process(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def start(*words: object, **keywords: object) -> None:
         raise AssertionError("a report started a process")
 
@@ -133,7 +133,7 @@ def test_matching_experiments_are_tried_until_one_shows_the_action(place: Path) 
 
 
 def test_a_query_without_a_match_is_reported(place: Path) -> None:
-    """A target without the actuator has no match either."""
+    """Nor does a query match if the run lacks the action's channel."""
     assert "no experiment of this run matches" in drawn(place, replace(BRAKE, query='module == "radar"')).note
     assert "records no sail" in drawn(place, replace(BRAKE, actions=("sail",))).note
 

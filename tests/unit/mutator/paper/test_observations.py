@@ -23,7 +23,7 @@ REFERENCES = Path(__file__).parents[4] / "fault_library" / "references"
 FILE = REFERENCES / observations.FILE
 HOLDS, FAILS, UNDECIDED = Verdict
 ACTIVATED = {"t_activation": 1.0}
-EVENTS = {  # what happened in a run, by the count that it enters
+EVENTS = {  # the events of a run, by the count that includes it
     "manifested": {"t_manifest": 2.0},
     "alerts": {"alerts": "steer_saturated", "t_alert": 3.0},
     "hazards": {"h3": 1, "t_h3": 9.0},
@@ -96,8 +96,7 @@ def test_a_query_finds_the_published_counts_of_table_3(table_3: dict[str, Judged
     assert one.answers[0].found.text == published.text
 
 
-def test_guided_faults_lead_only_per_activated_fault(table_3: dict[str, JudgedClaim]) -> None:
-    """The resampling draws faults within each fault type."""
+def test_guided_faults_are_ahead_only_per_activated_fault(table_3: dict[str, JudgedClaim]) -> None:
     assert table_3["4.4"].verdict is HOLDS
     assert table_3["4.5"].verdict is FAILS
     assert table_3["4.5"].paper is FAILS
@@ -162,8 +161,8 @@ def test_a_claim_is_undecided_if_a_group_is_missing() -> None:
     assert fcw.verdict is UNDECIDED
 
 
-def test_the_time_to_a_hazard_counts_runs_without_one() -> None:
-    """If most alerts precede no hazard, the censored median exceeds every run."""
+def test_the_median_time_to_a_hazard_includes_runs_without_one() -> None:
+    """If no run has a hazard, the lower end of the interval is infinite."""
     alerted = ACTIVATED | {"alerts": "fcw", "t_alert": 2.0}
     safe, late = of_rows(*[alerted] * 20), of_rows(*[alerted | {"t_h1": 6.0}] * 20)
     assert median_time(safe, of="").low == math.inf

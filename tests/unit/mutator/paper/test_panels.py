@@ -17,7 +17,7 @@ from mutator.workspace import Workspace
 
 from ..statistics.results_frame import results
 
-SEEN: Any = None  # these tests do not use it
+SEEN: Any = None  # unused by these tests
 REFERENCES = Path(__file__).parents[4] / "fault_library" / "references"
 
 
@@ -44,7 +44,7 @@ def test_claims_about_all_faults_need_the_whole_plan(
         {"module": module, "fault_type": kind, "fault_id": str(i), "seed": i % 2}
         for i, (module, kind) in enumerate(kinds)
     ]
-    frame = results(*all_kinds, against)  # the paper saw no such hazard, so its second observation is decided
+    frame = results(*all_kinds, against)  # decides the paper's second observation
     of_all = (REFERENCES / "paper_observations.yaml").read_text().count("mixture: true")
     assert of_all
     for done in (folder.planned - 1, folder.planned):

@@ -72,8 +72,8 @@ def test_the_paper_campaigns_have_the_counts_of_table_three(paper: Plan) -> None
     assert len({e.id for e in paper.experiments}) == 11_280
 
 
-def test_each_value_in_each_scenario_and_context(paper: Plan) -> None:
-    """282 values, in five scenarios and four contexts. Each random experiment has its partner."""
+def test_each_value_is_injected_in_each_scenario_and_context(paper: Plan) -> None:
+    """There are 282 values, five scenarios and four contexts. Each guided experiment has a random partner."""
     guided = of_method(paper, Method.GUIDED, pair)
     assert guided == of_method(paper, Method.RANDOM, pair)
     faults = {e.fault.id for e in paper.experiments}
@@ -91,8 +91,8 @@ def test_each_method_alone_has_its_half_of_the_experiments(
     assert {e.setting for e in half.experiments} == {("pictures", "paper_detector")}
 
 
-def test_as_coded_has_the_same_make_up(library: Workspace) -> None:
-    """As coded, triggers do not wait for the controller."""
+def test_the_as_coded_campaign_has_the_same_counts(library: Workspace) -> None:
+    """Its triggers are armed from the start."""
     coded = make_plan(library, "paper_guided", Choices(reading="as_coded"))
     assert kinds(coded, Method.GUIDED) == INJECTED
     assert {e.trigger.armed_after_s for e in coded.experiments} == {0.0}

@@ -44,7 +44,7 @@ def frame() -> pd.DataFrame:
     return results(*seed(11, 11, alert=True), *seed(3, 20, alert=True), *seed(1, 0, alert=True), *seed(12, 9))
 
 
-def test_how_many_seeds_show_each_observation(tmp_path: Path) -> None:
+def test_seeds_that_show_each_observation_are_counted(tmp_path: Path) -> None:
     file = tmp_path / "observations.yaml"
     file.write_text(OBSERVATIONS)
     found = judge_by_seed(file, frame(), lambda runs: [])

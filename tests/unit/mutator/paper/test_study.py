@@ -30,7 +30,7 @@ def study_forms(run: Path) -> tuple[str, str]:
     return (report / "STUDY.md").read_text(), " ".join(Page((report / "study.html").read_text()).texts)
 
 
-def test_the_observations_are_in_files_of_their_own(run: Path) -> None:
+def test_the_observations_have_their_own_files(run: Path) -> None:
     forms = study_forms(run)
     cell = "35.6 % (154/432; 31.3 to 40.3)"
     files = [run / "report" / "tables" / f"coverage_guided.{kind}" for kind in ("md", "csv")]
@@ -39,7 +39,7 @@ def test_the_observations_are_in_files_of_their_own(run: Path) -> None:
     assert files[1].read_text().splitlines()[1].startswith("radar/chaff,paper,432,480,0.9,")
 
 
-def test_the_observations_have_a_file_a_table_and_a_place_in_both_forms(run: Path) -> None:
+def test_the_observations_are_in_a_file_a_table_the_markdown_and_the_page(run: Path) -> None:
     text, page = study_forms(run)
     file, table = run / "report/observations.md", run / "report/tables/observations.csv"
     query = "share(runs, of='method == \"guided\" and is_activated', part='not is_alert')"
@@ -57,7 +57,7 @@ def test_without_a_library_there_are_no_observations(run: Path) -> None:
 
 
 def test_the_report_links_to_the_page_of_the_study(run: Path) -> None:
-    """The page is deleted when the results no longer concern the study."""
+    """The page of the study is deleted if the results are no longer enough for the study."""
     written = building.write(run, HERE)
     assert "[STUDY.md](STUDY.md)" in written.markdown.read_text()
     assert "study.html" in Page(written.page.read_text()).links
@@ -71,7 +71,7 @@ def test_the_report_links_to_the_page_of_the_study(run: Path) -> None:
 
 
 def test_an_experiment_outside_the_plan_has_no_figure(run: Path) -> None:
-    """Markdown and page show the query instead."""
+    """The Markdown and the page show the query instead."""
     forms = study_forms(run)
     for text in forms:
         assert "No figure: the traces are not available" in text

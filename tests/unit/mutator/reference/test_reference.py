@@ -50,7 +50,7 @@ def _generated() -> dict[Path, str]:
 
 
 def test_no_generated_file_lacks_a_source() -> None:
-    """The target generates its scenarios page."""
+    """The target generates `scenario.json`."""
     pages = [
         path
         for path in (CLONE / "docs").rglob("*.md")

@@ -146,7 +146,7 @@ def hazards(*rows: tuple[str, str, float]) -> pd.DataFrame:
     return frame.assign(fault=frame["kind"], place=frame.index, **same, **told)
 
 
-def test_severity_decides_what_to_fix_first_and_then_time() -> None:
+def test_severity_and_then_time_decide_what_to_fix_first() -> None:
     """One hazard of class S3 ranks before many of S1."""
     many = [("a/many", "S1", 1.0)] * 5
     some = [("b/slow", "S3", 9.0), ("c/fast", "S3", 8.0), ("d/both", "S3", 9.5), ("d/both", "", 9.0)]
@@ -264,7 +264,7 @@ def test_a_single_hazard_is_in_the_singular(run: ReportedRun) -> None:
     assert "1 of 1 experiment (100 %) was simulated" in found["time"].says
 
 
-def test_link_values_are_escaped_and_the_order_comes_last() -> None:
+def test_link_values_are_escaped_and_the_sort_key_comes_last() -> None:
     assert (
         to_list({"kind": ["a/b,c"], "outcome": ["sdc"]}, "-t_end") == "kind=a%2Fb%2Cc&outcome=sdc&sort=-t_end"
     )

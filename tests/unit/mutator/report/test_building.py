@@ -78,7 +78,7 @@ def test_the_page_contains_results_diff_and_still_of_an_experiment(run: Path) ->
     assert base64.b64decode(picture.partition(",")[2]) == b"picture"
 
 
-def test_many_failed_runs_are_a_link_to_all(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_link_leads_to_failed_runs_that_are_not_listed(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(failed, "PAGE_LISTED", 1)
     text = building.write(run, None).page.read_text()
     assert "1 more: " in text
@@ -108,7 +108,7 @@ def test_the_report_is_written_byte_for_byte_again(run: Path) -> None:
     assert (again.page.read_bytes(), again.markdown.read_bytes()) == before
 
 
-def test_no_report_without_a_run(tmp_path: Path) -> None:
+def test_a_folder_without_a_run_gets_no_report(tmp_path: Path) -> None:
     with pytest.raises(MutatorError, match="not a run folder"):
         building.write(tmp_path, None)
 
@@ -126,15 +126,15 @@ def test_figures_are_in_the_markdown_and_in_the_page(run: Path) -> None:
     assert written.markdown.read_text().count("](figures/") == 3
 
 
-def test_experiments_and_runs_are_told_apart(run: Path) -> None:
-    """For a plan from before shared runs, the number of runs is missing."""
+def test_experiments_and_runs_are_counted_separately(run: Path) -> None:
+    """Plans from before shared runs do not have the number of runs."""
     assert "3 experiments are planned, as 2 runs" in building.write(run, None).markdown.read_text()
     (run / "run.json").write_text(json.dumps({name: x for name, x in HEAD.items() if name != "runs"}))
     assert "3 experiments are planned.\n" in building.write(run, None).markdown.read_text()
 
 
-def test_the_report_says_what_runs_that_stop_may_have_missed(run: Path) -> None:
-    """If a run stops at a hazard, its alert may be missing because it came after the end."""
+def test_the_report_says_what_stopped_runs_might_have_missed(run: Path) -> None:
+    """If a run stops at a hazard, an alert after the end cannot be known."""
     assert STOP_NOTE not in building.write(run, None).markdown.read_text()
     stops = {"canary": {"after_hazard": "stop"}, "alerts": ["fcw"]}
     (run / "run.json").write_text(json.dumps(HEAD | stops))
@@ -203,7 +203,7 @@ def test_published_fault_types_alone_add_no_published_numbers(run: Path, workspa
     assert not {"paper", "observation", "study"} & set(re.findall(r"[a-z]+", shown.lower()))
     assert not (run / "report" / "observations.md").exists()
     tables = {path.name for path in (run / "report").glob("tables/*")}
-    assert tables == {"fault_tolerant_times.csv", "fault_tolerant_times.md"}  # of the run's own hazards
+    assert tables == {"fault_tolerant_times.csv", "fault_tolerant_times.md"}  # from the run's own hazards
 
 
 @pytest.mark.parametrize("workspace", [HERE, None], ids=["library", "no library"])

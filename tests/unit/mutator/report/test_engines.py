@@ -42,8 +42,8 @@ Finish = Callable[..., Path]
 
 @pytest.fixture
 def finish(toycar: Workspace, tmp_path: Path) -> Finish:
-    """Create a finished run of four experiments, of which `proven` have a record in the proof, after
-    `change`. With None, there is no proof."""
+    """Create a finished run of four experiments. The first `proven` records, after `change`, are also in the
+    proof. With None, there is no proof."""
 
     def made(
         proven: int | None, change: Callable[[Record], Record] = lambda r: r, ways: object = WAYS
@@ -142,10 +142,9 @@ def test_complete_partial_and_missing_proofs_are_distinguished(
     assert not told.failed
 
 
-def test_forking_is_not_called_useless_if_experiments_are_many(
+def test_a_large_campaign_without_forks_has_no_note_on_its_size(
     finish: Finish, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The harness chose the reference engine for the experiments."""
     monkeypatch.setattr(engines, "WORTH_IT", 4)
     told = summary(finish(None))
     assert told is not None

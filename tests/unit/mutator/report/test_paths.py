@@ -26,9 +26,8 @@ def path(*states: State, stopped_at: tuple[str, ...] = ()) -> Path:
     return Path(stages=stages, crossings=crossings, reached="", stopped_at=stopped_at)
 
 
-def test_shapes_and_columns_for_the_page(record: Callable[..., Record]) -> None:
-    """Equal paths share a shape. Deviations have three digits or are a name. If nothing left golden, the
-    columns of channels are empty."""
+def test_paths_become_shapes_and_columns_of_the_page(record: Callable[..., Record]) -> None:
+    """Equal paths share a shape. An experiment without divergences has empty columns of channels."""
     far, held = path(*[State.REACHED] * 3), path(State.REACHED, State.HELD, State.HELD)
     records = {
         "a": record("a", left=(("seen", 1.23456, 0.123456), ("gap", 2.0, inf))),
@@ -46,9 +45,8 @@ def test_shapes_and_columns_for_the_page(record: Callable[..., Record]) -> None:
     assert found.through("b") == found.through("c")[:0] == ""
 
 
-def test_counts_of_links_and_components() -> None:
-    """A link counts the faults that reached its start, unless the component after it is not recorded. A
-    masked fault that several components stopped counts once."""
+def test_faults_are_counted_by_link_and_component() -> None:
+    """A fault is not counted for a link if the component after the link is not recorded."""
     counts = PathCounts()
     counts.add(path(State.INJECTED, State.REACHED, State.REACHED))
     counts.add(path(State.INJECTED, State.HELD, State.HELD, stopped_at=("pedals",)))

@@ -32,8 +32,8 @@ def at(text: str) -> int:
 
 
 def became(experiment: Experiment) -> dict[str, Any]:
-    """The result of a mutant. Permanent ones on the line of `wanted` do harm, except an inactive one, and
-    transient ones are masked. Results for the pedals are unknown."""
+    """Return a mutant's result: FAILED for the pedals; IDLE or HAZARD for a permanent mutant; masked for a
+    transient one."""
     place = str(experiment.fault.value)
     if "3.0" in place or "6.0" in place:
         return FAILED
@@ -46,7 +46,7 @@ def became(experiment: Experiment) -> dict[str, Any]:
 def run(
     toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path], of_operators: Callable[..., Any]
 ) -> Path:
-    """A run folder with such mutants of the toy's driver."""
+    """A run folder with mutants of the toy's driver."""
     out = write_run(toycar, tmp_path / "run", became, changed=of_operators(toycar, DRIVER))
     results.build(out)
     (out / "report").mkdir()
@@ -101,7 +101,7 @@ def test_the_score_equals_that_of_the_api(toycar: Workspace, run: Path) -> None:
     assert (line["hazard: count"], line["hazard: of"], line["new alert"]) == (6, 6, None)
 
 
-def test_a_changed_target_is_not_shown(toycar: Workspace, run: Path) -> None:
+def test_the_source_of_a_changed_target_is_not_shown(toycar: Workspace, run: Path) -> None:
     path = toycar.library.parent / "tree" / DRIVER
     path.write_text("# one more line\n" + path.read_text())
     reported = ReportedRun.open(
@@ -114,7 +114,7 @@ def test_a_changed_target_is_not_shown(toycar: Workspace, run: Path) -> None:
     assert "| arithmetic | mutants | permanent |" in score.markdown
 
 
-def test_a_run_without_operators_has_neither_panel(
+def test_a_run_without_operators_has_no_source_view_and_no_score(
     toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path]
 ) -> None:
     out = write_run(toycar, tmp_path / "run")

@@ -100,14 +100,14 @@ def called(line: str, tag: str = TAG, **changed: str) -> dict[str, str]:
         ("picture = weather.Rain(3).apply(picture)", RAIN),
         ("picture = _fi.kept('x', lambda: car.weather.Rain(3))", RAIN),
         ("picture = car.Rain(3)", RAIN),
-        ("from car import numbers, weather", set()),  # and use nothing of them
+        ("from car import numbers, weather", set()),  # imported and not used
         ("picture = str(numbers)", {"car/numbers.py"}),
         ("picture = Mist().apply(picture)", {"car/weather.py Fog", "car/weather.py TABLE", "car/drops.npz"}),
         ("picture = kit.clip(picture)", {"car/tools.py clip", "car/numbers.py one"}),
         ("picture = cut(picture)", {"car/tools.py clip", "car/numbers.py one"}),
         ("picture = two(picture)", {"car/numbers.py two"}),
         ("picture = helper()", {"car/eye.py helper", "car/eye.py LEVEL"}),
-        ("picture = clip(picture)", set()),  # an argument
+        ("picture = clip(picture)", set()),  # `clip` is an argument
         ("picture = [cut for cut in picture]", set()),
         ("picture = sqrt(picture) + len(unknown.cut)", set()),
         ("picture = picture.cut.helper()", set()),
@@ -126,13 +126,12 @@ def test_names_lead_to_what_is_called(line: str, found: set[str]) -> None:
     assert set(called(line)) == found
 
 
-def test_only_injected_lines_call() -> None:
+def test_only_injected_lines_are_searched_for_calls() -> None:
     assert called("picture = weather.Rain(3)", tag="") == {}
     assert called("picture = weather.Rain(3)", tag="  # fi:observe") == {}
 
 
-def test_only_the_new_value_of_a_changed_line_calls() -> None:
-    """The unchanged part of the line is the target's."""
+def test_only_the_new_value_of_a_changed_line_is_searched_for_calls() -> None:
     line = 'picture = cut(picture) + (helper() if _fi.active("01234567") else Mist())'
     was = f"{TAG} was:        picture = cut(picture) + Mist()"
     assert set(called(line, was)) == {"car/eye.py helper", "car/eye.py LEVEL"}

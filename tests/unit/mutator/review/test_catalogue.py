@@ -96,7 +96,7 @@ def test_a_decision_depends_on_template_function_and_diff(
     assert bool(found[probe]) is file.endswith("_fi.py.j2")
 
 
-def test_drawn_values_are_not_bound(toycar: Workspace, groups: Groups) -> None:
+def test_a_decision_does_not_depend_on_drawn_values(toycar: Workspace, groups: Groups) -> None:
     other = of_library(toycar, toycar.manifest("toycar"), specs=SENSOR, seed=1)
     assert [group.bound for group in other] == [group.bound for group in groups.values()]
     assert [group.values for group in other] == [group.values for group in groups.values()]
@@ -130,7 +130,7 @@ def test_an_id_includes_the_target(toycar: Workspace, groups: Groups) -> None:
 
 
 @pytest.mark.slow
-def test_the_whole_library_is_at_most_80_groups(clone: Workspace) -> None:
+def test_the_whole_library_has_at_most_80_groups(clone: Workspace) -> None:
     groups = of_library(clone, clone.manifest("openpilot"))
     assert 50 < len(groups) <= 80
     assert len({group.id for group in groups}) == len(groups)

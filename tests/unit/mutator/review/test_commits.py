@@ -58,7 +58,7 @@ def say(toy: Workspace, by: str, kind: Kind = Kind.APPROVE) -> Review:
 
 
 def test_the_last_author_cannot_approve(toycar: Workspace, root: Path) -> None:
-    """The author may have changed the spec, the template, or its YAML, and is refused under any signature."""
+    """The author is refused under the name, the e-mail address or both."""
     for author in ("Git Smith", "smith@example.org", "git smith <other@example.org>"):
         with pytest.raises(MutatorError, match=r"changed group \w{12} last \(commit .*Git Smith") as caught:
             say(toycar, author)
@@ -71,7 +71,7 @@ def test_the_last_author_cannot_approve(toycar: Workspace, root: Path) -> None:
 
 
 @pytest.mark.parametrize("path", [LANE, OFFSET, "templates/offset.yaml"])
-def test_earlier_authors_may_approve(toycar: Workspace, root: Path, path: str) -> None:
+def test_earlier_authors_can_approve(toycar: Workspace, root: Path, path: str) -> None:
     sha = commit(root, path, "Jane Doe <jane@example.org>")
     commit(root, "fault_library/faults/sensor/distance.yaml", "Joe <joe@example.org>")
     with pytest.raises(MutatorError, match=sha[:12]):
@@ -90,7 +90,7 @@ def test_a_co_author_cannot_approve(toycar: Workspace, root: Path) -> None:
     assert say(toycar, "Git Smith").decision(lane(toycar).id)
 
 
-def test_who_merges_is_not_an_author(toycar: Workspace, root: Path) -> None:
+def test_merging_does_not_make_a_person_an_author(toycar: Workspace, root: Path) -> None:
     """The later of two authors still cannot approve their own change."""
     git(root, "checkout", "-qb", "side")
     commit(root, "templates/offset.yaml", "Joe <joe@example.org>")
@@ -118,10 +118,10 @@ def test_changes_that_git_does_not_know_are_refused(toycar: Workspace, root: Pat
     assert say(toycar, "Jane Doe", Kind.REJECT).decision(lane(toycar).id)
 
 
-def test_a_decision_keeps_the_librarys_commit(toycar: Workspace, root: Path) -> None:
+def test_a_decision_stores_the_librarys_commit(toycar: Workspace, root: Path) -> None:
     """The commit ends in `-dirty` if anything except reviews is uncommitted."""
     sha = git(root, "rev-parse", "HEAD")
-    for _ in range(2):  # the second time the first decision is uncommitted
+    for _ in range(2):  # in the second round, the first decision is uncommitted
         decision = say(toycar, "Jane Doe").decision(lane(toycar).id)
         assert decision is not None and decision.commit == sha
     (root / "fault_library/faults/sensor/new.yaml").write_text("")

@@ -49,7 +49,7 @@ def say(toy: Workspace, kind: Kind, *names: str, by: str = "Jane Doe", text: str
     return record(toy, "toycar", changes, {one.group.id: review.revision(one.group.id) for one in changes})
 
 
-def test_what_is_written_is_read(toycar: Workspace) -> None:
+def test_decisions_and_remarks_round_trip(toycar: Workspace) -> None:
     say(toycar, Kind.APPROVE, "b", "0", text="fine")
     say(toycar, Kind.REJECT, "1", by="Ünï 'x' # \"y\"", text="a: b\\n")
     say(toycar, Kind.REMARK, "a", text="- [not yaml]")
@@ -196,7 +196,7 @@ def test_a_changed_group_shows_the_diff_since_its_approval(toycar: Workspace) ->
     path = toycar.library / "reviews" / "seen" / "toycar" / f"{'a' * 12}.txt"
     text = path.read_text()
     path.write_text(text.replace("d" * 16, "9" * 16))
-    assert found.changes(now) == ""  # belongs to another decision
+    assert found.changes(now) == ""  # the stored text belongs to another decision
     path.unlink()
     assert found.changes(now) == ""
     assert found.state(now) is State.CHANGED
@@ -211,7 +211,9 @@ def test_a_changed_group_shows_the_diff_since_its_approval(toycar: Workspace) ->
         (Kind.REMARK, "J", " ", "text"),
     ],
 )
-def test_no_name_or_no_text(toycar: Workspace, kind: Kind, by: str, text: str, argument: str) -> None:
+def test_an_empty_name_or_an_invalid_text_is_refused(
+    toycar: Workspace, kind: Kind, by: str, text: str, argument: str
+) -> None:
     with pytest.raises(MutatorError) as caught:
         record(toycar, "toycar", [Change(group=group("a"), kind=kind, by=by, text=text)], {})
     assert caught.value.argument == argument
@@ -237,7 +239,7 @@ def test_a_failed_write_leaves_the_old_file(toycar: Workspace, monkeypatch: pyte
     assert sorted(one.name for one in path.parent.iterdir()) == ["seen", "toycar.yaml"]
 
 
-def test_a_library_from_a_wheel_takes_no_decisions(
+def test_a_library_from_a_wheel_cannot_store_decisions(
     toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(shipped, "ARCHIVE", tmp_path)

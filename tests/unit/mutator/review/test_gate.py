@@ -73,7 +73,7 @@ def test_a_group_of_the_canary_alone_has_no_count(toycar: Workspace, plan: Plan)
     assert all(f"{group.id}  missing, the canary: " in caught.value.got for group in alone)
 
 
-def test_a_file_of_the_users_is_named_by_its_path(toycar: Workspace, tmp_path: Path) -> None:
+def test_a_users_own_file_is_named_by_its_path(toycar: Workspace, tmp_path: Path) -> None:
     mine = tmp_path / "my own.yaml"
     mine.write_text(toycar.campaign("small").read_text() + "\n# mine\n")
     with pytest.raises(CheckFailed) as caught:

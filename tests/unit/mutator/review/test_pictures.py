@@ -70,8 +70,8 @@ def test_three_levels_of_an_effect(lit: Lit) -> None:
     assert [grey(one.after) for one in found.levels] == pytest.approx([100, 130, 250], abs=1)
 
 
-def test_images_of_one_level_are_a_pair(lit: Lit) -> None:
-    """The result is None for a level that a group with few values lacks, and for a group without images."""
+def test_each_level_has_a_pair_of_images(lit: Lit) -> None:
+    """The result is None for a missing level and for a group without images."""
     workspace, group = lit(values="[10, 50]")
     manifest = workspace.manifest("toycar")
     pairs = [pictures.of_group(workspace, manifest, group, level) for level in (*LEVELS, "utmost")]
@@ -143,7 +143,7 @@ def test_an_image_that_cannot_be_drawn_is_reported(lit: Lit, picture: str, said:
         drawn(*lit(picture=picture))
 
 
-def test_a_place_that_no_run_reaches(lit: Lit) -> None:
+def test_a_place_that_no_run_reaches_is_reported(lit: Lit) -> None:
     workspace, _ = lit()
     sensing = workspace.library.parent / "tree/toycar/sensing.py"
     text = sensing.read_text()

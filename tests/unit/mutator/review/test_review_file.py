@@ -39,7 +39,7 @@ def written(path: Path, *names: str) -> Path:
     return path
 
 
-def test_what_is_written_is_read(tmp_path: Path) -> None:
+def test_a_review_file_round_trips(tmp_path: Path) -> None:
     path = written(tmp_path / "toycar.yaml", "b", "a")
     found = review_file.load(path, "toycar")
     assert found == Content(entries={name * 12: entry(name) for name in "ab"}, four_eyes=True)
@@ -137,7 +137,7 @@ def test_old_approvals_of_different_diffs_are_invalid(old: Path) -> None:
 
 
 def test_old_remarks_are_kept(old: Path) -> None:
-    """A reviewer under one kind of trigger counts as a reviewer."""
+    """The reviewers under all kinds of triggers are named together."""
     edited(old, "4f924f1dc5e6", 'remark: ""', 'remark: "once"')
     edited(old, "6ee7b871b4c7", 'remark: ""', 'remark: "twice"')
     entry = edited(old, "6ee7b871b4c7", "Jane Doe", "Joe")[SILENCE]

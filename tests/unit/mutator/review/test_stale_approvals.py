@@ -154,7 +154,6 @@ def groups(toy: Workspace) -> tuple[Group, ...]:
 def test_a_change_makes_exactly_its_groups_stale(
     approved: Workspace, file: str, old: str, new: str, stale: set[str], why: str
 ) -> None:
-    """The reason is given."""
     path = approved.library.parent / file
     text = path.read_text()
     assert old in text

@@ -24,7 +24,7 @@ WriteRun = Callable[..., Path]
 HAZARD = {"outcome": Outcome.HAZARD, "t_manifest": 2.5}
 
 
-def test_counts_a_typical_and_the_worst_experiment(
+def test_a_group_has_counts_a_typical_and_a_worst_experiment(
     toycar: Workspace, tmp_path: Path, write_run: WriteRun
 ) -> None:
     """The typical experiment is the median of the most frequent ending."""
@@ -48,7 +48,7 @@ def test_counts_a_typical_and_the_worst_experiment(
 def test_a_group_without_experiments_has_no_verdict(
     toycar: Workspace, tmp_path: Path, write_run: WriteRun
 ) -> None:
-    """The probe has none, because all mutants share it."""
+    """The group of the probe has no experiments, because all mutants share the probe."""
     run = RunFolder.open(write_run(toycar, tmp_path / "run", only='fault_type == "silence"'))
     results.ensure(run.path)
     groups = of_plan(toycar, make_plan(toycar, "toy", Choices()))
@@ -118,5 +118,5 @@ def row(**given: Any) -> Row:
         ({"outcome": Outcome.MASKED}, "masked: no actuator differed from the golden run"),
     ],
 )
-def test_a_verdict_in_words(given: dict[str, Any], words: str) -> None:
+def test_a_verdict_is_put_into_words(given: dict[str, Any], words: str) -> None:
     assert verdict_of(row(**given), {"H1": "a crash"}) == words

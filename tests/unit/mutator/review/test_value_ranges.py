@@ -50,7 +50,7 @@ def test_values_without_an_order_are_listed_next_to_the_range(
 
 
 def test_the_selected_execution_and_instance_are_values(toycar: Workspace) -> None:
-    """A seed is drawn and is no value."""
+    """A drawn seed is not a value."""
     fault = faults(toycar, "sensor/distance")[0]
     (injection,) = fault.injections
     made = replace(fault, injections=(injection, replace(injection, call=3, where="index == 2")))

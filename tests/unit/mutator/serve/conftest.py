@@ -79,7 +79,7 @@ class Client:
                 sent["Content-Length"] = str(len(data))
             for name, value in sent.items():
                 connection.putheader(name, value)
-            with suppress(BrokenPipeError, ConnectionResetError):  # it was refused before it was all sent
+            with suppress(BrokenPipeError, ConnectionResetError):  # refused before all was sent
                 connection.endheaders(data, encode_chunked=chunked)
             answer = connection.getresponse()
             found = Answer(answer.status, {k.lower(): v for k, v in answer.getheaders()}, answer.read())

@@ -175,7 +175,7 @@ def test_a_hostile_series_script_is_not_served(client: Client, name: str, text: 
 
 
 def test_series_are_served_as_they_are(client: Client) -> None:
-    """The page relies on lengths in bytes, so there is no encoding."""
+    """The page relies on the length in bytes, so the response is not encoded."""
     path = client.place / "runs/night/series/kept/0123456789abcdef.js"
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(script_of(path.stem, bytes(range(256)) + b'");alert(1);("'))
@@ -196,7 +196,7 @@ def test_a_report_with_a_forged_stamp_gets_a_strict_policy(client: Client, linke
     stamp["files"]["index.html"] = digest(page.read_bytes())
     (linked / "report/made_from.json").write_text(json.dumps(stamp))
     answer = client.get("/runs/linked/report/index.html")
-    assert "alert(2)" in answer.text  # without this, the test would prove nothing
+    assert "alert(2)" in answer.text  # the report's script must be in the response
     scripts = answer.headers["content-security-policy"].split("script-src ")[1].split(";")[0]
     assert "unsafe" not in scripts and "http" not in scripts and "data:" not in scripts
     assert blocks(answer.text, "script")

@@ -61,7 +61,7 @@ def child_of(folder: Path) -> int:
     return int((folder / "started").read_text())
 
 
-def test_a_command_ends_in_order_with_its_server(tmp_path: Path) -> None:
+def test_a_command_is_asked_to_end_when_its_server_ends(tmp_path: Path) -> None:
     """When the pipe is closed, the command is asked to end, and so are its children."""
     keeper, hold = kept(tmp_path, COMMAND.format(IN_ORDER))
     child = child_of(tmp_path)
@@ -91,7 +91,7 @@ def test_a_command_dies_with_its_keeper(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("code", [0, 1, 3])
-def test_the_exit_code_is_the_commands(tmp_path: Path, code: int) -> None:
+def test_the_keeper_exits_with_the_commands_code(tmp_path: Path, code: int) -> None:
     keeper, hold = kept(tmp_path, f"raise SystemExit({code})")
     assert keeper.wait(20) == code
     os.close(hold)

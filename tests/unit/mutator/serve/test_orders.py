@@ -142,7 +142,7 @@ def test_requests_become_command_lines(desk: Desk) -> None:
 
 
 @pytest.mark.parametrize("trigger", ["always", "10", "1.5", "near", "near_far/near", "t >= 2 and v_ego > 3"])
-def test_triggers_are_those_of_try(desk: Desk, trigger: str) -> None:
+def test_a_trigger_becomes_an_option_of_try(desk: Desk, trigger: str) -> None:
     assert f"--trigger={trigger}" in work(desk, **TRY, trigger=trigger).words
 
 
@@ -155,6 +155,6 @@ def test_a_new_run_cannot_be_a_link(desk: Desk, tmp_path: Path) -> None:
         work(desk, **TRY)
 
 
-def test_numbers_are_finite(desk: Desk) -> None:
+def test_an_infinite_number_is_refused(desk: Desk) -> None:
     with pytest.raises(ValueError):
         work(desk, **TRY, value=math.inf)

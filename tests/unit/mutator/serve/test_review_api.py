@@ -28,7 +28,7 @@ def reviewed(
 
 
 def decided(client: Client, *changes: tuple[str, str], by: str = "Jane", **more: Any) -> Any:
-    """The response to changes, given as group and kind, by a reviewer with the current view."""
+    """Send changes, given as group and kind, from a reviewer with the current view. Return the response."""
     groups = client.get(f"{API}?spec=sensor/*").json["groups"]
     body = {
         "changes": [{"group": group, "kind": kind, "text": more.get("text", "")} for group, kind in changes],

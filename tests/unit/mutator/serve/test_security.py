@@ -19,7 +19,7 @@ ASKED = ("/", "/api/jobs", "/runs/night/report/index.html", "/assets/base.css", 
 )
 @pytest.mark.parametrize("path", ASKED)
 def test_another_host_is_refused(client: Client, path: str, host: str | None) -> None:
-    """Another name may resolve to this machine."""
+    """Another name can resolve to this machine."""
     answer = client.get(path, Host=host and host.format(port=client.port))
     assert answer.status in (400, 403)
     assert "<" not in answer.text

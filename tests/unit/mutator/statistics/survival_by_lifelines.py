@@ -1,9 +1,9 @@
-"""What lifelines says of ten samples of censored times; run by hand, where lifelines is installed:
+"""The results of lifelines for ten samples of censored times. Run this file by hand:
 
     python -m venv /tmp/lifelines && /tmp/lifelines/bin/pip install lifelines==0.30.3
     /tmp/lifelines/bin/python survival_by_lifelines.py > survival_by_lifelines.json
 
-It is no dependency of the tests because it needs an older pandas than they are run with.
+Lifelines is not a dependency of the tests, because it needs an older pandas than theirs.
 """
 
 import json

@@ -69,7 +69,7 @@ def test_holm_adjusts_as_in_the_textbook() -> None:
 def test_holm_adjusts_as_statsmodels_does() -> None:
     """The p-values include ties, 0, 1, and tests without a result."""
     draw = random.Random(1)
-    for _ in range(20):  # a single one that takes 50 ms
+    for _ in range(20):  # one call of `multipletests` takes 50 ms
         p_values = [
             draw.choice((0.0, 1.0, 0.01, math.nan, draw.random(), draw.random() / 100))
             for _ in range(draw.randint(1, 20))
@@ -111,7 +111,6 @@ def test_resampling_draws_whole_faults() -> None:
 
 
 def test_faults_that_all_agree_have_no_interval() -> None:
-    """Three faults do not bound what other faults would do."""
     for guided in (RAN, HIT):
         rows = [row for i in range(3) for row in pair(str(i), guided, RAN)]
         found = contrasts.resampled(results(*rows), "injected")

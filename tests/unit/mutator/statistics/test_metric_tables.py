@@ -52,7 +52,7 @@ def test_without_values_there_is_no_table() -> None:
 
 
 def test_classes_of_severity_by_fault_type() -> None:
-    """The count of any contact comes before the classes."""
+    """The first column counts contacts of any class."""
     rows = severity_sheet(FRAME).table().rows
     counts = [[row[0], *(cell.partition("(")[2].partition(";")[0] for cell in row[1:])] for row in rows]
     assert counts == [
@@ -79,7 +79,7 @@ def test_the_interval_of_a_median_resamples_whole_faults(
 ) -> None:
     """A simple loop that copies the runs of each fault drawn gives the same interval."""
     monkeypatch.setattr(medians, "RESAMPLES", 40)
-    monkeypatch.setattr(medians, "_CELLS", 300)  # this takes several batches
+    monkeypatch.setattr(medians, "_CELLS", 300)  # the draws need several batches
     rng = np.random.default_rng(3)
     cluster = pd.Series(rng.integers(0, 6, 30))
     first, second = pd.Series(rng.normal(0, 1, 30)), pd.Series(rng.normal(1, 1, 30).round(1))

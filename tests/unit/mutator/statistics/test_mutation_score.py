@@ -99,7 +99,7 @@ def test_harness_errors_are_in_no_denominator(faults: dict[str, Fault]) -> None:
 
 
 def test_the_note_warns_of_several_draws(faults: dict[str, Fault]) -> None:
-    """The overall share estimates none of their populations."""
+    """The draws have different populations, and the overall share has no weights."""
     small, large = "a: 4 draws of 9 mutants of operators", "b: 4 draws of 900 mutants of operators"
     frame = results(drive("a", HIT))
     assert "without weights" in score_sheet(frame, faults, GOLDEN, [small, large]).note

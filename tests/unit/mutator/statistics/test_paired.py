@@ -54,7 +54,7 @@ def test_median_times_use_pairs_with_both_times() -> None:
     assert found.p == pytest.approx(2 / 2**7)
 
 
-def test_equal_and_missing_times() -> None:
+def test_equal_or_missing_times_have_no_result() -> None:
     same = pd.Series([1.0, 0.1 + 0.2])
     assert math.isnan(times(same, pd.Series([1.0, 0.3])).p)
     none = times(pd.Series([None], dtype=float), pd.Series([1.0]))
@@ -64,7 +64,8 @@ def test_equal_and_missing_times() -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_the_interval_of_a_rate_equals_that_of_all_resamples(seed: int) -> None:
-    """Five faults have 5^5 resamples. The interval ends between their percentiles near 2.5 and 97.5 %."""
+    """With five faults, all 5^5 resamples can be computed. The interval ends near their percentiles 2.5 and
+    97.5."""
     draw = np.random.default_rng(seed)
     cluster = pd.Series(np.repeat(range(5), [1, 2, 3, 5, 8]))
     first, second = (pd.Series(draw.random(19) < chance) for chance in (0.3, 0.6))

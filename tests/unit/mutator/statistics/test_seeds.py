@@ -55,7 +55,7 @@ def test_the_interval_is_made_of_percentiles_of_resampled_seeds() -> None:
 
 
 def test_seeds_that_agree_have_no_interval() -> None:
-    """A seed with nothing to count does not enter a share."""
+    """A seed without runs to count is left out of a share."""
     frame = results(*seed(1, 4), *seed(2, 4), *seed(3, 0, t_activation=""))
     found = cells(seeds_sheet(frame), "all", "hazards", "activated")
     assert math.isnan(found["low"]) and math.isnan(found["high"])

@@ -49,7 +49,7 @@ def campaign(seed: int) -> Campaign:
     return Campaign(by_hand.usable(made), {sheet.name: sheet for sheet in sheets})
 
 
-# Three for each change. The slow tests run all ten.
+# The quick tests run three campaigns, and the slow tests all ten.
 SEEDS = [pytest.param(seed, marks=pytest.mark.slow if seed > 2 else ()) for seed in range(10)]
 
 

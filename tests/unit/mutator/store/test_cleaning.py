@@ -58,7 +58,7 @@ def test_everything_that_a_run_wrote_is_deleted(run: Path) -> None:
         "report/compare-old/notes.txt",
     ],
 )
-def test_a_run_folder_with_another_file_stays(run: Path, stranger: str) -> None:
+def test_a_run_folder_with_another_file_is_not_deleted(run: Path, stranger: str) -> None:
     path = run / stranger
     path.parent.mkdir(parents=True, exist_ok=True)
     path.mkdir() if stranger.endswith("/") else path.touch()
@@ -71,8 +71,7 @@ def test_a_run_folder_with_another_file_stays(run: Path, stranger: str) -> None:
     assert contents(run) == before
 
 
-def test_a_folder_of_other_files_stays_despite_its_run_json(tmp_path: Path) -> None:
-    """A folder with another schema stays as well."""
+def test_a_foreign_folder_is_not_deleted_despite_its_run_json(tmp_path: Path) -> None:
     for head, names in (
         ('{"schema":"run/1"}', ["a", "b", "c", "d", "e"]),
         ('{"schema":"run/99"}', []),
@@ -91,7 +90,7 @@ def test_a_folder_of_other_files_stays_despite_its_run_json(tmp_path: Path) -> N
         assert len(contents(folder)) == 1 + len(names)
 
 
-def test_a_folder_without_run_json_stays(tmp_path: Path) -> None:
+def test_a_folder_without_run_json_is_not_deleted(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").touch()
     with pytest.raises(MutatorError, match="not a run folder"):
         clean(tmp_path)
@@ -125,8 +124,7 @@ def test_links_are_not_followed(run: Path, tmp_path: Path) -> None:
     assert (elsewhere / "S1" / "trace.npz").exists()
 
 
-def test_a_deleted_folder_is_not_created_again(run: Path) -> None:
-    """Another command writes a report while the folder is deleted."""
+def test_files_written_during_a_deletion_are_deleted_too(run: Path) -> None:
     assert not finish_deletion(run)
     clean(run)
     assert finish_deletion(run)

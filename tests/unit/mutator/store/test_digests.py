@@ -16,7 +16,7 @@ from mutator.store.lines import LineWriter
 
 
 class Killed(BaseException):
-    """Raised instead of a kill of the process."""
+    """Raised instead of killing the process."""
 
 
 @pytest.fixture
@@ -60,7 +60,7 @@ def test_every_changed_byte_is_found(run: Path) -> None:
 
 
 @pytest.mark.parametrize("content", ["{}", '{"schema": "digests/1"}', "[]", "", '{"schema": "digests/9"}'])
-def test_what_is_not_a_ledger_is_refused(run: Path, content: str) -> None:
+def test_a_file_that_is_not_a_ledger_is_refused(run: Path, content: str) -> None:
     """The file is truncated, or has another kind or a newer schema."""
     (run / digests.FILE).write_text(content)
     with pytest.raises(MutatorError, match=r"digests\.json"):
@@ -102,7 +102,7 @@ def kills(run: Path, work: Callable[[], Any], monkeypatch: pytest.MonkeyPatch) -
     raise AssertionError("no end")
 
 
-def test_a_kill_while_a_file_is_rewritten(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_kill_during_a_rewrite_leaves_a_valid_folder(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert kills(run, lambda: digests.rewrite(run, "a", b"new a"), monkeypatch) == 3
     assert accepted(run) and (run / "a").read_text() == "new a"
     assert digests.read(run).rewriting == {}
@@ -117,8 +117,8 @@ def test_after_a_kill_a_file_is_old_or_new(run: Path, monkeypatch: pytest.Monkey
     assert not accepted(run)
 
 
-def test_a_file_announced_for_deletion_may_be_missing(run: Path) -> None:
-    """After the announcement, the file is not listed."""
+def test_a_file_announced_for_deletion_can_be_missing(run: Path) -> None:
+    """Afterwards, the ledger no longer lists the file."""
     with digests.rewriting(run, {"a": None}):
         assert accepted(run)
         (run / "a").unlink()

@@ -1,4 +1,4 @@
-"""An index of lines by experiment, which are read on request."""
+"""An index of lines by experiment. Each line is read when it is requested."""
 
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,7 @@ def opened(folder: Path) -> IndexedLines[dict[str, Any]]:
 
 
 def test_the_newest_line_replaces_the_first(tmp_path: Path) -> None:
-    """Experiments keep the order of their first lines. Many files are read with few of them open."""
+    """Experiments keep the order of their first lines."""
     told = {"note": '"experiment_id":"zz"', "within": ['{"experiment_id":"yy"}']}
     many = {f"f{i:02}": [{"experiment_id": f"e{i}", "n": i}] for i in range(30)}
     found = things(tmp_path, a=[{"experiment_id": "aa", "n": 0, **told}], b=[{"experiment_id": "bb"}], **many)

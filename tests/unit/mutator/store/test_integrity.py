@@ -64,7 +64,7 @@ def test_a_folder_or_link_in_place_of_a_file_is_reported(run: Path, name: str, w
     assert problem(run).where == str(run / name)
 
 
-def test_the_seal_covers_all_files_of_these_tests(run: Path) -> None:
+def test_these_tests_list_all_sealed_files(run: Path) -> None:
     folder = RunFolder.open(run)
     assert folder.verifiable and folder.finished and folder.problems() == []
     found = {path.relative_to(run).as_posix() for path in run.rglob("*") if path.is_file()}
@@ -239,7 +239,7 @@ def test_a_damaged_stretch_of_work_is_reported(run: Path, key: str) -> None:
         (run / "run.json").write_text(json.dumps(data))
         with pytest.raises(MutatorError, match=r"run\.json: damaged at 'stretches'"):
             RunFolder.unverified(run)
-    if key == "machines":  # nothing is printed if there are no others
+    if key == "machines":  # this key is optional
         return
     data["stretches"] = [{name: value for name, value in stretch.items() if name != key}]
     (run / "run.json").write_text(json.dumps(data))

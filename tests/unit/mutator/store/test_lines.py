@@ -142,7 +142,7 @@ def test_records_are_synced_in_batches(tmp_path: Path, monkeypatch: pytest.Monke
     assert 3 <= len(synced) <= 6
 
 
-def test_a_file_is_never_shared(tmp_path: Path) -> None:
+def test_an_existing_file_is_not_reopened(tmp_path: Path) -> None:
     LineWriter(tmp_path / "a.jsonl", HEAD).close()
     with pytest.raises(FileExistsError):
         LineWriter(tmp_path / "a.jsonl", HEAD)

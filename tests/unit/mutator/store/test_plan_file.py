@@ -64,7 +64,7 @@ def test_a_missing_field_of_an_older_plan_has_its_default(experiment: Make) -> N
 
 
 def test_a_pipe_in_place_of_a_plan_is_refused(tmp_path: Path) -> None:
-    """Opening a pipe would wait for a writer for ever."""
+    """Opening a pipe would wait forever for a writer."""
     (tmp_path / "plan").mkdir()
     os.mkfifo(tmp_path / plan_file.EXPERIMENTS)
     with pytest.raises(MutatorError, match=r"experiments\.jsonl: cannot be read"):

@@ -27,7 +27,7 @@ def write(run: Path, name: str, *records: Record) -> Path:
 
 
 def test_records_are_read_as_written(tmp_path: Path, record: MakeRecord) -> None:
-    """Deviations may be infinite, and activations missing."""
+    """Deviations can be infinite, and activations can be missing."""
     first = record(
         "a" * 16, max_dev=(("gas", float("inf")),), hazards=(("H1", 3.25),), alerts=(("fcw", 3.0),)
     )
@@ -64,7 +64,7 @@ def test_an_incomplete_last_line_is_skipped(tmp_path: Path, record: MakeRecord, 
 
 
 @pytest.mark.parametrize("content", [b"", b'{"sche'])
-def test_a_file_without_its_head_is_empty(tmp_path: Path, content: bytes) -> None:
+def test_a_file_without_its_head_has_no_records(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "records").mkdir()
     (tmp_path / "records" / "0001-gw0.jsonl").write_bytes(content)
     assert read_records(tmp_path) == {}

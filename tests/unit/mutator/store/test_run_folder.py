@@ -61,7 +61,7 @@ def test_a_newer_schema_is_refused(folder: RunFolder) -> None:
         RunFolder.open(folder.path)
 
 
-def test_a_folder_that_is_no_run_is_refused(tmp_path: Path) -> None:
+def test_a_folder_that_is_not_a_run_is_refused(tmp_path: Path) -> None:
     with pytest.raises(MutatorError, match="not a run folder"):
         RunFolder.open(tmp_path)
 

@@ -1,4 +1,4 @@
-"""A finished run that this machine verified before is verified by comparing its bytes."""
+"""A finished run that this machine has verified before is verified again by comparing its bytes."""
 
 import json
 from collections.abc import Callable
@@ -73,7 +73,6 @@ def test_a_verified_run_is_only_compared_byte_for_byte(
 
 
 def test_a_change_after_verification_is_found(made: tuple[Workspace, Path], cache: Path) -> None:
-    """A change with recomputed digests makes another run."""
     run = made[1]
     RunFolder.open(run)
     patches = Patches(run)

@@ -56,7 +56,7 @@ def test_the_shipped_analysis_has_no_problem(
 
 
 def test_faults_are_injected_at_the_papers_locations_and_in_software(analysis: Analysis) -> None:
-    """The paper injects none into the controllers' software."""
+    """The paper injects no faults into the controllers' software."""
     places = {place for factor in analysis.factors.values() if factor.faults for place in factor.where}
     sensed = {"own_speed", "own_motion", "steer_angle"}
     assert places == {"radar_points", "pictures", "vision_lead", "path", *sensed, "acc", "lkas"}
@@ -66,7 +66,7 @@ def test_faults_are_injected_at_the_papers_locations_and_in_software(analysis: A
 
 
 def test_a_spec_with_two_locations_is_listed_at_both(clone: Workspace) -> None:
-    """A spec can have another location as coded."""
+    """The as-coded reading can inject at another location."""
     assert injected(clone.spec("radar/jamming")) == {
         "selfdrive/sim/radar.py::RadarSensor.measure",
         "selfdrive/sim/simulator.py::Simulator.step",
@@ -199,7 +199,7 @@ def test_every_hazard_and_category_must_be_judged(
     assert "no unsafe control action for 'steer' in category wrong_duration" in problems[1]
 
 
-def test_an_unsafe_action_without_a_cause(
+def test_an_unsafe_action_without_a_cause_is_reported(
     folder: Path, specs: tuple[FaultSpec, ...], manifest: TargetManifest
 ) -> None:
     text = (folder / FACTORS).read_text()

@@ -21,7 +21,7 @@ def test_rows_become_triggers(toy: Workspace) -> None:
     assert only.name == "far" and only.hold is Hold.WHILE
 
 
-def test_an_unknown_row(toy: Workspace) -> None:
+def test_an_unknown_row_is_refused(toy: Workspace) -> None:
     with pytest.raises(MutatorError, match="context 'C1'; expected one of near, far"):
         toy.context_table("pedals").triggers(rows=("C1",))
 
@@ -62,7 +62,7 @@ def test_hazards_lead_to_known_accidents(toy: Workspace) -> None:
         toy.hazards()
 
 
-def test_the_shipped_table_covers_everything_once(clone: Workspace) -> None:
+def test_the_shipped_table_covers_every_situation_exactly_once(clone: Workspace) -> None:
     """The table's four contexts include the paper's hazardous cells."""
     table = clone.context_table("accelerate_decelerate")
     triggers = table.triggers()
@@ -105,7 +105,7 @@ def test_the_table_in_the_docs_loads_and_is_proved(clone: Workspace, tmp_path: P
     assert table.coverage.cells == 9 and table.coverage.beyond is None
 
 
-def test_rows_judge_the_same_actions(toy: Workspace) -> None:
+def test_rows_with_different_actions_are_refused(toy: Workspace) -> None:
     path = toy.library / "stpa" / "contexts" / "pedals.yaml"
     head, _, tail = path.read_text().rpartition("accelerate:")
     path.write_text(f"{head}brake:{tail}")

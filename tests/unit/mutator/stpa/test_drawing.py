@@ -76,13 +76,13 @@ def test_labels_overlap_nothing(analysis: Analysis, layout: Layout) -> None:
                 assert not any(meets(area, a, b) for a, b in pairwise(arrow.points)), (name, other)
 
 
-def test_only_places_with_faults_have_their_colour(analysis: Analysis) -> None:
+def test_only_places_with_faults_have_the_colour_of_faults(analysis: Analysis) -> None:
     text = draw(analysis)
     assert text == draw(analysis)
     root = ElementTree.fromstring(text)
     lines = [e for e in root.iter("{http://www.w3.org/2000/svg}path") if e.get("stroke") == FAULT]
     links = faulty_places(analysis).keys() & analysis.structure.links.keys()
-    assert len(lines) == len(links) + 1  # and that of the legend
+    assert len(lines) == len(links) + 1  # the links and the legend's line
     words = [e.text for e in root.iter("{http://www.w3.org/2000/svg}text")]
     assert {"ACC", "LKAS", "steer torque", "CF13, 14"} <= set(words)
 

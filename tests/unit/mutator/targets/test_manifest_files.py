@@ -35,7 +35,7 @@ def test_actuators_have_no_default_tolerance(toy: Workspace) -> None:
     assert found == {"speed": 0.5, "pedal": 0.0, "wish": 1e-9, "gap": 0.0}
 
 
-def test_ground_truth_may_be_computed(toy: Workspace) -> None:
+def test_ground_truth_can_be_computed(toy: Workspace) -> None:
     """Formulas use names, attributes and items that the target has."""
     path = toy.library / "targets" / "toy.yaml"
     text = path.read_text().replace("is: now.gap", "is: 'now[\"lead\"].x[-1] - (now.x + 4.5)'")
@@ -98,7 +98,7 @@ def test_without_arguments_the_entry_gets_options(toy: Workspace) -> None:
     assert given == ("--scenario", "s", "--seed", "3", "--out", "o")
 
 
-def test_the_cache_is_the_same_in_every_run(toy: Workspace) -> None:
+def test_every_run_has_the_same_cache_folder(toy: Workspace) -> None:
     """`{cache}` is the target's folder in the user's cache."""
     path = toy.library / "targets" / "toy.yaml"
     path.write_text(path.read_text().replace('"{out}"', '"{out}", --cache, "{cache}"'))
@@ -138,7 +138,7 @@ def test_the_root_can_be_given(toy: Workspace, tmp_path: Path) -> None:
         load_manifest(path, tmp_path / "none")
 
 
-def test_the_root_may_be_the_shipped_controller(toy: Workspace) -> None:
+def test_the_root_can_be_the_shipped_controller(toy: Workspace) -> None:
     """The root `shipped:target` can be named in any manifest."""
     path = toy.library / "targets" / "toy.yaml"
     text = path.read_text()
@@ -153,7 +153,7 @@ def test_the_root_may_be_the_shipped_controller(toy: Workspace) -> None:
 
 
 def test_a_manifest_is_a_snapshot(toy: Workspace) -> None:
-    """An edit is seen only by a manifest that is loaded later. Bytecode is not part of a tree."""
+    """Only a manifest that is loaded later has an edit of the tree. Bytecode is not part of a tree."""
     manifest = toy.manifest("toy")
     before = manifest.tree
     (manifest.root / "toycar" / "__pycache__").mkdir()

@@ -41,7 +41,7 @@ def test_an_overlay_is_part_of_the_tree(pole: Workspace) -> None:
     assert not (before.root / "drive.py").exists()
 
 
-def test_an_overlay_is_searched_in_the_library_too(pole: Workspace) -> None:
+def test_an_overlay_is_also_looked_up_in_the_library(pole: Workspace) -> None:
     edit(pole.library / MANIFEST, "../overlays/pole", "overlays/pole")
     assert "drive.py" in pole.manifest("pole").tree.overlaid
     edit(pole.library / MANIFEST, "overlays/pole", "overlays/none")

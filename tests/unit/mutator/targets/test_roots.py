@@ -33,8 +33,8 @@ def installed(pole: Workspace, **keys: str) -> Workspace:
     return pole
 
 
-def test_the_tree_of_an_installed_package(pole: Workspace, site: Path) -> None:
-    """The tree has the package's files and the overlay, and no other packages. Nothing is imported."""
+def test_the_tree_has_only_the_installed_package_and_the_overlay(pole: Workspace, site: Path) -> None:
+    """The package is not imported."""
     manifest = installed(pole, root="installed:filters_of_poles", packages="[filters_of_poles]").manifest(
         "pole"
     )
@@ -48,7 +48,7 @@ def test_the_tree_of_an_installed_package(pole: Workspace, site: Path) -> None:
     assert "filters_of_poles/gains.txt" not in manifest.tree.files
 
 
-def test_an_installed_module(pole: Workspace, site: Path) -> None:
+def test_the_root_can_be_an_installed_module(pole: Workspace, site: Path) -> None:
     installed(pole, root="installed:aside_of_poles", packages="[aside_of_poles.py]")
     manifest = pole.manifest("pole")
     assert manifest.root == site.resolve()
@@ -99,7 +99,7 @@ def test_a_mutant_of_an_installed_package_runs_from_its_own_tree(
     """The installed package stays unchanged."""
     root, site = pole.manifest("pole").root, tmp_path / "site"
     shutil.move(root / "filters", site / "filters")
-    for name in ("pole.py", "regulator.py"):  # the glue may have requirements
+    for name in ("pole.py", "regulator.py"):  # modules that the glue imports
         shutil.move(root / name, pole.library / "overlays" / "pole" / name)
     shutil.rmtree(pole.library / "faults" / "sensor")
     monkeypatch.syspath_prepend(str(site))

@@ -90,7 +90,7 @@ def test_robustness_equals_the_definition(formula: Formula, rows: list[tuple[int
     assert found.tolist() == expected[: len(rows)]
 
 
-def test_a_predicate_and_a_future_operator_have_their_own_steps() -> None:
+def test_a_predicate_and_a_future_operator_can_be_combined() -> None:
     x = np.array([1.0, 6, 6, 6, 6])
     found = stl.robustness("(x > 5) implies eventually[0,2](x < 5)", {"t": np.arange(5.0), "x": x}, 1.0)
     assert found.tolist() == [np.inf, np.inf, 4, -1, -1]
@@ -100,7 +100,7 @@ def test_a_predicate_and_a_future_operator_have_their_own_steps() -> None:
     ("step_s", "bound", "steps"), [(1 / 30, "1", 30), (0.01, "0.07", 7), (0.5, "500ms", 1)]
 )
 def test_bounds_count_whole_steps(step_s: float, bound: str, steps: int) -> None:
-    """The length of a step may have no short decimal form."""
+    """The length of a step need not have a short decimal form."""
     time = np.arange(40) * step_s
     found = stl.robustness(f"always[0:{bound}](x < 1)", {"t": time, "x": np.zeros(40)}, step_s)
     assert found.tolist() == [np.inf] * steps + [1.0] * (40 - steps)
@@ -138,7 +138,7 @@ def test_an_invalid_formula_raises_and_prints_nothing(
 
 @pytest.mark.parametrize("formula", ["1 / (x - 1) < 3", "sqrt(0 - x) < 3", "next(x > 3) or rise(y < 2)"])
 def test_a_check_accepts_arithmetic_that_some_values_make_invalid(formula: str) -> None:
-    """A check knows no values."""
+    """A check does not know the values."""
     stl.check(formula, ["x", "y"], STEP)
 
 

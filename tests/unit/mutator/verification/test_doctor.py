@@ -26,7 +26,7 @@ def test_a_missing_package_fails_with_its_pip_line(monkeypatch: pytest.MonkeyPat
 
 
 def test_another_version_is_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The package may still work."""
+    """The package might still work."""
     monkeypatch.setattr(importlib.metadata, "requires", lambda _: ["numpy>=999"])
     [finding] = [f for f in doctor.examine(NO_LIBRARY) if f.name == "numpy"]
     assert finding.level is Level.WARN

@@ -91,7 +91,7 @@ def test_a_nondeterministic_line_is_reported(
 
 @pytest.mark.parametrize("made", ["names()", "held['names']"], ids=["returned", "in a dict"])
 def test_an_effect_of_the_hash_seed_is_reported_without_a_line(toy: Workspace, made: str) -> None:
-    """A set of constants in loaded bytecode can have another order than in fresh bytecode."""
+    """The order of a set of constants can differ between loaded and fresh bytecode."""
     names = "{'x', 'y', 'zed', 'q'}"
     change(toy, "sensing.py", "class Sensor", f"def names():\n    return {names}\n\n\nclass Sensor")
     change(
@@ -192,7 +192,7 @@ def test_an_anchor_that_no_run_executes_is_reported(toy: Workspace) -> None:
 
 
 def test_an_anchor_reached_only_without_the_faults_change_is_reported(toy: Workspace) -> None:
-    """A fault may change its scenario."""
+    """A fault can change its scenario."""
     change(
         toy,
         "sensing.py",

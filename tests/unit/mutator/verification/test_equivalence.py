@@ -89,7 +89,7 @@ _BELIEVE = """
 
 @pytest.fixture
 def sharing(toycar: Workspace, tmp_path: Path) -> Workspace:
-    """A toy whose runs read a file about the world from some time on, unless `--forget` is given."""
+    """A toy whose runs read a file about the world after a given time, unless `--forget` is given."""
     go, world = (tmp_path / "toy/tree/toycar" / name for name in ("go.py", "world.py"))
     believe = _BELIEVE.replace("{kept}", str(tmp_path / "kept"))
     go.write_text(go.read_text().replace("\n    return Drive(case)\n", believe))
@@ -128,7 +128,7 @@ def test_an_error_that_runs_share_fails_the_campaign(
 
 
 def test_forking_is_the_default_where_it_is_worthwhile(toycar: Workspace) -> None:
-    """An engine that is requested is used or refused."""
+    """A requested engine is used or refused."""
     manifest = toycar.manifest("toycar")
     assert choose_engine(None, manifest, 1000) == "fork"
     assert choose_engine(None, manifest, 10) == "reference"
@@ -151,7 +151,7 @@ def threaded(toycar: Workspace, tmp_path: Path) -> Workspace:
 
 
 def test_without_forks_there_is_no_equivalence_check(threaded: Workspace, tmp_path: Path) -> None:
-    """The folder equals one of the reference engine, and its audit finds nothing."""
+    """The folder has the seal of a run on the reference engine, and an audit finds nothing."""
     summary = run_campaign(threaded, "small", tmp_path / "run", engine="fork", choices=Choices(limit=1))
     assert (summary.proof, summary.exit_code) == (None, 0)
     assert summary.not_forked.endswith("only one can be forked: besides the main one, 'poll'")
@@ -200,7 +200,7 @@ def test_runs_of_an_unneeded_check_are_deleted(threaded: Workspace, tmp_path: Pa
 
 
 @pytest.mark.slow
-def test_an_experiment_that_must_run_again_may_be_forked(toycar: Workspace, tmp_path: Path) -> None:
+def test_an_experiment_that_must_run_again_can_be_forked(toycar: Workspace, tmp_path: Path) -> None:
     run = tmp_path / "run"
     run_campaign(toycar, "small", run, engine="reference", choices=Choices(limit=2))
     folder = RunFolder.open(run)

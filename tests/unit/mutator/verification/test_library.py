@@ -61,15 +61,17 @@ def test_the_shipped_library_has_no_problem(clone: Workspace) -> None:
     assert check_library(clone, "openpilot") == []
 
 
-def test_fault_types_have_as_many_values_as_they_reproduce(faults: dict[str, tuple[Fault, ...]]) -> None:
+def test_published_fault_types_have_the_published_number_of_values(
+    faults: dict[str, tuple[Fault, ...]],
+) -> None:
     assert list(faults) == ["as_described", "as_coded"]
     for found in faults.values():
         assert Counter((f.module, f.fault_type) for f in found) == COUNTS
         assert len({f.id for f in found}) == 282
 
 
-def test_values_and_signs(faults: dict[str, tuple[Fault, ...]]) -> None:
-    """An invisible vehicle appears faster, and ghosts appear closer."""
+def test_values_have_the_expected_ranges_and_signs(faults: dict[str, tuple[Fault, ...]]) -> None:
+    """An invisible vehicle's speed is too high, and ghosts are too close."""
     by_spec: dict[str, list[Fault]] = {}
     for fault in faults["as_described"]:
         by_spec.setdefault(fault.spec, []).append(fault)
@@ -97,9 +99,9 @@ def test_values_and_signs(faults: dict[str, tuple[Fault, ...]]) -> None:
     ]
 
 
-def test_aims_holds_and_changes(faults: dict[str, tuple[Fault, ...]]) -> None:
-    """Faults without a lead vehicle aim at H2. Steering, lane and image faults aim at H3, and the others at
-    H1. Lost data latch as described, and bad images latch as coded."""
+def test_faults_have_the_expected_aims_holds_and_changes(faults: dict[str, tuple[Fault, ...]]) -> None:
+    """Faults without a lead vehicle aim at H2; steering, lane and image faults at H3; the others at H1. As
+    described, faults of lost data last to the end of the run; as coded, those of bad images do."""
     for fault in faults["as_described"]:
         seen = fault.module == "vision_input"
         lateral = seen or fault.fault_type in ("steer", "path_model", "camera_unavailable")
@@ -112,9 +114,8 @@ def test_aims_holds_and_changes(faults: dict[str, tuple[Fault, ...]]) -> None:
     assert alone == {"ghost_vehicle": 31, "speed": 6, "relative_distance": 50}
 
 
-def test_readings(faults: dict[str, tuple[Fault, ...]]) -> None:
-    """Both readings have the same values. As coded, units are wrong, lanes drift, and jamming stops all CAN
-    messages."""
+def test_the_readings_share_values_and_differ_in_injections(faults: dict[str, tuple[Fault, ...]]) -> None:
+    """As coded, units are wrong, lanes drift, and jamming stops all CAN messages."""
     described, coded = faults["as_described"], faults["as_coded"]
     assert [(f.spec, f.value) for f in described] == [(f.spec, f.value) for f in coded]
     differing = {f.fault_type for f, g in zip(described, coded, strict=True) if f.injections != g.injections}
@@ -190,7 +191,7 @@ def test_two_effects_act_in_the_order_of_the_spec(
 
 
 def test_code_that_draws_or_reads_frames_cannot_have_faults(clone: Workspace) -> None:
-    """All runs share the output of such code."""
+    """All runs share the frames."""
     manifest = clone.manifest("openpilot")
     todo, closed = ["selfdrive/sim/road_renderer.py", "selfdrive/sim/image_folder.py"], set()
     while todo:
@@ -282,6 +283,6 @@ def test_problems_do_not_hide_each_other(toy: Workspace) -> None:
         ("target/toycar/world.py", "def step", "def step(", "target/toycar/world.py:17: not valid Python"),
     ],
 )
-def test_other_problems(toy: Workspace, file: str, old: str, new: str, said: str) -> None:
+def test_other_problems_are_reported(toy: Workspace, file: str, old: str, new: str, said: str) -> None:
     problems = edited(toy, file, old, new)
     assert any(said in problem for problem in problems)

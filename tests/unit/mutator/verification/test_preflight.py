@@ -106,7 +106,7 @@ def test_an_observation_that_is_not_reached_is_refused(toycar: Workspace, tmp_pa
 
 
 def test_a_harmless_canary_is_refused(toycar: Workspace, tmp_path: Path) -> None:
-    """If a campaign has no hazard, the harness might have missed it."""
+    """A harness that misses hazards would not notice them in a campaign either."""
     path = toycar.campaign("small")
     path.write_text(path.read_text().replace("at_s: 1.0", "at_s: 5.9"))
     folder = frozen(toycar, tmp_path)
@@ -120,7 +120,7 @@ def test_a_harmless_canary_is_refused(toycar: Workspace, tmp_path: Path) -> None
     assert error.value.got.endswith(", ".join(f"{value} m" for value in values))
 
 
-def test_a_canary_that_harms_with_another_value_passes(toycar: Workspace, tmp_path: Path) -> None:
+def test_a_canary_that_does_harm_with_another_value_passes(toycar: Workspace, tmp_path: Path) -> None:
     change(toycar, "offset = world.offset", "shown = world.offset\n        offset = shown", "sensing")
     change(toycar, "closing, offset))", "closing, shown if offset > 2.0 else offset))", "sensing")
     results = run_checks(toycar, frozen(toycar, tmp_path))

@@ -51,9 +51,7 @@ def nothing_is_driven(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("cache", "nothing_is_driven")
-def test_another_folder_takes_results_from_the_cache(
-    checked: tuple[Workspace, RunFolder], tmp_path: Path
-) -> None:
+def test_another_folder_uses_the_cached_results(checked: tuple[Workspace, RunFolder], tmp_path: Path) -> None:
     toy, before = checked
     folder = freeze(make_plan(toy, "small", Choices(only='method == "guided"')), tmp_path / "run", toy)
     assert all(result.passed for result in run_checks(toy, folder))

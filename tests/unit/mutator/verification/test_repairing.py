@@ -118,7 +118,7 @@ def test_a_damaged_first_block_removes_all_records_of_its_file(run: Path) -> Non
 
 @pytest.mark.parametrize("name", ["checks.json", "golden/A/log.npz"])
 def test_what_run_can_rebuild_is_moved_aside(run: Path, name: str) -> None:
-    """The run then counts as unfinished, so that `run` rebuilds the file."""
+    """The run is then unfinished, so that `run` rebuilds the file."""
     (run / name).write_bytes(b"other")
     said, folder = repaired(run)
     assert said == [f"{name} set aside: `mutator run` rebuilds it"]
@@ -154,7 +154,7 @@ def test_damaged_timings_are_removed(run: Path) -> None:
 
 @pytest.mark.parametrize("content", [None, b"{", b"{}"])
 def test_a_damaged_ledger_is_rebuilt_from_the_files(run: Path, content: bytes | None) -> None:
-    """Only a seal that was known before can vouch for the rebuilt ledger."""
+    """Only an earlier seal can confirm the rebuilt ledger."""
     path = run / digests.FILE
     path.unlink() if content is None else path.write_bytes(content)
     said, folder = repaired(run)
@@ -162,7 +162,7 @@ def test_a_damaged_ledger_is_rebuilt_from_the_files(run: Path, content: bytes | 
     assert len(folder.records()) == 24 and not folder.finished
 
 
-def test_a_damaged_campaign_file_or_plan_stays(run: Path) -> None:
+def test_a_damaged_campaign_file_or_plan_is_not_repaired(run: Path) -> None:
     """A user can replace the file by a copy."""
     (run / "campaign.yaml").write_text("other")
     assert repair(RunFolder.unverified(run)) == []
