@@ -59,7 +59,7 @@ def test_a_mark_lists_its_experiments(
     assert page.found == "2 of 18 experiments"
     page.page.click("#grid tr[data-at]")
     verbs = {one.split()[1] for one in page.texts("#experiment .command code")}
-    assert verbs == {"rerun", "show"}  # no spec has it, for `try`
+    assert verbs == {"report", "rerun", "show"}  # no spec has it, for `try`
 
 
 def test_the_source_fits_a_narrow_screen(report: Path, open_report: "Callable[[Path], Page]") -> None:

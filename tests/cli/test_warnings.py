@@ -63,5 +63,5 @@ def test_a_run_warns_of_triggers_that_never_fire(cli: Cli, root: Path) -> None:
     campaign.write_text(text.replace("table: near_far", "list: [{at_s: 50}, {at_s: 2}]"))
     answer = cli("run", "small", "--out", "r", "-n", "0", "--limit", "4")
     assert answer.code == 0
-    told = answer.err.index("warning: the scenario ends before the time of 2 of 4 experiments, whose")
+    told = answer.err.index("warning: the scenario ends before the time of 2 of 4 experiments, which")
     assert answer.err.index("golden runs 0/4") < told < answer.err.index("\nexperiments ")

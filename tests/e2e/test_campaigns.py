@@ -262,10 +262,10 @@ def test_a_run_keeps_its_options(toy: Workspace, finished: Path) -> None:
         Choices(only="value > 1"),
         Choices(reading="as_coded"),
     ):
-        with pytest.raises(MutatorError, match="planned with") as caught:
+        with pytest.raises(MutatorError, match="expected the value of this run's plan") as caught:
             run_campaign(toy, "small", finished, choices=choices)
         assert "None" not in str(caught.value)
-    with pytest.raises(MutatorError, match="another text"):
+    with pytest.raises(MutatorError, match="whose text differs"):
         run_campaign(toy, "toy", finished)
     assert run_campaign(toy, finished / "campaign.yaml", finished).exit_code == 0
 

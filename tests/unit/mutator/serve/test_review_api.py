@@ -86,7 +86,7 @@ def test_a_diff_that_the_page_did_not_show_is_not_approved(
     digests = {changed: before[changed]["digest"]}
     answer = decided(client, (changed, "approve"), digests=digests)
     assert answer.status == 409
-    assert "another diff" in answer.json["conflict"]
+    assert "the diff has changed" in answer.json["conflict"]
     assert decided(client, (changed, "approve"), digests={changed: now[changed]["digest"]}).status == 200
     assert client.get(f"{API}/{changed}/changes?spec=sensor/*").json == {"changes": ""}
 

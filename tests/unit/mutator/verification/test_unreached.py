@@ -63,7 +63,7 @@ def test_triggers_are_checked_with_cached_golden_runs(toycar: Workspace, tmp_pat
         folder = freeze(make_plan(toycar, "small"), tmp_path / name, toycar)
         run_checks(toycar, folder)
         late, never = unreached_triggers(toycar, folder)
-        assert late.startswith("the scenario ends before the time of 3 of 6 experiments, whose faults")
+        assert late.startswith("the scenario ends before the time of 3 of 6 experiments, which")
         assert "v_ego > 99.0 in A: 3" in never
         assert (folder.path / "checks.json").is_file()
     again = freeze(make_plan(toycar, "small"), tmp_path / name, toycar)
