@@ -13,7 +13,7 @@ from mutator.glue import GlueError, Run, read_scenario, seed_globals
 
 
 class Ball(Run):
-    """A ball that falls until it is caught at a given place."""
+    """A falling ball. If it is `caught`, the run ends when the ball reaches the ground."""
 
     def __init__(self, scenario, seed):
         super().__init__(step_s=0.1, duration_s=scenario["duration_s"])
@@ -50,7 +50,8 @@ def driven(arguments: list[str]) -> tuple[dict[str, list[float]], dict[str, obje
 
 
 def test_a_run_writes_a_row_for_each_step(arguments: list[str]) -> None:
-    """The record has the time at which each hazard first occurred, or null, and at which each alert began."""
+    """The record has the time at which each hazard first occurred, or null, and the times at which each alert
+    began."""
     trace, record = driven(arguments)
     assert list(trace) == ["t", "height", "lies"]
     assert trace["t"] == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
@@ -67,7 +68,7 @@ def test_the_step_that_calls_end_is_the_last(arguments: list[str]) -> None:
 
 
 def test_equal_runs_write_equal_bytes(arguments: list[str]) -> None:
-    """It does not matter when or how often files were written. No other file is left."""
+    """A second run replaces the files and leaves no others."""
     out = Path(arguments[5])
     files = []
     for _ in range(2):
@@ -91,7 +92,6 @@ def test_a_run_stepped_from_outside_writes_the_same_files_as_main(
 
 @pytest.mark.parametrize("flags", [["--height-m", "-2"], ["--height_m=-2"]])
 def test_flags_replace_keys_of_the_scenario(arguments: list[str], flags: list[str]) -> None:
-    """Such a change needs no code."""
     trace, _ = driven([*arguments, *flags])
     assert trace["height"][0] == -3.0
 
@@ -99,7 +99,10 @@ def test_flags_replace_keys_of_the_scenario(arguments: list[str], flags: list[st
 @pytest.mark.parametrize(
     ("flags", "words"),
     [
-        (["--heigth_m", "3"], "drop.yaml: no key 'heigth_m'; the file has about, duration_s, height_m, caught"),
+        (
+            ["--heigth_m", "3"],
+            "drop.yaml: no key 'heigth_m'; the file has about, duration_s, height_m, caught",
+        ),
         (["3"], "argument '3'"),
         (["--seed", "-1"], "--seed -1; expected a whole number"),
         (["--seed"], "no --seed"),
@@ -115,7 +118,7 @@ def test_a_wrong_argument_is_named(arguments: list[str], flags: list[str], words
 
 
 def test_values_are_read_as_json_or_as_text(tmp_path: Path) -> None:
-    """Text may have colons."""
+    """Text can contain colons."""
     path = tmp_path / "a.yaml"
     path.write_text('a: 1\nb: 2.5\nc: true\nd: null\ne: [1, 2]\nf: {"x": 1}\ng: a: b\nh: "1"\ni: a#b\n')
     expected = {
@@ -141,7 +144,7 @@ def test_an_invalid_scenario_file_is_an_error(tmp_path: Path, line: str) -> None
 
 
 @pytest.mark.parametrize("later", [{"b": 1.0}, {}, {"a": 1.0, "b": 2.0}])
-def test_each_step_has_the_same_channels(later: dict[str, float]) -> None:
+def test_each_step_must_record_the_same_channels(later: dict[str, float]) -> None:
     run = Run(step_s=0.5, duration_s=1.0)
     run.record(a=1.0)
     with pytest.raises(GlueError, match=r"at 0.5 s: missing or unexpected channels: [ab]"):
@@ -169,7 +172,7 @@ def test_any_single_number_is_recorded(value: float, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("length", [0, -0.1, float("nan"), float("inf"), None])
-def test_an_infinite_or_zero_step_length_is_refused(length: float) -> None:
+def test_an_invalid_step_length_is_refused(length: float) -> None:
     with pytest.raises(GlueError, match=r"step_s is .*; expected"):
         Run(step_s=length, duration_s=1.0)
     run = Run(step_s=0.5, duration_s=1.0)
@@ -193,7 +196,7 @@ LENGTHS = [0.1, 0.25, 0.05, 0.1, 0.1, 0.4, 0.1]
 
 
 @pytest.mark.parametrize("first", [0.1, 0.7])
-def test_steps_may_differ_in_length(first: float, arguments: list[str]) -> None:
+def test_steps_can_differ_in_length(first: float, arguments: list[str]) -> None:
     """If a step sets `step_s` before it records, it has that length, and the next step begins after it. The
     run keeps its duration, to the nearest step."""
 
@@ -215,7 +218,7 @@ def test_steps_may_differ_in_length(first: float, arguments: list[str]) -> None:
 
 
 def test_times_of_equal_steps_are_exact_multiples() -> None:
-    """Lengths are not added up, even if each step sets the length."""
+    """Adding up the step lengths would accumulate rounding errors."""
     run = Run(step_s=0.1, duration_s=100.0)
     times = []
     while not run.done:
@@ -232,7 +235,7 @@ def test_a_channel_named_time_is_refused() -> None:
 
 
 @pytest.mark.parametrize("rows", [0, 2])
-def test_a_step_that_does_not_record_once_is_an_error(
+def test_a_step_that_does_not_record_exactly_once_is_an_error(
     arguments: list[str], rows: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(Ball, "step", lambda run: [run.record(a=1.0) for _ in range(rows)])
@@ -249,7 +252,7 @@ def test_a_subclass_must_call_the_constructor_of_run(arguments: list[str]) -> No
         Bare.open(arguments)
 
 
-def test_a_run_without_a_step_is_an_error(arguments: list[str]) -> None:
+def test_a_run_without_a_step_method_is_an_error(arguments: list[str]) -> None:
     with pytest.raises(NotImplementedError, match="Run has no step"):
         Run(step_s=1.0, duration_s=1.0).step()
 

@@ -1,4 +1,4 @@
-"""The names in `mutator`."""
+"""The public names of `mutator`."""
 
 import subprocess
 import sys
@@ -17,8 +17,8 @@ def test_every_public_name_can_be_imported() -> None:
         mutator.load_runs  # noqa: B018
 
 
-def test_the_import_is_light() -> None:
-    """Nothing slow is loaded until a name is used."""
+def test_importing_mutator_loads_no_slow_packages() -> None:
+    """Such packages are loaded when a name that needs them is first used."""
     code = "import mutator, sys; dir(mutator); print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = {name.partition(".")[0] for name in done.stdout.split()}

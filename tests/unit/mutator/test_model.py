@@ -27,7 +27,7 @@ SOURCES = Path(mutator.__file__).parent
         ("", "-", "radar/chaff/distance"),
     ],
 )
-def test_a_fault_has_one_label(value: Value, unit: str, label: str) -> None:
+def test_the_label_of_a_fault_contains_its_value_and_unit(value: Value, unit: str, label: str) -> None:
     assert fault_label("radar/chaff/distance", value, unit) == label
 
 
@@ -39,12 +39,13 @@ def test_a_fault_and_its_row_of_the_results_have_the_same_label(
     assert row_of(one, record(one.id), ("H1",)).fault == one.fault.label  # type: ignore[arg-type]
 
 
-def test_an_experiment_has_one_label(experiment: Callable[..., Experiment]) -> None:
-    """Fault, value, scenario and trigger appear once each."""
+def test_the_label_of_an_experiment_names_its_fault_scenario_and_trigger(
+    experiment: Callable[..., Experiment],
+) -> None:
     assert experiment(value=35).label == "radar/chaff/distance 35 m, S1, guided C1"
     assert experiment(method=Method.RANDOM, trigger="random/C2").drive_label == "S1, random C2"
 
 
 def test_only_one_module_combines_value_and_unit() -> None:
-    """Several modules once gave six different labels."""
+    """Otherwise, labels of the same fault could differ between tables."""
     assert [path for path in SOURCES.rglob("*.py") if '(" -")' in path.read_text()] == []

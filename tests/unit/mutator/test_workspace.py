@@ -21,7 +21,7 @@ def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return place
 
 
-def test_the_nearest_library_above_is_found(
+def test_the_nearest_library_above_the_current_folder_is_found(
     toy: Workspace, elsewhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     root = toy.library.parent
@@ -59,7 +59,7 @@ def test_outside_a_clone_the_shipped_library_is_used(elsewhere: Path) -> None:
 
 
 def test_a_library_without_templates_uses_the_shipped_ones(elsewhere: Path) -> None:
-    """A root that is named must have both."""
+    """A root folder that is given explicitly must contain both."""
     (elsewhere / "fault_library").mkdir()
     found = Workspace.find()
     assert (found.library, found.templates) == (elsewhere / "fault_library", CLONE / "templates")
@@ -96,8 +96,8 @@ def test_a_name_cannot_lead_out_of_the_library(toy: Workspace) -> None:
         toy.spec("../targets/toy")
 
 
-def test_spec_file_names_consist_of_module_and_fault_type(toy: Workspace) -> None:
-    """Such names are unique."""
+def test_the_path_of_a_spec_file_must_match_its_module_and_fault_type(toy: Workspace) -> None:
+    """The names of specs are therefore unique."""
     path = toy.library / "faults" / "sensor" / "distance.yaml"
     path.write_text(path.read_text().replace("fault_type: distance", "fault_type: speed"))
     with pytest.raises(MutatorError, match=r"distance.yaml:2: .*faults/sensor/speed.yaml"):
@@ -111,7 +111,7 @@ def test_a_workspace_prints_as_a_line_and_as_a_table(toycar: Workspace) -> None:
         assert name in shown
 
 
-def test_faults_can_be_iterated(toycar: Workspace) -> None:
+def test_faults_can_be_selected_with_patterns(toycar: Workspace) -> None:
     """A pattern selects specs or variants, and the values depend on the seed. A file can be given instead of
     a name."""
     names = {fault.spec for fault in toycar.faults("sensor/*")}

@@ -1,4 +1,4 @@
-"""Comparing a run with golden, and reading the output of a target."""
+"""Comparing a run with its golden run, and reading the output of a target."""
 
 import errno
 import json
@@ -49,7 +49,7 @@ def test_equal_traces_do_not_differ() -> None:
     assert difference.max_dev == (("gas", 0.0),)
 
 
-def test_steps_after_the_end_of_the_drive_count_only_for_the_run() -> None:
+def test_steps_after_the_end_of_the_drive_affect_only_max_dev() -> None:
     golden, faulty = trace(gas=[0, 0, 0, 0, 0]), trace(gas=[0, 2, 1, 9, 0])
     found = compare(golden, faulty, [GAS], "t", t_end=0.2)
     assert (found.max_dev, found.dev) == ((("gas", 9.0),), (("gas", 2.0),))
@@ -57,7 +57,7 @@ def test_steps_after_the_end_of_the_drive_count_only_for_the_run() -> None:
 
 
 def test_a_channel_is_compared_at_its_own_times() -> None:
-    """A run that ends earlier still differs."""
+    """A run that ends earlier differs, too."""
     own, times = np.array([0.0, 0.2]), T + 0.01
     golden = {"t": T, "gas": np.array([1.0, 2.0]), "gas@": own}
     faulty = {**golden, "t": times}
@@ -76,7 +76,7 @@ def test_shared_times_do_not_change_a_comparison(times: np.ndarray) -> None:
     assert compare(golden, shared, [GAS], "t") == compare(golden, faulty, [GAS], "t")
 
 
-def test_first_and_largest_difference() -> None:
+def test_the_first_and_the_largest_difference_are_found() -> None:
     golden = trace(gas=[0, 0, 0, 0, 0], brake=[1, 1, 1, 1, 1])
     faulty = trace(gas=[0, 0, 0, 0.5, -2], brake=[1, 1, 1.25, 1, 1])
     difference = compare(golden, faulty, [GAS, BRAKE], "t")
@@ -90,8 +90,8 @@ def test_without_a_tolerance_any_difference_counts(step: float, first: float) ->
     assert difference.t_first == first
 
 
-def test_a_difference_within_its_tolerance_does_not_count() -> None:
-    """The size of the difference is stored."""
+def test_a_difference_within_its_tolerance_is_not_a_manifestation() -> None:
+    """The size of the difference is stored nevertheless."""
     channel = Channel(name="gas", unit="-", tolerance=0.1)
     difference = compare(trace(gas=[1, 1, 1]), trace(gas=[1, 1.05, 1]), [channel], "t")
     assert difference.t_first is None
@@ -100,7 +100,7 @@ def test_a_difference_within_its_tolerance_does_not_count() -> None:
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_a_non_finite_value_is_an_infinite_difference(value: float) -> None:
-    """A tolerance does not matter."""
+    """This holds for any tolerance."""
     channel = Channel(name="gas", unit="-", tolerance=100.0)
     difference = compare(trace(gas=[1, 1, 1]), trace(gas=[1, value, 1]), [channel], "t")
     assert difference.t_first == T[1]
@@ -113,18 +113,18 @@ def test_runs_of_different_lengths_differ_where_one_ends(golden: int, faulty: in
     assert difference.t_first == T[3]
 
 
-def test_flags_and_integers_compare_too() -> None:
+def test_boolean_channels_are_compared() -> None:
     golden = {"t": T[:2], "gas": np.array([True, False])}
     faulty = {"t": T[:2], "gas": np.array([True, True])}
     assert compare(golden, faulty, [GAS], "t").t_first == T[1]
 
 
-def test_key_of_a_golden_run() -> None:
+def test_the_key_of_a_golden_run_names_its_scenario_and_changes() -> None:
     assert GoldenRun("S1").key == "S1"
     assert GoldenRun("S1", ("no_lead",)).key == "S1+no_lead"
 
 
-def test_trace_is_read(tmp_path: Path) -> None:
+def test_a_trace_is_read(tmp_path: Path) -> None:
     np.savez(tmp_path / "trace.npz", t=T, gas=T * 2, other=T)
     found = load_trace(MANIFEST, tmp_path, [GAS])
     assert set(found) == {"t", "gas"}
@@ -173,7 +173,7 @@ def test_an_unusual_file_is_a_bad_output(tmp_path: Path) -> None:
 
 
 def test_a_record_is_read(tmp_path: Path) -> None:
-    """Each time at which a counted alert is raised is included."""
+    """`alerts_of` returns each time at which one of the given alerts was raised."""
     said = {
         "hazards": {"H1": None, "H2": 3.5},
         "alerts": [{"name": "fcw", "t": 1.0}],
@@ -214,7 +214,7 @@ def test_a_lack_of_file_handles_is_not_blamed_on_the_run(
         load_trace(MANIFEST, tmp_path)
 
 
-def test_a_pipe_counts_as_a_missing_output(tmp_path: Path) -> None:
+def test_a_pipe_is_a_bad_output(tmp_path: Path) -> None:
     for name in (MANIFEST.trace_file, MANIFEST.record_file):
         os.mkfifo(tmp_path / name)
     for read in (load_trace, load_record, trace_digest):

@@ -65,8 +65,8 @@ def judged(manifest: TargetManifest, **channels: Any) -> Judged:
         ("when: gap <= 1", 1.0),
         ("when: gap < 1", 3.0),
         ("when: gap < -5", None),
-        ("{when: gap <= 2, for_s: 2}", 3.0),  # from 1 s to 4 s
-        ("{when: gap <= 1, for_s: 1}", 4.0),  # from 3 s on; the earlier stretch is too short
+        ("{when: gap <= 2, for_s: 2}", 3.0),  # held from 1 s to 4 s
+        ("{when: gap <= 1, for_s: 1}", 4.0),  # held from 3 s; the earlier period is too short
         ("{when: gap <= 1, for_s: 2}", None),
         ("when: left < 1", 1.0),  # `left`, a derived value: 1 m at 2 m/s
         ("when: rate(gap) > 3", 5.0),
@@ -119,7 +119,7 @@ def test_metrics_end_with_the_first_terminal_hazard(write: Write, metric: str, v
 
 
 def test_without_a_terminal_hazard_metrics_cover_the_whole_run(write: Write) -> None:
-    """Values at the end of the drive are missing."""
+    """Metrics of the end of the drive have no value."""
     found = judged(
         write(
             "hazards: {}\nmetrics:\n"
@@ -130,7 +130,7 @@ def test_without_a_terminal_hazard_metrics_cover_the_whole_run(write: Write) -> 
     assert (found.t_end, dict(found.metrics)) == (None, {"least": -1.0})
 
 
-def test_a_hazard_may_occur_before_the_end_of_the_drive(write: Write) -> None:
+def test_a_hazard_can_occur_before_the_end_of_the_drive(write: Write) -> None:
     found = judged(write('hazards: {NEAR: {when: "gap <= 1", terminal: "gap <= 0", unit: m}}\n'))
     assert (found.hazards, found.t_end) == ((("NEAR", 1.0),), 3.0)
     assert dict(found.metrics) == {"margin_near": -1.0}  # gap - 1, at contact
@@ -151,9 +151,9 @@ CONTACT = (
         (np.nan, None),
     ],
 )
-def test_delta_v_of_a_contact(write: Write, speed: float, delta_v: float | None) -> None:
-    """Delta-v is the change of the car's speed in an inelastic collision, computed from closing speed and
-    masses."""
+def test_the_delta_v_of_a_contact_is_a_metric(write: Write, speed: float, delta_v: float | None) -> None:
+    """Delta-v is the change of the car's speed in an inelastic collision, computed from the closing speed and
+    the masses."""
     manifest = write(CONTACT.replace("OUT_ENDS", "false"))
     found = judged(manifest, speed=np.array([1.0, 2.0, -1.0, speed, 9.0, 9.0]))
     assert found.t_end == 3.0
@@ -175,12 +175,12 @@ def test_only_the_contact_that_ends_the_drive_has_a_delta_v(write: Write) -> Non
     [
         ('{when: "gap <= 1"}', -2.0),  # gap - 1
         ('{when: "abs(speed) > 1.5"}', -0.5),  # 1.5 - abs(speed)
-        ('{when: "gap <= 1 and speed > 0"}', None),  # a margin of which of the two comparisons?
+        ('{when: "gap <= 1 and speed > 0"}', None),  # two comparisons, so the margin is ambiguous
         ('{when: "gap <= 1 and speed > 0", margin: gap - 1}', -2.0),
     ],
 )
 def test_the_smallest_margin_is_a_metric(write: Write, rule: str, margin: float | None) -> None:
-    """A hazard with a single comparison needs no declaration."""
+    """A hazard with a single comparison needs no declared margin."""
     assert dict(judged(write(f"hazards: {{HIT: {rule}}}\n")).metrics).get("margin_hit") == margin
 
 
@@ -195,7 +195,7 @@ def test_a_hazard_without_a_condition_is_read_from_the_record(write: Write) -> N
 
 
 def test_a_slow_channel_keeps_its_newest_value(write: Write) -> None:
-    """Before its first value it has none."""
+    """Before its first value, the channel has no value."""
     manifest = write(
         'hazards: {SEEN: {when: "seen < 2"}}\n',
         observation="  seen: {unit: m, role: internal, time: t_seen}\nobservation:",
@@ -204,8 +204,8 @@ def test_a_slow_channel_keeps_its_newest_value(write: Write) -> None:
     assert judge_run(manifest, trace, {}).hazards == (("SEEN", 4.0),)
 
 
-def test_the_length_of_steps_matters(write: Write) -> None:
-    """The trace's times decide how long a condition has held and how much a step counts in an integral."""
+def test_steps_can_differ_in_length(write: Write) -> None:
+    """The trace's times determine how long a condition has held and how much a step adds to an integral."""
     manifest = write(
         'hazards: {HIT: {when: "gap < 2", for_s: 0.5}}\n'
         "metrics: {way: {integral: speed, unit: m, worse: lower, about: x}}\n"
@@ -217,7 +217,7 @@ def test_the_length_of_steps_matters(write: Write) -> None:
 
 
 def test_a_temporal_formula_is_judged_after_its_horizon(write: Write) -> None:
-    """The margin is the robustness."""
+    """The hazard's margin is the robustness of the formula."""
     pytest.importorskip("rtamt")
     rule = "(gap < 2) implies eventually[0:2](gap > 3)"
     found = judged(write(f'hazards: {{LATE: {{stl: "{rule}", unit: m}}}}\n'))
@@ -230,7 +230,6 @@ def test_a_temporal_formula_is_judged_after_its_horizon(write: Write) -> None:
 
 
 def test_temporal_logic_needs_even_steps(write: Write) -> None:
-    """Such a formula cannot be evaluated on uneven steps."""
     pytest.importorskip("rtamt")
     manifest = write('hazards: {LATE: {stl: "speed < 3"}}\n')
     with pytest.raises(BadOutput, match="a step of 2 s at 4 s"):
@@ -239,7 +238,7 @@ def test_temporal_logic_needs_even_steps(write: Write) -> None:
 
 @pytest.mark.parametrize("kind", ["npz", "csv", "parquet", "mcap"])
 def test_every_trace_format_gives_the_same_result(tmp_path: Path, kind: str) -> None:
-    """One channel has its own rate."""
+    """One of the channels has its own rate."""
     import pandas as pd
 
     places = ("/cart:force", "/cart:state.gap", "/cam:d") if kind == "mcap" else ("force", "gap", "seen")
@@ -277,8 +276,8 @@ def test_every_trace_format_gives_the_same_result(tmp_path: Path, kind: str) -> 
     assert load_record(manifest, tmp_path) == {"hazards": {}, "alerts": []}
 
 
-def test_a_channel_may_be_faster_than_the_steps(write: Write, tmp_path: Path) -> None:
-    """In a table, rows at times other than a step's belong to channels with their own times."""
+def test_a_channel_can_be_faster_than_the_steps(write: Write, tmp_path: Path) -> None:
+    """In a CSV trace, rows without a step's time belong to channels with their own times."""
     fast = "trace: {file: trace.csv, time: time}"
     text = (tmp_path / "cart.yaml", write("hazards: {}\n"))[0].read_text()
     text = text.replace("trace: {file: trace.npz, time: time}", fast)
@@ -294,7 +293,7 @@ def test_a_channel_may_be_faster_than_the_steps(write: Write, tmp_path: Path) ->
 
 @pytest.mark.parametrize("times", [[0, 2, 1], [0, 1, np.nan], [0, np.inf, np.inf]])
 def test_times_must_increase(write: Write, tmp_path: Path, times: list[float]) -> None:
-    """Hazards depend on the order."""
+    """Hazards depend on the order of the values."""
     np.savez(tmp_path / "trace.npz", time=times, gap=GAP[:3], speed=GAP[:3], force=GAP[:3])
     manifest = write("hazards: {}\n")
     with pytest.raises(MutatorError, match="times of time that decrease or are missing"):
@@ -304,7 +303,7 @@ def test_times_must_increase(write: Write, tmp_path: Path, times: list[float]) -
 @pytest.mark.parametrize(
     ("later", "first", "largest"),
     [
-        ([0.0, 1.9, 2.5], 1.0, 7.0),  # late: 9 s value is there at 1.9 s, not at 1 s
+        ([0.0, 1.9, 2.5], 1.0, 7.0),  # the value 9 comes at 1.9 s instead of 1 s
         ([0.0, 1.0, 2.5], 2.0, 4.0),
         ([0.0, 1.0, 2.0], None, 0.0),
     ],

@@ -1,4 +1,4 @@
-"""Arrays that the fast reader gets from stored .npz files equal numpy's."""
+"""The fast reader of uncompressed .npz files returns the same arrays as numpy."""
 
 import io
 import zipfile
@@ -23,7 +23,7 @@ def written(save=np.savez, **arrays: np.ndarray) -> bytes:
     return buffer.getvalue()
 
 
-def test_the_fast_reader_equals_numpy() -> None:
+def test_the_fast_reader_returns_the_same_arrays_as_numpy() -> None:
     """Names, order, types, shapes and values are the same."""
     found = npz.members(written(**ARRAYS))
     assert found is not None
@@ -45,7 +45,7 @@ def test_the_fast_reader_equals_numpy() -> None:
     ],
 )
 def test_unusual_files_are_left_to_numpy(data: bytes) -> None:
-    """Compressed members, other orders and types, and other kinds of files are unusual."""
+    """Examples are compressed members, arrays in Fortran order, arrays of text, and other kinds of files."""
     assert npz.members(data) is None
 
 
@@ -64,7 +64,7 @@ def headed(header: bytes) -> bytes:
     "shape", ["(3,)", "(-1,)", "(3, -1)", "(2,)", "(4,)", "(0,)", "(True,)", "(3,", "(%s,)" % ("9" * 30)]
 )
 def test_any_header_is_read_as_numpy_reads_it(shape: str) -> None:
-    """A mutant may write a file with valid checksums."""
+    """A mutant can write an invalid header with a valid checksum."""
     data = headed(b"{'descr': '<f8', 'fortran_order': False, 'shape': " + shape.encode() + b"}")
     found = npz.members(data)
     if shape == "(3,)":
@@ -74,7 +74,7 @@ def test_any_header_is_read_as_numpy_reads_it(shape: str) -> None:
 
 
 def test_a_flipped_bit_never_changes_the_arrays() -> None:
-    """The reader returns the original arrays or none."""
+    """The reader returns the original arrays or None."""
     data = written(t=np.arange(3.0), x=np.arange(3, dtype=np.int32))
     for place in range(len(data)):
         found = npz.members(data[:place] + bytes([data[place] ^ 4]) + data[place + 1 :])

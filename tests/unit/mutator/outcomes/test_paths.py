@@ -1,4 +1,4 @@
-"""Paths of faults, computed by hand for a structure with two controllers and for chains without a
+"""The paths of faults through a structure with two controllers, and through chains of components without a
 structure."""
 
 from pathlib import Path as Folder
@@ -125,7 +125,7 @@ def passages(found: Path) -> dict[str, Passage]:
 
 
 def test_an_estimator_that_did_not_change_stopped_the_fault() -> None:
-    """The fault was injected in a component without recorded channels."""
+    """The fault is injected in a component without recorded channels."""
     found = path("eyes", outcome=Outcome.MASKED)
     assert [*states(found).items()] == [
         ("eyes", State.INJECTED),
@@ -143,15 +143,15 @@ def test_an_estimator_that_did_not_change_stopped_the_fault() -> None:
     }
 
 
-def test_a_fault_that_a_controller_stopped() -> None:
+def test_a_controller_that_did_not_change_stopped_the_fault() -> None:
     found = path("eyes", outcome=Outcome.MASKED, seen=1.2)
     assert (found.reached, found.stopped_at) == ("finder", ("speed",))
     assert passages(found)["picture"] is Passage.THROUGH
     assert passages(found)["lead"] is Passage.STOPPED
 
 
-def test_a_fault_that_reached_the_car() -> None:
-    """Each component has the time of its first channel to differ."""
+def test_a_fault_that_changed_the_car_reached_it() -> None:
+    """The time of each component is that of its first channel that differs."""
     found = path("eyes", seen=1.2, wanted=1.3, gas=1.3, place=1.4)
     assert [(s.component, s.t_first) for s in found.stages[1:]] == [
         ("finder", 1.2),
@@ -179,8 +179,8 @@ def test_links_that_the_study_ignores_are_not_part_of_the_path() -> None:
 
 
 def test_a_component_that_changed_after_the_car_only_received_feedback() -> None:
-    """Something off the path leads to the speed control, which left golden after the car. So the speed
-    control and the components that it alone feeds only received feedback. An earlier branch was reached."""
+    """The speed control changed after the car, and has an input that is not on the path. Therefore it and the
+    pedals, which only it feeds, are taken to have received feedback."""
     found = path("finder", "wheel", angle=1.0, torque=1.0, place=1.1, wanted=1.5, gas=1.6)
     assert states(found) == {
         "finder": State.INJECTED,
@@ -195,7 +195,7 @@ def test_a_component_that_changed_after_the_car_only_received_feedback() -> None
 
 
 def test_the_only_input_of_a_reached_component_passed_the_fault_on() -> None:
-    """The rack left golden before the car, so the fault came through the wheel control, even if its recorded
+    """The rack changed before the car, so the fault came through the wheel control, even if its recorded
     channels changed later or not at all."""
     found = path("gauge", torque=1.0, place=1.1)
     assert states(found)["wheel"] is State.PASSED
@@ -203,7 +203,7 @@ def test_the_only_input_of_a_reached_component_passed_the_fault_on() -> None:
     assert states(path("gauge", torque=1.0, place=1.1, angle=1.2))["wheel"] is State.REACHED
 
 
-def test_a_component_changed_no_later_than_what_it_alone_feeds() -> None:
+def test_a_component_changed_no_later_than_a_component_that_only_it_feeds() -> None:
     """Only the speed control feeds the pedals. A component with other inputs proves nothing about the
     components that feed it."""
     found = path("finder", gas=1.2, place=1.3, wanted=1.25)
@@ -216,7 +216,7 @@ def test_a_component_changed_no_later_than_what_it_alone_feeds() -> None:
 @pytest.mark.parametrize(
     ("left", "state"),
     [
-        ({"pace": 1.6}, State.REACHED),  # the gauge did not observe the car's different motion yet
+        ({"pace": 1.6}, State.REACHED),  # the gauge had not yet observed the car's different motion
         ({"pace": 1.5}, State.FEEDBACK),
         ({"pace": 1.5, "seen": 1.2}, State.REACHED),  # the fault reached it earlier
         ({"pace": 1.2, "seen": 1.4}, State.FEEDBACK),
@@ -225,22 +225,22 @@ def test_a_component_changed_no_later_than_what_it_alone_feeds() -> None:
 def test_the_first_changed_input_decides_between_fault_and_feedback(
     left: dict[str, float], state: State
 ) -> None:
-    """The car moved before the speed control left golden. An input on the path means the fault, and one off
-    the path means feedback."""
+    """The car moved differently before the speed control changed. If the first changed input of the speed
+    control is on the path, the fault reached it; otherwise, it received feedback."""
     ways = Ways([*CHANNELS, ["pace", "m/s", "internal", "gauge", ""]], STRUCTURE)
     found = path("finder", "wheel", ways=ways, torque=1.0, place=1.1, wanted=1.5, **left)
     assert states(found)["speed"] is state
 
 
-def test_a_late_departure_with_a_single_input_is_the_fault() -> None:
-    """Only the speed control leads to the pedals, so the fault reached them, although the car moved
-    earlier."""
+def test_a_component_with_a_single_input_is_reached_even_after_the_car() -> None:
+    """Only the speed control feeds the pedals, so the fault reached them, although the car moved differently
+    before."""
     found = path("eyes", "wheel", seen=1.0, wanted=1.0, torque=1.0, place=1.1, gas=3.0)
     assert states(found)["pedals"] is State.REACHED
 
 
 def test_components_without_channels_are_unobserved() -> None:
-    """The components after them show whether the fault got further."""
+    """The components after them show whether the fault went further."""
     ways = Ways([channel for channel in CHANNELS if channel[0] != "seen"], STRUCTURE)
     found = path("eyes", ways=ways, wanted=1.2, gas=1.2, place=1.3)
     assert states(found)["finder"] is State.UNSEEN
@@ -250,25 +250,25 @@ def test_components_without_channels_are_unobserved() -> None:
     assert held.stopped_at == ("speed",)
 
 
-def test_two_controllers_may_stop_one_fault() -> None:
+def test_two_controllers_can_stop_one_fault() -> None:
     """A sensor feeds both controllers."""
     assert path("gauge", outcome=Outcome.MASKED).stopped_at == ("speed", "wheel")
     assert path("gauge", outcome=Outcome.MASKED, angle=2.0).stopped_at == ("rack",)
 
 
 @pytest.mark.parametrize("outcome", [Outcome.NOT_ACTIVATED, None])
-def test_an_inactive_fault_or_a_broken_run_has_no_path(outcome: Outcome | None) -> None:
+def test_an_inactive_fault_or_a_failed_run_has_no_path(outcome: Outcome | None) -> None:
     assert WAYS.path(experiment("eyes"), record(outcome)) is None
 
 
 def test_a_fault_outside_all_components_has_no_path() -> None:
-    """No component names the fault's file, so the start is unknown."""
+    """No component names the fault's file, so the start of the path is unknown."""
     assert WAYS.path(experiment("other"), record(Outcome.SDC, gas=1.0)) is None
 
 
-def test_without_a_structure_components_follow_by_role() -> None:
-    """Components with the same role keep the order of the manifest. The first one after those reached, which
-    stayed equal, stopped the fault."""
+def test_without_a_structure_components_are_ordered_by_role() -> None:
+    """Components with the same role keep the order of the manifest. The fault stopped at the first unchanged
+    component after those that it reached."""
     ways = Ways(CHANNELS[::-1], None)
     found = path("eyes", ways=ways, outcome=Outcome.MASKED, angle=1.0)
     assert [*states(found)] == ["wheel", "speed", "finder", "rack", "pedals", "car"]
@@ -278,8 +278,7 @@ def test_without_a_structure_components_follow_by_role() -> None:
 
 
 def test_a_chain_has_feedback_too() -> None:
-    """The car interface reads values that change after the car, because the command was injected after the
-    interface."""
+    """The fault is injected after the interface, whose channels change only after the car."""
     ways = Ways(
         [
             ["seen", "", "internal", "interface", ""],

@@ -47,9 +47,9 @@ WORST_FIRST = {
 }
 
 
-def test_the_worst_come_first(tmp_path: Path) -> None:
-    """The order is by class, then by delta-v. Without a class, it is by ending, then by the margin of each
-    hazard. Ids decide ties."""
+def test_the_worst_results_come_first(tmp_path: Path) -> None:
+    """The order is by severity class, then by delta-v. Without a class, it is by ending, then by the margin
+    of each hazard. Ids decide ties."""
     path = tmp_path / "results.csv"
     with path.open("w", newline="", encoding="utf-8") as file:
         table = csv.DictWriter(file, COLUMNS, restval="")
@@ -61,7 +61,7 @@ def test_the_worst_come_first(tmp_path: Path) -> None:
 
 
 def test_ranking_columns_equals_ranking_rows(tmp_path: Path) -> None:
-    """The results are made up and have many ties."""
+    """The results are random and have many ties."""
     draw = random.Random(3)
     choices = list(WORST_FIRST.values())
     lines = [dict(draw.choice(choices)) for _ in range(400)]

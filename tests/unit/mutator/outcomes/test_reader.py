@@ -1,4 +1,4 @@
-"""The only reader of a run's results."""
+"""The module through which all others read the results of a run."""
 
 import os
 import re
@@ -29,7 +29,7 @@ from mutator.workspace import Workspace
 
 SOURCES = Path(mutator.__file__).parent
 WriteRun = Callable[..., Path]
-# The toy car's names, which a target without gas, brake or H1 must not show.
+# Names of the toy car, and their replacements for another target.
 OF_A_CRANE = {r"\bH1\b": "CRUSHED", r"\bH3\b": "DROPPED", r"\bgas\b": "winch", r"\bbrake\b": "clamp"}
 
 
@@ -79,7 +79,7 @@ def test_reading_tables_leaves_no_thread(run: Path) -> None:
 
 
 def test_columns_follow_the_targets_hazards_and_channels(run: Path) -> None:
-    """The readers are CSV, Parquet and frames."""
+    """The CSV file and the frames have the same columns."""
     table = Results.up_to_date(run)
     columns = list(next(table.lines()))
     at = columns.index("t_manifest")
@@ -115,7 +115,6 @@ def test_numbers_have_the_units_of_their_metric_or_channel(
 
 
 def test_every_way_of_reading_gives_the_same_hazards(run: Path) -> None:
-    """Hazards have the same times for each experiment."""
     table = Results.up_to_date(run)
     rows = table.rows()
     frame, statistics = table.frame(), load(run / "results.csv").set_index("experiment_id")
@@ -129,7 +128,7 @@ def test_every_way_of_reading_gives_the_same_hazards(run: Path) -> None:
         assert row.checked == (("CRUSHED", "DROPPED", "TOO_FAST") if row.status is Status.OK else ())
 
 
-def test_hazard_is_unknown_for_runs_that_did_not_end_well(run: Path) -> None:
+def test_the_column_hazard_is_unknown_for_crashes(run: Path) -> None:
     frame = Results.up_to_date(run).frame()
     assert list(frame["hazard"].isna()) == list(frame["status"] == "crashed")
     assert frame["hazard"].isna().any()
@@ -175,7 +174,7 @@ def test_a_real_run_fills_each_column(crane: Workspace, tmp_path: Path, write_ru
     assert cells["max_dev_wheel"]
 
 
-def test_a_missing_table_is_a_users_error(tmp_path: Path) -> None:
+def test_a_missing_table_is_reported(tmp_path: Path) -> None:
     table = Results.of_run(tmp_path)
     for read in (table.rows, table.texts, table.csv, table.frame):
         with pytest.raises(MutatorError, match=f"{tmp_path}: no results here"):
@@ -183,8 +182,8 @@ def test_a_missing_table_is_a_users_error(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("text", ["a,b\n1,2\n", "", "\xff"])
-def test_a_file_that_is_not_a_results_table_is_a_users_error(tmp_path: Path, text: str) -> None:
-    """No KeyError or decoding error escapes."""
+def test_a_file_that_is_not_a_results_table_is_refused(tmp_path: Path, text: str) -> None:
+    """No KeyError or decoding error is raised."""
     table = Results.of_run(tmp_path)
     table.path.write_bytes(text.encode("latin-1"))
     for read in (table.rows, table.texts):

@@ -32,8 +32,10 @@ HAZARDS = ("H1", "H2", "H3")
 MakeRecord = Callable[..., Record]
 
 
-def test_the_row_of_a_run_with_a_hazard(experiment: Callable[..., Experiment], record: MakeRecord) -> None:
-    """The row has flags, simulation times, the alerts in order, and reaction times."""
+def test_the_row_of_a_run_with_a_hazard_has_the_expected_cells(
+    experiment: Callable[..., Experiment], record: MakeRecord
+) -> None:
+    """Among them are flags, simulation times, alerts in order, and the reaction time."""
     one = experiment(24, method=Method.RANDOM, trigger="random/C2")
     kept = record(
         one.id,
@@ -97,7 +99,7 @@ SCALE = Scale(
         ({"hazards": (), "outcome": Outcome.SDC, "metrics": ()}, None, None, None),
     ],
 )
-def test_severity_and_times_to_the_hazard(
+def test_a_row_has_the_severity_and_the_times_to_the_hazard(
     experiment: Callable[..., Experiment],
     record: MakeRecord,
     given: dict[str, object],
@@ -105,8 +107,8 @@ def test_severity_and_times_to_the_hazard(
     tolerant: float | None,
     after_manifest: float | None,
 ) -> None:
-    """A contact after the activation has a class. Times to the first hazard count from the activation at 2
-    s."""
+    """Only a contact after the activation has a severity class. The fault-tolerant time begins with the
+    activation, at 2 s."""
     hit = {"outcome": Outcome.HAZARD, "t_manifest": 2.25, "t_end": 5.5, "metrics": (("delta_v", 5.5),)}
     kept = record(**hit | {"hazards": (("H1", 5.5), ("H2", 7.0))} | given)
     cells = result_rows.row(experiment(), kept, HAZARDS, scale=SCALE)
@@ -115,7 +117,7 @@ def test_severity_and_times_to_the_hazard(
     assert result_rows.row(experiment(), kept, HAZARDS)["severity"] is None  # without a scale
 
 
-def test_the_head_selects_the_columns_of_severity(experiment: Callable[..., Experiment]) -> None:
+def test_run_json_determines_the_columns_of_severity(experiment: Callable[..., Experiment]) -> None:
     """A run has all columns, only the times, or, if it is older, none."""
     scale = {"severity": SCALE.plain()}
     times = ["fault_tolerant_time", "manifest_to_hazard"]
@@ -157,7 +159,7 @@ def test_unknown_values_of_a_failed_run_are_empty(
         assert cells[name] is None
 
 
-def test_a_run_without_activation_has_no_empty_cell(
+def test_flags_and_counts_of_a_run_without_activation_are_zero(
     experiment: Callable[..., Experiment], record: MakeRecord
 ) -> None:
     cells = result_rows.row(experiment(), record(outcome=Outcome.NOT_ACTIVATED, activation=None), HAZARDS)
@@ -285,7 +287,7 @@ def test_tables_built_in_batches_have_the_same_bytes(
 def test_row_groups_of_a_long_table_have_the_same_size(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The last group may be shorter, but never empty. Batches do not matter."""
+    """The last group can be shorter. The size of batches does not matter."""
     monkeypatch.setattr(table_files, "_ROWS", 4)
     columns = (Column("n", "count", "", ""),)
     for size, groups in ((0, [0]), (4, [4]), (8, [4, 4]), (11, [4, 4, 3])):
@@ -324,7 +326,7 @@ def test_nothing_is_built_while_the_digests_are_the_same(
 def test_tables_are_rebuilt_after_any_change(
     folder: RunFolder, monkeypatch: pytest.MonkeyPatch, changed: str, gone: bool
 ) -> None:
-    """Records or timings change, or a table or a stamp is edited or deleted."""
+    """Records or timings change, or a table or the stamp is edited or deleted."""
     results.build(folder.path)
     if changed == "more records":
         head = {"schema": SCHEMA, "plan": folder.head["plan"]}
@@ -341,7 +343,7 @@ def test_tables_are_rebuilt_after_any_change(
 
 @pytest.mark.parametrize("stamp", [True, False])
 def test_replacing_an_edited_table_is_reported(folder: RunFolder, stamp: bool) -> None:
-    """The stamp may be missing."""
+    """The table is also replaced if the stamp is missing."""
     table = results.build(folder.path)
     made = table.read_bytes()
     table.write_bytes(made.replace(b"masked", b"hazard", 1))
@@ -352,10 +354,10 @@ def test_replacing_an_edited_table_is_reported(folder: RunFolder, stamp: bool) -
     assert table.read_bytes() == made
 
 
-def test_an_interrupted_build_is_not_an_edited_table(
+def test_an_interrupted_build_is_not_reported_as_an_edited_table(
     folder: RunFolder, monkeypatch: pytest.MonkeyPatch, record: MakeRecord
 ) -> None:
-    """The next build prints nothing, even if records were added."""
+    """The next build gives no warning, even if records were added."""
     results.build(folder.path)
     planned = plan_file.read_all(folder.path)
     for killed_before, number in ((results.CSV, 2), (results.PARQUET, 3)):

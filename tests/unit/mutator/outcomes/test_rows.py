@@ -53,7 +53,7 @@ def test_one_row_of_each_kind_is_counted_once(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("status", [Status.HARNESS_ERROR, Status.INVALID_MUTANT])
-def test_unusable_experiments_enter_no_other_count(tmp_path: Path, status: Status) -> None:
+def test_unusable_experiments_are_counted_separately(tmp_path: Path, status: Status) -> None:
     bad = SEEN | {"status": status.value, "outcome": "", "t_h1": "3.0", "alerts": "fcw"}
     rows = Results(write_table(tmp_path / "results.csv", SEEN, bad)).texts()
 
@@ -65,7 +65,7 @@ def test_unusable_experiments_enter_no_other_count(tmp_path: Path, status: Statu
 
 
 @pytest.mark.parametrize("status", [Status.CRASHED, Status.TIMEOUT])
-def test_a_crash_counts_as_injected(tmp_path: Path, status: Status) -> None:
+def test_a_crash_is_counted_as_injected(tmp_path: Path, status: Status) -> None:
     """Controllers that crash or hang have a separate column."""
     bad = SEEN | {"status": status.value, "outcome": "", "t_manifest": ""}
     rows = Results(write_table(tmp_path / "results.csv", SEEN, bad)).texts()
@@ -77,7 +77,7 @@ def test_a_crash_counts_as_injected(tmp_path: Path, status: Status) -> None:
     assert lines[-1][-1] == "1"
 
 
-def test_columns_of_failures_appear_only_when_there_are_any(tmp_path: Path) -> None:
+def test_failure_columns_appear_only_if_a_run_failed(tmp_path: Path) -> None:
     """Failures are crashes, timeouts and unusable runs."""
     rows = Results(write_table(tmp_path / "results.csv", SEEN)).texts()
     heads, _ = count_table(counts_by(rows, kinds(rows)), "fault type", hazard_names(rows))

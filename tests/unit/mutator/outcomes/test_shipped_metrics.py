@@ -1,4 +1,4 @@
-"""The margins and metrics of the shipped target, compared with drives computed by hand."""
+"""The margins and metrics of the shipped target, compared with values computed by hand."""
 
 from pathlib import Path
 

@@ -23,7 +23,7 @@ TRUTH = {
 
 
 @pytest.mark.parametrize("case", list(product((False, True), repeat=3)), ids=str)
-def test_truth_table(case: tuple[bool, bool, bool]) -> None:
+def test_the_outcome_follows_the_truth_table(case: tuple[bool, bool, bool]) -> None:
     activated, manifested, hazard = case
     outcome = judge(
         activation=ACTIVE if activated else None,
@@ -36,11 +36,11 @@ def test_truth_table(case: tuple[bool, bool, bool]) -> None:
 @pytest.mark.parametrize(
     ("time", "counts"), [(0.0, False), (1.99, False), (2.0, True), (2.01, True), (9.0, True)]
 )
-def test_events_before_the_activation_do_not_count(time: float, counts: bool) -> None:
+def test_events_before_the_activation_are_ignored(time: float, counts: bool) -> None:
     assert first_events([("H1", time)], ACTIVE) == ((("H1", time),) if counts else ())
 
 
-def test_events_need_an_activated_fault() -> None:
+def test_without_an_activated_fault_there_are_no_events() -> None:
     assert first_events([("H1", 3.0), ("fcw", 0.0)], None) == ()
 
 
