@@ -81,16 +81,15 @@ def _files(head: Mapping[str, Any]) -> dict[str, str] | None:
 
 
 def remarks(a: Side, b: Side, matching: Matching) -> tuple[str, ...]:
-    """Remarks on runs that cannot be verified, and on pairs with the same key that differ, with their
-    number."""
+    """Remarks on runs that cannot be verified, and on the number of pairs that differ in each input."""
     told: tuple[tuple[str, Callable[[Pair], bool]], ...] = (
-        ("inject something else, or elsewhere", lambda p: p.a.fault.injections != p.b.fault.injections),
-        ("wait for another condition", lambda p: p.a.trigger.condition != p.b.trigger.condition),
-        ("have another hold or trigger time", lambda p: _hold(p.a) != _hold(p.b)),
-        ("have a scenario with different text", lambda p: p.a.scenario_digest != p.b.scenario_digest),
-        ("have another seed", lambda p: p.a.seed != p.b.seed),
+        ("have different injections", lambda p: p.a.fault.injections != p.b.fault.injections),
+        ("have different trigger conditions", lambda p: p.a.trigger.condition != p.b.trigger.condition),
+        ("have different holds or trigger times", lambda p: _hold(p.a) != _hold(p.b)),
+        ("have scenarios with different texts", lambda p: p.a.scenario_digest != p.b.scenario_digest),
+        ("have different seeds", lambda p: p.a.seed != p.b.seed),
         (
-            "end at their first terminal hazard in only one run, which lacks what came later",
+            "end at the first terminal hazard in only one run, where later hazards and alerts are missing",
             lambda p: p.a.after_hazard != p.b.after_hazard,
         ),
     )
@@ -111,7 +110,7 @@ def parts_remark(a: Side, b: Side) -> str:
     if of_a == of_b:
         return ""
     told = [
-        f"{side.name} has {', '.join(f'--{name} {value}' for name, value in chosen.items()) or 'all of it'}"
+        f"{side.name} has {', '.join(f'--{name} {value}' for name, value in chosen.items()) or 'everything'}"
         for side, chosen in ((a, of_a), (b, of_b))
     ]
     return f"The runs are different parts of a campaign: {', '.join(told)}. Only their overlap is compared."
@@ -121,7 +120,7 @@ def severity_remarks(a: Side, b: Side) -> tuple[str, ...]:
     scales = [side.folder.scale for side in (a, b)]
     if None in scales:
         (without,) = [s for s, scale in zip((a, b), scales, strict=True) if not scale][:1]
-        return (f"Severity is not compared: {without.name} has none.",) if any(scales) else ()
+        return (f"Severity is not compared: {without.name} has no classes.",) if any(scales) else ()
     if scales[0] == scales[1]:
         return ()
     return (f"The runs have different severity scales; both use the classes of {b.name}.",)

@@ -30,8 +30,8 @@ def metrics_sheets(pairs: Sequence[Pair], a: Side, b: Side, names: Names) -> tup
         groups = {str(kind): (unit, worse, *_medians(group)) for kind, group in frame.groupby("kind")}
         parts += adjusted(name, groups)
     note = (
-        f"Pairs with a value on both sides. Difference: the median of {names.b} minus that of {names.a}, "
-        "with an interval resampled by fault (variant and value; none if all faults agree). p: "
+        f"Pairs with a value in both runs. Difference: the median of {names.b} minus that of {names.a}. Its "
+        "interval resamples whole faults (variant and value); there is none if all faults agree. p: "
         "Wilcoxon's signed-rank test (none if no pair differs)"
     )
     heads = ("unit", "worse", "pairs", names.a, names.b, "difference", "difference, low", "difference, high")
@@ -63,7 +63,7 @@ def severity_sheet(pairs: Sequence[Pair], names: Names) -> Sheet:
     return Sheet(
         name="severity",
         title="Severity",
-        note=f"Lines: severity class in {names.a}. Columns: severity class in {names.b}.",
+        note=f"Rows: severity class in {names.a}. Columns: severity class in {names.b}.",
         heads=(f"{names.a} / {names.b}", *(name or NO_CONTACT for name in seen)),
         lines=tuple((one or NO_CONTACT, *(counts[one, other] for other in seen)) for one in seen)
         if any(seen)

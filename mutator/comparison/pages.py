@@ -17,7 +17,7 @@ from mutator.comparison.pairs import Change, Pair, time_to_hazard
 from mutator.outcomes.rows import Row
 from mutator.web import asset
 
-LISTED = 50  # experiments that the Markdown lists for each kind of change; the page and the CSV list all
+LISTED = 50  # number of experiments that the Markdown lists for each change; the page and the CSV list all
 SHOWN = 500  # table rows that the page shows at once; browsers need seconds to lay out thousands
 _BAD = frozenset(gate.value for gate in Gate)
 
@@ -62,8 +62,8 @@ def summary(comparison: Comparison) -> str:
     else:
         text += "None of them changed."
     if unusable := sum(not p.usable for p in c.pairs):
-        text += f" {unusable} of them have no valid result in one run (a harness error or an invalid mutant) "
-        text += "and are not in the rates."
+        text += f" In {unusable} of the experiments, a run has a harness error or an invalid mutant, so they "
+        text += "are not in the rates."
     if c.unmatched:
         text += " Not compared: " + ", ".join(f"{n} {why}" for why, n in reasons(c)) + "."
     return text
@@ -76,7 +76,7 @@ def reasons(comparison: Comparison) -> list[tuple[str, int]]:
 def files_text(comparison: Comparison) -> str:
     found = comparison.files
     if found is None:
-        return "It is not known which target files differ: one run is too old to list them."
+        return "It is unknown which target files differ, because one run is too old to list them."
     parts = {
         "changed": found.changed,
         f"only in {comparison.names.a}": found.only_a,
@@ -101,7 +101,7 @@ def markdown(comparison: Comparison) -> str:
             parts += [f"## {change.value}: {len(pairs)}", _listed(pairs)]
     if c.unmatched:
         parts += ["## Not compared", _reasons(c).as_markdown()]
-        parts.append("They are listed in `unmatched.csv`.")
+        parts.append("`unmatched.csv` lists these experiments.")
     parts.append("All pairs are in `pairs.csv`; `index.html` lists those that changed.")
     return "\n\n".join(parts) + "\n"
 

@@ -15,8 +15,8 @@ _TIME_DIGITS = 6  # decimals of a time from activation; absorbs rounding errors
 
 
 class Change(StrEnum):
-    """A change in the second run of a pair, relative to the first; `comparison.Gate` explains those for the
-    worse."""
+    """A change in the second run of a pair, relative to the first. `comparison.Gate` explains the changes for
+    the worse."""
 
     NEW_HAZARD = "new-hazard"
     OTHER_HAZARD = "other-hazard"
@@ -69,7 +69,7 @@ class Matching:
 
 
 def match(a: Side, b: Side) -> Matching:
-    """Match experiments by id, then the remaining ones by key, unless several of a run share it."""
+    """Match experiments by id, then the remaining ones by key, unless several in one run share that key."""
     by_id = {e.id: e for e in b.experiments}
     same = {e.id for e in a.experiments if e.id in by_id}
     rest_a = [e for e in a.experiments if e.id not in same]

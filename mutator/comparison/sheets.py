@@ -68,9 +68,9 @@ def rates_sheets(frame: pd.DataFrame, names: Names) -> tuple[Sheet, Sheet]:
         found = {str(kind): _rates(group, flag) for kind, group in frame.groupby("kind")}
         parts += adjusted(flag, found)
     note = (
-        f"Pairs with a result on both sides. Difference: the rate of {names.b} minus that of {names.a} "
-        "(of 1), with an interval resampled by fault (variant and value; none if all faults agree). "
-        "p: McNemar's exact test of the pairs that differ"
+        f"Pairs with a result in both runs. Difference: the rate of {names.b} minus that of {names.a}, as a "
+        "fraction. Its interval resamples whole faults (variant and value); there is none if all faults "
+        "agree. p: McNemar's exact test of the pairs that differ"
     )
     heads = (
         *("pairs", names.a, names.b, f"only {names.a}", f"only {names.b}"),
@@ -169,7 +169,7 @@ def endings_sheet(pairs: Sequence[Pair], names: Names) -> Sheet:
     return Sheet(
         name="endings",
         title="How they ended",
-        note=f"Lines: outcome or status in {names.a}. Columns: outcome or status in {names.b}.",
+        note=f"Rows: outcome or status in {names.a}. Columns: outcome or status in {names.b}.",
         heads=(f"{names.a} / {names.b}", *after),
         lines=tuple((a, *(counts[a, b] for b in after)) for a in before),
     )

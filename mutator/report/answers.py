@@ -1,4 +1,4 @@
-"""Answers to the first questions of a reader. Each links to its experiments in the list."""
+"""Answers to a reader's first questions. Each answer links to its experiments in the list."""
 
 import pandas as pd
 
@@ -24,7 +24,7 @@ from mutator.report.seen import COURSE, PLACE
 from mutator.report.studies import ReportedRun
 from mutator.report.warnings import FIRST, LATE, NO_ALERT, SILENT, warnings_of
 
-TYPES = 6  # maximum of fault types that an answer lists
+TYPES = 6  # maximum number of fault types that an answer lists
 
 
 def answers_of(run: ReportedRun) -> tuple[Answer, ...]:
@@ -43,7 +43,7 @@ def answers_of(run: ReportedRun) -> tuple[Answer, ...]:
 
 
 def _told(run: ReportedRun) -> pd.DataFrame:
-    """The usable experiments with rank, course and warning. Those that may be listed also have names."""
+    """The usable experiments with rank, course and warning. Those that answers can list also have texts."""
     frame = run.frame
     told = frame.assign(place=frame[PLACE], course=frame[COURSE], warning=warnings_of(frame))
     shown = worst_of(told)
@@ -57,7 +57,7 @@ def _told(run: ReportedRun) -> pd.DataFrame:
 
 
 def _warned(row: Row) -> str:
-    """The first alert and how long before the hazard it came; or `only after`, or `none`."""
+    """The first alert and its time before the hazard; `only after` if it came later; `none` without one."""
     if row.reaction_time is None:
         return "only after" if row.alerts else "none"
     return f"{row.alerts[0]}, {row.reaction_time:.1f} s"
@@ -91,7 +91,7 @@ def unwarned(frame: pd.DataFrame, note: str = "") -> Answer:
     return Answer(
         name="unwarned",
         title="Which hazards were silent",
-        says="No hazard came."
+        says="No hazard occurred."
         if hazards.empty
         else says + _more(sum(part > 0 for _, part, _ in kinds), "fault types with silent hazards"),
         listings=(Listing(heads=heads, lines=lines),),

@@ -1,4 +1,4 @@
-"""The data of each experiment in the report's page: results as columns, fault, trigger and diff."""
+"""The data of each experiment on the report's page: results as columns, fault, trigger and diff."""
 
 import base64
 import json
@@ -41,7 +41,7 @@ SCHEMA = "report-table/1"
 DETAILS_SCHEMA = "report-details/1"
 _OF_ALERTS = ("alerts", "t_alert", "reaction_time")  # columns that need a target with alerts
 STILLS_BYTES = 1_000_000  # limit of the stills embedded in the page; the others become links
-LISTED = 50_000  # maximum of experiments that the page lists; more would open slowly
+LISTED = 50_000  # maximum number of experiments that the page lists; with more it would open slowly
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,12 +87,12 @@ def _which(run: ReportedRun) -> str:
     return (
         f"The list has the {LISTED:,} worst of {count:,} experiments (by rank). All other parts of this page "
         f"count all of them. To see another experiment: `mutator show ID --run {path}`. To list the worst "
-        f"that match a filter: `mutator show --run {path} --only 'FILTER'`. All are in results.parquet."
+        f"that match a filter: `mutator show --run {path} --only 'FILTER'`. results.parquet has all of them."
     )
 
 
 def _of_target(folder: RunFolder, workspace: "Workspace | None") -> dict[str, Any]:
-    """Whether films can be made (true without a manifest), and the scene seen from above."""
+    """Whether films can be made (true without a manifest), and the scene for the replay."""
     try:
         manifest = workspace.manifest(folder.head["target"]) if workspace else None
     except MutatorError:
@@ -162,7 +162,7 @@ def table(
 
 
 def _of_operators(source: SourceLines, lines: Sequence[Mapping[str, str]]) -> dict[str, list[str]]:
-    """The columns of operators' faults. `value` is the change that an operator makes."""
+    """The columns that differ for mutants of operators. Their `value` is the change in the source."""
     changes = [source.changes.get(line["fault_id"], "") for line in lines]
     both = list(zip(lines, changes, strict=True))
     return {
@@ -174,8 +174,8 @@ def _of_operators(source: SourceLines, lines: Sequence[Mapping[str, str]]) -> di
 
 
 def column(name: str, values: Sequence[str]) -> dict[str, Any]:
-    """A column's data: numbers (None: empty), ids as texts, else codes of the distinct values. Names are
-    never parsed as numbers, because a variant may be called `nan`."""
+    """A column's data: numbers (None: empty), ids as texts, otherwise codes of the distinct values. Names are
+    never parsed as numbers, because a variant can be called `nan`."""
     if not is_text(name) and any(values):
         try:
             return {"numbers": [_number(text) for text in values]}
@@ -189,7 +189,7 @@ def column(name: str, values: Sequence[str]) -> dict[str, Any]:
 
 
 def _number(text: str) -> float | int | str | None:
-    """The value for JSON, which has no infinities."""
+    """The value for JSON, which has no infinities or NaN."""
     if not text:
         return None
     value = float(text)

@@ -1,6 +1,6 @@
 """Builds the report of a run: REPORT.md and one self-contained HTML page.
 
-Its only inputs are results.csv and the run folder, so rebuilding gives the same bytes.
+The only inputs are results.csv and the run folder, so rebuilding the report gives the same bytes.
 """
 
 from collections.abc import Callable, Sequence
@@ -108,6 +108,5 @@ def _planned(folder: RunFolder) -> str:
     if runs == experiments:
         text += "; each needs its own run"
     elif runs is not None:  # older plans do not count runs
-        text += f", as {runs} runs: if a fault makes several scenarios the same run, it runs once "
-        text += "and counts in each"
+        text += f", in {runs} runs: if a fault makes several scenarios identical, they share one run"
     return " ".join(filter(None, (f"{text}.", folder.stop_note)))

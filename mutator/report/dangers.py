@@ -7,9 +7,9 @@ import pandas as pd
 
 from mutator.report.answer_parts import Answer, Link, Listing, bar, by_kind, kind_link, share, to_list
 
-WORST = 10  # maximum of experiments listed as most dangerous
-CONTACTS = 6  # how many of them have contact, if there are also hazards without contact
-TYPES = 6  # maximum of fault types listed
+WORST = 10  # maximum number of experiments listed as most dangerous
+CONTACTS = 6  # maximum number with contact among them, if there are also hazards without contact
+TYPES = 6  # maximum number of fault types listed
 MARGIN = "margin_"  # prefix of the columns of hazard margins
 SEVERITY = "severity"  # column with S0 to S3, or '' without contact
 HAZARD = {"outcome": ["hazard"]}  # filter for the list of experiments
@@ -43,7 +43,7 @@ def dangerous(frame: pd.DataFrame, metrics: Sequence[Sequence[str]], *, has_aler
 
 
 def worst_of(frame: pd.DataFrame) -> list[str]:
-    """Ids of the experiments that `dangerous` may list, by `place`."""
+    """Ids of the experiments that `dangerous` can list, by `place`."""
     hazards = frame[frame["outcome"] == "hazard"]
     groups = [hazards]
     if SEVERITY in frame:
@@ -63,7 +63,7 @@ def _links(ranked: pd.DataFrame) -> tuple[Link, ...]:
 
 
 def contact_measure(frame: pd.DataFrame) -> str:
-    """The column that measures a contact best: delta-v, else contact speed; '' if the target has neither."""
+    """The column that best measures a contact: delta-v or contact speed; '' if the target has neither."""
     return next((name for name in ("delta_v", "contact_speed") if name in frame), "")
 
 
@@ -125,7 +125,7 @@ def _worst(
 
 
 def _how_bad(row: Mapping[Any, Any], contact: str, units: Mapping[str, str]) -> str:
-    """For a contact its speed, for example `delta-v 6.70 m/s`; else the least margin to the hazards that
+    """For a contact its speed, for example `delta-v 6.70 m/s`; otherwise the smallest margin to hazards that
     occurred, or `-`."""
     if contact and row[contact] not in ("", "0.0"):
         words = "delta-v" if contact == "delta_v" else "contact at"

@@ -16,7 +16,7 @@ from mutator.verification import equivalence
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-LISTED = 20  # maximum of reasons for using the reference engine that a report lists, most frequent first
+LISTED = 20  # maximum number of listed reasons for using the reference engine, most frequent first
 _WORDS = {
     RunMode.FORK: "a fork of the golden run, just before the fault is first active",
     RunMode.GOLDEN: "no run: the trigger never holds, so the golden run's result is used",
@@ -62,7 +62,7 @@ def _lines(ways: Counter[tuple[str | None, str]]) -> Iterator[list[str]]:
             yield [words, str(count)]
         by_count = sorted(reasons.items(), key=lambda item: (-item[1], item[0]))
         for why, count in by_count[:LISTED]:
-            yield [f"{words}, because it cannot be forked: {why}", str(count)]
+            yield [f"{words}, because the run cannot be forked: {why}", str(count)]
         if rest := sum(count for _, count in by_count[LISTED:]):
             yield [f"{words}, for other reasons (see timings/)", str(rest)]
 
@@ -76,10 +76,11 @@ def _proof(folder: RunFolder, records: Mapping[str, Record]) -> tuple[str, str, 
     if found is None:
         said = "All experiments ran on the reference engine, so no equivalence check is needed."
         if folder.head["experiments"] < WORTH_IT:
-            said += f" Forking pays off from {WORTH_IT} experiments."
+            said += f" Forking pays off only with {WORTH_IT} or more experiments."
         return said, "none needed", False
     same = f"{found.same} of {found.sampled} same"
     if not found.whole:
-        said = f"Equivalence check, not finished: so far {found}, byte for byte. The rest has not run."
+        said = f"The equivalence check is not finished: so far, {found}, byte for byte. The rest of the "
+        said += "sample has not been rerun."
         return said, f"not finished: {same}", False
     return f"Equivalence check: of a sample rerun from the start, {found}, byte for byte.", same, False

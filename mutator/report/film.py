@@ -1,4 +1,4 @@
-"""Films an experiment: reruns its golden and faulty run with recording, and renders the film with the
+"""Films an experiment: reruns its golden and faulty runs with recording, and renders the film with the
 target's command."""
 
 import json
@@ -76,7 +76,7 @@ class Filming:
             if not (single.faulty / FILM).is_dir():
                 raise MutatorError(
                     f"the faulty run left no film: {record.status.value}, {record.detail}",
-                    remedy="choose an experiment that runs",
+                    remedy="choose an experiment whose run finishes",
                 )
             events = scratch / "events.json"
             names = hazards_in_words(self.workspace, self.target)
@@ -141,5 +141,5 @@ def _show(manifest: TargetManifest, folder: Path, places: Mapping[str, str], sho
         said = done.stderr.strip().splitlines() or ["no message"]
         complaint = said[-1].removeprefix("error: ").replace(str(made), str(out))
         raise MutatorError(complaint, where=f"{film.module}")
-    with half_written(out) as temporary:  # copying may be interrupted
+    with half_written(out) as temporary:  # copying can be interrupted
         shutil.copyfile(made, temporary)

@@ -11,14 +11,14 @@ from mutator.report.dangers import NO_CONTACT, SEVERITY
 from mutator.report.paths import FoundPaths, link_text
 from mutator.report.warnings import FIRST, SILENT
 
-LISTED = 5  # maximum of fault types listed
+LISTED = 5  # maximum number of fault types listed
 
 
 def first_to_fix(frame: pd.DataFrame, paths: FoundPaths | None, *, has_alerts: bool) -> Answer:
     """Answer which fault types to fix first: those with the most silent hazards in the highest severity
-    class, then in the next class, down to hazards without contact, then with the shortest time from
-    activation to hazard. If the target has no alerts, all hazards count. `frame` must have at least one
-    hazard."""
+    class; ties are broken by the next lower class, at last by hazards without contact, then by the shortest
+    time from activation to hazard. If the target has no alerts, all hazards are counted. `frame` must have at
+    least one hazard."""
     hazards = frame[frame["outcome"] == "hazard"]
     counted = hazards[hazards["warning"] != FIRST] if has_alerts else hazards
     if counted.empty:  # all hazards came after an alert, so count all

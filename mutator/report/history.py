@@ -80,7 +80,7 @@ def write_history(folder: Path) -> History:
             left_out.append(f"{path.name}: {err.got}")
     if not runs:
         raise MutatorError(
-            f"no run with results ({'; '.join(left_out)})" if left_out else "no run folder, and none in it",
+            f"no run with results ({'; '.join(left_out)})" if left_out else "there is no run folder here",
             where=folder,
             expected="a run folder, or a folder of run folders",
             remedy="check the path",

@@ -77,7 +77,7 @@ class FoundPaths:
     def data(self, ids: Sequence[str]) -> dict[str, Any]:
         """The page's data for the experiments `ids`: the shape of each path (-1: none), and for each
         channel a column of first times and a column of largest deviations. `by` lists the components that
-        changed before their own channels show it, with the latest possible time."""
+        must have changed before their own channels did, with the latest possible time."""
         shapes: dict[str, int] = {}
         columns: dict[str, Any] = {}
         codes, by, names = [], {}, [name for name, *_ in self.channels]

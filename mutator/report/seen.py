@@ -1,4 +1,4 @@
-"""The data that a report needs from all experiments in addition to the results, read once."""
+"""The data, read once, that a report needs from all experiments in addition to the results."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from mutator.store.run_folder import RunFolder
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-_PIECE = 5_000  # experiments read at once
+_PIECE = 5_000  # number of experiments read at a time
 PLACE, COURSE = "#place", "#course"  # extra columns of a frame of results; no metric has such a name
 _Alerts = tuple[tuple[str, float], ...]  # the alerts of one experiment
 

@@ -1,4 +1,4 @@
-"""Finds the series next to the report's page, and writes missing ones."""
+"""Finds the series that the report's page loads, and writes missing ones."""
 
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
@@ -24,6 +24,6 @@ def sample_kept_traces(folder: RunFolder, workspace: "Workspace") -> None:
     """Write the missing or damaged series of experiments whose traces are kept."""
     traces, series = Traces(workspace, folder), SeriesFolder(folder.path)
     for name in sorted(path.name for path in (folder.path / "traces").glob("*")):
-        with suppress(MutatorError, KeyError):  # e.g. the sources changed, or the trace is from other sources
+        with suppress(MutatorError, KeyError):  # for example, the sources changed after the run
             if not series.is_readable(name) and traces.is_kept(name):
                 keep_series(folder.path, traces.manifest, *traces.of(name), traces.record(name))

@@ -1,5 +1,5 @@
 """The source of a run's target, with the outcomes of the faults in each line. If the target has changed
-since, no source is shown."""
+since the run, no source is shown."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -30,7 +30,7 @@ ENDINGS = (
 )
 LASTING = (PERMANENT, TRANSIENT)
 _AROUND = 2  # lines shown before and after a marked line outside functions
-_JOINED = 3  # gaps up to this many lines are shown, too
+_JOINED = 3  # gaps of up to this many lines are shown, too
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -122,7 +122,7 @@ def _place(manifest: TargetManifest, fault: Fault) -> tuple[str, int]:
 def _marks(
     at: Mapping[str, tuple[str, int]], texts: "DataFrame"
 ) -> Iterator[tuple[tuple[str, int], str, Mark]]:
-    """Yield the marks of each line, for permanent and transient faults. Each fault counts once, with its
+    """Yield the marks of each line, for permanent and transient faults. Each fault is counted once, with its
     worst experiment."""
     found: dict[tuple[tuple[str, int], str], dict[str, int]] = {}
     for name, trigger, ending in zip(texts["fault_id"], texts["trigger"], endings(texts), strict=True):

@@ -1,4 +1,4 @@
-"""Digests of a report's inputs and files, so that resuming a complete run does not write the report again."""
+"""Digests of a report's inputs and files, so that resuming a complete run does not rewrite the report."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Takes stills of the few worst experiments whose controller sees pictures."""
+"""Takes stills of the worst experiments whose controller gets camera frames."""
 
 import time
 from collections.abc import Callable, Collection, Iterable, Mapping
@@ -24,7 +24,7 @@ Notify = Callable[[Progress], None]
 
 
 def take_stills(workspace: Workspace, folder: RunFolder, *, workers: int, notify: Notify) -> str:
-    """Take the run's missing stills. Returns why the first experiment without stills has none, or ''."""
+    """Take the run's missing stills. Return why the first experiment without stills has none, or ''."""
     manifest = workspace.manifest(folder.head["target"])
     if manifest.film is None or not manifest.film.pictures:
         return ""
@@ -52,7 +52,7 @@ def take_stills(workspace: Workspace, folder: RunFolder, *, workers: int, notify
     with ScratchFolder("mutator-stills-") as scratch:
         try:
             driven = {_golden_key(experiments[name]): experiments[name] for name in due}
-            # golden runs are submitted first, or all threads could wait for one that none runs
+            # golden runs are submitted first; otherwise all threads could wait for one that has not started
             goldens = {key: pool.submit(filming.golden, one, scratch / key) for key, one in driven.items()}
             found = [pool.submit(wrong, name, goldens[_golden_key(experiments[name])]) for name in due]
             pace = Pace("pictures", len(found))
@@ -74,7 +74,7 @@ def _due(
     experiments: Mapping[str, Experiment],
     records: Mapping[str, Record],
 ) -> dict[str, list[Shot]]:
-    """The missing stills of the worst experiments that see `pictures`, worst first."""
+    """The missing stills of the worst experiments with one of the changes `pictures`, worst first."""
     seeing = set(pictures)
     texts = Results.of_run(folder.path).texts()
     moved = ((texts["status"] == Status.OK.value) & (texts["t_manifest"] != "")).to_numpy()

@@ -19,14 +19,14 @@ _RUNS = {
     "margin": "the distance that a run kept from a hazard, negative once the hazard has occurred",
     "end of the drive": "the first terminal hazard, such as a contact: the simulation continues, but metrics "
     "and fault paths leave out later steps",
-    "rank": "1 is the worst; by severity, then delta-v; without contact by outcome, then margin",
+    "rank": "1 is the worst; contacts rank by severity and delta-v, the others by outcome and margin",
 }
 _ENDINGS = {
     "hazard": "a hazard occurred at or after activation",
     "sdc": "silent data corruption: the fault changed an actuator, without a hazard",
     "masked": "the fault was activated but changed no actuator, without a hazard",
     "not activated": "no changed statement ran while the trigger held",
-    "crashed, timeout": "the fault crashed the program, or kept it from finishing",
+    "crashed, timeout": "the fault crashed the program, or prevented it from finishing in time",
     "harness error, invalid mutant": "no result about the fault; counted only here",
 }
 _ALERTS = {
@@ -87,17 +87,17 @@ def _severity(scale: Mapping[str, object] | None) -> dict[str, str]:
     classes = scale["classes"]
     assert isinstance(classes, list)
     told = {f"severity {name}": f"delta-v of {low:.2f} m/s or more: {about}" for name, low, about in classes}
-    return told | {"no contact": "no class; these hazards rank by margin, with hazard types alternating"}
+    return told | {"no contact": "no severity class; these hazards rank by margin, each hazard in turn"}
 
 
 def _scenarios(run: ReportedRun) -> dict[str, str]:
-    """The descriptions in the scenarios' files, where there are any."""
+    """The descriptions of scenarios whose files have one."""
     names = sorted(run.texts["scenario"].unique())
     return {name: about for name in names if (about := _title(run, name))}
 
 
 def _title(run: ReportedRun, name: str) -> str:
-    """The `title` or `about` in a scenario's file. The file may have any format."""
+    """The `title` or `about` in a scenario's file, which can have any format."""
     if run.workspace is None:
         return ""
     try:
@@ -124,7 +124,7 @@ def _triggers(run: ReportedRun) -> dict[str, str]:
 
 
 def _contexts(run: ReportedRun) -> dict[str, str]:
-    """The contexts in the campaign's context table, if the table is found."""
+    """The contexts in the campaign's context table; empty if the table is not found."""
     try:
         campaign = yaml.safe_load((run.folder.path / "campaign.yaml").read_text(encoding="utf-8"))
         table = campaign["triggers"]["table"]

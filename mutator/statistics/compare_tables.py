@@ -28,10 +28,10 @@ def overall_sheet(frame: pd.DataFrame, published: Published | None) -> Sheet:
         name="guided_against_random",
         title="Guided against random: hazards",
         note="Fault types with faults of both methods. Odds ratio: Mantel-Haenszel over fault types, above 1 "
-        "if guided faults are more hazardous; p: that it is 1; p equal: that it is the same in all "
-        "types. Both p assume independent runs, so they are too small. Difference of rates (of 1): "
-        "guided minus random, with an interval resampled by fault (location and value), which needs single "
-        "runs; none if all faults agree.",
+        "if guided faults are more hazardous. p tests that the odds ratio is 1, p equal that it is the same "
+        "in all types; both assume independent runs, so they are too small. Difference: the rate of guided "
+        "minus that of random faults, as a fraction. Its interval resamples whole faults (location and "
+        "value), which needs single runs; there is none if all faults agree.",
         heads=(
             *("hazards of", "from", "guided", "random", "fault types"),
             *("odds ratio", "odds ratio, low", "odds ratio, high", "p", "p equal"),
@@ -42,7 +42,7 @@ def overall_sheet(frame: pd.DataFrame, published: Published | None) -> Sheet:
 
 
 def _resampled(frame: pd.DataFrame, whole: Whole, source: str) -> tuple[Cell, ...]:
-    if source != OURS:  # this needs single runs, which are not published
+    if source != OURS:  # resampling needs single runs, which are not published
         return (None,) * 4
     found = contrasts.resampled(frame, whole)
     return (found.difference, found.low, found.high, found.clusters)
@@ -87,8 +87,8 @@ def pairs_sheet(frame: pd.DataFrame) -> Sheet:
     return Sheet(
         name="matched_pairs",
         title="Guided and random runs of the same fault, in pairs",
-        note="Pairs have the same fault and value, scenario and context row. Hazards in both, in one or in "
-        "neither; p: McNemar's exact test, too small because it assumes that pairs of one fault are "
+        note="Pairs of runs with the same fault and value, scenario and context row, by which of the two has "
+        "a hazard. p: McNemar's exact test, too small because it assumes that pairs of one fault are "
         "independent; p, Holm: adjusted over fault types.",
         heads=("pairs", "fault type", "N", "both", "guided only", "random only", "neither", "p", "p, Holm"),
         lines=tuple(lines),

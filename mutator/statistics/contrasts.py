@@ -42,8 +42,8 @@ class Stratum:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pooled:
-    """The Mantel-Haenszel estimate over fault types: above 1 if guided faults are more hazardous, NaN if not
-    defined.
+    """The Mantel-Haenszel estimate over fault types: above 1 if guided faults are more hazardous, NaN if
+    undefined.
 
     `p` tests that the common odds ratio is 1, and `p_equal` that the odds ratio is the same in all types.
     """

@@ -1,7 +1,7 @@
 """Medians with bootstrap intervals that resample whole faults with all their runs.
 
 Each draw takes as many faults as there are, with replacement. The interval covers the middle 95 % of the
-medians of the draws. The seed is fixed.
+medians of all draws. The seed is fixed.
 """
 
 import math
@@ -15,15 +15,15 @@ from mutator.statistics.shares import CONFIDENCE
 
 RESAMPLES = 999
 _SEED = 1
-_CELLS = 500_000  # maximum of cells in one batch of draws, to limit memory
-_BLOCK = 256  # minimum of values in a block
+_CELLS = 500_000  # maximum number of cells in one batch of draws, to limit memory
+_BLOCK = 256  # minimum number of values in a block
 
 
 def median_interval(values: pd.Series, cluster: pd.Series) -> tuple[float, float]:
-    """The interval of the median of `values`, which must not have NaN. `cluster` has the cluster of each
+    """The interval of the median of `values`, which must not contain NaN. `cluster` has the cluster of each
     value.
 
-    NaN if there are fewer than two clusters or if all values are equal, because unobserved values may differ.
+    NaN if there are fewer than two clusters or if all values are equal, because unobserved values can differ.
     """
     return _interval([values.to_numpy(dtype=float)], cluster)
 

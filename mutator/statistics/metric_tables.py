@@ -13,7 +13,9 @@ from mutator.targets.severity import CLASSES
 
 HIGHER = "higher"
 TOTAL = "total"
-_INTERVAL = "Medians have 95 % intervals, resampled by fault (location and value); none if all runs agree."
+_INTERVAL = (
+    "The 95 % intervals of medians resample whole faults (location and value); none if all runs agree."
+)
 
 
 def metrics_sheet(frame: pd.DataFrame, metrics: Sequence[Sequence[str]]) -> Sheet:
@@ -30,8 +32,8 @@ def metrics_sheet(frame: pd.DataFrame, metrics: Sequence[Sequence[str]]) -> Shee
     return Sheet(
         name="metrics",
         title="Metrics by fault type",
-        note="Over the N runs with an activated fault and a value, up to the end of the drive. "
-        f"{_INTERVAL} A quarter of the runs is at least as bad as the worse quartile.",
+        note="The N runs with an activated fault and a value, up to the end of the drive. "
+        f"{_INTERVAL} A quarter of the runs are at least as bad as the worse quartile.",
         heads=(
             *("fault type", "metric", "unit", "worse", "N"),
             *("median", "median, low", "median, high", "worse quartile", "worst"),
@@ -53,7 +55,7 @@ def severity_sheet(frame: pd.DataFrame) -> Sheet:
         name="severity",
         title="Severity by fault type",
         note="Activated faults whose drive ended in a contact, in total and by class. 95 % "
-        "Wilson intervals; in brackets count/whole. Hazards without a contact have no class.",
+        "Wilson intervals; in brackets, the count and the total. Hazards without a contact have no class.",
         heads=("fault type", "contact", *CLASSES),
         lines=tuple(lines),
     )
@@ -73,9 +75,9 @@ def tolerant_times_sheet(frame: pd.DataFrame, *, alerts: bool = True) -> Sheet:
     return Sheet(
         name="fault_tolerant_times",
         title="From fault to hazard by fault type",
-        note="s from activation (the fault-tolerant time), from the first difference of an actuator, and "
-        "from the first alert to the first hazard, in the N runs with this order of events. Fault "
-        f"detection and reaction must fit into the shortest. {_INTERVAL}",
+        note="Time in s to the first hazard from activation (the fault-tolerant time), from the first "
+        "difference of an actuator, and from the first alert, in the N runs with this order of events. "
+        f"Fault detection and reaction must fit into the shortest time. {_INTERVAL}",
         heads=(
             *("fault type", "time", "N", "shortest, s", "lower quartile, s"),
             *("median, s", "median, low, s", "median, high, s"),

@@ -1,7 +1,7 @@
 """The mutation score of a closed loop: the share of operator mutants that change the drives.
 
-Each mutant counts once, and it has an effect if any of its drives has that effect. Shares are of activated
-mutants; others are listed separately.
+Each mutant is counted once, and it has an effect if any of its drives has that effect. Shares are of
+activated mutants; others are listed separately.
 """
 
 import math
@@ -26,15 +26,15 @@ _EFFECTS = ("actuator changed", "new alert", "hazard", "crash or timeout")
 _ALERT, _ACTIVE = _EFFECTS[1], "active"
 _HEADS = ("of", "counted", "fault", "number", "not activated", *_EFFECTS, "no effect")
 _NOTE = (
-    "What operators' mutants do to the closed loop. *Permanent* mutants are active in the whole "
-    "drive, *transient* ones while their trigger holds. Shares are of *activated* mutants; a mutant counts "
-    "once, if any of its drives shows the effect. Intervals are 95 % Wilson intervals; for counts of drives, "
+    "How mutants of operators affect the closed loop. *Permanent* mutants are active in the whole "
+    "drive, *transient* ones while their trigger holds. Shares are of *activated* mutants; a mutant has an "
+    "effect if any of its drives shows it. Intervals are 95 % Wilson intervals; for counts of drives, "
     "whole mutants are resampled (bootstrap). *New alert*: an alert that the scenario's fault-free run "
-    "does not raise. A drive that crashed or timed out is not judged: it counts only as such and in the "
-    "total. *No effect*: none of the four, which includes mutants that are equivalent to the "
-    "original."
+    "does not raise. A drive that crashed or timed out is not judged; it counts only as a crash or timeout "
+    "and in the total. *No effect*: none of the four effects, which includes mutants that are equivalent to "
+    "the original."
 )
-_SEVERAL = " They are counted together as drawn, without weights."
+_SEVERAL = " The chosen mutants are counted together, without weights for different sampling rates."
 _UNKNOWN_ALERTS = " The fault-free runs cannot be read, so alerts are not compared with theirs."
 
 

@@ -88,7 +88,7 @@ def resampled_interval(clusters: Sequence[np.ndarray], statistic: Callable[..., 
     """The interval of a statistic from a percentile bootstrap over whole clusters (scipy).
 
     Each array has a number for each cluster. NaN if there are fewer than two clusters, if the statistic is
-    undefined for some draws, or if it is equal for all draws, because unobserved clusters may differ.
+    undefined for some draws, or if it is equal for all draws, because unobserved clusters can differ.
     """
     from scipy.stats import DegenerateDataWarning, bootstrap  # type: ignore[import-untyped]
 

@@ -1,7 +1,7 @@
-"""The variation between a campaign's seeds. Each seed is the whole campaign with other draws.
+"""The variation between a campaign's seeds. Each seed is the whole campaign with different draws.
 
 An interval over runs assumes independence and ignores the variation of draws. Resampling whole seeds shows
-how much another campaign with as many seeds may differ.
+how much another campaign with as many seeds could differ.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,9 +17,9 @@ from mutator.statistics.sheet import Cell, Rate, Sheet
 
 ALL = "all"  # label of the lines for all faults
 _NOTE = (
-    "The 95 % Wilson interval of all seeds together, and the interval between seeds: whole seeds resampled "
-    "9,999 times, percentiles (none if all seeds agree); then the seeds with the least and the "
-    "largest share."
+    "All seeds: the share over all runs, with its 95 % Wilson interval. Between seeds: the 95 % interval "
+    "from 9,999 resamples of whole seeds (none if all seeds agree). Least and largest: the smallest and the "
+    "largest share of a seed."
 )
 _HEADS = (
     *("faults", "what", "of", "all seeds", "between seeds, low", "between seeds, high"),

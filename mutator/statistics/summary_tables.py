@@ -19,7 +19,7 @@ _MEASURES = (
     ("alerts_no_hazards", "activated"),
 )
 _WORDS = {"hazards_no_alerts": "hazards without alert", "alerts_no_hazards": "alerts without hazard"}
-_NOTE = "95 % Wilson intervals; in brackets count/whole."
+_NOTE = "Shares with 95 % Wilson intervals; in brackets, the count and the total."
 
 
 def summary_sheet(method: str, ours: Counts, published: Published | None, *, alerts: bool = True) -> Sheet:
@@ -33,7 +33,7 @@ def summary_sheet(method: str, ours: Counts, published: Published | None, *, ale
         for source, tallies in sources.items():
             cells = [_share(one, part, whole) for one in (*tallies.values(), _total(tallies.values()))]
             lines.append((_WORDS.get(part, part), whole, source, *cells))
-    notes = (_NOTE, published.counts_note if published else "", "The total is of the scenarios shown.")
+    notes = (_NOTE, published.counts_note if published else "", "The total covers the scenarios shown.")
     return Sheet(
         name=f"summary_{method}",
         title=_title(f"Summary by scenario, {method}", published.scenario_title if published else ""),

@@ -11,7 +11,8 @@ import pandas as pd
 class Tally:
     """Numbers of a group's faults that were injected, activated and so on. None: not known.
 
-    Alerts and hazards count from activation on. `hazards_no_alerts` counts hazards in runs without any alert.
+    Only alerts and hazards at or after the activation are counted. `hazards_no_alerts` counts hazards in runs
+    without any alert.
     """
 
     injected: int

@@ -10,8 +10,8 @@ from mutator.statistics.published import Published
 from mutator.statistics.sheet import Cell, Sheet
 
 _ALERT_NOTE = (
-    " Alert to hazard: only if the alert came first. Events after the end of the run are missing "
-    "here; see alert to hazard, censored."
+    " Alert to hazard: only if the alert came first. Hazards that would follow after the end of the run are "
+    "missing here; see the table *From alert to hazard, censored*."
 )
 
 
@@ -24,7 +24,7 @@ def propagation_sheet(frame: pd.DataFrame, published: Published | None, *, alert
     return Sheet(
         name="propagation",
         title="Propagation times by scenario",
-        note="s between events, in the N runs with both. Manifest: first difference of an "
+        note="Time in s between two events, in the N runs with both. Manifest: first difference of an "
         "actuator output from the fault-free run."
         + (_ALERT_NOTE if alerts else "")
         + (f" {published.times_note}" if published else ""),
@@ -53,9 +53,10 @@ def reaction_sheet(frame: pd.DataFrame, ends: Mapping[str, float], driver_s: flo
     return Sheet(
         name="alert_to_hazard",
         title="From alert to hazard, censored",
-        note="Runs whose first alert came before any hazard; without a hazard, censored at their end. "
+        note="Runs whose first alert came before any hazard. Without a hazard, they are "
+        "censored at their end. "
         "Median: Kaplan-Meier with its 95 % interval, `-` or `inf` if not reached; if the curve is flat at "
-        "one half, the middle. The last "
+        "one half, the middle of the flat part. The last "
         f"columns: share of alerts without a hazard within {late}, the driver's reaction time "
         f"(Kaplan-Meier), and share of hazards after an alert that came more than {late} later. Alerts "
         "with or after the first hazard are counted separately.",

@@ -39,11 +39,11 @@ class Reaction:
     `at_risk` is the number of runs with an alert before any hazard. Of these, `events` then had a hazard; the
     others are censored at their end. `median` is the time at which the Kaplan-Meier curve crosses one half.
     If the curve is flat at one half, `median` is the middle of the flat section, as in R's `survfit` and SAS;
-    if the flat section reaches the end of the curve, it is the section's beginning. From `median_low` to
-    `median_high`, the curve's log-log transformed interval contains one half (Brookmeyer and Crowley 1982).
-    An infinite end is not reached within the runs. `survival` is the Kaplan-Meier share of alerts without a
-    hazard within the driver's reaction time; `in_time` is the share of the hazards after an alert that came
-    later than this.
+    if the flat section reaches the end of the curve, `median` is the section's beginning. From `median_low`
+    to `median_high`, the curve's log-log transformed interval contains one half (Brookmeyer and Crowley
+    1982). A bound is infinite if the runs do not reach it. `survival` is the Kaplan-Meier share of alerts
+    without a hazard within the driver's reaction time; `in_time` is the share of the hazards after an alert
+    that came later than this.
     """
 
     at_risk: int
@@ -130,7 +130,7 @@ def _median(curve: Any) -> float:
 
 def _median_interval(curve: Any) -> tuple[float, float]:
     """The interval of the median time. Infinite or NaN: not reached."""
-    with np.errstate(all="ignore"):  # the last point of the curve may be 0, which has no log
+    with np.errstate(all="ignore"):  # the last point of the curve can be 0, which has no log
         low, high = curve.quantile_ci(0.5, alpha=1 - CONFIDENCE)
     # a curve that ends at 0 has no interval there, so the median's interval cannot end there
     is_open = high == curve.surv_times[-1] and curve.surv_prob[-1] < _EQUAL
@@ -174,5 +174,5 @@ def _order(times: Mapping[str, float]) -> str:
 
 
 def _warned(frame: pd.DataFrame) -> pd.Series:
-    """Whether an alert came before the first hazard. A simultaneous alert is no warning."""
+    """Whether an alert came before the first hazard. An alert at the same time is no warning."""
     return frame["t_alert"] < frame["t_hazard"]

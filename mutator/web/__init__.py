@@ -1,7 +1,7 @@
 """Assets of the HTML pages (the CSS and JavaScript files of this package), and data embedded in pages.
 
-Scripts are plain, not modules. A page loads them in the order in which it names them. Each declares one
-constant.
+The scripts are not modules. A page names them in the order in which they must be loaded. Each script declares
+one constant.
 """
 
 import base64

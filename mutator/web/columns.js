@@ -1,5 +1,5 @@
 "use strict";
-// The fold-out in which the user chooses the columns of the list.
+// The fold-out menu in which the user chooses the columns of the list.
 
 class Columns {
   constructor(place, grid, state) {

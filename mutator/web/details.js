@@ -4,7 +4,7 @@
 class Details {
   static #made = null;
 
-  /** The details in the page, which are unpacked once. */
+  /** The details that the page contains. They are unpacked only once. */
   static read() {
     Details.#made ??= Packed.read("details").then((data) => new Details(data));
     return Details.#made;

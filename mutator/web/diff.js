@@ -47,11 +47,11 @@ const Diff = (() => {
     return files;
   }
 
-  /** Whether each line of a hunk begins inside a docstring, which may begin above the hunk. */
+  /** Whether each line of a hunk begins inside a docstring, which can begin above the hunk. */
   function prose(lines) {
     const isOdd = (line) => (line.text.match(/"""/g) || []).length % 2 === 1;
     const first = lines.find(isOdd);
-    // the first quotes open a docstring if text follows them; else they close one
+    // the first quotes open a docstring if text follows them; otherwise they close one
     let inside = Boolean(first) && !/^\s*[rRfFbB]*"""./.test(first.text);
     return lines.map((line) => {
       const before = inside;

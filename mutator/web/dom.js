@@ -41,7 +41,7 @@ const Dom = (() => {
     return button;
   }
 
-  /** Select the text of an element, so that the user can copy it where the page is not allowed to. */
+  /** Select the text of an element, so that the user can copy it if the page is not allowed to. */
   function select(element) {
     if (element) getSelection().selectAllChildren(element);
   }

@@ -2,9 +2,9 @@
 // An open experiment next to the list: events, path, replay, diff, and commands to run it again.
 
 class Experiment {
-  static open = null; // {id, experiment} for scripts that add buttons, which the event `filled` notifies
+  static open = null; // {id, experiment} for scripts that add buttons; the event `filled` notifies them
 
-  /** `move(by)` moves within the list, `place()` returns the position in the list, `close()` closes the panel. */
+  /** `actions`: `move(by)` moves within the list, `place()` returns the position in the list, `close()` closes the panel. */
   constructor(place, table, state, facts, actions) {
     Object.assign(this, { place, table, state, facts, actions, title: document.title });
     this.mode = innerWidth > 1100 ? "split" : "unified";
@@ -38,7 +38,7 @@ class Experiment {
     else this.#fill();
     this.#showPlace();
     this.place.scrollTop = 0;
-    // restore the lost focus, or keys would scroll the page below
+    // restore the lost focus; otherwise keys would scroll the page below
     if (!wasOpen || hadFocus) {
       const same = hadFocus && [...this.place.querySelectorAll("header button")].find((b) => b.getAttribute("aria-label") === button);
       (same || this.place.querySelector("h2")).focus({ preventScroll: true });
@@ -150,14 +150,14 @@ class Experiment {
     if (this.row !== row) return; // another experiment was opened in the meantime
     this.#change(details.patch(row));
     const spec = details.spec(row);
-    this.#content("spec").replaceChildren(spec ? this.#spec(spec, details.setting(row)) : Dom.el("p.quiet", {}, "No plan of this run folder has it."));
+    this.#content("spec").replaceChildren(spec ? this.#spec(spec, details.setting(row)) : Dom.el("p.quiet", {}, "The plan of this run folder does not contain this experiment."));
     this.#pictures(id, [media?.[id]].find((kept) => kept?.stills.length || kept?.films.length));
     const place = this.#content("replay");
     if (series && !(series instanceof Error)) Replay.show(place, series, this.facts);
     else this.#noSeries(id, series);
   }
 
-  /** How far the fault got; `Path` reads this experiment's results with `text(name)` and `number(name)`. */
+  /** Show how far the fault got. `Path` reads this experiment's results with `text(name)` and `number(name)`. */
   #path() {
     if (typeof Path === "undefined") return;
     const { table, row } = this;
@@ -200,7 +200,7 @@ class Experiment {
     const { el } = Dom;
     const place = this.#content("pictures");
     if (!kept && !(this.facts.filmed && this.#endedWell)) {
-      place.parentElement.remove(); // without films of the target, or without channels of the run
+      place.parentElement.remove(); // the target cannot be filmed, or the run has no channels
       return;
     }
     const hazard = this.table.number(this.row, "t_hazard"), begin = this.table.number(this.row, "t_activation");
@@ -215,7 +215,7 @@ class Experiment {
       el("p", {}, "Then rebuild the report to see them here:"), this.command(`mutator report ${run}`));
   }
 
-  /** The event at the time of a still, which its file name has. */
+  /** The time of a still, as in its file name, and the event at that time. */
   #moment(time) {
     const moments = { t_activation: "fault first active", t_alert: "first alert", t_hazard: "first hazard" };
     const what = Object.keys(moments).filter((name) => this.table.number(this.row, name).toFixed(2) === time).map((name) => moments[name]);

@@ -1,5 +1,5 @@
 "use strict";
-// The filters above the table: a fold-out with counts for each facet, and removable chips for chosen values.
+// The filters above the table: a fold-out menu with counts for each facet, and removable chips for chosen values.
 
 class Filters {
   constructor(place, chips, table, state) {

@@ -108,7 +108,7 @@ class Grid {
   show(rows) {
     const areOthers = rows.length !== this.rows.length || rows.some((row, at) => row !== this.rows[at]);
     this.rows = rows;
-    this.place.style.setProperty("--rows", Math.max(1, rows.length)); // so that the window of a short list is low
+    this.place.style.setProperty("--rows", Math.max(1, rows.length)); // so that a short list has a small window
     if (this.state.columns.join() !== this.chosen) {
       this.#choose();
       this.#build();
@@ -137,7 +137,7 @@ class Grid {
   }
 
   /**
-   * Draw for paper from `beforeprint` to `afterprint`, else for the screen. This must be a state, because printing
+   * Draw for paper from `beforeprint` to `afterprint`, otherwise for the screen. `isOnPaper` is stored, because printing
    * scrolls and resizes the window, and the redraw that follows must not restore the screen's rows.
    */
   print(isOnPaper) {
@@ -199,7 +199,7 @@ class Grid {
     this.state.set({ experiment: this.table.text(this.rows[at], "experiment_id") }, options);
   }
 
-  /** Move the focus by a number of rows. If an experiment is open, open the one with the focus. */
+  /** Move the focus by a number of rows. If an experiment is open, open the newly focused one instead. */
   move(by) {
     if (!this.rows.length) return;
     this.current = Math.max(0, Math.min(this.rows.length - 1, this.current + by));

@@ -2,7 +2,7 @@
 // What happened in an experiment: scenario, trigger, alert, events with their times, severity and metrics.
 
 class Happened {
-  /** What the header says after the outcome; by `warning`. */
+  /** The header's text after the outcome, for each value of `warning`. */
   static ALERTED = { "no alert at all": ", no alert at all,", "alert only after the hazard": ", no alert before it,", "alert before the hazard": " after an alert," };
 
   constructor(table, row, facts) {

@@ -96,7 +96,7 @@ class HeatMap {
     return { all, text: `${n}/${all}`, what: all ? `${n} of ${all}, ${HeatMap.interval(n, all)}` : "", rate: all ? n / all : 0 };
   }
 
-  /** The same for the cells of a metric. The worst cell has full colour. */
+  /** The text, description and colour of each cell of a metric. The worst cell has full colour. */
   static #summaries({ which, turn }, cells) {
     return HeatMap.#coloured({ turn }, cells.map((told) => {
       const sorted = told.sort((a, b) => turn * (a - b)), middle = (sorted.length - 1) / 2;
@@ -105,7 +105,7 @@ class HeatMap {
     }));
   }
 
-  /** The same for values (null if there is none), each with its number of runs. */
+  /** The same for given values (null: no value), each with its number of runs. */
   static #coloured({ turn }, told) {
     const values = told.map(([value]) => value ?? NaN);
     const known = values.filter(Number.isFinite), low = Math.min(...known), high = Math.max(...known);
@@ -140,7 +140,7 @@ class HeatMap {
     return this.state.chosen.has(HeatMap.ROW) || this.state.chosen.has(HeatMap.COLUMN);
   }
 
-  /** Whether exactly `value` is chosen in a facet; null stands for nothing. */
+  /** Whether `value` is the only chosen value of a facet; null: whether no value is chosen. */
   #isChosen(name, value) {
     const chosen = this.state.chosen.get(name);
     return value === null ? !chosen : Boolean(chosen) && chosen.size === 1 && chosen.has(value);

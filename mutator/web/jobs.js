@@ -15,7 +15,7 @@ const Jobs = (() => {
   const words = ({ got, where, expected, remedy }) =>
     [where ? `${where}: ${got}` : got, expected && `expected ${expected}`, remedy].filter(Boolean).join("; ");
 
-  /** The answer of the server. Throws an Error with a text if the server refuses or is unreachable. */
+  /** The answer of the server. Throws an Error with a readable message if the server refuses or is unreachable. */
   async function ask(address, body) {
     const post = body && { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) };
     let response = null;
@@ -36,7 +36,7 @@ const Jobs = (() => {
     return id;
   }
 
-  /** Call `seen(jobs)` with the jobs, newest first, after every request. */
+  /** Call `seen(jobs)` with the jobs, newest first, after each request for the list. */
   function watch(seen) {
     watchers.push(seen);
     seen(known);
@@ -106,7 +106,7 @@ const Jobs = (() => {
     return { element: el("li", {}, state, title, progress, message, el("span.job-do", {}, result, cancel, log)), update };
   }
 
-  /** A link to the page that is open reloads it, because the job rebuilt its report. */
+  /** If a link leads to the open page, reload the page, because the job rebuilt its report. */
   function opened(event) {
     const to = new URL(event.currentTarget.href);
     if (to.pathname !== location.pathname) return;

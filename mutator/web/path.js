@@ -94,12 +94,12 @@ const Path = (() => {
       one.t === Infinity ? "" : el("span.time", {}, one.by ? "by " : "", seconds(one.t), one.state === "injected" ? "" : el("span.quiet", {}, ` ${since(one.t, one.begin)}`)));
   }
 
-  /** The reason why a component may change after one further along the path. */
+  /** The reason why a component can change after one further along the path. */
   function late(stages, paths) {
     const { el } = Dom;
     const all = stages.filter((one) => one.state === "reached" && stages.some((other) => other.state === "reached" && other.column > one.column && other.t < one.t));
     const names = all.map((one) => paths.components[one.name]?.label || one.name).join(" and ");
-    return names ? el("p.quiet", {}, `Recorded channels of ${names} changed only after those of a component further along the path. The fault reached that component by another way.`) : "";
+    return names ? el("p.quiet", {}, `Recorded channels of ${names} changed only after those of a component further along the path. The fault reached that component by another path.`) : "";
   }
 
   /** All channels that left the golden run, including those of components off the path. */

@@ -3,8 +3,8 @@
 
 const Replay = (() => {
   const BEFORE = 1; // the replay starts this many s before activation
-  const SPOKEN = 4; // maximum of channels in the description of a time
-  const SILENCE = 500; // ms for which the time must rest before it is read out
+  const SPOKEN = 4; // maximum number of channels in the description of a time
+  const SILENCE = 500; // ms for which the time must not change before it is read out
 
   const SYMBOLS = {
     play: "M4 2l9 6-9 6z", pause: "M4 2h3v12H4zM9 2h3v12H9z", start: "M3 3h2v10H3zM13 3v10L6 8z", end: "M11 3h2v10h-2zM3 3v10l7-5z",
@@ -178,7 +178,7 @@ const Replay = (() => {
       if (!isPlaying) this.speaking = setTimeout(() => document.activeElement !== this.bar.element && this.#say(t), SILENCE);
     }
 
-    /** Read the state out when the time rests. The bar announces its own changes. */
+    /** Read the state out once the time stops changing. The bar announces its own changes. */
     #say(t) {
       const text = this.describe(t);
       if (this.root.contains(document.activeElement) && this.live.textContent !== text) this.live.textContent = text;

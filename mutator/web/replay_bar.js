@@ -60,7 +60,7 @@ class ReplayBar {
     for (const name of ["pointerup", "pointercancel"]) this.element.addEventListener(name, () => over.abort(), { signal });
   }
 
-  /** Show the time. Describe it only at rest, or a screen reader would talk without a pause. */
+  /** Show the time. Describe it only while the replay is paused; otherwise a screen reader would never stop talking. */
   show() {
     const { t, isPlaying } = this.clock, { start, end } = this.series, share = (t - start) / (end - start || 1);
     this.handle.style.left = `${100 * share}%`;
@@ -70,7 +70,7 @@ class ReplayBar {
     this.element.setAttribute("aria-valuetext", this.describe(t));
   }
 
-  /** Show which part of the time the plots cover, unless they cover all of it. */
+  /** Show which part of the time the plots cover, unless they cover the whole run. */
   zoomed(from, to) {
     this.window.hidden = from <= this.series.start && to >= this.series.end;
     this.window.style.left = this.#at(from);

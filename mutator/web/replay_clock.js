@@ -31,7 +31,7 @@ class ReplayClock {
   }
 
   pause() {
-    if (!this.isPlaying) return; // a replay that left the page pauses at each frame; the last must not request another
+    if (!this.isPlaying) return; // a replay that is no longer on the page is paused repeatedly; it must not request more frames
     this.isPlaying = false;
     this.#ask();
   }
@@ -70,7 +70,7 @@ class ReplayClock {
 
   /** Play with reduced motion: two frames a second, without gliding. */
   #goOnCalmly() {
-    clearInterval(this.#timer); // left from a recent pause
+    clearInterval(this.#timer); // a timer can still run after a recent pause
     this.#timer = setInterval(() => {
       if (!this.isPlaying) return clearInterval(this.#timer);
       this.#advance(performance.now());

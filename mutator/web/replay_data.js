@@ -39,7 +39,7 @@ const ReplayData = (() => {
   }
 
   /** The root mean square difference of golden and faulty, from activation to the end of the drive, as a share of the axis.
-   *  A value that only one of them has counts as the whole axis. */
+   *  Where only one of them has a value, the difference is the whole axis. */
   function apart(channel, { low, high }, begin, end) {
     let sum = 0, count = 0;
     for (let i = index(channel.t, begin); i < channel.t.length && channel.t[i] <= end + TINY; i++, count++) {
@@ -49,8 +49,8 @@ const ReplayData = (() => {
     return Math.sqrt(sum / (count || 1));
   }
 
-  /** The axis of a channel, from its values up to the end of the drive. `cut`: the true range, if it is too large to show;
-   *  a headway time near standstill, for example, would hide everything else. `isWhole`: all values are integers. */
+  /** The axis of a channel, from its values up to the end of the drive. `cut`: the true range, if it is too large to show:
+   *  for example, a headway time near standstill would hide everything else. `isWhole`: all values are integers. */
   function range(channel, end) {
     const values = [];
     for (let i = 0; i < channel.t.length && channel.t[i] <= end + TINY; i++) values.push(channel.golden[i], channel.faulty[i]);

@@ -14,7 +14,7 @@ class ReplayGauges {
       this.element.classList.add("has-all");
       all.remove();
     } }, `All ${channels.length} instruments`);
-    this.element = el("div.gauges", { role: "group", "aria-label": "Instruments; pressed: its plot is shown" },
+    this.element = el("div.gauges", { role: "group", "aria-label": "Instruments; those that are pressed have a plot" },
       this.gauges.map(({ button }) => button), channels.length > ReplayGauges.FEW ? all : null);
   }
 

@@ -3,7 +3,7 @@
 
 class ReplayPlots {
   static NARROWEST = 0.2; // duration (s) of the narrowest view
-  static CHOSEN = { actuator: 2, truth: 3, internal: 1 }; // maximum of initial plots by role
+  static CHOSEN = { actuator: 2, truth: 3, internal: 1 }; // maximum number of initial plots by role
   static SEEN = 0.002; // the smallest visible difference, as a share of the axis
   static FACTOR = 1.6; // ratio of a zoom step
 

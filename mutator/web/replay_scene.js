@@ -6,7 +6,7 @@ class ReplayScene {
   static DASH = [3, 9]; // length (m) of dash and gap of a line
   static POST = 20; // distance (m) of the posts that make motion visible
   static AT = 0.24; // position of the followed actor, as a share of the width
-  static ZOOM = [3, 17]; // minimum and maximum of pixels per metre
+  static ZOOM = [3, 17]; // minimum and maximum number of pixels per metre
 
   constructor(tracks, series) {
     Object.assign(this, { tracks, series, end: ReplayData.until(series) });

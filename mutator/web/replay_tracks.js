@@ -39,7 +39,7 @@ class ReplayTracks {
     return { ground, actors };
   }
 
-  /** The distance of the origin, which is the integrated speed. A missing value counts as standstill. */
+  /** The distance that the origin has moved: the integrated speed. A missing speed is taken as 0. */
   #ground(speed) {
     let sum = 0;
     return Array.from(speed, (v, i) => {

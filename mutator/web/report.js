@@ -44,7 +44,7 @@ const Report = (() => {
     search.parentElement.append(Dom.copyButton(() => location.href, "Copy link to this view"));
   }
 
-  /** A text with the number of experiments that match a state, and with what the state asks for in vain. */
+  /** A text with the number of experiments that match a state, and with the names in the state that do not exist. */
   function foundText(table, state, count) {
     const all = table.count.toLocaleString("en");
     const found = state.isFiltered ? `${count.toLocaleString("en")} of ${all} experiments` : `${all} experiment${table.count === 1 ? "" : "s"}`;

@@ -2,7 +2,7 @@
 // The results as columns. Search, counts and sorting take less than the time between two keystrokes for 100,000 experiments.
 
 const Rows = (() => {
-  /** The filters: column, title and, for cells with several values, the separator. */
+  /** The filters: column, title, the name of an empty cell and, for cells with several values, the separator. */
   const FACETS = [
     { name: "kind", title: "Fault type" },
     { name: "module", title: "Module" },
@@ -167,7 +167,7 @@ const Rows = (() => {
       return { rows, apart, counts: new Map(this.facets.map((f, i) => [f.name, counts[i]])) };
     }
 
-    /** Sentences on a state's unknown columns and filters, and on filters without a value in these results. */
+    /** Sentences on a state's unknown columns and filters, and on filters for values that these results do not have. */
     unknown({ query, chosen, unknown }) {
       const made = unknown.map((name) => `This page has no filter "${name}"`);
       for (const token of query.toLowerCase().split(/\s+/)) {

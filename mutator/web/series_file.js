@@ -178,7 +178,7 @@ const SeriesFile = (() => {
   }
 
   /** The series of an experiment; null if there is none. Rejects with a message if it is damaged.
-   *  `isNew`: it may be newer than this page. */
+   *  `isNew`: the series can be newer than this page. */
   async function load(id, { isNew = false } = {}) {
     try {
       return await found(id, isNew);

@@ -37,7 +37,7 @@ class State {
     this.query = one("q", "");
     this.sort = one("sort", "");
     this.heat = one("heat", "");
-    this.columns = (given.get("cols") || []).filter(Boolean); // columns of the list; none stands for the defaults
+    this.columns = (given.get("cols") || []).filter(Boolean); // columns of the list; empty: the defaults
     this.chosen = new Map();
     for (const { name, none } of Rows.FACETS) {
       if (given.has(name)) this.chosen.set(name, new Set(given.get(name).map((value) => (value === "none" && none) || value)));
@@ -62,13 +62,13 @@ class State {
     return parts.join("&");
   }
 
-  /** Change the state (`{query, sort, heat, columns, experiment}`); `replace`: too small a step for Back. */
+  /** Change the state (`{query, sort, heat, columns, experiment}`); `replace`: Back does not stop at this step. */
   set(change, { replace = false } = {}) {
     Object.assign(this, change);
     this.#write(replace);
   }
 
-  /** Choose exactly these values of a facet. No values stands for all. */
+  /** Choose exactly these values of a facet. An empty choice selects all values. */
   choose(facets, { replace = false } = {}) {
     for (const [name, values] of Object.entries(facets)) {
       if (values.length) this.chosen.set(name, new Set(values));

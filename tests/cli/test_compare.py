@@ -42,7 +42,7 @@ def test_a_different_selection_is_reported_before_any_table(cli: Cli, root: Path
     """The page has the remark, too."""
     workspace = Workspace.find(root)
     runs = write_run(workspace, Path("whole")), write_run(workspace, Path("part"), limit=6)
-    said = "The runs are different parts of a campaign: whole has all of it, part has --limit 6."
+    said = "The runs are different parts of a campaign: whole has everything, part has --limit 6."
     answer = cli("compare", *runs, "--out", "c")
     assert answer.code == 0, answer.err
     assert answer.out.startswith(said)

@@ -20,8 +20,8 @@ PANELS: tuple[Callable[[ReportedRun], Panel | None], ...] = (
 
 
 def study_panels(run: ReportedRun) -> tuple[Panel, ...]:
-    """The panels of the study's page: its own, then the run's tables and figures next to the published
-    ones. Empty if the study does not apply: too few experiments, or none of the study's faults."""
+    """The panels of the study's page: those of the study, then the run's tables and figures next to the
+    published ones. Empty if the run has too few experiments or none of the study's faults."""
     said = [panel for panel_of in run.study.panels if (panel := panel_of(run))] if run.study else []
     if not said:
         return ()

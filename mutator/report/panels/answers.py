@@ -1,4 +1,4 @@
-"""The first panel of a report, which answers the first questions of a reader."""
+"""The first panel of a report, which answers a reader's first questions."""
 
 import re
 from collections.abc import Mapping
@@ -72,7 +72,7 @@ def _labelled(head: str, cell: Cell, meanings: Mapping[str, str]) -> str:
 
 
 def _explained(codes: str, meanings: Mapping[str, str]) -> str:
-    """Codes of hazards or of a severity class, with their meanings as a tooltip."""
+    """The codes of hazards or of a severity class, with their meanings as a tooltip."""
     names = codes.removeprefix("severity ").split(", ")
     about = "; ".join(meanings[name] for name in names if name in meanings)
     return Markup('<abbr title="{}">{}</abbr>').format(about, codes) if about else codes
@@ -80,7 +80,7 @@ def _explained(codes: str, meanings: Mapping[str, str]) -> str:
 
 def _cell(cell: Cell) -> str:
     if isinstance(cell, Link):
-        text = Markup("<wbr>").join(re.split(r"(?<=[/_])", cell.text))  # long names may break here
+        text = Markup("<wbr>").join(re.split(r"(?<=[/_])", cell.text))  # long names can break here
         return Markup('<a href="#{}">{}</a>').format(cell.to, text)
     if isinstance(cell, Part):
         return Markup(_BAR).format(cell.part / cell.of if cell.of else 0.0, cell.text)

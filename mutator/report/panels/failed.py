@@ -11,13 +11,13 @@ from mutator.report.panel import Panel, rendered
 from mutator.report.studies import ReportedRun
 
 _HEADS = ("status", "experiment", "fault", "scenario", "message")
-LISTED, PAGE_LISTED = 30, 200  # maximum of runs listed; the page's search finds all
+LISTED, PAGE_LISTED = 30, 200  # maximum number of runs in Markdown and on the page, whose search finds all
 _HTML = """\
 <h2>Runs that did not finish normally</h2>
 <p>A harness error says nothing about its fault, so no count includes it.</p>
 {{ table.as_html() }}
 {% if more > 0 %}
-<p>{{ more }} more: <a href="#status={{ failings | join(',') }}">all of them</a>.</p>
+<p>And {{ more }} more: <a href="#status={{ failings | join(',') }}">all of them</a>.</p>
 {% endif %}
 """
 

@@ -1,4 +1,4 @@
-"""The panel of a run's figures. They are written as files, and both forms of the report show them."""
+"""The panel of a run's figures. The figures are written as files, and both forms of the report show them."""
 
 import base64
 from pathlib import Path

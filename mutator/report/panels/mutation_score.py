@@ -24,7 +24,7 @@ _HTML = """\
 
 
 def score_panel(run: ReportedRun) -> Panel | None:
-    """The panel with the shares in total and by operator. Writes tables/mutation_score.csv."""
+    """The panel with the shares in total and by operator. This also writes tables/mutation_score.csv."""
     if not (run.texts["module"] == OPERATORS).any():
         return None
     runs = run.fault_free()
@@ -42,5 +42,5 @@ def score_panel(run: ReportedRun) -> Panel | None:
 
 
 def _part(score: Sheet, of_functions: bool) -> Sheet:
-    """The lines of functions if `of_functions`, else all other lines."""
+    """The lines of functions if `of_functions`; otherwise all other lines."""
     return replace(score, lines=tuple(line for line in score.lines if ("::" in str(line[0])) == of_functions))

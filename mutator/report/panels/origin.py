@@ -57,14 +57,14 @@ def _facts(run: ReportedRun) -> list[tuple[str, str]]:
 
 
 def _study(run: ReportedRun) -> dict[str, str]:
-    """The study that the campaign asks for, and the reason if this report does not show it."""
+    """The study that the campaign names, and the reason if this report is not compared with it."""
     name = run.folder.head.get("study")
     if not name:
         return {}
     if run.study and run.workspace:
         problems = study_problems(name, run.study, run.workspace)
-        silent = "" if run.compared else "; these results are not enough for it"
+        silent = "" if run.compared else "; these results cannot be compared with it"
         why = f"; problem with its data (see `mutator check`): {problems[0].got}" if problems else silent
         return {"study": f"{name} ({run.study.about}){why}"}
-    why = "cannot be loaded here" if run.workspace else "needs a fault library, and none is here"
+    why = "cannot be loaded here" if run.workspace else "needs a fault library, but none was found"
     return {"study": f"{name}, which {why}"}

@@ -11,19 +11,20 @@ from mutator.report.studies import ReportedRun
 from mutator.web import plainly_embedded
 
 _ABOUT = (
-    "Each link shows how many active faults came to it and how many got through: after it, recorded signals "
-    "differ from the golden run."
+    "Each link shows how many active faults came to it and how many got through it. A fault got through if "
+    "recorded signals behind the link differ from the golden run."
 )
 _NONE_STOPPED = "None: every active fault changed an actuator."
 _HTML = """\
 <h2>Fault paths</h2>
 <p>{{ about }}</p>
 {% if figure %}
-<p class="quiet">Links: thicker, more faults got through; dashed, none did; thin, the end is not recorded;
-dotted, feedback and people, which are on no path. Boxes: orange, faults were <strong>injected</strong> here;
-green, faults were <strong>stopped</strong> here, so they got no further through this component. A fault that
-two components stopped counts at both. A <strong>masked</strong> fault changed no actuator by any way. Select
-a link to list the experiments that got through it, or a box to list those masked there.</p>
+<p class="quiet">Links: the thicker, the more faults got through; dashed if none did; thin if the end is not
+recorded; dotted if it is feedback or a link of people, which belong to no path. Boxes: orange if faults were
+<strong>injected</strong> here; green if faults were <strong>stopped</strong> here, so they got no further
+through this component. A fault that two components stopped is counted at both. A <strong>masked</strong>
+fault changed no actuator at all. Select a link to list the experiments whose faults got through it, or a box
+to list those whose faults were masked there.</p>
 <div class="row"><label for="ways-kind">Faults:</label> <select id="ways-kind" disabled>
 {% for kind in kinds %}
 <option>{{ kind }}</option>
@@ -43,7 +44,7 @@ a link to list the experiments that got through it, or a box to list those maske
 {% endfor %}
 </tbody></table></div></details>
 <h3>Where masked faults were stopped</h3>
-<p class="quiet">Each fault that changed no actuator counts once, under all components that stopped it.</p>
+<p class="quiet">Each fault that changed no actuator is counted once, under all that stopped it.</p>
 {% if stops %}
 {{ stops.as_html("counts") }}
 {% else %}

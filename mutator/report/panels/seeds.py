@@ -21,13 +21,13 @@ _HTML = """\
 
 
 def seeds_panel(run: ReportedRun) -> Panel | None:
-    """The panel with the spread of each share between seeds. Writes its tables."""
+    """The panel with the spread of each share between seeds. This also writes its tables."""
     seeds = seeds_of(run.frame)
     if len(seeds) < 2:
         return None
     sheets = (seeds_sheet(run.frame, alerts=run.folder.has_alerts), kinds_sheet(run.frame))
     write_sheets(sheets, run.out)
-    about = f"{len(seeds)} seeds, from {seeds[0]} to {seeds[-1]}: each is the campaign with other draws."
+    about = f"{len(seeds)} seeds, from {seeds[0]} to {seeds[-1]}. Each repeats the campaign with new draws."
     markdown = "\n\n".join(["## Seeds", about, *(f"#{sheet.markdown().rstrip()}" for sheet in sheets)])
     html = rendered(_HTML, about=about, sheets=sheets)
     return Panel(anchor="seeds", link="Seeds", markdown=markdown, html=html, summary=_summary(sheets[0]))

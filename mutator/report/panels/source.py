@@ -23,11 +23,11 @@ _MEANINGS = dict(
         strict=True,
     )
 )
-_LISTED = 20  # maximum of lines listed in Markdown
+_LISTED = 20  # maximum number of lines listed in Markdown
 _ABOUT = (
     "Functions with injected faults. Each line shows the worst outcome of its permanent mutants and, next to "
-    "it, of its transient ones, with the number of mutants that reached it. A mutant counts by its worst "
-    "experiment; harness errors do not count."
+    "it, of its transient ones, with the number of mutants that had it. A mutant is counted by its worst "
+    "experiment; harness errors are not counted."
 )
 _HTML = """\
 <h2>Source</h2>
@@ -62,7 +62,7 @@ _CLASSES = {tokenize.COMMENT: "comment", tokenize.NUMBER: "number", tokenize.STR
 
 
 def source_panel(run: ReportedRun) -> Panel | None:
-    """The panel with each file that has faults. The worst file is unfolded."""
+    """The panel with each file that has faults. Only the worst file is unfolded."""
     source = run.source
     if source is None:
         return None
@@ -84,7 +84,7 @@ def source_panel(run: ReportedRun) -> Panel | None:
 
 def _told(file: MarkedFile) -> str:
     endings = [f"{_MEANINGS[name].partition(':')[0]} {n}" for name, n in file.worst_lines().items()]
-    return f"{counted(len(file.marks), 'line')} with mutants, by the worst of them: {', '.join(endings)}"
+    return f"{counted(len(file.marks), 'line')} with mutants, by worst outcome: {', '.join(endings)}"
 
 
 def _worst(files: Sequence[MarkedFile]) -> Table:

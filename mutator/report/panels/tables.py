@@ -24,7 +24,7 @@ NOTES = (
     "separately. *Activated*: an injected statement ran while triggered. "
     "*Manifested*: an actuator output then differed from the fault-free run."
 )
-NO_ALERT = " **Hazard, no alert*: no counted alert, before or after the hazard."
+NO_ALERT = " *Hazard, no alert*: no alert at all, before or after the hazard."
 FAULT_FREE = "The golden runs: first times of alerts and hazards, and the range of each plotted channel."
 _GROUPS = (
     ("By fault type", "fault type", kinds),
@@ -66,7 +66,7 @@ def notes(folder: RunFolder) -> str:
 
 
 def tables_panel(run: ReportedRun) -> Panel:
-    """The panel of counts, then statistics. Those with published counterparts are on the study's page."""
+    """The panel of counts, then statistics. Tables with published counterparts are on the study's page."""
     runs = run.fault_free()
     note = own_alerts(runs)
     own = () if run.compared else _statistics(run, None)

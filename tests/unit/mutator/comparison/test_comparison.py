@@ -67,7 +67,7 @@ def test_pairs_in_which_one_run_stops_get_a_remark(found: Comparison) -> None:
     first, *rest = found.pairs
     stopped = replace(first, b=replace(first.b, after_hazard=AfterHazard.STOP))
     (remark,) = remarks(found.a, found.b, replace(found.matching, pairs=(stopped, *rest)))
-    assert remark.startswith(f"1 of {len(found.pairs)} pairs end at their first terminal hazard in only one")
+    assert remark.startswith(f"1 of {len(found.pairs)} pairs end at the first terminal hazard in only one")
 
 
 def test_runs_without_a_list_of_files_can_be_compared(
@@ -80,7 +80,7 @@ def test_runs_without_a_list_of_files_can_be_compared(
     del told["target_files"]
     head.write_text(json.dumps(told))
     reseal(old)
-    assert "is not known" in pages.files_text(compare(old, runs[1]))
+    assert "is unknown" in pages.files_text(compare(old, runs[1]))
 
 
 def test_a_gate_names_each_new_hazard_once(found: Comparison) -> None:
@@ -173,7 +173,7 @@ def test_missing_results_do_not_affect_rates(toycar: Workspace, tmp_path: Path, 
     assert len(findings(found, [Gate.HARNESS_ERROR])) == kinds.count("lane")
     rates = found.sheets[2]
     assert {line[1] for line in rates.lines} == {kinds.count("distance")}
-    assert "have no valid result in one run" in pages.summary(found)
+    assert "a run has a harness error or an invalid mutant" in pages.summary(found)
 
 
 class Page(HTMLParser):
@@ -224,4 +224,4 @@ def test_a_long_page_shows_the_first_changes_without_scripts(
     rows = [line for line in text.splitlines() if '<span class="change' in line]
     assert len(rows) == len(found.changed) > 3
     assert "#changed:not([data-filtered]) tbody tr:nth-child(n + 4) { display: none; }" in text
-    assert f"At most 3 of the {len(rows)} are shown at once" in text
+    assert f"At most 3 of the {len(rows)} experiments are shown at once" in text

@@ -143,6 +143,6 @@ def test_without_severity_classes_no_change_of_severity_is_reported(
     """A gate on severity is refused."""
     found = compare(*(runs[i] for i in order))
     assert not found.having(Change.HIGHER_SEVERITY) + found.having(Change.LOWER_SEVERITY)
-    assert "Severity is not compared: without has none." in found.remarks
+    assert "Severity is not compared: without has no classes." in found.remarks
     with pytest.raises(MutatorError, match="without has no severity classes"):
         findings(found, [Gate.SEVERITY_S1])

@@ -233,7 +233,7 @@ def names_of(run: ReportedRun, empty: str) -> set[str]:
 def test_a_report_without_hazards_has_no_empty_table(run: ReportedRun) -> None:
     panel = answers_panel(part_of(run, names_of(run, "t_h1")))
     assert "0 of 3 activated faults (0 %) led to a hazard." in panel.markdown
-    assert "## Which hazards were silent\n\nNo hazard came." in panel.markdown
+    assert "## Which hazards were silent\n\nNo hazard occurred." in panel.markdown
     assert "| worst" not in panel.markdown
     assert "What to fix first" not in panel.markdown
 

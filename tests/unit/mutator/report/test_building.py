@@ -128,7 +128,7 @@ def test_figures_are_in_the_markdown_and_in_the_page(run: Path) -> None:
 
 def test_experiments_and_runs_are_counted_separately(run: Path) -> None:
     """Plans from before shared runs do not have the number of runs."""
-    assert "3 experiments are planned, as 2 runs" in building.write(run, None).markdown.read_text()
+    assert "3 experiments are planned, in 2 runs" in building.write(run, None).markdown.read_text()
     (run / "run.json").write_text(json.dumps({name: x for name, x in HEAD.items() if name != "runs"}))
     assert "3 experiments are planned.\n" in building.write(run, None).markdown.read_text()
 
@@ -140,7 +140,7 @@ def test_the_report_says_what_stopped_runs_might_have_missed(run: Path) -> None:
     (run / "run.json").write_text(json.dumps(HEAD | stops))
     written = building.write(run, None)
     assert written.markdown.read_text().count(STOP_NOTE) == 3
-    assert f"counts in each. {STOP_NOTE}" in written.markdown.read_text()
+    assert f"they share one run. {STOP_NOTE}" in written.markdown.read_text()
     assert STOP_NOTE in written.page.read_text()
 
 
@@ -225,7 +225,7 @@ def test_the_report_shows_the_spread_of_several_seeds(run: Path) -> None:
         table.writeheader()
         table.writerows([line | {"seed": "2"} for line in lines] + more)
     written = building.write(run, None)
-    assert "## Seeds\n\n3 seeds, from 2 to 11: each is" in written.markdown.read_text()
+    assert "## Seeds\n\n3 seeds, from 2 to 11. Each repeats" in written.markdown.read_text()
     assert '<section class="part" id="seeds">' in written.page.read_text()
     assert (run / "report" / "tables" / "seeds_by_fault_type.csv").is_file()
     assert (

@@ -128,7 +128,11 @@ def record_ids(run: Path) -> list[str]:
             "3 of 4 experiments came out the same on the reference engine, byte for byte. The rest",
             "not finished: 3 of 4 same",
         ),
-        (None, "no equivalence check is needed. Forking pays off from 40 experiments.", "none needed"),
+        (
+            None,
+            "no equivalence check is needed. Forking pays off only with 40 or more experiments.",
+            "none needed",
+        ),
     ],
 )
 def test_complete_partial_and_missing_proofs_are_distinguished(

@@ -69,5 +69,5 @@ def test_the_page_links_to_existing_reports_and_comparisons(folder: Path) -> Non
 
 
 def test_no_run_is_an_error(folder: Path) -> None:
-    with pytest.raises(MutatorError, match="no run folder, and none in it"):
+    with pytest.raises(MutatorError, match="there is no run folder here"):
         write_history(folder / "before" / "plots")
