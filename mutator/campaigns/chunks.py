@@ -42,7 +42,7 @@ class Pending:
 def pending(folder: RunFolder, records: Mapping[str, Record]) -> tuple[Pending, ...]:
     """Return the chunks of this folder's share that have experiments to run.
 
-    These are experiments without a record, and harness errors, which are retried.
+    Experiments to run are those without a record, and harness errors, which are retried.
     """
     done = {one.experiment_id for one in endings(records) if one.counts}
     names = plan_file.ids(folder.path) if done else None

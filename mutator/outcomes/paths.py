@@ -105,7 +105,7 @@ class Course:
 
 
 class Sight(NamedTuple):
-    """The inputs that determine a course."""
+    """The facts about an experiment that determine its course."""
 
     injected: frozenset[str]
     order: tuple[tuple[str, int], ...]  # the rank of the time at which each component left golden

@@ -99,7 +99,7 @@ def _worst(
     *,
     has_alerts: bool,
 ) -> Listing:
-    """The experiments with their measures of danger. Each link opens within the list filtered by
+    """The experiments with their measures of danger. Each link opens one of them in the list filtered by
     `shown`."""
     contact = contact_measure(ranked)
     heads = [head, "scenario", "hazards"]

@@ -17,7 +17,7 @@ from mutator.store.run_folder import RunFolder
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-_PIECE = 5_000  # number of experiments read at a time
+_PIECE = 5_000  # number of experiments in a batch
 PLACE, COURSE = "#place", "#course"  # extra columns of a frame of results; no metric has such a name
 _Alerts = tuple[tuple[str, float], ...]  # the alerts of one experiment
 
@@ -62,7 +62,7 @@ class Seen:
 def _looks(
     folder: RunFolder, texts: "DataFrame", records: Mapping[str, Record], ways: Ways | None
 ) -> Iterator[tuple[list[Sight | None], dict[str, _Alerts]]]:
-    """For each piece, the sights of its experiments, and the alerts of those with a hazard."""
+    """Yield, for each batch of experiments, their `Sight`, and the alerts of those with a hazard."""
     faults, pairs = plan_file.read_faults(folder.path), texts[["experiment_id", "fault_id"]]
 
     def looked_at(piece: "DataFrame") -> tuple[list[Sight | None], dict[str, _Alerts]]:

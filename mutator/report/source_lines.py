@@ -56,7 +56,7 @@ class MarkedFile:
     marks: Marks
 
     def worst_lines(self) -> dict[str, int]:
-        """For each ending, the number of lines of which it is the worst."""
+        """The number of lines by the worst outcome or status of their mutants, worst first."""
         worst = [min((m.ending for m in here.values()), key=ENDINGS.index) for here in self.marks.values()]
         return {ending: worst.count(ending) for ending in ENDINGS if ending in worst}
 
