@@ -18,7 +18,7 @@ def frames(d_rel=50.0, v_rel=-3.0, **truth):
 
 
 def test_a_track_has_the_radars_resolution(radar):
-    """Distances are multiples of 1/16 m and speeds of 1/32 m/s. Positions to the left are positive."""
+    """Distances are multiples of 1/16 m, and speeds of 1/32 m/s. Positions to the left are positive."""
     data = radar.update(frames(d_rel=97.681, v_rel=-8.8902, lateral_offset=0.5), 1.0)
     (point,) = data.points
     assert (point.d_rel, point.v_rel, point.y_rel) == (97.625, -8.875, -0.5)

@@ -13,7 +13,7 @@ def test_interp_between_and_beyond_breakpoints() -> None:
 
 
 def test_interp_takes_the_last_of_equal_breakpoints() -> None:
-    """This also holds at the start of the table."""
+    """Equal breakpoints can also be at the start of the table."""
     assert interp(0.0, (0.0, 0.0, 1.0), (5.0, 7.0, 8.0)) == 7.0
 
 

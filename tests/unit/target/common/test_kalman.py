@@ -6,7 +6,7 @@ from selfdrive.common.kalman import DistanceFilter, SteadyKalman
 
 
 def test_speed_estimate_starts_like_openpilots() -> None:
-    """From 0, with a measured 26.797 m/s, the third and fourth estimates equal openpilot's."""
+    """For a measured speed of 26.797 m/s, the third and fourth estimates equal openpilot's."""
     speed = SteadyKalman(0.0, 0.0, dt=0.01, gains=SPEED_GAINS)
     values = []
     for _ in range(4):

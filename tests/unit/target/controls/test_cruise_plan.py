@@ -21,7 +21,7 @@ from selfdrive.messages import LeadData
 def test_acceleration_limits_depend_on_speed(
     v_ego: float, following: bool, a_min: float, a_max: float
 ) -> None:
-    """The jerk limits have the same values."""
+    """The jerk limits have the same values as the acceleration limits."""
     limits = cruise_limits(v_ego, following, 0.0, slow_down=False)
     assert limits == pytest.approx((a_min, a_max, a_min, a_max))
 

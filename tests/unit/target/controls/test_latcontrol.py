@@ -93,7 +93,7 @@ def test_there_is_no_torque_at_rest_or_while_disengaged(
 def test_saturation_is_reported_only_above_10_mps(
     params: CarParams, v_ego: float, degrees: float, told: bool
 ) -> None:
-    """The report comes after more than 0.8 s of full torque."""
+    """Saturation is reported after more than 0.8 s of full torque."""
     lateral, car = control(params, degrees, v_ego=v_ego)
     for _ in range(85):
         lateral.update(car, True)

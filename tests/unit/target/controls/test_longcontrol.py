@@ -20,8 +20,8 @@ def follow(control: LongControl, car: CarState, p: Plan, cycles: int = 1) -> tup
     return output
 
 
-def test_while_off_the_outputs_are_zero_and_the_target_is_the_cars_speed(params: CarParams) -> None:
-    """The target is at least 0.3 m/s."""
+def test_off_has_zero_outputs_and_follows_the_cars_speed(params: CarParams) -> None:
+    """While control is off, the target speed is at least 0.3 m/s."""
     control = LongControl(params)
     assert control.update(False, at(20.0), plan(30.0)) == (0.0, 0.0)
     assert (control.state, control.v_pid) == (OFF, 20.0)

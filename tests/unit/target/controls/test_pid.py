@@ -66,7 +66,7 @@ def test_saturation_is_reported_after_more_than_800_ms() -> None:
     assert saturate(82).saturated
 
 
-def test_small_errors_an_override_or_a_disabled_check_prevent_saturation() -> None:
+def test_a_small_error_an_override_or_a_disabled_check_prevents_saturation() -> None:
     assert not saturate(200, error=0.09).saturated
     assert saturate(200, error=0.11).saturated
     assert not saturate(200, override=True).saturated
@@ -74,7 +74,7 @@ def test_small_errors_an_override_or_a_disabled_check_prevent_saturation() -> No
 
 
 def test_the_saturation_count_falls_as_fast_as_it_rises() -> None:
-    """The count is limited to 1 s."""
+    """The saturation count is limited to 1 s."""
     pid = saturate(300)
     for _ in range(10):
         pid.update(0.0, 0.0, speed=0.0)

@@ -179,7 +179,7 @@ def test_radar_errors_raise_an_event_at_once(params: CarParams) -> None:
 
 
 def test_collision_warnings_are_passed_on_unless_the_driver_brakes(params: CarParams) -> None:
-    """A new lead restarts the counters."""
+    """A new lead restarts the warning's counters."""
     drive = Drive(params)
     resets = []
     drive.planner._fcw_checker = SimpleNamespace(update=lambda *_: True, reset=lambda: resets.append(1))

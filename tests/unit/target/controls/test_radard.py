@@ -80,7 +80,7 @@ def test_a_vehicle_off_the_path_is_not_a_lead(params: CarParams) -> None:
 
 
 def test_the_steering_angle_gives_the_path_while_the_driver_steers(params: CarParams) -> None:
-    """This also holds while control is off."""
+    """The steering angle also gives the path while control is off."""
     straight = {"steering_angle": 0.5}
     assert Drive(params, **straight).see(point(), cycles=3).lead_one.status
     assert not Drive(params, active=False, **straight).see(point(), cycles=3).lead_one.status

@@ -21,7 +21,7 @@ def test_from_constant_speed_acceleration_changes_at_the_jerk_limit() -> None:
     assert smooth_speed(20.0, 0.0, 15.0, LIMITS, 0.2) == pytest.approx((19.98, -0.2))
 
 
-def test_acceleration_away_from_the_target_ends_with_three_times_the_jerk_limit() -> None:
+def test_away_from_the_target_the_jerk_limit_is_three_times_as_high() -> None:
     _, a = smooth_speed(20.0, -0.5, 25.0, LIMITS, 0.1)
     assert a == pytest.approx(-0.2)
 

@@ -1,7 +1,7 @@
 """The effect of a step in the radar's relative speed on the lead's history and the collision warning.
 
-In the original, a distance jump of more than 2.5 m or a lost lead resets everything. A jump of the relative
-speed resets nothing, unless the plan cannot follow it. We measured these rules on openpilot v0.4.2. The
+In openpilot, a distance jump of more than 2.5 m or a lost lead resets everything. A jump of the relative
+speed resets nothing, unless the plan cannot follow it. We measured these rules on v0.4.2. The
 numbers of cycles here follow from them and from this controller.
 """
 
@@ -94,7 +94,7 @@ def test_a_step_that_the_plan_cannot_follow_resets_the_lead(params: CarParams) -
 def test_a_jump_of_the_distance_resets_the_lead(params: CarParams) -> None:
     """A jump of more than 2.5 m is treated as another lead.
 
-    The counters of 30 cycles of detection and 3 s without a blinker restart.
+    The warning's counters (30 cycles of detection, 3 s without a blinker) restart.
     """
     found = drive(params, [-2.0] * 80 + [-18.0] * 40, jump=-3.0)
     assert found[80].new_lead

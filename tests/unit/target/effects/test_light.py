@@ -19,7 +19,7 @@ def test_rays_meet_the_horizon(camera):
 
 
 def test_glare_falls_off_with_the_square_of_the_angle(camera):
-    """At twice the angle from the sun, the veil is a quarter as bright. It grows with the scatter."""
+    """At twice the angle from the sun, the veil is a quarter as bright. The veil grows with the scatter."""
     veil = SunGlare(0.5, 3, camera).ready()._light.astype(float)
     more = SunGlare(1.0, 3, camera).ready()._light.astype(float)
     sky = veil[: int(camera.horizon)]

@@ -125,7 +125,7 @@ def test_motion_blur_has_the_papers_length_and_angle():
 
 
 def test_contrast_and_brightness_saturate(camera, moment, road):
-    """A gain of 3 turns asphalt white, so the marks disappear. A bias of 100 does not."""
+    """A gain of 3 turns asphalt white, so the marks disappear. With a bias of 100, they stay visible."""
     strong = Contrast(3.0, 0, camera).apply(road, moment())[300:]
     bright = Brightness(100, 0, camera).apply(road, moment())[300:]
     assert strong.min() == 255

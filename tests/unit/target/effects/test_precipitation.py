@@ -73,7 +73,7 @@ def test_falling_particles_sink(camera, moment):
 
 
 def test_a_streak_is_the_motion_during_the_exposure(camera, moment):
-    """A streak ends where the particle is when the shutter closes. At higher speed it is longer."""
+    """A streak ends where the particle is when the shutter closes. At higher speed, streaks are longer."""
     particles = alone(camera, speed=5.0)
     now = moment()
     closed = now._replace(t=now.t + 0.002, position=now.position + 0.002 * now.v_ego)

@@ -30,7 +30,7 @@ def test_drops_gather_until_the_wipe(glass, road, moment):
 
 
 def test_a_faster_car_meets_more_drops(glass, road, moment):
-    """The number of drops grows with the speed of the air at the glass, which includes the rain's fall."""
+    """The number of drops grows with the speed at which rain and glass meet."""
     slow, fast = (wet(glass, road, moment(speed=speed), 0.9).sum() for speed in (0.0, 26.8))
     assert 2.0 < fast / slow < 5.0
     assert wet(glass, road, moment(speed=90.0), 0.99).any()

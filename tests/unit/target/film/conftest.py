@@ -28,7 +28,7 @@ spacing_m: 1.342
 
 @pytest.fixture(scope="session")
 def drive(tmp_path_factory):
-    """Run the first half second of S1 into a new folder and return it. Its film is in film/."""
+    """Run the first half second of S1 and return its new folder, with the film in film/."""
 
     def go(*arguments, film=True):
         folder = tmp_path_factory.mktemp("run")

@@ -77,7 +77,7 @@ def test_a_crashed_run_leaves_the_frames_before_the_crash(tmp_path, monkeypatch)
 
 
 def test_a_film_folder_that_cannot_be_created_is_an_error(tmp_path, capsys):
-    """The error names the folder, and nothing runs."""
+    """The error names the film's folder, and nothing runs."""
     (tmp_path / "file").touch()
     words = ["--scenario", str(SCENARIOS / "S1.yaml"), "--out", str(tmp_path / "out")]
     assert main([*words, "--film", str(tmp_path / "file" / "film")]) == 2

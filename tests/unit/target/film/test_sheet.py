@@ -92,7 +92,7 @@ def test_the_sheet_marks_the_time_in_which_the_fault_is_active(reel):
 
 
 def test_the_last_frame_of_a_shorter_film_stays(reel):
-    """The frame is darkened while the other film continues."""
+    """The last frame is darkened while the other film continues."""
     sheet = Sheet(reel({}, {}, {}), reel({}), EVENTS)
     assert sheet.count == 3
     assert pane_of(sheet.draw(2), "faulty").mean() < 0.7 * pane_of(sheet.draw(0), "faulty").mean()

@@ -77,8 +77,8 @@ def test_compiled_iterations_have_the_bits_of_casadis(
 ) -> None:
     """After each of 15 iterations, trajectory, next guess and flags have the same bytes.
 
-    This also holds for impossible problems and NaN. If a result is not finite, the test only checks that the
-    other solver's is not finite either.
+    The bytes also agree for impossible problems and NaN. If a result is not finite, the test only checks that
+    the other solver's is not finite either.
     """
     draw = random.Random(seed)
     wild = draw.choice((1.0, 3.0, 10.0, 1e3, 1e10, 1e100, 1e308)) if seed % 4 == 0 else 1.0
@@ -132,7 +132,10 @@ def test_a_solvers_result_does_not_depend_on_earlier_problems(name: str) -> None
 
 
 def test_the_c_file_is_current() -> None:
-    """The generated part of the C file matches this CasADi, and its weights match those of the problems."""
+    """The generated part of the C file matches the installed CasADi.
+
+    Its weights are those of the problems.
+    """
     assert casadi.__version__ == compiled_mpc.CASADI
     text = C_SOURCE.read_text()
     assert mpc_parts.with_parts(text) == text
@@ -145,7 +148,7 @@ def test_the_c_file_is_current() -> None:
 def test_the_library_is_not_used_with_another_version_of_daqp(
     other: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The library requires a certain version of CasADi, DAQP's function, and a known solution."""
+    """CasADi's version, DAQP's function and a known solution must be the expected ones."""
     compiled_mpc._daqp.cache_clear()
     if other == "version":
         monkeypatch.setattr(compiled_mpc, "CASADI", "3.7.0")

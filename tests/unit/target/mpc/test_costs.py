@@ -12,7 +12,7 @@ FACTORS = np.array([1.0] * 5 + [3.0] * 15 + [1.0])  # the long intervals have we
 
 
 def flattest(cost, controls, scale):
-    """Return the largest slope of the cost along a control, relative to the slope at a plan slightly off.
+    """Return the largest slope of the cost along a control, relative to that at a slightly different plan.
 
     The slopes are central differences.
     """

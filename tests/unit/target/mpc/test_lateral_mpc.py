@@ -127,7 +127,7 @@ def test_nan_resets_the_controller(lateral_mpc, lanes, where):
 
 
 def test_a_discarded_plan_has_no_later_effect(lateral_mpc, lanes):
-    """After two different pasts, the results have the same bytes."""
+    """After two different histories, the results have the same bytes."""
     outcomes = []
     for past in (lanes(1.0), lanes(-3.0)):
         lateral_mpc.reset()

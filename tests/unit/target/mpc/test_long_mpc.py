@@ -238,7 +238,7 @@ def test_a_reset_instance_behaves_like_a_new_one(make_long, lead):
 
 
 def test_a_discarded_plan_has_no_later_effect(make_long, lead):
-    """After two different causes, the results have the same bytes."""
+    """After plans discarded for two different reasons, the results have the same bytes."""
     one, other = make_long(), make_long()
     one.update(20.0, 0.0, lead(math.nan, 20.0))
     drive(other, 20.0, 0.0, lead(40.0, 20.0), 5)

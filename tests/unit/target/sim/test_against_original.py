@@ -5,8 +5,8 @@ import pytest
 from selfdrive.sim.run import simulate
 from selfdrive.sim.scenario import PLANTS, load_scenario, on_plant
 
-# HWT of 2 s first at, min HWT, min distance, max brake, max gas, speeds (m/s) at 5, 10, ... s. S5 omits
-# values below 6 m/s, where the original's simulator sent its speed in the wrong unit.
+# First time with an HWT of 2 s, min HWT, min distance, max brake, max gas, speeds (m/s) at 5, 10, ... s.
+# S5 omits values below 6 m/s, where openpilot's simulator sent the speed in the wrong unit.
 MEASURED = {
     "S1": (6.94, 1.614, 29.22, 0.293, 0.088, (24.92, 20.27, 18.04, 17.43, 17.41, 17.56)),
     "S3": (6.94, 1.820, 37.95, 0.355, 0.092, (24.92, 20.68, 23.01, 24.30, 19.97, 19.01)),
@@ -15,7 +15,7 @@ MEASURED = {
 
 
 @pytest.mark.parametrize("name", MEASURED)
-def test_longitudinal_control_is_the_original(fault_free, name):
+def test_longitudinal_control_agrees_with_openpilot(fault_free, name):
     close_at, headway, distance, brake, gas, speeds = MEASURED[name]
     trace = fault_free(name).trace
     assert trace["t"][np.argmax(trace["hwt"] <= 2.0)] == pytest.approx(close_at, abs=0.011)
@@ -30,8 +30,8 @@ def test_longitudinal_control_is_the_original(fault_free, name):
 
 @pytest.mark.parametrize("plant", PLANTS)
 @pytest.mark.parametrize("name", ["O17", "O18", "O19", "O20"])
-def test_warning_two_seconds_before_contact(scenarios, name, plant):
-    """A driver about to hit the lead is warned about two seconds before contact, as in the original."""
+def test_the_driver_is_warned_two_seconds_before_contact(scenarios, name, plant):
+    """openpilot warns at the same time."""
     result = simulate(on_plant(load_scenario(scenarios / f"{name}.yaml"), plant), 0)
     contact = result.record["hazards"]["H1"]
     warned = [alert["t"] for alert in result.record["alerts"] if alert["name"] == "fcw"]

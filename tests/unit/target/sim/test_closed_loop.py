@@ -18,7 +18,7 @@ def drive(scenario, change=lambda simulator: None, simulator=None):
 
 
 def contexts(trace):
-    """Return the context table's rows (HWT above 2 s or not, approaching or not) reached from 1.5 s on."""
+    """Count the rows of the context table (HWT above 2 s or not, closing in or not) reached after 1.5 s."""
     armed = trace["t"] >= 1.5
     far, closing = trace["hwt"][armed] > 2.0, trace["v_rel"][armed] < 0.0
     return len(set(zip(far.tolist(), closing.tolist(), strict=True)))
@@ -30,8 +30,8 @@ def s1(scenarios):
 
 
 @pytest.mark.parametrize(("name", "rows"), [("S1", 3), ("S2", 4), ("S3", 4), ("S4", 4), ("S5", 3)])
-def test_fault_free(fault_free, name, rows):
-    """The car stays engaged and straight, without hazard or alert.
+def test_fault_free_runs_have_no_hazard_or_alert(fault_free, name, rows):
+    """The car stays engaged and in the middle of its lane.
 
     It reaches as many contexts as the campaigns need.
     """
@@ -73,11 +73,8 @@ def no_model_from(t):
     ],
     ids=["all CAN", "radar", "camera"],
 )
-def test_loss_of_an_input(s1, change, alert, within):
-    """After losing an input, the controller alerts in time and releases the pedals for good.
-
-    The car hits the lead.
-    """
+def test_a_lost_input_raises_an_alert_and_releases_the_pedals(s1, change, alert, within):
+    """The pedals stay released, and the car hits the lead."""
     result = drive(replace(s1, steps=2500), change)
     first = result.record["alerts"][0]
     assert first["name"] == alert
@@ -105,8 +102,8 @@ def lanes_from(t, shift):
 
 
 @pytest.mark.parametrize("offset", [0.5, -0.5])
-def test_start_beside_the_middle(s1, offset):
-    """If engaged half a metre off, the car returns to the middle within 4 s, without overshoot."""
+def test_a_car_beside_the_middle_returns_without_overshoot(s1, offset):
+    """A car engaged half a metre off the middle is back within 4 s."""
     trace = drive(replace(s1, lateral_offset=offset, steps=1200)).trace
     distance = trace["lateral_offset"] * np.sign(offset)
     assert distance[:130] == pytest.approx(0.5)
@@ -115,11 +112,8 @@ def test_start_beside_the_middle(s1, offset):
 
 
 @pytest.mark.parametrize("shift", [1.0, -1.0])
-def test_lanes_a_metre_off(s1, shift):
-    """If lanes are seen a metre to the side, the car leaves its lane.
-
-    It steers briefly at full torque and moves over smoothly.
-    """
+def test_lanes_seen_a_metre_aside_make_the_car_leave_its_lane(s1, shift):
+    """The car briefly steers at full torque and then moves over smoothly."""
     result = drive(s1, lanes_from(5.0, lambda t: shift))
     trace = result.trace
     distance = trace["lateral_offset"] * np.sign(shift)
@@ -130,31 +124,30 @@ def test_lanes_a_metre_off(s1, shift):
     assert 6.0 < result.record["hazards"]["H3"] < 10.0
 
 
-def test_lanes_that_run_away(s1):
-    """Lanes that drift by half a metre a step saturate the steering.
+def test_drifting_lanes_saturate_the_steering(s1):
+    """The lanes drift by half a metre per step.
 
-    It alerts and turns no faster than it can.
+    The wheel turns no faster than motor and tyres can turn it.
     """
     result = drive(replace(s1, steps=1000), lanes_from(5.0, lambda t: 50.0 * (t - 5.0)))
     assert [alert["name"] for alert in result.record["alerts"]] == ["steer_saturated"]
     assert 5.8 < result.record["alerts"][0]["t"] < 6.5
     assert 5.5 < result.record["hazards"]["H3"] < 7.5
-    # the motor and, when it turns back, the tyres: half a radian a second each
+    # half a radian a second from the motor and, when the wheel returns, as much from the tyres
     assert np.abs(np.diff(result.trace["steer_angle"])).max() < 1.1 / 100
 
 
 @pytest.mark.parametrize("side", [1, -1])
-def test_lanes_beyond_any_solution(s1, side):
-    """If the lanes on either side are too far off for a solution, the car steers left at full torque."""
+def test_lanes_too_far_off_for_a_solution_give_full_torque_to_the_left(s1, side):
     trace = drive(replace(s1, steps=1300), lanes_from(5.0, lambda t: 50.0 * side * (t - 5.0))).trace
     unsolved = np.flatnonzero(np.isnan(trace["angle_desired"]))
     assert len(unsolved) > 50
-    # a command acts in the next step; 4096 counts of the 3840 that are the EPS' full torque
+    # a command acts in the next step; 3840 counts are the EPS' full torque
     assert set(trace["steer_torque"][unsolved[:-1] + 1]) == {4096 / 3840}
 
 
-def test_a_bend_of_500_m(s1):
-    """At 60 mph, the car holds a curve of 500 m steadily within half a metre, with half the torque."""
+def test_the_car_holds_a_bend_of_500_m(s1):
+    """At 60 mph, the car stays within half a metre of the middle and needs half the torque."""
     bend = replace(s1, lead=None, curvature=((0.0, 150.0, 250.0), (0.0, 0.0, 0.002)))
     trace = drive(bend).trace
     offset = trace["lateral_offset"]
@@ -170,8 +163,8 @@ def test_a_grade_is_climbed(s1):
     assert trace["v_ego"][-1] == pytest.approx(97 / 3.6, abs=0.5)
 
 
-def test_runs_leave_nothing_behind(scenarios, fault_free):
-    """After a run with a failed lateral solver and a run of another scenario, S1 has the same bits."""
+def test_earlier_runs_do_not_change_a_run(scenarios, fault_free):
+    """The earlier runs are one with a failed lateral solver and one of another scenario."""
     simulator = Simulator()
     s1 = load_scenario(scenarios / "S1.yaml")
     broken = drive(replace(s1, steps=1500), lanes_from(5.0, lambda t: 50.0 * (t - 5.0)), simulator)

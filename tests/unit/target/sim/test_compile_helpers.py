@@ -1,4 +1,4 @@
-"""Compiled helpers are found by the code they replace, and compute the same bytes."""
+"""Compiled helpers are found by the digest of the code that they replace, and compute the same bytes."""
 
 import shutil
 import sys
@@ -35,8 +35,7 @@ def helpers(all_compiled, tmp_path):
     return shutil.copytree(all_compiled, tmp_path / "own")
 
 
-def test_every_c_file_says_what_it_stands_for():
-    """Each C file names the Python files that it replaces, so an edit of them is noticed."""
+def test_every_c_file_names_the_python_files_that_it_replaces():
     sources = list(compile_helpers.PACKAGE.rglob("*.c"))
     assert C_SOURCE in sources
     for source in sources:
@@ -46,8 +45,8 @@ def test_every_c_file_says_what_it_stands_for():
 
 @needs_compiler
 @pytest.mark.parametrize("edited", ["mark_windows.c", "hog.py", "lane_net.py"])
-def test_a_library_is_found_only_for_what_it_stands_for(helpers, monkeypatch, tmp_path, edited):
-    """No library is found for other C or Python code, or while compiled code is disabled."""
+def test_a_library_is_found_only_for_the_code_that_it_replaces(helpers, monkeypatch, tmp_path, edited):
+    """No library is found after an edit, or while compiled code is disabled."""
     compiled.use(helpers)
     assert compiled.library(C_SOURCE) is not None
     for name in (C_SOURCE.name, *compiled.stands_for(C_SOURCE.read_bytes())):
@@ -62,7 +61,7 @@ def test_a_library_is_found_only_for_what_it_stands_for(helpers, monkeypatch, tm
 
 @needs_compiler
 @pytest.mark.parametrize("keep", [0, 10, 5000, -1])
-def test_a_library_that_is_damaged_is_none(helpers, keep):
+def test_a_truncated_library_is_not_used(helpers, keep):
     (helpers / NAME).write_bytes((helpers / NAME).read_bytes()[:keep])
     compiled.use(helpers)
     assert compiled.library(C_SOURCE) is None
@@ -70,8 +69,8 @@ def test_a_library_that_is_damaged_is_none(helpers, keep):
 
 
 @needs_compiler
-def test_a_changed_constant_of_a_library_is_noticed(helpers):
-    """A library with a changed constant is rejected, because nothing else would show the error."""
+def test_a_library_with_a_changed_byte_is_not_used(helpers):
+    """Nothing else would reveal a changed constant."""
     data = bytearray((helpers / NAME).read_bytes())
     data[len(data) // 2] ^= 1
     (helpers / NAME).write_bytes(data)
@@ -88,8 +87,8 @@ def test_a_folder_without_libraries_is_no_error(tmp_path, folder):
 
 @needs_compiler
 @pytest.mark.slow
-def test_compiling_again_gives_the_same_bytes_and_leaves_nothing_old(all_compiled, tmp_path):
-    """A library's name contains the digest of the code it replaces. Libraries of other code are deleted."""
+def test_compiling_again_gives_the_same_bytes_and_deletes_old_libraries(all_compiled, tmp_path):
+    """A library's name contains the digest of the code that it replaces."""
     old = tmp_path / f"warp-0{compiled.SUFFIX}"
     old.touch()
     list(compile_helpers.compile_helpers(tmp_path))
@@ -99,11 +98,8 @@ def test_compiling_again_gives_the_same_bytes_and_leaves_nothing_old(all_compile
 
 
 @pytest.mark.parametrize("given", ["no-such-compiler", "/", "cc '"])
-def test_without_a_compiler_it_says_so_and_leaves_nothing(tmp_path, monkeypatch, capsys, given):
-    """Without a compiler the command exits with code 2.
-
-    Its message gives CC, what was expected and what to do.
-    """
+def test_without_a_compiler_the_command_exits_with_code_2(tmp_path, monkeypatch, capsys, given):
+    """The message gives CC and a remedy, and no file is written."""
     monkeypatch.setenv("CC", given)
     monkeypatch.setattr("sys.argv", ["compile_helpers", "--out", str(tmp_path)])
     assert compile_helpers.main() == 2
@@ -113,11 +109,8 @@ def test_without_a_compiler_it_says_so_and_leaves_nothing(tmp_path, monkeypatch,
 
 
 @pytest.mark.parametrize("there", [True, False], ids=["ziglang", "nothing"])
-def test_a_machine_without_a_compiler_takes_that_of_a_package(monkeypatch, there):
-    """The compiler is CC, else cc, else that of the package ziglang.
-
-    Without cc, installation requires ziglang.
-    """
+def test_without_cc_the_compiler_of_ziglang_is_used(monkeypatch, there):
+    """On a machine without cc, the installation requires the package ziglang."""
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setattr(shutil, "which", lambda name: None)
     monkeypatch.setattr(compile_helpers, "find_spec", lambda name: there or None)
@@ -126,11 +119,8 @@ def test_a_machine_without_a_compiler_takes_that_of_a_package(monkeypatch, there
 
 @needs_compiler
 @pytest.mark.slow
-def test_runs_have_the_same_bytes_and_the_proof_takes_no_helper(all_compiled, tmp_path, monkeypatch):
-    """Record and trace of a run with frames are the same with and without helpers.
-
-    With `--forget`, no helper is used.
-    """
+def test_runs_have_the_same_bytes_with_and_without_helpers(all_compiled, tmp_path, monkeypatch):
+    """With `--forget`, no helper is used."""
     found = []
     look = compiled.library
 

@@ -18,11 +18,8 @@ def key(number: int, bucket: int = 7) -> bytes:
     return bucket.to_bytes(8, "little") + number.to_bytes(8, "big")
 
 
-def test_what_is_kept_is_recalled(tmp_path):
-    """Any process with the same cache recalls the entry to the bit.
-
-    An entry has from none to MOST numbers. Other keys have no entry.
-    """
+def test_stored_entries_are_recalled(tmp_path):
+    """A second memory with the same folder recalls each entry to the bit. An entry has 0 to MOST numbers."""
     memory = DetectionMemory(tmp_path)
     memory.keep(key(1), NUMBERS)
     memory.keep(key(2), ())
@@ -46,8 +43,7 @@ def test_the_table_never_grows(tmp_path):
 
 
 @pytest.mark.parametrize("at", [0, 16, 24, 32, ENTRY - 1])
-def test_a_damaged_entry_is_not_recalled(tmp_path, at):
-    """An entry with one wrong byte counts as missing. It can be stored again."""
+def test_a_damaged_entry_is_not_recalled_and_can_be_stored_again(tmp_path, at):
     memory = DetectionMemory(tmp_path)
     memory.keep(key(1), NUMBERS)
     with (tmp_path / FILE).open("r+b") as file:
@@ -60,8 +56,7 @@ def test_a_damaged_entry_is_not_recalled(tmp_path, at):
     assert memory.recall(key(1)) == NUMBERS
 
 
-def test_a_short_or_strange_file_is_taken_over(tmp_path):
-    """A file with other content in place of the table holds no entries and does not prevent storing."""
+def test_a_file_with_other_content_does_not_prevent_storing(tmp_path):
     (tmp_path / FILE).write_bytes(b"no table" * 5000)
     memory = DetectionMemory(tmp_path)
     assert memory.recall(key(1, 2)) is None
@@ -69,14 +64,14 @@ def test_a_short_or_strange_file_is_taken_over(tmp_path):
     assert memory.recall(key(1, 2)) == NUMBERS
 
 
-def test_without_a_file_nothing_is_remembered(tmp_path):
+def test_nothing_is_stored_if_the_file_cannot_be_opened(tmp_path):
     (tmp_path / FILE).mkdir()
     memory = DetectionMemory(tmp_path)
     memory.keep(key(1), NUMBERS)
     assert memory.recall(key(1)) is None
 
 
-def test_a_full_disk_ends_remembering_and_no_more(tmp_path, monkeypatch):
+def test_a_full_disk_only_prevents_storing(tmp_path, monkeypatch):
     memory = DetectionMemory(tmp_path)
 
     def full(*_):
@@ -100,15 +95,15 @@ for turn in range(30):
 """
 
 
-def test_processes_share_it_at_once(tmp_path):
-    """If two processes write many entries to few places, each recalls only values of the right key."""
+def test_two_processes_can_write_at_once(tmp_path):
+    """Each process recalls only values of the right key."""
     root = str(Path(selfdrive.__path__[0]).parent)
     command = [sys.executable, "-c", WRITER, str(tmp_path)]
     both = [subprocess.Popen(command, env={"PYTHONPATH": root}) for _ in range(2)]
     assert [one.wait() for one in both] == [0, 0]
 
 
-def test_a_forked_child_shares_it(tmp_path):
+def test_a_forked_child_shares_the_memory(tmp_path):
     code = (
         "import os, sys; from pathlib import Path\n"
         "from selfdrive.sim.detection_memory import DetectionMemory\n"

@@ -11,7 +11,7 @@ def first(truth, *rows):
     return monitor.first
 
 
-def test_none_in_ordinary_driving(truth):
+def test_ordinary_driving_has_no_hazard(truth):
     assert first(truth, {}, {}) == {"H1": None, "H2": None, "H3": None}
 
 
@@ -20,7 +20,9 @@ def test_none_in_ordinary_driving(truth):
     [(0.0, 0.0, True), (0.01, 0.0, False), (-3.0, 2.75, True), (-3.0, -2.76, False)],
 )
 def test_h1(truth, d_rel, offset, hit):
-    """H1, a collision, needs zero distance and overlapping cars, up to 2.75 m to either side."""
+    """H1, a collision, needs a distance of 0 or less and an offset of at most 2.75 m, so that the cars
+    overlap.
+    """
     assert (first(truth, {"d_rel": d_rel, "lateral_offset": offset})["H1"] == 0.0) is hit
 
 
@@ -47,10 +49,10 @@ def test_h2_needs_a_car_that_has_moved(truth):
 
 @pytest.mark.parametrize(("offset", "hit"), [(0.94, False), (0.96, True), (-0.96, True)])
 def test_h3(truth, offset, hit):
-    """H3: at more than 0.95 m of offset, a side of the car is outside the lane."""
+    """H3 is an offset of more than 0.95 m, at which a side of the car is outside the lane."""
     assert (first(truth, {"lateral_offset": offset})["H3"] == 0.0) is hit
 
 
-def test_only_the_first_time_counts(truth):
+def test_only_the_first_time_is_recorded(truth):
     out = {"lateral_offset": 2.0}
     assert first(truth, {}, out, {}, out)["H3"] == 1.0

@@ -53,7 +53,7 @@ def folder(tmp_path):
 
 
 def test_frames_are_read_in_the_order_of_their_numbers(folder):
-    """Frame 2 comes before frame 10. Both are grey and have the size of the calibration's camera."""
+    """Frame 2 comes before frame 10. All frames are grey and have the camera's size."""
     frames = list(ImageFolder(folder).read())
     assert [frame[0, 0] for frame in frames] == list(range(10, 121, 10))
     assert {frame.shape for frame in frames} == {(48, 64)}
@@ -68,7 +68,7 @@ def test_a_folder_becomes_a_library(folder, tmp_path):
     assert library.model.horizon == pytest.approx(20.0)
 
 
-def test_the_digest_follows_every_byte(folder, tmp_path):
+def test_the_digest_changes_with_frames_and_calibration(folder, tmp_path):
     digests = {ImageFolder(folder).digest}
     cv2.imwrite(str(folder / "7.png"), np.full((48, 64), 71, np.uint8))
     digests.add(ImageFolder(folder).digest)
@@ -78,14 +78,14 @@ def test_the_digest_follows_every_byte(folder, tmp_path):
 
 
 def test_a_full_calibration_gives_that_camera(folder):
-    """Focal lengths, principal point, height and pitch reach the camera model in its units."""
+    """Focal lengths, principal point, height and pitch are converted to the camera model's units."""
     (folder / "camera.yaml").write_text(CALTECH)
     read = ImageFolder(folder)
     assert astuple(read.model) == pytest.approx(astuple(CameraModel()))
     assert (read.fps, read.spacing) == (None, 1.34)
 
 
-def test_frames_are_made_smaller_with_their_camera(folder):
+def test_resizing_scales_frames_and_camera(folder):
     full = ImageFolder(folder).model
     (folder / "camera.yaml").write_text(VIEW + "resize_width: 32\n")
     half = ImageFolder(folder)
@@ -100,18 +100,18 @@ def error(folder):
     return str(caught.value)
 
 
-def test_a_frame_of_another_size_is_named(folder):
+def test_the_error_names_a_frame_of_another_size(folder):
     cv2.imwrite(str(folder / "7.png"), np.zeros((60, 80), np.uint8))
     assert error(folder).startswith(f"{folder}/7.png: 80x60, expected 64x48; ")
 
 
 @pytest.mark.parametrize("content", [b"", b"no picture", b"\x89PNG\r\n\x1a\n truncated"])
-def test_an_unreadable_frame_is_named(folder, content):
+def test_the_error_names_an_unreadable_frame(folder, content):
     (folder / "7.png").write_bytes(content)
     assert error(folder).startswith(f"{folder}/7.png: not readable as a picture, expected ")
 
 
-def test_a_frame_that_is_cut_off_is_named(folder):
+def test_the_error_names_a_truncated_frame(folder):
     """Half a JPEG or PNG file is refused, even if its header and first rows are intact."""
     picture = np.random.default_rng(0).integers(0, 256, (48, 64), dtype=np.uint8)
     for kind in (".png", ".jpg"):
@@ -122,8 +122,8 @@ def test_a_frame_that_is_cut_off_is_named(folder):
         assert error(folder).startswith(f"{folder}/7.png: not readable as a picture, expected a whole ")
 
 
-def test_a_frame_too_large_to_be_read_is_named(folder):
-    """A header that claims billions of pixels is refused with an error, too."""
+def test_the_error_names_a_frame_too_large_to_be_read(folder):
+    """The frame's header claims billions of pixels."""
     header = b"IHDR" + struct.pack(">II5B", 60000, 60000, 8, 0, 0, 0, 0)
     png = cv2.imencode(".png", np.zeros((48, 64), np.uint8))[1].tobytes()
     (folder / "7.png").write_bytes(
@@ -133,9 +133,9 @@ def test_a_frame_too_large_to_be_read_is_named(folder):
 
 
 def test_colour_depth_and_transparency_do_not_matter(folder):
-    """Grey images, colour with and without alpha, and 16 bits per channel are read as 8-bit grey.
+    """Grey images, colour images with alpha, and 16-bit images are read as 8-bit grey.
 
-    One frame is enough.
+    A folder with a single frame is valid.
     """
     for path in folder.glob("*.png"):
         path.unlink()
@@ -145,12 +145,12 @@ def test_colour_depth_and_transparency_do_not_matter(folder):
         assert frame.dtype == np.uint8 and (frame == 90).all()
 
 
-def test_a_missing_frame_is_named(folder):
+def test_the_error_names_a_missing_frame(folder):
     (folder / "7.png").unlink()
     assert error(folder).startswith(f"{folder}/7.png: missing, expected ")
 
 
-def test_numbers_may_go_in_larger_steps(folder):
+def test_frame_numbers_can_have_larger_steps(folder):
     """Frames 0, 30 and 60 are a sequence without gaps, unless one of them is missing."""
     for path in folder.glob("*.png"):
         path.rename(folder / f"run{30 * int(path.stem):05}.png")
@@ -160,7 +160,10 @@ def test_numbers_may_go_in_larger_steps(folder):
 
 
 def test_several_sequences_follow_each_other(folder):
-    """Clips in separate folders are used in order. In each folder, numbers start again or are not needed."""
+    """Clips in separate folders are used in the order of the folders.
+
+    Each folder has its own numbers, or none.
+    """
     for clip in ("b", "a"):
         (folder / clip).mkdir()
         for number in (1, 2, 3):
@@ -205,8 +208,7 @@ def test_a_camera_that_sees_no_road_is_refused(folder):
     assert "pitch_deg: '14', expected road in the picture" in error(folder)
 
 
-def test_a_folder_without_calibration_is_explained(tmp_path):
-    """For a missing camera.yaml, the error gives its path and the page that says how to write one."""
+def test_the_error_names_a_missing_calibration(tmp_path):
     assert error(tmp_path).startswith(f"{tmp_path}/camera.yaml: No such file")
 
 
@@ -214,8 +216,8 @@ EXAMPLES = re.findall(r"```yaml\n(.*?)```", PAGE.read_text(), re.DOTALL)
 
 
 @pytest.mark.parametrize("text", EXAMPLES)
-def test_the_calibrations_in_the_docs_are_good(tmp_path, text):
-    """Every camera.yaml in the documentation is valid and gives a camera that sees the road."""
+def test_the_calibrations_in_the_docs_are_valid(tmp_path, text):
+    """The cameras of the calibrations in the docs see the road."""
     (tmp_path / "camera.yaml").write_text(text)
     pattern = re.search(r'files: "([^"]*)"', text)
     frame = tmp_path / pattern[1].replace("*", "1")
@@ -227,8 +229,7 @@ def test_the_calibrations_in_the_docs_are_good(tmp_path, text):
     assert 1.4 < model.spread() < 3.2
 
 
-def test_the_docs_show_a_calibration_for_each_known_set():
-    """Caltech, TuSimple, CULane, Udacity and a user's own frames each have a calibration in the docs."""
+def test_the_docs_show_a_calibration_for_each_known_data_set():
     names = " ".join(re.findall(r"name: (.*)", PAGE.read_text()))
     assert len(EXAMPLES) == 5
     assert all(name in names for name in ("caltech", "tusimple", "culane", "udacity", "my road"))

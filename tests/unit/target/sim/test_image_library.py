@@ -42,34 +42,28 @@ def library(**given):
 
 
 def test_frames_are_found_by_distance_and_start_again():
-    """The next frame comes every `spacing` metres, whatever the time.
-
-    After the last frame comes the first.
-    """
+    """A new frame is used every `spacing` metres, regardless of the time."""
     frames = library(spacing=2.0)
     assert [frames.frame(9.9, x)[0, 0] for x in (0.0, 1.9, 2.0, 9.0, 10.0, 13.0)] == [0, 0, 1, 4, 0, 1]
 
 
 def test_frames_are_found_by_time_and_start_again():
-    """Ten frames a second follow the run's time, not the distance. Rounded times skip none."""
+    """At ten frames per second, frames follow the run's time, not the distance. Rounding skips no frame."""
     frames = library(fps=10.0)
     times = [k * 0.05 for k in range(12)]
     assert [frames.frame(t, 99.0)[0, 0] for t in times] == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 0, 0]
 
 
-def test_the_rendered_loop_closes_on_a_dash():
-    """The 600 frames cover whole dash periods and pass at 20 a second at 60 mph."""
+def test_the_rendered_loop_has_whole_dash_periods():
+    """At 60 mph, 20 frames pass per second."""
     periods = FRAMES * SPACING / DASH_PERIOD
     assert FRAMES >= 600
     assert periods == pytest.approx(round(periods))
     assert pytest.approx(60 * 0.44704 / 20, rel=0.001) == SPACING
 
 
-def test_frames_are_made_once(tmp_path):
-    """A cached frame is not built again.
-
-    The cached file is read-only, and another digest does not find it.
-    """
+def test_frames_are_built_once(tmp_path):
+    """Cached frames are read-only, and frames with another digest have their own file."""
     first = cached(tmp_path, DIGEST, SHAPE, noise)
     again = cached(tmp_path, DIGEST, SHAPE, refuse)
     other = cached(tmp_path, "cd" * 32, SHAPE, lambda: noise(2))
@@ -101,7 +95,7 @@ def test_frames_are_made_once(tmp_path):
         *("other content", "zeros", "archive", "header"),
     ],
 )
-def test_a_damaged_file_is_noticed_and_made_anew(tmp_path, harm):
+def test_a_damaged_file_is_detected_and_rebuilt(tmp_path, harm):
     cached(tmp_path, DIGEST, SHAPE, noise)
     (path,) = tmp_path.iterdir()
     path.write_bytes(harm(path.read_bytes()))
@@ -109,7 +103,7 @@ def test_a_damaged_file_is_noticed_and_made_anew(tmp_path, harm):
     assert len(list(cached(tmp_path, DIGEST, SHAPE, refuse))) == 5
 
 
-def test_only_frames_that_are_looked_at_are_verified(tmp_path):
+def test_frames_are_verified_when_they_are_used(tmp_path):
     """Mapping a file takes almost no time. A damaged frame is rebuilt when it is used."""
     cached(tmp_path, DIGEST, SHAPE, noise)
     (path,) = tmp_path.iterdir()
@@ -121,8 +115,7 @@ def test_only_frames_that_are_looked_at_are_verified(tmp_path):
         frames[0]
 
 
-def test_a_disk_that_gives_back_something_else_is_not_used(tmp_path, monkeypatch):
-    """If the file is damaged again right after it was written, the frames are kept in memory."""
+def test_frames_stay_in_memory_if_the_disk_returns_other_data(tmp_path, monkeypatch):
     cached(tmp_path, DIGEST, SHAPE, noise)
     real = image_library._mapped
 
@@ -134,7 +127,7 @@ def test_a_disk_that_gives_back_something_else_is_not_used(tmp_path, monkeypatch
     assert np.array_equal(cached(tmp_path, DIGEST, SHAPE, noise), np.stack(list(noise())))
 
 
-def test_a_failure_while_frames_are_made_leaves_nothing(tmp_path):
+def test_a_failed_build_leaves_no_file(tmp_path):
     def break_off():
         yield from list(noise())[:2]
         raise ConfigError("unreadable", where="0002.png", expected="a picture", remedy="replace it")
@@ -145,8 +138,8 @@ def test_a_failure_while_frames_are_made_leaves_nothing(tmp_path):
 
 
 @pytest.mark.parametrize("place", [None, "file/cache", "x" * 300])
-def test_without_a_cache_that_can_be_written_the_frames_are_the_same(tmp_path, place):
-    """If there is no cache or it cannot be created, the frames equal cached frames and are read-only."""
+def test_frames_are_the_same_without_a_writable_cache(tmp_path, place):
+    """Without a cache, the frames are read-only, too."""
     (tmp_path / "file").write_text("in the way")
     cache = None if place is None else tmp_path / place
     frames = cached(cache, DIGEST, SHAPE, noise)
@@ -156,7 +149,7 @@ def test_without_a_cache_that_can_be_written_the_frames_are_the_same(tmp_path, p
     assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "sound"]
 
 
-def test_processes_may_make_the_same_frames_at_once(tmp_path):
+def test_processes_can_build_the_same_frames_at_once(tmp_path):
     """If processes start with an empty cache, all get the same frames and leave one complete file."""
     code = (
         "import numpy as np, hashlib, pathlib, sys\n"
@@ -180,11 +173,8 @@ def test_processes_may_make_the_same_frames_at_once(tmp_path):
 
 
 @pytest.mark.slow
-def test_the_rendered_library_is_the_road_in_steps(tmp_path):
-    """The 600 frames are the renderer's.
-
-    They are equal for equal seeds and different for other seeds and marks.
-    """
+def test_the_rendered_library_has_the_renderers_frames(tmp_path):
+    """The frames are the same for equal seeds, and differ for other seeds and marks."""
     pictures = Pictures(marks=DASHED, cache=tmp_path / "one")
     frames = open_library(pictures, 5)
     assert frames.frames.shape == (600, 480, 640)

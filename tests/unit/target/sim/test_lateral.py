@@ -29,7 +29,7 @@ def test_nothing_moves_without_torque(car):
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-def test_left_is_positive_all_the_way(car, sign):
+def test_torque_to_the_left_gives_positive_motion(car, sign):
     run(car, 1.0, 0.2 * sign, 20.0)
     assert car.steer_angle * sign > 0 and car.yaw_rate * sign > 0
     assert car.heading * sign > 0 and car.offset * sign > 0
@@ -48,11 +48,8 @@ def test_sides_are_symmetric():
 
 
 @pytest.mark.parametrize("speed", [1.0, 5.0, 15.0, 26.8, 40.0])
-def test_steady_turn_is_that_of_the_bicycle_model(car, speed):
-    """At a constant angle, the car settles at the bicycle model's yaw rate.
-
-    The yaw rate is v delta / (L (1 + K v^2)), with the understeer gradient K.
-    """
+def test_a_steady_turn_agrees_with_the_bicycle_model(car, speed):
+    """The yaw rate is v delta / (L (1 + K v^2)), with the understeer gradient K."""
     p = get_params()
     rear = p.wheelbase - p.center_to_front
     understeer = (
@@ -67,7 +64,7 @@ def test_steady_turn_is_that_of_the_bicycle_model(car, speed):
 def test_full_torque_is_limited_by_the_tyres(car):
     """At 60 mph, full torque turns the wheel at up to 0.5 rad/s.
 
-    The lateral acceleration ends near 2.8 m/s^2.
+    The lateral acceleration settles near 2.8 m/s^2.
     """
     fastest = 0.0
     for _ in range(600):
@@ -103,8 +100,8 @@ def test_slow_driving_is_stable(car, speed):
         assert (car.offset, car.heading) == (0.0, 0.0)
 
 
-def test_a_bend_carries_the_lane_away(car):
-    """A car that goes straight in a left-hand bend of 500 m is s^2 / 2R to the right of its lane."""
+def test_a_car_that_goes_straight_leaves_its_lane_in_a_bend(car):
+    """After s metres in a left-hand bend of radius R, the car is s^2 / 2R to the right."""
     run(car, 1.0, 0.0, 20.0, curvature=0.002)
     assert car.offset == pytest.approx(-(20.0**2) / 1000, rel=0.02)
     assert car.heading == pytest.approx(-0.04, rel=0.01)

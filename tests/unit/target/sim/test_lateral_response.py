@@ -7,7 +7,7 @@ import pytest
 from selfdrive.sim.scenario import load_scenario
 from selfdrive.sim.simulator import Simulator
 
-FULL_TORQUE = 4096 / 3840  # of the EPS' full torque, the largest command
+FULL_TORQUE = 4096 / 3840  # the largest command, as a multiple of the EPS' full torque
 STEP_AT, STEP = 800, 0.5  # simulation step, m
 
 
@@ -41,7 +41,7 @@ def settling(trace, start, band):
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_offset_start(drive, side):
-    """If engaged half a metre off, the car is within 5 % after 3 to 3.6 s.
+    """A car engaged half a metre off the middle is within 5 % of it after 3 to 3.6 s.
 
     It overshoots by at most 1 % and ends within 5 mm of the middle.
     """
@@ -56,9 +56,9 @@ def test_offset_start(drive, side):
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_step_in_lane_position(drive, side):
-    """After a lane step of half a metre, the car is half way in 1.5 s and within 5 % in 3.4 s.
+    """After a lane step of half a metre, the car has covered half the distance in 1.5 s, and 95 % in 3.4 s.
 
-    Its overshoot is 1 %.
+    It overshoots by at most 1 %.
     """
     result = drive("L01", step=side * STEP)
     trace = result.trace
@@ -75,7 +75,7 @@ def test_step_in_lane_position(drive, side):
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_bend_of_500_m(drive, side):
-    """In the bend the car stays 0.3 m outside the middle, with half the torque and no overshoot."""
+    """In the bend, the car stays 0.3 m outside the middle, with half of the full torque and no overshoot."""
     result = drive("L02", side)
     trace = result.trace
     outside = -side * trace["lateral_offset"]

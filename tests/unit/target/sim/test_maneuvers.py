@@ -32,8 +32,8 @@ def show(folder, *arguments):
     return code, (folder / "page" / "index.html").read_text() if code == 0 else ""
 
 
-def test_page(folder):
-    """The page has all scenarios with their hazards and any reference, and loads nothing."""
+def test_the_page_has_all_scenarios_and_loads_nothing(folder):
+    """Each scenario has its hazards and, if there is one, its reference."""
     code, text = show(folder, "--references", str(folder / "kept"), "--plant", "reference")
     assert code == 0
     first, second = re.findall(r"<section.*?</section>", text)
@@ -50,12 +50,12 @@ def test_page(folder):
     assert len(text) < 60_000
 
 
-def test_page_is_the_same_again(folder):
+def test_the_page_is_the_same_each_time(folder):
     assert show(folder, "A") == show(folder, "A")
 
 
-def test_road_the_plant_does_not_know(folder, capsys):
-    """On the reference plant, "all maneuvers" leave out a bend. Naming the bend is an error."""
+def test_scenarios_that_the_plant_does_not_support_are_left_out(folder, capsys):
+    """The reference plant does not support bends. Naming a scenario with a bend is an error."""
     bend = BRIEF.format(name="B") + "road: {curvature: {at_m: [0], per_m: [0.001]}}\n"
     (folder / "B.yaml").write_text(bend)
     code, text = show(folder, "--plant", "reference")
@@ -65,8 +65,8 @@ def test_road_the_plant_does_not_know(folder, capsys):
     assert show(folder, "--plant", "reference", "B")[0] == 2
 
 
-def test_mistakes(folder, tmp_path, capsys):
-    """An unknown scenario, no scenario, an invalid file or an unwritable page exits with code 2."""
+def test_user_errors_exit_with_code_2(folder, tmp_path, capsys):
+    """The errors are an unknown scenario, no scenario, a page that cannot be written, and an invalid file."""
     assert main(["--out", str(tmp_path / "page"), "--scenarios", str(folder), "X"]) == 2
     assert main(["--out", str(tmp_path / "page"), "--scenarios", str(tmp_path / "nowhere")]) == 2
     assert main(["--out", str(folder / "A.yaml"), "--scenarios", str(folder), "A"]) == 2
@@ -88,7 +88,10 @@ def test_simplified_line():
 
 
 def test_gaps_and_constants_are_drawn():
-    """A line has gaps where values are missing. Without values it is empty. A constant has an axis, too."""
+    """A line has gaps where values are missing.
+
+    A line without values is empty, and a constant has an axis, too.
+    """
     t = np.arange(10) / 20
     broken = np.where(np.arange(10) == 5, np.inf, 1.0)
     panel = Panel(title="a", unit="m", lines=(Line("b", 0, t, broken), Line("c", 1, t, np.full(10, np.nan))))

@@ -40,16 +40,16 @@ CUTS = [
 
 
 @pytest.mark.parametrize("cut", CUTS)
-def test_a_cut_is_that_of_the_whole(cut):
-    """A slice equals the slice of an array with the same pixels, whether it was computed before or not."""
+def test_a_slice_equals_the_slice_of_an_array(cut):
+    """The slices are equal whether or not the pixels were computed before."""
     one = picture()
     assert np.array_equal(one[cut], WHOLE[cut])
     one.pixels()
     assert np.array_equal(one[cut], WHOLE[cut])
 
 
-def test_no_more_is_made_than_asked_for():
-    """Size and type compute nothing. A slice computes only its content, and each part is computed once."""
+def test_only_the_requested_pixels_are_computed():
+    """Reading size or type computes nothing. Once the whole image is computed, nothing is computed again."""
     asked = []
     one = picture(asked)
     assert (one.shape, one.dtype, len(one)) == ((6, 8), np.uint8, 6) and asked == []
@@ -59,8 +59,8 @@ def test_no_more_is_made_than_asked_for():
     assert asked == [Region(1, 3, 2, 5), whole((6, 8))]
 
 
-def test_it_is_calculated_with_as_an_array():
-    """Operators, functions and methods of arrays give the results that they give for the pixels."""
+def test_an_image_can_be_used_like_an_array():
+    """Operators, functions and methods of arrays give the same results as for the pixels."""
     one = picture()
     assert np.array_equal(one * 0.5 + 3, WHOLE * 0.5 + 3) and np.array_equal(200 - one, 200 - WHOLE)
     assert np.array_equal(one.astype(float), WHOLE.astype(float)) and (one == WHOLE).all()
@@ -90,11 +90,8 @@ def put_into_pixels(one):
 
 @pytest.mark.parametrize("made", [False, True])
 @pytest.mark.parametrize("write", [add_in_place, add_into, put, put_into_cut, put_into_pixels])
-def test_it_is_not_written_to(write, made):
-    """The image, its pixels and its slices are read-only, because all runs share the frame.
-
-    Writing raises NumPy's usual error.
-    """
+def test_an_image_is_read_only(write, made):
+    """The pixels and slices of an image are read-only, too, because all runs share the frame."""
     one = picture()
     if made:
         one.pixels()
@@ -103,7 +100,7 @@ def test_it_is_not_written_to(write, made):
     assert np.array_equal(one, np.arange(48).reshape(6, 8))
 
 
-def test_what_is_made_of_it_can_be_written_to():
+def test_results_of_arithmetic_can_be_written_to():
     """A sum with an image is a new array. An image can be added to an array in place."""
     one = picture()
     more = one + 5

@@ -29,8 +29,8 @@ def camera(model, translation=GROUND, frames=12):
 
 @CAMERAS
 @pytest.mark.parametrize(("offset", "heading"), [(0.4, 0.0), (0.0, 0.02), (-0.5, -0.02), (0.9, 0.03)])
-def test_the_view_is_what_would_be_rendered_from_there(model, offset, heading, truth):
-    """Below the horizon, a moved frame equals the road rendered from that pose, apart from interpolation."""
+def test_a_moved_frame_equals_the_road_rendered_from_that_pose(model, offset, heading, truth):
+    """Below the horizon, only interpolation causes differences."""
     looking, renderer = camera(model)
     seen = looking.look(truth(lateral_offset=offset, heading=heading, position=3 * SPACING)).picture
     drawn = renderer.grey(3 * SPACING, offset, heading)
@@ -42,8 +42,8 @@ def test_the_view_is_what_would_be_rendered_from_there(model, offset, heading, t
 
 
 @CAMERAS
-def test_lines_in_the_view_are_where_the_truth_says(model, truth):
-    """In the moved frame, lines are where the displaced car sees them, within a fraction of a pixel."""
+def test_lines_in_a_moved_frame_are_at_their_true_place(model, truth):
+    """The position of a line is off by a fraction of a pixel."""
     looking, renderer = camera(model)
     offset, heading = 0.32, -0.015
     picture = looking.look(truth(lateral_offset=offset, heading=heading)).picture.astype(float)
@@ -60,8 +60,7 @@ def test_lines_in_the_view_are_where_the_truth_says(model, truth):
     assert abs(np.mean(errors)) < 0.1 and np.median(np.abs(errors)) < 0.15
 
 
-def test_in_the_middle_of_the_lane_the_frame_is_the_view(truth):
-    """At the frame's own pose, the car sees the frame itself, read-only."""
+def test_in_the_middle_of_the_lane_the_frame_is_unchanged(truth):
     looking, renderer = camera(CALTECH)
     picture = looking.look(truth(position=2.5 * SPACING)).picture
     assert np.array_equal(picture, renderer.grey(2 * SPACING))
@@ -69,7 +68,7 @@ def test_in_the_middle_of_the_lane_the_frame_is_the_view(truth):
         picture[0, 0] = 1
 
 
-def test_poses_that_round_to_the_same_give_the_same_bytes(truth):
+def test_poses_that_round_to_the_same_values_give_the_same_frame(truth):
     """Offset and heading are rounded to their steps before the frame is moved."""
     looking, _ = camera(CALTECH)
     exact = truth(lateral_offset=10 * OFFSET_STEP, heading=8 * HEADING_STEP)
@@ -85,7 +84,7 @@ def test_the_rounding_is_finer_than_a_pixel(truth):
     assert 0.5 * HEADING_STEP * CALTECH.fx < 0.5
 
 
-def test_above_the_horizon_the_view_pans_and_no_more(truth):
+def test_above_the_horizon_the_frame_only_pans(truth):
     """The sky does not follow the offset. When the car turns left, the sky moves right."""
     looking, renderer = camera(CALTECH)
     frame = renderer.grey(0.0)
@@ -100,7 +99,7 @@ def test_above_the_horizon_the_view_pans_and_no_more(truth):
 
 @pytest.mark.parametrize(("offset", "heading"), [(0.5, 0.0), (-0.5, 0.0), (0.0, 0.01), (40.0, 0.0)])
 def test_a_shift_moves_the_frame_as_a_whole(offset, heading, truth):
-    """In the paper's mode all rows shift by the same amount, the lane's shift 10 m ahead."""
+    """In the paper's mode, all rows shift as far as the lane does 10 m ahead."""
     looking, renderer = camera(CALTECH, SHIFT)
     picture = looking.look(truth(lateral_offset=offset, heading=heading)).picture
     away = offset + SHIFT_DISTANCE * np.tan(heading)
@@ -110,7 +109,7 @@ def test_a_shift_moves_the_frame_as_a_whole(offset, heading, truth):
 
 
 @pytest.mark.parametrize("offset", [0.5, -0.9, 3.0])
-def test_as_coded_the_frame_moves_by_another_rows_metres(truth, offset):
+def test_as_coded_the_frame_shifts_by_a_fixed_scale(truth, offset):
     """The whole image shifts by a pixel for each 0.03895 m, up to 1 m. The car's heading has no effect."""
     looking, renderer = camera(CALTECH, CODED)
     picture = looking.look(truth(lateral_offset=offset, heading=0.02)).picture
@@ -119,15 +118,15 @@ def test_as_coded_the_frame_moves_by_another_rows_metres(truth, offset):
     assert np.array_equal(picture, renderer.grey(0.0)[:, columns])
 
 
-def test_the_message_stays_geometric(truth):
-    """Lane, path and lead in the message are the ideal camera's. The image is added."""
+def test_the_message_equals_the_ideal_cameras(truth):
+    """The message differs from the ideal camera's only in the image."""
     looking, _ = camera(CALTECH)
     there = truth(lateral_offset=0.3, heading=0.01, d_rel=42.0)
     assert looking.look(there)._replace(picture=None) == Camera(Road(None, None)).look(there)
 
 
-def test_any_size_of_frame_is_moved(truth):
-    """Frames of other sizes than 640 x 480 are moved, also if the horizon lies above the frame."""
+def test_frames_of_any_size_are_moved(truth):
+    """The horizon can lie above the frame."""
     small = CameraModel.from_view(width=320, rows=117, horizon=-5.0, focal=260.0, height=1.5)
     looking, renderer = camera(replace(small), frames=1)
     picture = looking.look(truth(lateral_offset=0.4, heading=0.01)).picture
@@ -136,15 +135,15 @@ def test_any_size_of_frame_is_moved(truth):
     assert np.abs(picture[:, 80:240].astype(int) - drawn[:, 80:240]).mean() < 1.5
 
 
-def test_pictures_show_no_curves():
-    """Frames on a road with curvature are refused, because frames show a straight road."""
+def test_a_road_with_curvature_is_refused():
+    """Frames show a straight road."""
     with pytest.raises(ConfigError, match="a road with curvature, expected a straight road"):
         build_vision(Pictures(), Road(None, ((0.0, 100.0), (0.0, 0.001))), 0)
 
 
 @pytest.mark.parametrize("translation", [GROUND, SHIFT, CODED])
 @CAMERAS
-def test_a_part_is_that_of_the_whole_view(model, translation, truth):
+def test_a_region_equals_that_of_the_whole_frame(model, translation, truth):
     looking, _ = camera(model, translation, frames=1)
     random = np.random.default_rng(4)
     for _ in range(60):

@@ -1,4 +1,4 @@
-"""Longitudinal motion agrees with numbers measured on the original's plant."""
+"""Longitudinal motion agrees with numbers measured on openpilot's plant."""
 
 import pytest
 from selfdrive.car.honda.interface import get_params
@@ -15,7 +15,7 @@ def plant():
 
 
 def test_coasting_from_60_mph(plant):
-    """The first steps of a coasting car match the original's to all printed digits."""
+    """The first steps of a coasting car match openpilot's to all printed digits."""
     car = plant(26.8224)
     car.step(Actuators(), 0.0, 0.0)
     assert (car.position, car.speed, car.acceleration) == pytest.approx((0.26822, 26.821, -0.17586), abs=6e-4)
@@ -41,16 +41,16 @@ def test_gas_below_and_above_base_speed():
 
 
 def test_brake_and_grade():
-    """Full brake decelerates by 3.0 m/s^2. A grade decelerates by its own value."""
+    """Full brake decelerates by 3.0 m/s^2. A grade of 1 m/s^2 decelerates by that value."""
     free = acceleration(15.0, 0.0, 0.0, 0.0)
     assert free - acceleration(15.0, 0.0, 1.0, 0.0) == pytest.approx(3.0)
     assert free - acceleration(15.0, 0.0, 0.0, 1.0) == pytest.approx(1.0)
 
 
 def test_creep():
-    """An idling car accelerates by 1 m/s^2 at rest and by nothing at 1.5 m/s.
+    """The idling engine accelerates the car by 1 m/s^2 at rest and by 0 at 1.5 m/s.
 
-    The rolling resistance is subtracted.
+    Rolling resistance is subtracted.
     """
     assert acceleration(0.0, 0.0, 0.0, 0.0) == pytest.approx(1.0 - 0.0981)
     assert acceleration(0.75, 0.0, 0.0, 0.0) == pytest.approx(0.5 - 0.0981, abs=1e-3)
@@ -66,11 +66,8 @@ def test_the_car_never_drives_backwards(plant):
     assert (car.speed, car.acceleration, car.position) == (0.0, 0.0, stopped_at)
 
 
-def test_way_along_the_road(plant):
-    """Only motion along the road counts.
-
-    A car at an angle, or on the outside of a bend, covers less distance.
-    """
+def test_position_is_measured_along_the_road(plant):
+    """A car at an angle, or on the outside of a bend, covers less distance."""
     straight, askew, outside = plant(20.0), plant(20.0), plant(20.0)
     askew.lateral.heading = 0.5
     outside.lateral.offset = -2.0

@@ -1,4 +1,4 @@
-"""The reference plant copies the original's simulator with its errors."""
+"""The reference plant copies openpilot's simulator, including its errors."""
 
 import json
 from dataclasses import replace
@@ -33,7 +33,10 @@ def s1(scenarios):
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("speed", [0.0, 30.0])
 def test_torque_turns_the_wheel_slowly(sign, speed):
-    """Full torque turns the wheel by 0.1 deg a second. A fifth of the turn moves the car, at any speed."""
+    """Full torque turns the wheel by 0.1 degrees per second.
+
+    A fifth of the angle moves the car, at any speed.
+    """
     lateral = CrudeLateral()
     assert [lateral.step(sign * 1.0, speed, 0.0) for _ in range(200)] == [speed] * 200
     assert degrees(lateral.steer_angle) == pytest.approx(0.2 * sign)
@@ -52,7 +55,7 @@ def test_only_every_fifth_step_moves_the_car():
     assert [step for step in range(10) if moved[step]] == [0, 5]
 
 
-def test_nothing_turns_the_wheel_back():
+def test_the_wheel_does_not_return_by_itself():
     lateral = CrudeLateral()
     for torque in [1.0] * 100 + [0.0] * 500:
         lateral.step(torque, 30.0, 0.0)
@@ -61,7 +64,7 @@ def test_nothing_turns_the_wheel_back():
     assert lateral.steer_rate == 0.0
 
 
-def test_it_moves_along_the_road_as_the_standard_plant(car):
+def test_longitudinal_motion_equals_that_of_the_standard_plant(car):
     """Pedals and grade have the same effect on both plants, to the bit."""
     standard = Plant(get_params(), speed=20.0)
     for k in range(2000):
@@ -77,9 +80,9 @@ def test_it_moves_along_the_road_as_the_standard_plant(car):
 
 
 def test_headway_time(car):
-    """Headway time is distance over speed, or the last moving step's while the car stands.
+    """Headway time is distance over speed.
 
-    Before the first moving step it is 30 s.
+    While the car stands, the last value is used; before the car has moved, 30 s.
     """
     assert ReferencePlant(get_params(), speed=0.0).headway(50.0) == 30.0
     assert car.headway(50.0) == 2.5
@@ -89,7 +92,7 @@ def test_headway_time(car):
 
 
 def test_distance_ends_at_zero(car):
-    """After contact, the lead stays at 0 m. On the standard plant it falls behind."""
+    """After contact, the lead stays at 0 m. On the standard plant, the distance becomes negative."""
     car.position = 10.0
     assert (car.distance_to(12.0), car.distance_to(8.0)) == (2.0, 0.0)
     standard = Plant(get_params(), speed=20.0)
@@ -97,8 +100,8 @@ def test_distance_ends_at_zero(car):
     assert standard.distance_to(8.0) == -2.0
 
 
-def test_drift_is_not_shown(s1):
-    """A car half a metre off the middle sees lines at 1.85 m to both sides and the lead straight ahead."""
+def test_the_lane_offset_is_hidden_from_the_sensors(s1):
+    """A car half a metre off the middle sees lines at 1.85 m on both sides and the lead straight ahead."""
     simulator = Simulator()
     simulator.reset(s1, 0)
     simulator._plant.lateral.offset = 0.5
@@ -119,14 +122,17 @@ def test_drift_is_not_shown(s1):
 @pytest.mark.parametrize(
     ("speed", "read"), [(0.5, 1.8), (0.29, 0.0), (1.0, 3.6), (3.5, 8.05), (6.0, 6.0), (20.0, 20.0)]
 )
-def test_speed_is_wrong_where_the_gearbox_is_believed(truth, speed, read):
-    """Its gearbox reports km/h as m/s: 3.6 times too fast up to 1 m/s, less so up to 6 m/s."""
+def test_the_gearbox_speed_has_the_wrong_unit(truth, speed, read):
+    """The gearbox reports km/h as m/s.
+
+    The speed is 3.6 times too high up to 1 m/s, and less so up to 6 m/s.
+    """
     sensors, interface = CarSensors(ReferencePlant.gearbox_scale), CarInterface()
     state = interface.update(sensors.measure(truth(v_ego=speed), 0, 0), 0.0)
     assert state.v_ego_raw == pytest.approx(read, abs=0.01)
 
 
-def test_a_scenario_may_choose_it(scenarios):
+def test_a_scenario_can_select_the_plant(scenarios):
     """The key `plant`, or `on_plant`, selects the plant. The default is the standard plant."""
     assert parse_scenario(TEXT, "a.yaml", "").plant == "reference"
     plain = load_scenario(scenarios / "S1.yaml")
@@ -143,7 +149,7 @@ def test_a_scenario_may_choose_it(scenarios):
         (TEXT + "road: {curvature: {at_m: [0], per_m: [0.001]}}\n", 6, "take the standard plant"),
     ],
 )
-def test_what_it_does_not_know_is_refused(text, line, remedy):
+def test_unsupported_scenarios_are_refused(text, line, remedy):
     """An unknown plant, a bend and an offset start are refused at the line of `plant`."""
     with pytest.raises(ConfigError) as caught:
         parse_scenario(text, "a.yaml", "")
@@ -151,11 +157,8 @@ def test_what_it_does_not_know_is_refused(text, line, remedy):
     assert remedy in str(caught.value)
 
 
-def test_the_command_line_chooses_it(scenarios, tmp_path, capsys):
-    """`--plant reference` selects the plant, and the record says so.
-
-    An unsupported road exits with code 2.
-    """
+def test_the_command_line_can_select_the_plant(scenarios, tmp_path, capsys):
+    """The record names the plant. An unsupported road exits with code 2."""
     common = ["--max-steps", "5", "--plant", "reference", "--out", str(tmp_path / "out")]
     assert main(["--scenario", str(scenarios / "S1.yaml"), *common]) == 0
     assert json.loads((tmp_path / "out" / "record.json").read_text())["plant"] == "reference"
@@ -165,7 +168,7 @@ def test_the_command_line_chooses_it(scenarios, tmp_path, capsys):
     assert "a on the plant 'reference', expected a straight road" in capsys.readouterr().err
 
 
-def test_both_plants_in_one_simulator(s1):
+def test_one_simulator_can_run_both_plants(s1):
     simulator, results = Simulator(), []
     for scenario in (s1, replace(s1, plant="standard"), s1):
         simulator.reset(replace(scenario, steps=200), 0)
@@ -178,7 +181,7 @@ def test_both_plants_in_one_simulator(s1):
 
 
 def test_lines_are_mirrored(s1):
-    """The controller receives the left line as the right one. It never sees the true side."""
+    """The controller receives the left line as the right one, and never sees the true side."""
     simulator = Simulator()
     simulator.reset(s1, 0)
     simulator.step()
@@ -187,8 +190,11 @@ def test_lines_are_mirrored(s1):
     assert model.path.points[0] == 0.0
 
 
-def test_pictures_move_to_the_other_side(car):
-    """A car left of the middle is shown equally far to the right. The rest of the frame is unchanged."""
+def test_frames_are_shifted_to_the_other_side(car):
+    """In frames, a car left of the middle appears equally far to the right.
+
+    Other sensors show it in the middle.
+    """
     truth = GroundTruth(*(1.0, 50.0, 20.0, 20.0, 0.0, 0.3, 0.0, 0.0, 0.0, 20.0, 2.5), free_road=False)
     assert car.pictured(truth) == truth._replace(lateral_offset=-0.3)
     assert car.shown(truth) == truth._replace(lateral_offset=0.0)

@@ -1,6 +1,6 @@
-"""On the reference plant the loop agrees with openpilot v0.4.2 in its own simulator: recordings and figures.
+"""On the reference plant, the closed loop agrees with openpilot v0.4.2 in its own simulator.
 
-The recordings are not part of the project. OPENPILOT_TRACES names their folder.
+The recordings of openpilot are not part of the project. OPENPILOT_TRACES names their folder.
 """
 
 import csv
@@ -60,8 +60,8 @@ def rms(values):
 
 
 @pytest.mark.parametrize("name", RECORDED)
-def test_a_recorded_run(recorded, driven, name):
-    """Speed, distance, headway, braking, engaging and set speed match the original's within narrow limits."""
+def test_a_run_agrees_with_its_recording(recorded, driven, name):
+    """Speed, distance, headway, braking, engaging and set speed match openpilot's within narrow limits."""
     steps, column = recorded(name)
     result = driven(name)
     trace = {channel: values[steps] for channel, values in result.trace.items()}
@@ -81,8 +81,8 @@ def test_a_recorded_run(recorded, driven, name):
 
 
 @pytest.mark.parametrize("name", ["S1", "S3", "O02", "O09"])
-def test_what_the_controller_thought(recorded, driven, name):
-    """From engaging on, the controller's speed estimate, plan and lead follow the recording."""
+def test_the_controllers_estimates_agree_with_the_recording(recorded, driven, name):
+    """Once engaged, the speed estimate, plan and lead follow the recording."""
     steps, column = recorded(name)
     trace = driven(name).trace
     later = steps > 150
@@ -98,16 +98,14 @@ def test_what_the_controller_thought(recorded, driven, name):
 
 @pytest.mark.parametrize("name", ["S5", "O06", "O08"])
 def test_brake_at_rest(recorded, driven, name):
-    """The brake equals the original's to the last count: above the holding level only while the
-    wheels turn.
-    """
+    """At the end of the run, the brake equals openpilot's to the last count."""
     _, column = recorded(name)
     assert driven(name).trace["brake"][-1] == pytest.approx(column("brake")[-1], abs=1e-5)
 
 
 @pytest.mark.parametrize(("name", "rows"), [("S1", 3), ("S2", 4), ("S3", 4), ("S4", 4), ("S5", 3)])
 def test_contexts(driven, name, rows):
-    """As many rows of the context table are reached as on the original, except that S1 misses its fourth."""
+    """As many rows of the context table are reached as on openpilot, except that S1 misses its fourth row."""
     result = driven(name)
     trace = result.trace
     armed = trace["t"] >= 1.5
@@ -136,7 +134,7 @@ def s1(scenarios):
 
 
 def angle_off(degrees):
-    """Add an error to the measured steering angle while the headway time is 0 to 2 s."""
+    """Return a disturbance: an error of the measured steering angle while the headway time is 0 to 2 s."""
 
     def disturb(simulator, truths):
         measure = simulator._sensors.measure
@@ -150,13 +148,13 @@ def angle_off(degrees):
     return disturb
 
 
-# The original's 0.86 deg is published, and times; errors in between are those that take the same time (13.0
-# s also the torque, 0.952) as there.
+# Published for openpilot are the error of 0.86 deg and the times. The errors in between were chosen to give
+# these times (at 13.0 s, also the published torque of 0.952).
 @pytest.mark.parametrize(
     ("degrees", "leaves"), [(0.86, 11.9), (-0.86, 11.9), (0.576, 13.0), (0.366, 18.3), (0.34, None)]
 )
 def test_steering_angle_off(s1, degrees, leaves):
-    """An error makes the car leave its lane, later if it is smaller. A very small error never does."""
+    """The smaller the error, the later the car leaves its lane. With a very small error, it never does."""
     record = faulty(s1, angle_off(degrees))
     assert record["alerts"] == []
     if leaves is None:
@@ -166,7 +164,7 @@ def test_steering_angle_off(s1, degrees, leaves):
 
 
 def near(truths):
-    """Whether the headway time has been 2 s or less."""
+    """Return whether the headway time has been 2 s or less."""
     return any(truth.hwt <= 2.0 for truth in truths)
 
 
@@ -186,7 +184,9 @@ def lose_model(simulator, truths):
     [(lose_frames, "can_error", 7.085, 18.28), (lose_model, "model_error", 7.415, 19.30)],
 )
 def test_loss_of_an_input(s1, disturb, alert, at, hit):
-    """Without CAN or model from the closest approach on, alert and contact occur at the original's times."""
+    """If CAN frames or the model are lost once the headway time is 2 s, alert and contact occur at
+    openpilot's times.
+    """
     record = faulty(s1, disturb)
     assert [event["name"] for event in record["alerts"]] == [alert]
     assert record["alerts"][0]["t"] == pytest.approx(at, abs=0.011)

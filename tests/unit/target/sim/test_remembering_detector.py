@@ -65,8 +65,10 @@ class Counting:
 
 
 @pytest.mark.parametrize("make", [PaperDetector, RobustDetector])
-def test_remembered_lines_are_those_seen(make, look, tmp_path):
-    """With clean and disturbed images, no memory, a cold, a warm and a half-warm one give equal lines."""
+def test_remembered_lines_equal_detected_ones(make, look, tmp_path):
+    """Clean and disturbed images give equal lines without a memory, and with an empty, full or partly filled
+    one.
+    """
     rain = PaperRain(6, 1, MODEL)
     way = [(0.03 * k, 0.001 * k, 0.7 * k) for k in range(8)]
     seen = [look(lateral_offset=y, heading=turn, position=x) for y, turn, x in way]
@@ -86,8 +88,8 @@ def test_remembered_lines_are_those_seen(make, look, tmp_path):
                 detector._memory = DetectionMemory(tmp_path)
 
 
-def test_nothing_is_looked_at_twice(look, tmp_path):
-    """An image with a known key is neither built nor analysed. An array is always analysed."""
+def test_a_known_image_is_not_analysed_again(look, tmp_path):
+    """The pixels of an image with a known key are not computed. An array is always analysed."""
     looking = Counting()
     detector = RememberingDetector(looking, "it", DetectionMemory(tmp_path))
     lines = detector.detect(view(look(lateral_offset=0.1)))
@@ -102,10 +104,9 @@ def test_nothing_is_looked_at_twice(look, tmp_path):
     assert looking.asked == 3
 
 
-def test_what_makes_another_picture_makes_another_key(look, truth):
-    """The key depends on frame, pose, translation and frames, and on each effect.
-
-    Of an effect, it depends on the amount, seed, order and time.
+def test_different_images_have_different_keys(look, truth):
+    """The key depends on the frame, the pose, the translation, the library's digest, and the kind, amount,
+    seed, order and time of the effects.
     """
     base = look()
     moment, later = truth(t=1.0), truth(t=1.05)
@@ -135,15 +136,17 @@ def test_what_makes_another_picture_makes_another_key(look, truth):
     assert not any(np.array_equal(one, other) for one, other in pairwise(looks))
 
 
-def test_what_makes_no_other_picture_makes_no_other_key(look, truth):
-    """Poses that round to the same value share a key, and so do times of an effect that does not move."""
+def test_equal_images_have_equal_keys(look, truth):
+    """Poses that round to the same value share a key, and so do different times of an effect that does not
+    move.
+    """
     assert look(lateral_offset=0.1).key == look(lateral_offset=0.1004).key
     light = Brightness(20, 1, MODEL)
     assert light.apply(look(), truth(t=1.0)).key == light.apply(look(), truth(t=2.0)).key
 
 
-def test_effects_from_elsewhere_are_looked_at(look, truth):
-    """An effect outside the digest returns an array, so its result is not remembered."""
+def test_results_of_other_effects_are_not_remembered(look, truth):
+    """An effect whose code is not in the digest returns an array."""
 
     class Upside(Effect):
         UNIT, LEAST, MOST = "times", 0.0, 1.0
@@ -158,8 +161,7 @@ def test_effects_from_elsewhere_are_looked_at(look, truth):
     assert isinstance(picture, np.ndarray) and np.array_equal(picture, np.asarray(look())[::-1])
 
 
-def test_other_code_has_another_digest(tmp_path):
-    """The memory's key changes with any file that affects detection, and with no other file."""
+def test_the_digest_changes_only_with_code_that_affects_detection(tmp_path):
     root = tmp_path / "selfdrive"
     copytree(ROOT, root)
     before = seeing_digest(root)
@@ -176,10 +178,8 @@ def test_other_code_has_another_digest(tmp_path):
         file.write_bytes(kept)
 
 
-def test_all_code_that_sees_is_in_the_digest():
-    """The digest covers all code loaded by detectors, frames and effects, except plain messages, errors and
-    YAML.
-    """
+def test_the_digest_covers_all_code_of_detectors_frames_and_effects():
+    """Messages, errors, conversions, the reading of YAML and the geometry of the view are exceptions."""
     code = (
         "import sys, selfdrive.visiond.paper_detector, selfdrive.visiond.robust_detector\n"
         "import selfdrive.sim.effects, selfdrive.sim.image_library, selfdrive.sim.moved_picture\n"
@@ -193,6 +193,6 @@ def test_all_code_that_sees_is_in_the_digest():
     loaded = {Path(name).relative_to(ROOT).as_posix() for name in done.stdout.split()}
     covered = {file.relative_to(ROOT).as_posix() for pattern in SEEING for file in ROOT.glob(pattern)}
     plain = {"__init__.py", "common/__init__.py", "sim/__init__.py", "messages.py", "common/errors.py"}
-    plain |= {"common/conversions.py", "sim/yaml_section.py"}  # how the camera is read: it is in the key
+    plain |= {"common/conversions.py", "sim/yaml_section.py"}  # the camera is in the key
     plain |= {"common/interp.py", "sim/camera.py", "sim/road.py", "sim/truth.py"}  # the view's geometry
     assert loaded - covered <= plain

@@ -68,7 +68,7 @@ def replay(reference, runs, *arguments):
     return main(["--references", str(reference.path.parent), "--runs", str(runs), *arguments])
 
 
-def test_written_and_read_back(trace, reference):
+def test_a_written_reference_is_read_back(trace, reference):
     assert list(reference.steps) == list(range(0, STEPS, 5))
     for column in COLUMNS:
         if column.channel != "fcw":
@@ -78,7 +78,7 @@ def test_written_and_read_back(trace, reference):
 
 
 def test_rms_and_largest_difference(trace, reference):
-    """A hump of 0.6 m/s on a tenth of the rows has the RMS computed by hand and the time of its peak."""
+    """A dip of up to 0.6 m/s in a tenth of the rows gives the RMS and the time that were computed by hand."""
     trace["v_ego"] = trace["v_ego"].copy()
     trace["v_ego"][300:400] -= 0.5
     trace["v_ego"][350] -= 0.1
@@ -95,8 +95,7 @@ def test_lag(trace, late):
     assert time_lag(steps, 3.0 * np.sin(steps / 100), wave) == pytest.approx(late / 100, abs=0.011)
 
 
-def test_no_lag_to_be_seen():
-    """A constant has no lag. A constant slope counts as having no lag."""
+def test_the_lag_of_a_constant_is_unknown_and_of_a_slope_zero():
     steps = np.arange(0, STEPS, 5)
     assert time_lag(steps, np.ones(len(steps)), np.ones(STEPS)) is None
     assert time_lag(steps, steps / 100, np.arange(STEPS) / 100) == 0.0
@@ -115,18 +114,18 @@ def test_crossings():
     ]
 
 
-def test_messages_may_be_a_cycle_late(trace, reference):
+def test_a_message_can_be_a_cycle_late(trace, reference):
     reference.channels["v_ego_est"] = np.concatenate(([0.0], trace["v_ego"][4::5][: STEPS // 5 - 1]))
     trace["v_ego_est"] = trace["v_ego"]
     reference.channels["v_ego"] = reference.channels["v_ego_est"]
     comparison = compare(reference, trace, NO_LIMITS)
     assert abs(channel(comparison, "v_ego_est").largest) == pytest.approx(
         20.0
-    )  # the first row has no cycle before
+    )  # the first row has no earlier cycle
     assert channel(comparison, "v_ego_est").rms < channel(comparison, "v_ego").rms
 
 
-def test_lead_compared_while_both_see_one(trace, reference):
+def test_leads_are_compared_only_while_both_runs_have_one(trace, reference):
     trace["lead_status"] = np.where(np.arange(STEPS) < 500, 0, 1)
     trace["lead_d_rel"] = np.where(np.arange(STEPS) < 500, 99.0, 0.0)
     comparison = compare(reference, trace, NO_LIMITS)
@@ -134,12 +133,12 @@ def test_lead_compared_while_both_see_one(trace, reference):
     assert channel(comparison, "lead_status").rms == pytest.approx(np.sqrt(0.5))
 
 
-def test_no_number_is_beyond_any_limit(trace, reference):
+def test_nan_exceeds_any_limit(trace, reference):
     trace["v_ego"] = np.where(np.arange(STEPS) == 500, np.nan, trace["v_ego"])
     assert channel(compare(reference, trace, NO_LIMITS), "v_ego").rms == np.inf
 
 
-def test_free_road_has_no_lead_to_compare(trace, reference):
+def test_leads_are_not_compared_on_a_free_road(trace, reference):
     with_lead = {result.column.channel for result in compare(reference, trace, NO_LIMITS).channels}
     without = {
         result.column.channel for result in compare(reference, trace, NO_LIMITS, free_road=True).channels
@@ -148,7 +147,7 @@ def test_free_road_has_no_lead_to_compare(trace, reference):
 
 
 def test_key_figures(trace):
-    """Engaging lies between two rows, set speeds keep their order, and headway counts only while moving."""
+    """The time of engaging is a span between two rows. The headway is used only while the car moves."""
     rows = {name: values[::5] for name, values in trace.items()}
     rows["v_ego"] = np.where(np.arange(200) > 190, 0.0, rows["v_ego"])
     rows["v_cruise"] = np.where(np.arange(200) < 100, 97, 104) * KPH_TO_MS
@@ -176,26 +175,22 @@ def test_key_figures(trace):
     ],
 )
 def test_difference_of_figures(name, reference, ours, expected):
-    """Spans differ by the gap between them, and lists by their worst pair.
+    """Two spans differ by the gap between them, two lists by their worst pair.
 
-    A figure that only one side has differs infinitely.
+    The difference is infinite if only one side has the figure.
     """
     assert difference(name, reference, ours) == pytest.approx(expected)
 
 
-def test_within_tolerance(reference, finished, capsys):
-    """A run compared with itself passes with the project's table. The exit code is 0, with a summary."""
+def test_a_run_compared_with_itself_is_within_tolerance(reference, finished, capsys):
     assert replay(reference, finished()) == 0
     out = capsys.readouterr().out
     assert "S1: within tolerance" in out
     assert out.endswith("1 of 1 within tolerance\n")
 
 
-def test_beyond_tolerance(reference, finished, trace, capsys):
-    """If the RMS is above its limit, the exit code is 1.
-
-    The long report gives the interval of each crossing.
-    """
+def test_an_rms_above_its_limit_gives_code_1(reference, finished, trace, capsys):
+    """The long report gives the time span of each crossing."""
     speed = trace["v_ego"].copy()
     speed[200:401] += 1.0
     assert replay(reference, finished(v_ego=speed), "--long") == 1
@@ -216,13 +211,13 @@ def test_limits_of_a_channel(reference, finished, trace, tmp_path, limits, code)
     assert replay(reference, finished(v_ego=changed), "--tolerances", str(table)) == code
 
 
-def test_beyond_in_a_key_figure(reference, finished, trace, capsys):
+def test_a_key_figure_beyond_its_limit_gives_code_1(reference, finished, trace, capsys):
     assert replay(reference, finished(v_cruise=np.full(STEPS, 96 * KPH_TO_MS))) == 1
     assert "difference 1.000, limit 0  <-- beyond" in capsys.readouterr().out
 
 
-def test_references_change_with_the_flag_only(reference, finished, trace, capsys):
-    """A comparison writes nothing. With the flag, the run becomes the reference and then passes."""
+def test_references_change_only_with_the_flag(reference, finished, trace, capsys):
+    """With the flag, the run becomes the reference and then passes."""
     before = reference.path.read_bytes()
     runs = finished(v_ego=trace["v_ego"] + 1.0)
     assert replay(reference, runs) == 1
@@ -232,8 +227,8 @@ def test_references_change_with_the_flag_only(reference, finished, trace, capsys
     assert replay(reference, runs) == 0
 
 
-def test_drives_the_scenario_itself(tmp_path, scenarios):
-    """Without finished runs, the scenario is simulated. Its trace, stored as a reference, matches exactly."""
+def test_without_finished_runs_the_scenario_is_simulated(tmp_path, scenarios):
+    """The trace, stored as a reference, matches a second simulation."""
     text = (scenarios / "S1.yaml").read_text().replace("duration_s: 30", "duration_s: 2")
     (tmp_path / "S1.yaml").write_text(text)
     given = ["--references", str(tmp_path / "kept"), "--scenarios", str(tmp_path)]
@@ -282,7 +277,7 @@ def test_reference_of_another_length(trace, reference):
             compare(reference, cut, NO_LIMITS)
 
 
-def test_limited_channel_must_be_there(trace, reference):
+def test_a_channel_with_a_limit_must_exist(trace, reference):
     tolerances = load_tolerances(TOLERANCES)
     reference.channels["d_rel"][:] = np.nan
     with pytest.raises(ConfigError, match="nothing in column 'd_rel'"):
@@ -322,8 +317,7 @@ def test_wrong_folders_and_names(reference, finished, tmp_path, capsys):
     assert "a run of S1 on the standard plant, expected a run of S1 on the reference plant" in errors[-1]
 
 
-def test_limits_asked_for():
-    """The project's table is as strict as the agreed limits."""
+def test_the_projects_table_has_the_agreed_limits():
     tolerances = load_tolerances(TOLERANCES)
     assert tolerances.channels["v_ego"].rms == 0.15
     assert tolerances.channels["d_rel"].rms == 0.5
@@ -337,8 +331,7 @@ def test_limits_asked_for():
 
 
 @pytest.mark.slow
-def test_recorded_traces(capsys):
-    """On the reference plant every recorded trace of the original matches within tolerance."""
+def test_all_recorded_traces_are_within_tolerance(capsys):
     if not any(TRACES.glob("*.csv")):
         pytest.skip(f"no recorded runs in {TRACES}; set OPENPILOT_TRACES to their folder")
     code = main(["--references", str(TRACES)])

@@ -47,7 +47,7 @@ def standard():
 
 @pytest.mark.parametrize("model", [CALTECH, UDACITY])
 @pytest.mark.parametrize(("offset", "heading"), [(0.0, 0.0), (0.4, 0.01), (-0.6, -0.03)])
-def test_lines_are_where_the_truth_says(model, offset, heading):
+def test_lines_are_at_their_true_place(model, offset, heading):
     """In each row, the middle of each line matches the analytic one within a fraction of a pixel."""
     renderer = RoadRenderer(model, BARE, 0, periods=1)
     picture = renderer.grey(5.0, offset, heading).astype(float) - BARE.asphalt
@@ -66,7 +66,7 @@ def test_lines_are_where_the_truth_says(model, offset, heading):
     assert abs(np.mean(errors)) < 0.01
 
 
-def test_a_line_is_as_wide_as_its_paint_down_to_where_it_is_a_fraction_of_a_pixel():
+def test_lines_have_their_true_width_at_any_distance():
     """A line's light in a row matches its width on the road, from a few metres to more than a hundred."""
     renderer = RoadRenderer(CALTECH, BARE, 0, periods=1)
     contrast = renderer.grey(0.0).astype(float) - BARE.asphalt
@@ -112,7 +112,7 @@ def test_dashes_have_us_dimensions():
     assert np.mean(painted != expected) < 0.015
 
 
-def test_the_road_closes_on_itself():
+def test_the_road_repeats_after_its_length():
     renderer = RoadRenderer(CALTECH, "dashed", 3, periods=2)
     assert np.array_equal(renderer.grey(4.0, 0.2, 0.01), renderer.grey(4.0 + 2 * DASH_PERIOD, 0.2, 0.01))
 
@@ -129,7 +129,7 @@ def test_another_seed_gives_another_road(standard):
     assert not np.array_equal(standard.grey(0.0), RoadRenderer(CALTECH, "dashed", 4, periods=2).grey(0.0))
 
 
-def test_the_standard_road_has_the_tones_of_a_road():
+def test_the_standard_road_has_realistic_grey_levels():
     """Asphalt is mid grey, white paint is bright, and yellow paint lies between them."""
     picture = RoadRenderer(CALTECH, "solid", 1, periods=4).grey(0.0)
     left, right = (CALTECH.line_in_picture(y, 0.0) for y in (1.85, -1.85))
@@ -147,7 +147,7 @@ def test_unknown_marks_are_refused():
         RoadRenderer(CALTECH, "dotted", 0)
 
 
-def test_every_part_of_a_look_shows():
+def test_every_part_of_a_look_changes_the_image():
     base = replace(BARE, far_left=FRESH, far_right=FRESH)
     plain = RoadRenderer(UDACITY, base, 1, periods=1).grey(0.0)
     changes = {
@@ -195,7 +195,7 @@ def test_colours_keep_the_grey_values(standard):
 
 
 @pytest.mark.parametrize(("offset", "heading"), [(0.0, 0.0), (0.5, 0.02)])
-def test_the_lead_stands_on_the_road_where_it_is(standard, offset, heading):
+def test_the_lead_is_drawn_at_its_distance(standard, offset, heading):
     """The lead's wheels touch the road in the row of its distance and in the middle of the lane."""
     lead = 20.0
     with_lead = standard.colour(3.0, offset, heading, lead=lead)
@@ -214,8 +214,8 @@ def test_a_lead_that_cannot_be_seen_is_not_drawn(standard):
     assert np.array_equal(plain, standard.colour(3.0, lead=500.0))
 
 
-def test_a_turn_pans_what_is_far_away(standard):
-    """When the car turns left, the whole sky moves right. It does not change with the offset."""
+def test_a_turn_pans_the_sky(standard):
+    """When the car turns left, the whole sky moves right. The sky does not change with the offset."""
     ahead, turned = standard.grey(0.0), standard.grey(0.0, 0.5, 0.05)
     shift = round(CALTECH.fx * np.tan(0.05) / np.cos(CALTECH.pitch))
     assert np.array_equal(turned[:150, shift:], ahead[:150, :-shift])

@@ -26,8 +26,8 @@ def contents(folder):
     return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
 
 
-def test_what_is_written(run, scenarios):
-    """A run writes a trace with one row per step. Its record has the inputs and the trace's digest."""
+def test_a_run_writes_a_trace_and_a_record(run, scenarios):
+    """The trace has one row per step. The record has the inputs and the trace's digest."""
     folder = run("a", "--seed", "5")
     trace = np.load(folder / "trace.npz")
     record = json.loads((folder / "record.json").read_text())
@@ -42,17 +42,14 @@ def test_what_is_written(run, scenarios):
     assert record["alerts"] == []
 
 
-def test_same_bytes_whatever_ran_before(run):
+def test_a_run_has_the_same_bytes_after_another_run(run):
     first = contents(run("a"))
     run("other", "--no-lead", scenario="S2")
     assert contents(run("b")) == first
 
 
-def test_what_is_broken_off_has_no_record(run, scenarios, monkeypatch, capsys):
-    """Only a complete run has a record.
-
-    If the disk fills up half way, neither an old nor a new record is left.
-    """
+def test_an_incomplete_run_has_no_record(run, scenarios, monkeypatch, capsys):
+    """If the disk fills up, neither an old nor a new record remains."""
     folder = run("a")
     opened = Path.open
 
@@ -72,18 +69,14 @@ def test_what_is_broken_off_has_no_record(run, scenarios, monkeypatch, capsys):
     assert contents(run("a")) == contents(run("b"))
 
 
-def test_no_lead(run):
-    """Without the lead, the road is free from the first step on. The record says so."""
+def test_without_a_lead_the_road_is_free(run):
     folder = run("a", "--no-lead")
     assert set(np.load(folder / "trace.npz")["d_rel"]) == {200.0}
     assert json.loads((folder / "record.json").read_text())["no_lead"] is True
 
 
-def test_a_wrong_scenario_is_answered(tmp_path, capsys):
-    """A user's mistake is reported on stderr with place and remedy.
-
-    The exit code is 2, and no file is written.
-    """
+def test_a_wrong_scenario_exits_with_code_2(tmp_path, capsys):
+    """The error gives place and remedy, and no file is written."""
     bad = tmp_path / "bad.yaml"
     bad.write_text("schema: scenario/1\nnmae: x\n")
     assert main(["--scenario", str(bad), "--out", str(tmp_path / "out")]) == 2
@@ -94,14 +87,14 @@ def test_a_wrong_scenario_is_answered(tmp_path, capsys):
     assert not (tmp_path / "out").exists()
 
 
-def test_a_folder_that_cannot_be_written(scenarios, tmp_path, capsys):
+def test_an_unwritable_folder_exits_with_code_2(scenarios, tmp_path, capsys):
     (tmp_path / "file").write_text("")
     arguments = ["--scenario", str(scenarios / "S1.yaml"), "--max-steps", "1"]
     assert main([*arguments, "--out", str(tmp_path / "file" / "out")]) == 2
     assert "choose another --out" in capsys.readouterr().err
 
 
-def test_frames_without_pictures(scenarios, tmp_path, capsys):
+def test_the_option_frames_needs_the_option_pictures(scenarios, tmp_path, capsys):
     arguments = ["--scenario", str(scenarios / "S1.yaml"), "--out", str(tmp_path / "o"), "--max-steps", "1"]
     assert main([*arguments, "--frames", "mine"]) == 2
     assert "--frames mine, expected --pictures" in capsys.readouterr().err

@@ -40,7 +40,7 @@ spacing_m: {SPACING}
 
 
 class LineReader:
-    """A detector that reads only the lane's lines from the image, close to where it last saw them."""
+    """A detector that reads only the lane's lines from the image, near their last positions."""
 
     def __init__(self, model: CameraModel) -> None:
         self._model = model
@@ -83,15 +83,14 @@ def frames(tmp_path):
 
 
 def brought_aside(scenarios, steps):
-    """S1, started 0.3 m left of the lane's middle."""
+    """Return S1, started 0.3 m left of the middle of the lane."""
     return replace(load_scenario(scenarios / "S1.yaml"), lateral_offset=0.3, steps=steps)
 
 
 @pytest.mark.parametrize(("translation", "left_over"), [(GROUND, 0.06), (SHIFT, 0.15)])
-def test_the_loop_closes_through_the_picture(
+def test_a_car_that_sees_only_frames_returns_to_the_middle(
     monkeypatch, scenarios, frames, tmp_path, translation, left_over
 ):
-    """A controller that knows the lane only from frames steers an offset car into the middle."""
     monkeypatch.setattr(vision, "_detector", lambda pictures, library: LineReader(library.model))
     pictures = Pictures(frames=frames, translation=translation, cache=tmp_path / "cache")
     result = simulate(brought_aside(scenarios, 1000), 0, pictures)
@@ -101,10 +100,10 @@ def test_the_loop_closes_through_the_picture(
 
 
 @pytest.mark.parametrize("detector", [PAPER, ROBUST, AS_CODED])
-def test_memory_changes_no_byte_of_a_run(monkeypatch, scenarios, frames, tmp_path, detector):
-    """Trace and record are the same for any content of the cache, even if it is damaged or missing.
+def test_the_detection_memory_changes_no_byte_of_a_run(monkeypatch, scenarios, frames, tmp_path, detector):
+    """The cache can be missing, empty, full or damaged.
 
-    The run goes from clear weather into rain. A run with only known frames analyses none.
+    The run goes from clear weather into rain. If all frames are known, no pixels are computed.
     """
     monkeypatch.setattr(detection_memory, "BUCKETS", 512)
     clean, look = PictureCamera.look, []
@@ -140,10 +139,10 @@ def test_memory_changes_no_byte_of_a_run(monkeypatch, scenarios, frames, tmp_pat
     assert bytes_of("damaged", cache) == plain
 
 
-def test_a_run_that_forgets_believes_nothing_kept(monkeypatch, scenarios, frames, tmp_path):
-    """With `--forget`, wrong entries in the memory change no byte. Without it, the trace differs.
+def test_a_run_with_forget_ignores_the_memory(monkeypatch, scenarios, frames, tmp_path):
+    """Wrong entries in the memory change no byte, and nothing is stored.
 
-    A run with `--forget` stores nothing in the memory and does not mention it in the record.
+    Without `--forget`, the trace differs.
     """
     monkeypatch.setattr(detection_memory, "BUCKETS", 512)
     cache = tmp_path / "cache"
@@ -169,7 +168,7 @@ def test_a_run_that_forgets_believes_nothing_kept(monkeypatch, scenarios, frames
     assert bytes_of("forgotten", "--forget") == plain
 
 
-def test_a_run_with_pictures_has_one_thread(scenarios, frames, tmp_path):
+def test_a_run_on_frames_has_one_thread(scenarios, frames, tmp_path):
     """Neither imports nor detectors start a second thread, so the process can be forked."""
     code = (
         "import os, sys; from pathlib import Path; from dataclasses import replace\n"
@@ -181,13 +180,12 @@ def test_a_run_with_pictures_has_one_thread(scenarios, frames, tmp_path):
     )
     root = str(Path(selfdrive.__path__[0]).parent)
     command = [sys.executable, "-c", code, str(scenarios / "S1.yaml"), str(frames), str(tmp_path)]
-    single = {"PYTHONPATH": root, "OPENBLAS_NUM_THREADS": "1"}  # the one library that asks nobody but this
+    single = {"PYTHONPATH": root, "OPENBLAS_NUM_THREADS": "1"}  # OpenBLAS starts threads by default
     printed = subprocess.run(command, env=single, capture_output=True, text=True, check=True)
     assert printed.stdout.strip() == "1"
 
 
-def test_runs_without_pictures_load_nothing_for_them():
-    """Runs with ideal vision do not import the slow libraries."""
+def test_runs_with_ideal_vision_do_not_import_the_slow_libraries():
     code = (
         "import sys; from pathlib import Path; from dataclasses import replace\n"
         "from selfdrive.sim.run import simulate; from selfdrive.sim.scenario import load_scenario\n"
@@ -204,8 +202,10 @@ def test_runs_without_pictures_load_nothing_for_them():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("translation", [GROUND, SHIFT])
-def test_all_scenarios_are_driven_on_the_rendered_road(monkeypatch, scenarios, tmp_path_factory, translation):
-    """With lines read from frames, the car stays in the lane's middle in every scenario, without alerts."""
+def test_all_scenarios_run_without_alerts_on_the_rendered_road(
+    monkeypatch, scenarios, tmp_path_factory, translation
+):
+    """The lines are read from frames, and the car stays in the middle of the lane."""
     monkeypatch.setattr(vision, "_detector", lambda pictures, library: LineReader(library.model))
     pictures = Pictures(translation=translation, cache=tmp_path_factory.getbasetemp() / "pictures")
     for name in ("S1", "S2", "S3", "S4", "S5"):
@@ -220,11 +220,10 @@ def test_all_scenarios_are_driven_on_the_rendered_road(monkeypatch, scenarios, t
     ("plant", "translation", "alerting", "aside"),
     [(STANDARD, GROUND, set(), 0.2), (REFERENCE, CODED, {"S2", "S4"}, 0.6)],
 )
-def test_fault_free_runs_seen_as_coded(scenarios, tmp_path_factory, plant, translation, alerting, aside):
-    """Fault-free runs end without a hazard on either plant.
-
-    On the reference plant, two raise *steer saturated*.
-    """
+def test_fault_free_runs_with_the_detector_as_coded_have_no_hazard(
+    scenarios, tmp_path_factory, plant, translation, alerting, aside
+):
+    """On the reference plant, two of the runs raise *steer saturated*."""
     cache = tmp_path_factory.getbasetemp() / "pictures"
     pictures = Pictures(detector=AS_CODED, translation=translation, cache=cache)
     found = set()

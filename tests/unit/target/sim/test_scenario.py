@@ -34,7 +34,7 @@ def edit(old, new):
     return GOOD.replace(old, new, 1)
 
 
-def test_everything_arrives_in_si_units():
+def test_all_values_are_converted_to_si_units():
     scenario = parse(GOOD)
     assert (scenario.name, scenario.title, scenario.digest, scenario.steps) == ("T1", "a try", "digest", 1250)
     assert scenario.speed == pytest.approx(26.8224)
@@ -55,7 +55,7 @@ def test_buttons_are_down_from_press_to_release():
     assert [scenario.button(k) for k in (119, 120, 129, 130, 505)] == [0, 3, 3, 0, 2]
 
 
-def test_what_may_be_left_out():
+def test_optional_keys_can_be_left_out():
     """Lead, buttons, road and offset are optional. A single lead speed needs no times."""
     scenario = parse("schema: scenario/1\nname: a\ntitle: b\nduration_s: 1\nhost: {speed_mps: 5}\n")
     assert (scenario.lead, scenario.buttons, scenario.grade, scenario.curvature) == (None, (), None, None)
@@ -110,8 +110,8 @@ def test_what_may_be_left_out():
         ("- a\n", 1, "a list", "give the keys"),
     ],
 )
-def test_mistakes(text, line, got, remedy):
-    """For a mistake, the error gives file and line, what was found and expected, and what to do."""
+def test_the_error_for_a_mistake_gives_place_and_remedy(text, line, got, remedy):
+    """The error also gives what was found and what was expected."""
     with pytest.raises(ConfigError) as caught:
         parse(text)
     message = str(caught.value)
@@ -120,13 +120,13 @@ def test_mistakes(text, line, got, remedy):
     assert remedy in message.rsplit("; ", 1)[1]
 
 
-def test_a_number_is_what_it_looks_like():
-    """A number has its usual meaning in any notation. YAML 1.1 would read a leading zero as octal."""
+def test_numbers_have_their_usual_meaning():
+    """YAML 1.1 would read a leading zero as octal."""
     for text in ("60", "060", "60.", "+6.0e1"):
         assert parse(edit("speed_mph: 60", f"speed_mph: {text}")).speed == pytest.approx(26.8224)
 
 
-def test_files_that_cannot_be_read(tmp_path):
+def test_unreadable_files_are_refused(tmp_path):
     (tmp_path / "deep.yaml").write_text("a: " + 5000 * "[")
     with pytest.raises(ConfigError, match=r"deep\.yaml: bottomless nesting, expected valid YAML"):
         load_scenario(tmp_path / "deep.yaml")
@@ -139,7 +139,7 @@ def test_files_that_cannot_be_read(tmp_path):
 
 @pytest.mark.parametrize("name", ["S1", "S2", "S3", "S4", "S5"])
 def test_the_five_scenarios(scenarios, name):
-    """All five scenarios start at 60 mph, 100 m behind a lead at 40 mph, and last 30 s.
+    """All five scenarios start at 60 mph, 100 m behind a lead at 40 mph (S2: 25 mph), and last 30 s.
 
     The set button is pressed at 1.2 s for 0.1 s.
     """
@@ -150,8 +150,7 @@ def test_the_five_scenarios(scenarios, name):
     assert scenario.buttons == (ButtonPress(code=3, press=120, release=130),)
 
 
-def test_digest_is_that_of_the_bytes(tmp_path):
-    """Any change of the file changes the digest, even one in a comment."""
+def test_the_digest_changes_even_with_a_comment(tmp_path):
     first, second = tmp_path / "a.yaml", tmp_path / "b.yaml"
     first.write_text(GOOD)
     second.write_text(GOOD + "# more\n")

@@ -61,15 +61,14 @@ def full() -> dict[str, Any]:
     }
 
 
-def test_a_full_one_is_taken() -> None:
+def test_a_scenario_with_all_keys_is_accepted() -> None:
     assert accepted(full()) == (True, True)
 
 
 @pytest.mark.parametrize("name", scenario_page.SECTIONS)
 def test_schema_and_parser_agree_on_keys_and_bounds(name: str) -> None:
-    """The schema and the parser refuse the same mistakes.
-
-    These are a missing required key, an unknown key, text for a number, and a value beyond each bound.
+    """Both refuse a missing required key, an unknown key, text instead of a number, and values beyond the
+    bounds.
     """
     _, types, needed = scenario_page.SECTIONS[name]
     breaks: list[tuple[str, Any]] = [(key, None) for key in needed] + [("unheard_of", 1)]

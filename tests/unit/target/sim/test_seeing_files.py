@@ -1,4 +1,4 @@
-"""Files that the detections' memory depends on, and mutants of them."""
+"""Files that the detection memory depends on, and mutants of them."""
 
 import json
 from collections.abc import Callable
@@ -31,10 +31,9 @@ Drive = Callable[..., tuple[str, str]]
 
 @pytest.fixture
 def drive(tmp_path: Path) -> Drive:
-    """Run a mutant for a second on three frames.
-
-    Return its record with the trace's digest, and its counts. The fault is in `function` of a file, after the
-    assignment of `name`, and acts from `time_s` on.
+    """Run a mutant for a second on three frames, and return its record, which has the trace's digest, and its
+    counts. `place` is a file, a function and a name. The fault follows the assignment of the name and is
+    active from `time_s` on.
     """
     frames, work = tmp_path / "frames", tmp_path / "work"
     frames.mkdir()
@@ -80,7 +79,7 @@ def memory() -> Path:
     return caches.of_target("openpilot") / FILE
 
 
-def test_the_manifest_names_every_file_that_sees() -> None:
+def test_the_manifest_lists_every_file_that_affects_detection() -> None:
     """A mutant of a file in the memory's key runs from the disk.
 
     Faults in visiond and in the camera, which are not in the key, can be forked.
@@ -100,7 +99,7 @@ def test_the_manifest_names_every_file_that_sees() -> None:
         assert not matches(path, manifest.reads_itself)
 
 
-def test_the_manifest_names_every_file_that_compiled_code_stands_for() -> None:
+def test_the_manifest_lists_every_file_that_compiled_code_replaces() -> None:
     """A mutant of a file with compiled code runs from the disk, so the compiled code is not found.
 
     The code that chooses between the two accepts no faults.
@@ -134,11 +133,9 @@ def test_a_mutants_tree_finds_all_compiled_code(tmp_path: Path) -> None:
     assert [name for name, (here, there) in found.items() if here != there] == []
 
 
-def test_a_fault_in_what_sees_acts_whatever_was_seen_before(drive: Drive) -> None:
-    """A fault in a detector gives the same trace and counts, whatever ran before.
-
-    The cases are a run without sharing, a repeated run, and a run after the same fault at another time. No
-    result is stored.
+def test_a_fault_in_a_detector_does_not_depend_on_earlier_runs(drive: Drive) -> None:
+    """Trace and counts are the same in a run that shares nothing, in a repeated run, and after the same fault
+    at another time. No detection is stored.
     """
     place = ("selfdrive/visiond/paper_detector.py", "PaperDetector._marked", "score")
     early, late = (drive(place, time_s, independent=True) for time_s in (0.3, 0.7))
@@ -149,13 +146,12 @@ def test_a_fault_in_what_sees_acts_whatever_was_seen_before(drive: Drive) -> Non
 
 @pytest.mark.slow
 @pytest.mark.skipif(not any(compile_helpers.FOLDER.glob("mark_windows-*")), reason="nothing is compiled")
-def test_a_fault_in_code_that_was_compiled_acts(drive: Drive) -> None:
+def test_a_fault_in_code_with_a_compiled_version_is_activated(drive: Drive) -> None:
     place = ("selfdrive/visiond/hog.py", "Hog._votes", "votes")
     acted = drive(place, 0.3)
     assert '"count": 14' in acted[1] and acted == drive(place, 0.3, independent=True)
 
 
-def test_a_fault_elsewhere_leaves_the_memory_in_use(drive: Drive) -> None:
-    """Detections of a mutant's pristine detector are stored."""
+def test_a_fault_outside_detection_keeps_the_memory_in_use(drive: Drive) -> None:
     drive(("selfdrive/controls/lib/latcontrol.py", "LatControl.plan", "factor"), 0.3)
     assert memory().exists()

@@ -20,7 +20,7 @@ def read(database, frames):
     }
 
 
-def test_speed_and_angle_as_cantools_reads_them(truth):
+def test_cantools_reads_the_true_speed_and_angle(truth):
     """All speeds equal the true speed in km/h. The angle is in degrees."""
     frames = CarSensors().measure(truth(v_ego=20.0, steer_angle=-0.1, steer_rate=0.2), 3, 0)
     values = read(CAR, frames)
@@ -34,7 +34,7 @@ def test_speed_and_angle_as_cantools_reads_them(truth):
 
 @pytest.mark.parametrize(("speed", "shown"), [(0.29999, 0.0), (0.3, 1.08), (0.0, 0.0)])
 def test_speed_reads_zero_below_its_threshold(truth, speed, shown):
-    """Below 0.3 m/s all speeds read 0, but turning wheels count as moving."""
+    """Below 0.3 m/s all speeds read 0, but turning wheels are reported as moving."""
     values = read(CAR, CarSensors().measure(truth(v_ego=speed), 0, 0))
     assert values["ENGINE_DATA"]["XMISSION_SPEED"] == pytest.approx(shown)
     assert values["STANDSTILL"]["WHEELS_MOVING"] == (speed > 0)
@@ -56,7 +56,7 @@ def radar(truth, road=None, **values):
     return read(RADAR, frames)["TRACK_15"]
 
 
-def test_radar_cuts_off_towards_zero(truth):
+def test_radar_values_are_truncated_towards_zero(truth):
     track = radar(truth, d_rel=97.681, v_ego=26.777, v_lead=17.8868)
     assert (track["LONG_DIST"], track["REL_SPEED"]) == (97.625, -8.875)
 
@@ -67,7 +67,7 @@ def test_radar_distance_wraps(truth, d_rel, read_as):
     assert radar(truth, d_rel=d_rel)["LONG_DIST"] == read_as
 
 
-def test_radar_sees_the_lead_where_it_is(truth):
+def test_the_radar_reports_the_leads_lateral_position(truth):
     """The lead stays in its lane, so it moves right (positive) when the car drifts or turns left."""
     assert radar(truth, d_rel=50.0, lateral_offset=1.0)["LAT_DIST"] == 1.0
     assert radar(truth, d_rel=50.0, heading=0.1)["LAT_DIST"] == pytest.approx(4.99, abs=0.0625)
@@ -76,8 +76,7 @@ def test_radar_sees_the_lead_where_it_is(truth):
     assert radar(truth, left_bend, d_rel=250.0)["LAT_DIST"] == -31.0
 
 
-def test_radar_of_a_broken_measurement():
-    """A NaN measurement reads 0 and raises nothing."""
+def test_nan_and_infinite_measurements_are_sent_as_zero():
     sensor = RadarSensor(Road(None, None))
     track = read(RADAR, sensor._pack(float("nan"), float("inf"), 0.0))["TRACK_15"]
     assert (track["LONG_DIST"], track["REL_SPEED"]) == (0.0, 0.0)

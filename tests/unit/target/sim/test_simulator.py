@@ -59,11 +59,8 @@ def test_a_command_acts_in_the_next_step(s1):
     assert np.flatnonzero(trace["steer_angle"])[0] == 4
 
 
-def test_what_the_controller_is_given(s1):
-    """The controller gets car frames in every step.
-
-    In every fifth step it also gets radar frames and a view of the same time.
-    """
+def test_the_controller_gets_frames_every_step_and_views_every_fifth(s1):
+    """In every fifth step, the controller also gets radar frames."""
     script = Script()
     drive(s1, script, 20)
     assert [t for t, _, _ in script.steps] == [k / 100 for k in range(20)]
@@ -86,7 +83,7 @@ def test_buttons_reach_the_bus(s1):
 
 
 def test_truth_of_a_coasting_run(s1):
-    """The first rows match the original's plant to all printed digits. HWT is distance over speed."""
+    """The first rows match openpilot's plant to all printed digits. HWT is distance over speed."""
     trace = drive(s1, Script(), 101).result().trace
     row = {name: trace[name][100] for name in ("d_rel", "v_rel", "v_ego", "a_ego", "hwt")}
     expected = {"d_rel": 91.058, "v_rel": -8.7637, "v_ego": 26.645, "a_ego": -0.17485, "hwt": 3.4174}
@@ -114,9 +111,9 @@ def test_free_road(s1):
 
 
 def test_hazards_and_alerts_in_the_record(s1):
-    """The record has the first time of each hazard.
+    """The record has the first time of each hazard and of each alert, and all times of the alerts.
 
-    It also has the first of each kind of counted alert, and all alerts raised.
+    The start-up text is not recorded.
     """
     script = Script(lambda step: (0, 0, 1332))
     simulator = Simulator()
@@ -141,7 +138,10 @@ def test_hazards_and_alerts_in_the_record(s1):
 
 
 def test_trace_channels(s1):
-    """Every channel has one value per step, with the right type. This includes the controller's own view."""
+    """Every channel has one value per step, with the right type.
+
+    The channels include the controller's lead, plan and state.
+    """
     script = Script()
     script.radar_state = SimpleNamespace(lead_one=LeadData(status=True, d_rel=50.0, v_lead_k=17.0))
     script.controlsd.plan = Plan(v_target=25.0, source="mpc2")
@@ -156,7 +156,7 @@ def test_trace_channels(s1):
     assert (last["v_target"], last["plan_source"], last["long_state"]) == (25.0, 2, 2)
 
 
-def test_a_result_may_be_taken_on_the_way(s1):
+def test_a_result_can_be_taken_before_the_end(s1):
     simulator = drive(s1, Script(), 10)
     early = simulator.result()
     simulator.step()

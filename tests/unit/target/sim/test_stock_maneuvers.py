@@ -10,7 +10,7 @@ SET_EARLY = ((SET, 120, 130),)
 
 
 def resumed(times):
-    """Return presses of set at 1.2 s and then of RES, each 0.1 s long, every 0.2 s."""
+    """Return a press of SET at 1.2 s, followed by presses of RES every 0.2 s, each 0.1 s long."""
     return (*SET_EARLY, *((RESUME, 140 + 20 * k, 150 + 20 * k) for k in range(times)))
 
 
@@ -42,8 +42,8 @@ GRADES = {"O03": ((0, 10, 11), (0, 0, 1.0)), "O04": ((0, 10, 11), (0, 0, -1.0))}
 
 
 @pytest.mark.parametrize("name", MANEUVERS)
-def test_it_is_the_stock_maneuver(scenarios, name):
-    """Speed, lead, grade, buttons and duration match the original's. The user chooses the plant."""
+def test_the_scenario_equals_the_stock_maneuver(scenarios, name):
+    """Speed, lead, grade, buttons and duration match openpilot's. The plant is the default one."""
     speed, gap, profile, buttons, duration = MANEUVERS[name]
     scenario = load_scenario(scenarios / f"{name}.yaml")
     assert (scenario.name, scenario.steps, scenario.plant) == (name, 100 * duration, "standard")
@@ -59,5 +59,5 @@ def test_it_is_the_stock_maneuver(scenarios, name):
         assert scenario.lead.times == profile[1]
 
 
-def test_all_twenty_are_there(scenarios):
+def test_all_twenty_maneuvers_exist(scenarios):
     assert sorted(path.stem for path in scenarios.glob("O*.yaml")) == sorted(MANEUVERS)

@@ -1,4 +1,4 @@
-"""Regions of warped images have the bits of OpenCV's whole image, in C and with OpenCV."""
+"""Regions of warped images equal those of OpenCV's whole image, with the compiled code and with OpenCV."""
 
 import ctypes
 import subprocess
@@ -45,8 +45,8 @@ def sources(random):
     return random.integers(0, 256, SHAPE, np.uint8), stripes, np.full(SHAPE, 255, np.uint8)
 
 
-def test_a_region_is_that_of_opencvs_whole():
-    """With any matrix, the region equals the slice of OpenCV's whole result."""
+def test_a_region_equals_that_of_opencvs_whole_image():
+    """The matrices include impossible ones."""
     random = np.random.default_rng(1)
     for matrix in moves(random):
         flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
@@ -62,7 +62,7 @@ def test_a_region_is_that_of_opencvs_whole():
 def test_compiled_warps_have_the_same_bits(library):
     """The bits agree in any region, for contiguous images and slices."""
     if not agrees(library):
-        pytest.skip("OpenCV calculates in another way here")
+        pytest.skip("OpenCV computes other bits than the C code")
     random, fast = np.random.default_rng(2), CompiledWarp(library)
     for matrix in moves(random):
         for source in sources(random):
@@ -78,8 +78,7 @@ def test_compiled_warps_have_the_same_bits(library):
 
 @needs_compiler
 @pytest.mark.parametrize("option", ["-DIS_FAST=0", "-DIS_WIDE=0"])
-def test_processors_without_wide_vectors_warp_the_same(library, tmp_path, option):
-    """The bits do not depend on the processor's instruction set."""
+def test_results_do_not_depend_on_wide_vector_instructions(library, tmp_path, option):
     words = [*compile_helpers.compiler(), option, compiled_warp.C_SOURCE, "-o", tmp_path / "warp.so"]
     subprocess.run([*words, *compile_helpers.OPTIONS], check=True)
     narrow = compiled.Library(ctypes.CDLL(str(tmp_path / "warp.so")), b"")
@@ -97,7 +96,7 @@ def test_pictures_of_any_size_are_warped(library, shape):
     vector width.
     """
     if not agrees(library):
-        pytest.skip("OpenCV calculates in another way here")
+        pytest.skip("OpenCV computes other bits than the C code")
     random, fast = np.random.default_rng(3), CompiledWarp(library)
     for _ in range(20):
         source = random.integers(0, 256, shape, np.uint8)
@@ -106,17 +105,15 @@ def test_pictures_of_any_size_are_warped(library, shape):
 
 
 @needs_compiler
-def test_what_is_no_grey_picture_is_left_to_opencv(library):
-    """A float image, which a fault can produce, is warped by OpenCV."""
+def test_float_images_are_warped_by_opencv(library):
+    """A fault can produce a float image."""
     source = np.random.default_rng(4).random(SHAPE).astype(np.float32)
     region = Region(5, 9, 3, 200)
     assert np.array_equal(CompiledWarp(library)(source, np.eye(3), region), source[region.part])
 
 
 @needs_compiler
-def test_another_opencv_is_left_alone(library, monkeypatch):
-    """If OpenCV's bits differ from the compiled warp's, OpenCV warps and the run names no library."""
-
+def test_the_library_is_not_used_if_opencv_computes_other_bits(library, monkeypatch):
     def rounds_otherwise(source, matrix, region):
         return warp(source, matrix * (1.0 + 1e-7), region)
 

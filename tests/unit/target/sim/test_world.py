@@ -12,7 +12,7 @@ BEND = Road(None, ((0.0,), (0.002,)))
 
 
 def test_lead_follows_its_profile():
-    """At the start of each step, the lead has the speed of its table. It moves at that speed."""
+    """In each step, the lead moves at the speed that its table has at the start of the step."""
     lead = LeadVehicle(100.0, (0.0, 1.0, 2.0), (10.0, 10.0, 20.0))
     speeds = []
     for frame in range(300):
@@ -41,7 +41,10 @@ def test_bend_is_a_parabola_for_constant_curvature():
 
 
 def test_lane_in_view(truth):
-    """In mid-lane the lines are 1.85 m to either side. A car 0.4 m left sees them 0.4 m right."""
+    """In the middle of the lane, the lines are 1.85 m to either side.
+
+    A car 0.4 m to the left sees them 0.4 m further right.
+    """
     view = Camera(STRAIGHT).look(truth(d_rel=42.0))
     assert (view.left_lane_y, view.right_lane_y, view.path_y, view.lead_d_rel) == (1.85, -1.85, 0.0, 42.0)
     assert view.bend == (0.0,) * 50
@@ -50,14 +53,14 @@ def test_lane_in_view(truth):
 
 
 def test_heading_and_bend_in_view(truth):
-    """A car turned left sees the lane run to the right. In a left-hand bend it curves to the left."""
+    """A car turned left sees the lane run to the right. In a left-hand bend, the lane curves to the left."""
     assert Camera(STRAIGHT).look(truth(heading=0.1)).bend[49] == pytest.approx(-49 * 0.100335, rel=1e-4)
     assert Camera(BEND).look(truth()).bend[49] == pytest.approx(0.001 * 49**2)
     both = Camera(BEND).look(truth(heading=0.1)).bend
     assert both[49] == pytest.approx(0.001 * 49**2 - 49 * 0.100335, rel=1e-4)
 
 
-def test_ideal_vision_passes_geometry_on(truth):
+def test_ideal_vision_publishes_the_true_geometry(truth):
     """The model has the view's lines, shifted to where they pass the car, and the lead's distance."""
     visiond = Visiond(IdealDetector())
     assert visiond.latest is None

@@ -24,7 +24,7 @@ def support(picture: np.ndarray, first: int, last: int) -> float:
 
 @pytest.mark.parametrize("width", [2, 3, 4, 5])
 @pytest.mark.parametrize("brighter", [15.0, 60.0, 140.0])
-def test_a_mark_s_middle_is_found_in_every_row(width, brighter):
+def test_the_middle_of_a_mark_is_found(width, brighter):
     """The filter finds a band as wide as paint at its middle in almost every row, faint or bright."""
     picture = road((100, width, brighter))
     points = mark_points(picture)
@@ -43,13 +43,13 @@ def test_a_double_line_is_found_as_one():
     [[(100, 3, -50.0)], [(100, 160, 60.0)], [(100, 25, 60.0)], []],
     ids=["tar seam", "concrete beside asphalt", "a bright strip of 1 m", "nothing"],
 )
-def test_what_is_not_a_bright_narrow_band_is_not_found(bands):
+def test_only_bright_narrow_bands_are_found(bands):
     """Dark seams, edges between surfaces and broad bright strips give hardly any points."""
     assert support(road(*bands), 0, COLUMNS) < 0.15
 
 
 @pytest.mark.parametrize("light", [0.3, 0.6, 1.5])
-def test_light_does_not_matter(light):
+def test_brightness_does_not_matter(light):
     bright = road((60, 3, 50.0), (180, 4, 70.0))
     picture = (bright * light).clip(0, 255).astype(np.uint8)
     assert support(picture, 58, 65) > 0.9 * support(bright, 58, 65)
@@ -57,7 +57,7 @@ def test_light_does_not_matter(light):
 
 
 def test_points_on_rough_ground_weigh_little():
-    """If the ground is as rough as a mark is bright, chance points weigh much less than a mark's points."""
+    """If the ground is as rough as a mark is bright, its points weigh much less than those of a mark."""
     rough = road(noise=25.0)
     points = mark_points(rough)
     assert points.weight.sum() / ROWS * 7 / COLUMNS < 0.1

@@ -14,7 +14,7 @@ CALTECH = CameraModel()
 
 
 def seen(detector: CodedDetector, picture: np.ndarray) -> LaneLines:
-    """The lines detected in `picture`. The view's other fields are dummies."""
+    """Return the lines detected in `picture`. The view's other fields are dummies."""
     return detector.detect(
         CameraView(left_lane_y=9.0, right_lane_y=9.0, path_y=9.0, bend=(), lead_d_rel=50.0, picture=picture)
     )
@@ -27,9 +27,8 @@ def road() -> RoadRenderer:
 
 @pytest.mark.parametrize("offset", [0.0, 0.4, -0.4])
 def test_lines_are_read_in_one_row(road: RoadRenderer, offset: float) -> None:
-    """Each line is read at row 278, shifted 3 px towards the middle, and converted to metres.
-
-    The scale is the detector's own.
+    """Each line is read at row 278, shifted 3 px towards the middle, and converted to metres by a fixed
+    scale.
     """
     found = seen(CodedDetector(CALTECH), road.grey(4.0, offset))
     for line, true, inward in zip(found[:2], road.truth(offset), (3, -3), strict=True):
@@ -40,7 +39,7 @@ def test_lines_are_read_in_one_row(road: RoadRenderer, offset: float) -> None:
 
 
 def test_a_line_without_a_cluster_is_in_the_first_column(road: RoadRenderer) -> None:
-    """A line without a cluster is placed in column 0, far left of the car, with probability 1."""
+    """A line in column 0 is far to the left of the car, and has probability 1."""
     for half, expected in ((slice(320, None), (None, 8.03)), (slice(None, 320), (7.88, None))):
         picture = road.grey(4.0).copy()
         picture[:, half] = 97
@@ -73,13 +72,13 @@ def test_a_window_needs_25_edges(edges: int, looked_at: bool, monkeypatch: pytes
 
 @pytest.mark.parametrize(("points", "column"), [(29, 0), (30, 200)])
 def test_a_cluster_needs_30_points(points: int, column: int) -> None:
-    """A point counts once for each window that found it. Without a cluster, the line is in column 0."""
+    """A point is counted once for each window that found it."""
     left = np.column_stack((np.repeat(np.arange(270, 285), 2)[:points], np.full(points, 200)))
     right = np.column_stack((np.arange(265, 305), np.full(40, 440)))
     assert coded._columns_of_lines(np.concatenate((left, right))) == pytest.approx((column, 440))
 
 
-def test_without_an_edge_lines_stay_where_they_were(road: RoadRenderer) -> None:
+def test_without_edges_the_lines_keep_their_positions(road: RoadRenderer) -> None:
     detector = CodedDetector(CALTECH)
     before = seen(detector, road.grey(4.0, 0.3))
     assert seen(detector, np.full((480, 640), 97, np.uint8)) == before
@@ -87,7 +86,7 @@ def test_without_an_edge_lines_stay_where_they_were(road: RoadRenderer) -> None:
     assert seen(blind, np.zeros((480, 640), np.uint8)).left.y == 1.85
 
 
-def test_state_is_all_it_remembers(road: RoadRenderer) -> None:
+def test_the_detectors_only_memory_is_its_state(road: RoadRenderer) -> None:
     one, other = CodedDetector(CALTECH), CodedDetector(CALTECH)
     seen(one, road.grey(4.0, 0.3))
     other.state = one.state
@@ -96,23 +95,22 @@ def test_state_is_all_it_remembers(road: RoadRenderer) -> None:
 
 
 def test_steepness_is_relative_to_the_window() -> None:
-    """A tenth of the contrast gives the same edges, because steepness is relative to the window."""
+    """A tenth of the contrast gives the same edges."""
     random = np.random.default_rng(1)
     faint = random.integers(0, 10, coded.SIZE).astype(np.uint8)
     assert edges_in_windows(faint).any()
     assert np.array_equal(edges_in_windows(faint), edges_in_windows(10 * faint))
 
 
-def test_edges_are_crests_down_the_picture() -> None:
-    """A brightness step between rows is an edge one row high. A step between columns is not an edge."""
+def test_edges_are_brightness_steps_between_rows() -> None:
+    """A step between columns is not an edge."""
     level, upright = np.zeros((2, *coded.SIZE), np.uint8)
     level[40:], upright[:, 40:] = 100, 100
     assert edges_in_windows(level).any()
     assert not edges_in_windows(upright).any()
 
 
-def test_clusters_are_what_pixels_lead_to() -> None:
-    """A chain of single pixels joins two clusters that are separate without it."""
+def test_a_chain_of_pixels_joins_two_clusters() -> None:
     crowd = np.argwhere(np.ones((8, 8), bool))
     beyond = crowd + np.array([0, 38])
     chain = np.column_stack((np.full(30, 4), np.arange(8, 38)))
@@ -121,7 +119,7 @@ def test_clusters_are_what_pixels_lead_to() -> None:
     assert len(set(coded._linked(np.concatenate((crowd, beyond)), 1.5))) == 2
 
 
-def test_another_size_of_picture_is_refused() -> None:
-    """The detector rejects frames of any other size, because its pixel positions are fixed."""
+def test_frames_of_another_size_are_refused() -> None:
+    """The detector's pixel positions are fixed."""
     with pytest.raises(ConfigError, match=r"pictures of 1280 x 720.*expected 640 x 480"):
         CodedDetector(CameraModel.from_view(width=1280, rows=720, horizon=238.0, focal=1000.0, height=1.5))

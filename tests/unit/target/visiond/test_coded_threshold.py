@@ -10,7 +10,7 @@ def few(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(coded_threshold, "TRIED", [-50.0, 3.5, 4.0, 4.5, 50.0])
 
 
-def test_the_least_marks_all_and_the_largest_none() -> None:
+def test_the_lowest_threshold_marks_all_windows_and_the_highest_none() -> None:
     found = coded_threshold.thresholds()
     assert [row[0] for row in found] == coded_threshold.TRIED
     marked = [row[1] for row in found]
@@ -19,13 +19,11 @@ def test_the_least_marks_all_and_the_largest_none() -> None:
     assert found[0][2] == 1.0
 
 
-def test_the_middle_of_those_that_will_do_is_printed(
+def test_the_middle_of_the_acceptable_thresholds_is_printed(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The search prints the middle of the acceptable thresholds.
-
-    It rejects a threshold that marks too much, however well it reads the lines, and one that misreads more
-    lines.
+    """A threshold is rejected if it marks too many windows, even if it reads the lines well, or if it
+    misreads more lines than others.
     """
     rows = [(1.0, 0.004, 0.0), (2.0, 0.003, 0.1), (3.0, 0.002, 0.02), (4.0, 0.001, 0.02), (5.0, 0.0, 0.02)]
     monkeypatch.setattr(coded_threshold, "thresholds", lambda: rows)
@@ -36,13 +34,10 @@ def test_the_middle_of_those_that_will_do_is_printed(
 
 
 @pytest.mark.slow
-def test_the_threshold_is_the_one_that_is_found(
+def test_the_stored_threshold_is_the_one_that_the_search_finds(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The stored threshold is the one that the search finds.
-
-    After a change of the net, the road or the rule, search again.
-    """
+    """After a change of the net, the road or the rule, search again."""
     monkeypatch.undo()
     coded_threshold.main()
     assert float(capsys.readouterr().out.splitlines()[-1]) == coded_detector.THRESHOLD

@@ -41,7 +41,7 @@ DETECTORS = {
 
 @pytest.fixture(scope="module", params=["", " -DPLAIN"], ids=["vectors", "plain"])
 def helpers(request, tmp_path_factory, all_compiled):
-    """A folder with all libraries, compiled for any processor or with this processor's widest vectors."""
+    """A folder with all libraries, compiled with or without vector instructions."""
     if not request.param:
         return all_compiled
     folder = tmp_path_factory.mktemp("compiled")
@@ -61,9 +61,9 @@ def _found(helpers):
 
 @pytest.fixture(scope="module")
 def pictures():
-    """Images of a road with either kind of marks, from many poses, clean and with every effect.
+    """Images of a road with either kind of marks, from many poses, clean, with every effect and with noise.
 
-    An image of noise and an empty image are added.
+    Images of pure noise and of a single tone are added.
     """
     chance, found = np.random.default_rng(3), []
     roads = [RoadRenderer(MODEL, marks, 1, periods=3) for marks in ("solid", "dashed")]
@@ -120,8 +120,8 @@ def test_lines_of_another_camera_are_the_same_to_the_bit(model):
 
 
 @pytest.mark.parametrize("name", DETECTORS)
-def test_what_a_fault_makes_of_a_picture_is_seen_or_refused_alike(name, pictures):
-    """An image of another type, memory order or size gives the same lines or the same error."""
+def test_impossible_images_give_the_same_lines_or_the_same_error(name, pictures):
+    """A fault can give an image another type, memory order or size."""
     plain, build, _ = DETECTORS[name]
     slow, fast = plain(MODEL), build(MODEL)
     odd = [
@@ -160,10 +160,10 @@ def test_maps_of_any_camera_are_the_same(width, rows, focal):
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_the_same_lines_are_voted_for(seed):
+def test_votes_are_the_same(seed):
     """The votes agree for any number of points, in full and empty maps, with and without history.
 
-    They also agree if no lane of that width fits or if C has too many candidates.
+    The votes also agree if no lane of the expected width fits, or if there are too many candidates for C.
     """
     chance = np.random.default_rng(seed)
     view = RoadView(MODEL)
@@ -189,7 +189,7 @@ def _voted(choose, *given) -> str:
 
 
 @pytest.mark.parametrize("name", ["RoadView", "crests", "vote"])
-def test_code_with_other_bits_than_opencv_is_not_used(name, monkeypatch):
+def test_the_library_is_not_used_if_python_computes_other_bits(name, monkeypatch):
     here = RoadView.map if name == "RoadView" else getattr(compiled_robust, name)
 
     def otherwise(*given):
@@ -207,8 +207,11 @@ def test_code_with_other_bits_than_opencv_is_not_used(name, monkeypatch):
     assert not found.calculated_by and build_robust_detector(MODEL).calculated_by
 
 
-def test_features_are_the_same_and_signs_of_scores_right(helpers, pictures):
-    """The features of each window, in steps, equal Hog's. The windows above any threshold equal the net's."""
+def test_features_and_marked_windows_are_the_same(helpers, pictures):
+    """Rounded to steps, the features of each window equal those of `Hog`.
+
+    The windows above the threshold are those of the net.
+    """
     size = 112, 480
     hog, net = Hog(*size), LaneNet.load()
     for threshold in (0.0, 4.0, -2.5):
@@ -227,7 +230,7 @@ def test_features_are_the_same_and_signs_of_scores_right(helpers, pictures):
 
 
 def test_a_score_too_close_to_the_threshold_is_left_to_python(pictures):
-    """C reports a score that is too close to the threshold, and the detector asks the net."""
+    """The C code reports a score close to the threshold, and the detector asks the net."""
     part = np.ascontiguousarray(pictures[0][200:232, 280:312])
     score = float(LaneNet.load().score(windows(Hog(32, 32).blocks(part)).reshape(1, FEATURES))[0])
     library = compiled.library(compiled_windows.C_SOURCE)

@@ -55,8 +55,7 @@ def test_a_pixel_between_two_clusters_belongs_to_the_first():
     assert labels(mask, 2, 8) == [0, 0, 0, 1, 1, 1, 0, 0, 0, 0, 1, 1, 1, 0, 0, 0, 1, 1, 1]
 
 
-def test_nothing_makes_no_cluster_and_a_lone_pixel_is_noise():
-    """An empty mask gives no labels. A lone pixel gets the label of noise."""
+def test_a_lone_pixel_is_noise_and_an_empty_mask_has_no_labels():
     mask = np.zeros((5, 5), np.uint8)
     assert labels(mask, 2, 3) == []
     mask[2, 2] = 1

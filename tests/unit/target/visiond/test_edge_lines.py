@@ -1,4 +1,4 @@
-"""Edges become lines: which edges count as a lane mark, and where the line is on the road."""
+"""Edges become lines: which edges are a lane mark, and where the line is on the road."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ TONE = 90
 def seen(*strips: tuple[float, float, int], slope: float = 0.0):
     """Return the lines found in an image with strips along the road.
 
-    A strip goes from y to y (m, left first) and has a grey level.
+    Each strip has a left and a right edge (m) and a grey level.
     """
     row = np.arange(MODEL.rows)[:, np.newaxis]
     column = np.arange(MODEL.width)[np.newaxis]
@@ -38,19 +38,18 @@ def test_bright_strips_are_lines(slope):
     assert (right.y, right.slope) == pytest.approx((-1.66, slope), abs=0.02)
 
 
-def test_the_nearest_strip_counts():
-    """Of three strips on the left, the one closest to the middle is the line."""
+def test_the_nearest_strip_is_the_line():
     left, right = seen((5.6, 5.5, 210), (3.3, 3.2, 210), (1.4, 1.3, 140))
     assert left.y == pytest.approx(1.35, abs=0.03)
     assert right is None
 
 
 @pytest.mark.parametrize("strip", [(1.0, -9.0, 30), (1.1, 0.98, 30), (9.0, 0.7, 160)])
-def test_a_step_and_a_dark_strip_are_none(strip):
+def test_steps_and_dark_strips_are_not_lines(strip):
     assert seen(strip) == (None, None)
 
 
-def test_paint_behind_such_a_step_is_found():
+def test_paint_behind_a_step_is_found():
     left, _ = seen((9.0, 0.9, 60), (1.9, 1.78, 160))
     assert left.y == pytest.approx(1.84, abs=0.03)
 
@@ -67,7 +66,7 @@ def test_a_dark_joint_beside_the_paint_does_not_hide_it(gap, width):
         assert seen(joint) == (None, None)
 
 
-def test_less_contrast_and_other_light_change_no_edge():
+def test_contrast_and_brightness_change_no_edge():
     part = np.full((64, 96), 80, np.uint8)
     part[:, 40:46] = 180
     at, _ = edges(part)

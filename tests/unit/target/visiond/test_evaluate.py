@@ -17,7 +17,7 @@ def _road(model):
 
 @pytest.fixture
 def frames(tmp_path):
-    """A folder with a frame of each camera shape. The truth in both forms is in truth.json."""
+    """A folder with frames of two cameras. In truth.json, one frame has lines and the other has centres."""
     folder = tmp_path / "frames"
     (folder / "deep").mkdir(parents=True)
     lines = {}
@@ -49,7 +49,7 @@ def _lines(folder):
 
 
 def test_the_share_of_frames_with_both_lines_is_printed(frames, capsys):
-    """Frames are found by key in any folder, with or without the key's prefix. All lines count."""
+    """Frames are found by key in any folder, with or without the key's prefix."""
     assert _run(frames, "--overlays", str(frames / "drawn")) == 0
     out = capsys.readouterr().out
     assert "both lines found in 2 of 2 = 100.0%" in out and "p1_one" in out and "tus_two" in out
@@ -59,8 +59,8 @@ def test_the_share_of_frames_with_both_lines_is_printed(frames, capsys):
     assert ((red - green > 60) & (red - blue > 60)).sum() > 8, "the truth is red"
 
 
-def test_a_line_elsewhere_is_a_miss(frames, capsys):
-    """A frame is a miss if a line is off by more than the limit. The command still succeeds."""
+def test_a_line_off_by_more_than_the_limit_is_a_miss(frames, capsys):
+    """The command succeeds even if a line is missed."""
     lines = _lines(frames)
     lines["p1_one"]["L"][1] -= 30.0
     _write(frames, lines)
@@ -70,7 +70,7 @@ def test_a_line_elsewhere_is_a_miss(frames, capsys):
 
 
 def test_a_line_that_was_not_seen_is_a_miss(frames, capsys):
-    """If a detector saw nothing, its assumed lane does not count as a hit."""
+    """The lane that the detector assumes is not a hit."""
     cv2.imwrite(str(frames / "frames" / "one.png"), np.full((540, 960, 3), 90, np.uint8))
     _write(frames, {"p1_one": _lines(frames)["p1_one"]})
     assert _run(frames) == 0
@@ -78,7 +78,7 @@ def test_a_line_that_was_not_seen_is_a_miss(frames, capsys):
     assert "not found" in out and "0 of 1" in out
 
 
-def test_lines_win_over_centres(frames, capsys):
+def test_lines_take_precedence_over_centres(frames, capsys):
     lines = _lines(frames)
     lines["p1_one"]["gt"] = {"L": 1.0, "R": 2.0}
     _write(frames, lines)
@@ -86,7 +86,7 @@ def test_lines_win_over_centres(frames, capsys):
     assert "2 of 2" in capsys.readouterr().out
 
 
-def test_centres_stand_in_for_lines_that_are_null(frames, capsys):
+def test_centres_are_used_if_the_lines_are_null(frames, capsys):
     lines = _lines(frames)
     left, right = (lines["p1_one"][side] for side in "LR")
     lines["p1_one"] = {
@@ -99,8 +99,8 @@ def test_centres_stand_in_for_lines_that_are_null(frames, capsys):
     assert "2 of 2" in capsys.readouterr().out
 
 
-def test_of_frames_with_one_name_the_camera_s_folder_has_the_right_one(frames, capsys):
-    """The first word of the key selects the folder. If it does not match, the frame is refused."""
+def test_frames_of_the_same_name_are_distinguished_by_folder(frames, capsys):
+    """The first word of the key selects the folder. If no folder matches, the frame is refused."""
     folder = frames / "frames"
     for camera in ("p1", "tus"):
         (folder / camera).mkdir()
@@ -114,13 +114,13 @@ def test_of_frames_with_one_name_the_camera_s_folder_has_the_right_one(frames, c
     assert "p1_one" in capsys.readouterr().err
 
 
-def test_overlays_that_cannot_be_written_are_named(frames, capsys):
+def test_the_error_names_an_overlay_that_cannot_be_written(frames, capsys):
     (frames / "drawn").write_text("in the way")
     assert _run(frames, "--overlays", str(frames / "drawn")) == 2
     assert "drawn/robust_p1_one.png" in capsys.readouterr().err
 
 
-def test_a_folder_s_own_camera_is_used(frames, capsys):
+def test_the_folders_camera_file_is_used(frames, capsys):
     (frames / "frames" / "camera.yaml").write_text(
         "schema: camera/1\nname: mine\nfiles: '*.png'\nwidth: 960\nrows: 540\n"
         "horizon_row: 318\nfocal_px: 868.5\nheight_m: 1.21\nfps: 20\n"
@@ -144,21 +144,21 @@ def test_a_folder_s_own_camera_is_used(frames, capsys):
         (None, "lines"),
     ],
 )
-def test_a_wrong_truth_is_named(frames, capsys, lines, words):
-    """A missing frame or camera, or an invalid line, is a user error that names the entry."""
+def test_the_error_names_a_wrong_entry(frames, capsys, lines, words):
+    """The entry has no frame or camera, or an invalid line."""
     _write(frames, lines)
     assert _run(frames) == 2
     error = capsys.readouterr().err
     assert error.startswith("error: ") and words in error
 
 
-def test_an_unreadable_frame_is_named(frames, capsys):
+def test_the_error_names_an_unreadable_frame(frames, capsys):
     (frames / "frames" / "one.png").write_bytes(b"no picture")
     assert _run(frames) == 2
     assert "one.png" in capsys.readouterr().err
 
 
-def test_a_missing_truth_file_is_named(frames, capsys):
+def test_the_error_names_a_missing_truth_file(frames, capsys):
     (frames / "truth.json").unlink()
     assert _run(frames) == 2
     assert "truth.json" in capsys.readouterr().err

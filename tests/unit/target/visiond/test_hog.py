@@ -9,7 +9,7 @@ TOLERANCE = 1e-6  # features are at most 1
 
 
 def pictures() -> dict[str, np.ndarray]:
-    """Images of 64 x 96 pixels: noise, even grey, a pixel checkerboard, and a slope that wraps round."""
+    """Return images of 64 x 96 pixels: noise, even grey, a checkerboard, and a slope that wraps around."""
     rng = np.random.default_rng(7)
     row, column = np.mgrid[:64, :96]
     return {
@@ -28,11 +28,8 @@ def test_blocks_equal_those_of_scikit_image(name):
     assert np.abs(blocks.reshape(expected.shape) - expected).max() <= TOLERANCE
 
 
-def test_a_window_has_the_features_of_its_own_part_of_the_picture():
-    """A window has the features of a separate image, except at the border.
-
-    There a separate image has no gradient.
-    """
+def test_a_window_has_the_features_of_its_part_of_the_image():
+    """The border is not compared, because a separate image has no gradient there."""
     picture = pictures()["noise"].astype(np.uint8)
     shared = windows(Hog(*picture.shape).blocks(picture))
     assert shared.shape == (3, 5, 7, FEATURES // 7)
@@ -43,7 +40,7 @@ def test_a_window_has_the_features_of_its_own_part_of_the_picture():
     assert np.abs(inner - alone[1:-1, 1:-1]).max() <= TOLERANCE
 
 
-def test_turning_the_light_up_changes_no_feature():
+def test_contrast_and_brightness_change_no_feature():
     picture = np.random.default_rng(3).integers(0, 100, (64, 96)).astype(np.uint8)
     brighter = 2 * picture + 37
     tables = Hog(64, 96)

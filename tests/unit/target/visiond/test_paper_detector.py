@@ -43,8 +43,8 @@ def faded() -> RoadRenderer:
 
 
 @pytest.mark.parametrize(("offset", "heading"), POSES)
-def test_both_lines_are_found_where_they_are(road, offset, heading):
-    """Both lines are found within 6 cm and 0.6 degrees, from any position in the lane and with any camera."""
+def test_both_lines_are_found_at_their_true_place(road, offset, heading):
+    """The errors are at most 6 cm and 0.6 degrees, from any position in the lane and with any camera."""
     found = PaperDetector(road.model).detect(view(road.grey(4.0, offset, heading)))
     for line, (y, slope) in zip(found[:2], road.truth(offset, heading), strict=True):
         assert line.prob > 0.5
@@ -53,7 +53,7 @@ def test_both_lines_are_found_where_they_are(road, offset, heading):
     assert found.path.y == pytest.approx(0.5 * (found.left.y + found.right.y))
 
 
-def test_no_picture_is_remembered():
+def test_earlier_frames_do_not_change_the_result():
     road = RoadRenderer(CALTECH, "dashed", 3, periods=3)
     detector, picture = PaperDetector(CALTECH), road.grey(7.0, 0.3)
     expected = PaperDetector(CALTECH).detect(view(picture))
@@ -62,8 +62,8 @@ def test_no_picture_is_remembered():
     assert detector.detect(view(picture)) == expected
 
 
-def test_a_picture_may_be_read_only_and_stays_as_it_is():
-    """Read-only images work and stay unchanged, because processes share them."""
+def test_read_only_images_are_accepted_and_not_changed():
+    """Processes share read-only images."""
     picture = RoadRenderer(CALTECH, "solid", 1, periods=2).grey(0.0)
     before = picture.copy()
     picture.flags.writeable = False
@@ -72,8 +72,8 @@ def test_a_picture_may_be_read_only_and_stays_as_it_is():
 
 
 @pytest.mark.parametrize("level", [0, 97, 255])
-def test_where_nothing_is_seen_nothing_is_claimed(level):
-    """An even image has no lines. Both have probability 0 and the positions of an assumed lane."""
+def test_an_even_image_has_no_lines(level):
+    """Both lines have probability 0 and the positions of an assumed lane."""
     found = PaperDetector(CALTECH).detect(view(np.full((480, 640), level, np.uint8)))
     assert [(line.y, line.prob) for line in found] == [(1.85, 0.0), (-1.85, 0.0), (0.0, 0.0)]
 
@@ -91,7 +91,7 @@ def test_the_middle_of_the_car_divides_left_from_right(faded):
 
 
 def test_shadows_and_seams_beside_the_middle_are_not_lines():
-    """Hard shadows and tar seams across the lane move neither line by a tenth of the lane's width."""
+    """Hard shadows and tar seams across the lane move neither line by more than 0.3 m."""
     look = Look(shadows=0.35, shadow_depth=0.6, seams=8.0, cracks=12.0, patches=6.0, joint_tone=-50.0)
     road = RoadRenderer(CALTECH, look, 11, periods=8)
     detector = PaperDetector(CALTECH)
@@ -112,7 +112,7 @@ def test_real_edges_get_the_clusters_of_scikit_learn():
         assert np.array_equal(dbscan(at, part.shape, EPS, MIN_SAMPLES), expected)
 
 
-def test_what_is_seen_does_not_depend_on_the_number_of_threads():
+def test_scores_do_not_depend_on_the_number_of_threads():
     features = np.random.default_rng(0).random((192, 1764), dtype=np.float32)
     net = LaneNet.load()
     with threadpool_limits(1):
@@ -121,14 +121,14 @@ def test_what_is_seen_does_not_depend_on_the_number_of_threads():
         assert np.array_equal(net.score(features), alone)
 
 
-def test_a_tile_needs_its_share_of_marked_windows():
+def test_a_tile_needs_enough_marked_windows():
     marked = np.zeros((3, 4), bool)
     marked[1, 2] = True
     assert tiles_with_mark(marked, 1).sum() == 4
     assert tiles_with_mark(marked, NEED).sum() == 0
 
 
-def test_the_windows_on_a_tile_are_those_that_can_light_it():
+def test_the_windows_on_a_tile_are_those_that_can_mark_it():
     tiles = np.zeros((4, 5), bool)
     tiles.ravel()[tile_numbers(64, 80)[40 * 80 + 50]] = True  # the pixel in row 40, column 50
     assert np.argwhere(tiles).tolist() == [[2, 3]]
@@ -136,8 +136,8 @@ def test_the_windows_on_a_tile_are_those_that_can_light_it():
     assert tiles_with_mark(windows_on(tiles), 4)[2, 3]
 
 
-def test_a_window_is_judged_alike_whatever_others_are_looked_at():
-    """The net's score of a window has the same bits at any place in a stack, next to any other windows."""
+def test_a_windows_score_does_not_depend_on_other_windows():
+    """The score has the same bits at any place in a stack of windows."""
     features = np.random.default_rng(1).random((64, 1764), dtype=np.float32)
     net = LaneNet.load()
     scores = net.score(features)

@@ -15,7 +15,7 @@ CAMERAS = {
 
 @pytest.mark.parametrize("name", CAMERAS)
 @pytest.mark.parametrize("y", [-1.85, 0.0, 1.3])
-def test_a_line_along_the_road_stands_upright_in_its_column(name, y):
+def test_a_line_along_the_road_is_vertical_in_the_map(name, y):
     """A road line at y m is in the map's column of y, in every row where the image shows it."""
     model = CAMERAS[name]
     a, b = model.line_in_picture(y, 0.0)
@@ -33,7 +33,7 @@ def test_a_line_along_the_road_stands_upright_in_its_column(name, y):
 
 
 @pytest.mark.parametrize("name", CAMERAS)
-def test_the_map_s_rows_stand_for_the_picture_s(name):
+def test_the_maps_rows_cover_the_rows_of_the_image(name):
     """The map's rows go from far to near without a gap.
 
     Their shares add up to the image rows that they cover.

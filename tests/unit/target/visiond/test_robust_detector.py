@@ -40,8 +40,8 @@ def errors(lines: LaneLines, truth: tuple) -> list[float]:
 @pytest.mark.parametrize("camera", CAMERAS)
 @pytest.mark.parametrize("marks", ["solid", "dashed"])
 @pytest.mark.parametrize(("offset", "heading"), [(0.0, 0.0), (0.6, -0.03), (-0.7, 0.04)])
-def test_a_first_picture_is_enough(camera, marks, offset, heading):
-    """Without history, both lines are found within some cm and a few mrad, with the path between them."""
+def test_one_frame_is_enough_to_find_both_lines(camera, marks, offset, heading):
+    """The errors are at most 6 cm and 10 mrad. The path lies between the lines."""
     road = renderer(camera, marks)
     truth = road.truth(offset, heading)
     lines = see(RobustDetector(road.model), road.grey(3.0, offset, heading))
@@ -52,11 +52,8 @@ def test_a_first_picture_is_enough(camera, marks, offset, heading):
     assert lines.path.y == pytest.approx(0.5 * (lines.left.y + lines.right.y))
 
 
-def test_another_road_with_distractors():
-    """The errors are no larger on concrete with distractors.
-
-    These are seams, joints, shadows, faint paint, a double line, a kerb and cars.
-    """
+def test_distractors_do_not_hide_the_lines():
+    """The road is of concrete and has seams, joints, shadows, faint paint, a double line, a kerb and cars."""
     look = replace(
         standard_look("dashed"),
         asphalt=150.0,
@@ -75,19 +72,16 @@ def test_another_road_with_distractors():
 
 
 @pytest.mark.parametrize("tone", [0, 128, 255])
-def test_an_empty_picture_shows_no_lines(tone):
-    """In an image of one tone, no line is seen. Both lines get the positions of an assumed lane."""
+def test_an_image_of_one_tone_has_no_lines(tone):
+    """Both lines have the positions of an assumed lane."""
     model = CAMERAS["steep"]
     lines = see(RobustDetector(model), np.full((model.rows, model.width), tone, np.uint8))
     assert (lines.left.prob, lines.right.prob, lines.path.prob) == (0.0, 0.0, 0.0)
     assert (lines.left.y, lines.right.y) == (1.85, -1.85)
 
 
-def test_lines_are_held_for_a_while_ever_less_probable():
-    """When no line is seen any more, the lines stay and their probability falls.
-
-    After a second there are none.
-    """
+def test_lines_that_disappear_are_held_with_falling_probability():
+    """After a second, the lines are dropped."""
     road = renderer()
     detector = RobustDetector(road.model)
     before = see(detector, road.grey(0.0, 0.4, 0.02))
@@ -103,8 +97,8 @@ def test_lines_are_held_for_a_while_ever_less_probable():
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
-def test_one_line_is_enough_to_know_the_other(side):
-    """If half of the view is covered, the other line gives the covered one, whose probability falls."""
+def test_one_line_gives_the_position_of_the_other(side):
+    """Half of the view is covered, and the probability of the covered line falls."""
     road = renderer()
     detector = RobustDetector(road.model)
     see(detector, road.grey(0.0))
@@ -123,7 +117,7 @@ def test_one_line_is_enough_to_know_the_other(side):
 
 
 def test_lines_are_followed_through_rain():
-    """Rain of ten thousand streaks over a dashed road hides paint briefly. The lane is not lost."""
+    """The rain has ten thousand streaks, and the road has dashes."""
     from types import SimpleNamespace
 
     from selfdrive.sim.effects import PaperRain
@@ -138,7 +132,7 @@ def test_lines_are_followed_through_rain():
         assert max(errors(lines, road.truth(offset))) < 0.2
 
 
-def test_beyond_a_line_the_next_lane_is_the_car_s():
+def test_after_crossing_a_line_the_next_lane_is_found():
     """A car that drifts over a line keeps its old lane at first and then gets the new one."""
     road = renderer()
     detector = RobustDetector(road.model)
@@ -150,10 +144,10 @@ def test_beyond_a_line_the_next_lane_is_the_car_s():
             assert max(errors(lines, road.truth(known, 0.01))) < 0.1
 
 
-def test_the_same_pictures_give_the_same_lines():
-    """Two detectors agree to the last bit, whatever a third one sees in between.
+def test_the_same_frames_give_the_same_lines():
+    """Two detectors agree to the last bit, even if a third one sees other frames in between.
 
-    They do not modify the image.
+    Detectors do not modify the image.
     """
     road = renderer()
     first, second, other = (RobustDetector(road.model) for _ in range(3))

@@ -12,10 +12,10 @@ def sample() -> tuple[np.ndarray, np.ndarray]:
     return labelled_windows(2, np.random.default_rng(99))
 
 
-def test_windows_come_in_equal_parts_and_again_from_the_same_seed(sample):
-    """Windows with and without a mark are equal in number, with a limit for each image.
+def test_windows_are_balanced_and_reproducible(sample):
+    """About half of the windows have a mark, and the number per image is limited.
 
-    A second draw gives the same bytes.
+    A second draw with the same seed gives the same bytes.
     """
     features, labels = sample
     assert 0.4 < labels.mean() < 0.6
@@ -26,14 +26,13 @@ def test_windows_come_in_equal_parts_and_again_from_the_same_seed(sample):
     assert np.array_equal(again[1], labels[:number])
 
 
-def test_the_shipped_net_knows_marks_on_roads_it_has_not_seen(sample):
+def test_the_shipped_net_recognises_marks_on_unseen_roads(sample):
     """The shipped net classifies at least three in four windows correctly, on deliberately hard roads."""
     features, labels = sample
     assert np.mean((LaneNet.load().score(features) > 0.0) == labels) >= 0.75
 
 
 def test_weights_can_be_stored_and_loaded(tmp_path):
-    """A net that is written and read is the same, and has the same bytes when it is written again."""
     net = LaneNet.load()
     net.save(tmp_path / "a.npz")
     LaneNet.load(tmp_path / "a.npz").save(tmp_path / "b.npz")
@@ -41,7 +40,7 @@ def test_weights_can_be_stored_and_loaded(tmp_path):
 
 
 @pytest.mark.slow
-def test_training_anew_gives_the_same_net_which_agrees_with_the_shipped_one(tmp_path, sample, capsys):
+def test_training_is_reproducible_and_agrees_with_the_shipped_net(tmp_path, sample, capsys):
     """Two small trainings write the same bytes and agree with the shipped net on most windows."""
     for name in ("a.npz", "b.npz"):
         assert train.main(["--small", "--out", str(tmp_path / name)]) == 0

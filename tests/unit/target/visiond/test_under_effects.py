@@ -40,7 +40,7 @@ def test_misses_are_counted_by_level(frames, tmp_path, capsys):
     assert len(printed) == 1 + len(rows) and printed[-1].split() == ["MedianBlur", "2", "5", "1", "0", "0"]
 
 
-def test_a_line_that_cannot_be_seen_is_missed(frames, tmp_path):
+def test_more_lines_are_missed_in_heavier_rain(frames, tmp_path):
     assert main([*frames, "--effect", "PaperRain", "--seeds", "2", "--csv", str(tmp_path / "found.csv")]) == 0
     with (tmp_path / "found.csv").open() as file:
         missed = [int(row["missed_paper"]) for row in csv.DictReader(file)]
@@ -48,7 +48,7 @@ def test_a_line_that_cannot_be_seen_is_missed(frames, tmp_path):
 
 
 def test_strips_show_all_levels(frames, tmp_path):
-    """Strips have two rows of five images. Effects with fewer levels leave places empty."""
+    """A strip has five places in each row. Places without a level stay empty."""
     kinds = {kind.__name__: kind for kind in LEVELS}
     for name in ("PaperRain", "GaussianBlur"):
         assert main([*frames, "--effect", name, "--strips", str(tmp_path)]) == 0
@@ -57,6 +57,6 @@ def test_strips_show_all_levels(frames, tmp_path):
         assert strip.shape == (rows * (SMALL[1] + TITLE), IN_A_ROW * SMALL[0])
 
 
-def test_missing_frames_are_told(frames, tmp_path, capsys):
+def test_the_error_names_a_missing_frame(frames, tmp_path, capsys):
     assert main([str(tmp_path), frames[1]]) == EXIT_INPUT
     assert "p1_one" in capsys.readouterr().err

@@ -34,8 +34,8 @@ def solve(points: Points, belief: Belief) -> Pose:
 @pytest.mark.parametrize("left", [-22.0, 3.0, 30.0])
 @pytest.mark.parametrize("dip", [-7.0, 0.0, 9.0])
 @pytest.mark.parametrize("width", [3.2, 3.7, 4.2])
-def test_lines_are_found_wherever_they_are(middle, left, dip, width):
-    """Offset, heading, pitch error and lane width are found from points of which a third are random."""
+def test_lines_are_found_at_any_pose_and_width(middle, left, dip, width):
+    """About a third of the points are random."""
     true = Pose(left, dip, middle + 0.5 * width, middle - 0.5 * width)
     found = solve(points_on(true, chance=120), Belief())
     assert found.y_left == pytest.approx(true.y_left, abs=0.04)
@@ -45,14 +45,14 @@ def test_lines_are_found_wherever_they_are(middle, left, dip, width):
 
 
 @pytest.mark.parametrize(("lines", "missing"), [("L", "y_right"), ("R", "y_left")])
-def test_the_line_that_is_not_seen_is_a_lane_s_width_away(lines, missing):
+def test_an_unseen_line_is_placed_a_lane_width_away(lines, missing):
     true = Pose(5.0, 0.0, 1.6, -1.8)
     found = solve(points_on(true, lines), Belief(width=(3.4, 0.1)))
     assert getattr(found, missing) == pytest.approx(getattr(true, missing), abs=0.1)
     assert getattr(found, missing.replace("y_", "prob_")) < 0.1
 
 
-def test_without_points_the_belief_stands():
+def test_without_points_the_belief_is_unchanged():
     found = solve(
         points_on(Pose(0.0, 0.0, 1.85, -1.85), lines=""), Belief(middle=(0.3, 0.1), width=(3.6, 0.1))
     )
@@ -61,7 +61,7 @@ def test_without_points_the_belief_stands():
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_belief_keeps_the_lines_among_many_chance_points(seed):
+def test_the_belief_finds_the_lines_among_many_random_points(seed):
     true = Pose(4.0, 0.0, 1.95, -1.75)
     points = points_on(true, chance=1500, seed=seed)
     belief = Belief(middle=(0.15, 0.1), width=(3.7, 0.1), left=(0.0, 4.0), dip=(0.0, 1.5))
@@ -70,7 +70,6 @@ def test_belief_keeps_the_lines_among_many_chance_points(seed):
     assert found.y_right == pytest.approx(true.y_right, abs=0.05)
 
 
-def test_chance_alone_counts_as_nothing_seen():
-    """With evenly spread points, the best pair of lines counts as hardly seen."""
+def test_random_points_alone_give_no_confident_lines():
     found = solve(points_on(Pose(0.0, 0.0, 1.85, -1.85), lines="", chance=1500), Belief())
     assert max(found.prob_left, found.prob_right) < 0.6
