@@ -53,7 +53,7 @@ def test_each_target_has_its_own_cache_folder(name: str) -> None:
     assert place.resolve().parent == (caches.folder() / "targets").resolve()
 
 
-def test_passed_checks_are_one_entry_and_each_target_file_is_another(filled: Path) -> None:
+def test_checks_form_one_entry_and_each_target_file_has_its_own(filled: Path) -> None:
     found = [(entry.what, entry.path.relative_to(filled).as_posix()) for entry in caches.entries()]
     files = ["targets/car/a.npy", "targets/car/b.npy", "targets/car/compiled/hog.so"]
     assert found == [("checks", "checks/ab12"), *(("target car", file) for file in files)]

@@ -126,7 +126,7 @@ def test_readers_see_complete_files_while_several_writers_write(tmp_path: Path) 
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_other_failures_are_not_called_a_full_disk(tmp_path: Path) -> None:
+def test_other_failures_are_not_reported_as_a_full_disk(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
         write_atomic(tmp_path / "nosuch" / "file", b"")
 

@@ -53,7 +53,7 @@ def test_the_archive_is_unpacked_once(archive: Path, tmp_path: Path) -> None:
     assert [p.name for p in folder.parent.iterdir()] == [folder.name]
 
 
-def test_another_archive_has_another_folder(archive: Path) -> None:
+def test_a_different_archive_is_unpacked_into_a_different_folder(archive: Path) -> None:
     folder = shipped_folder()
     with ZipFile(archive, "a") as file:
         file.writestr("target/selfdrive/new.py", b"")

@@ -55,9 +55,8 @@ def run(
 
 
 def test_propagation_is_available_as_frames(run: Run) -> None:
-    """A run's frame has a row for each channel that deviated from the golden run. An experiment's frame sorts
-    its channels by the time of their first deviation. For older runs, which lack the data, there is an
-    error."""
+    """A run's frame has a row for each channel that left golden. An experiment's frame sorts its channels by
+    the time at which they left golden. For older runs, which lack the data, there is an error."""
     frame = run.propagation()
     lanes = run.results.index[run.results["fault_type"] == "lane"]
     assert list(frame["experiment_id"].unique()) == sorted(lanes)

@@ -27,7 +27,7 @@ def test_a_fault_is_tried_by_name(toycar: Workspace) -> None:
     assert "toycar/sensing.py" in trial._repr_html_()
 
 
-def test_value_replaces_the_drawn_values(toycar: Workspace, tmp_path: Path) -> None:
+def test_a_given_value_replaces_the_drawn_values(toycar: Workspace, tmp_path: Path) -> None:
     """All files are kept in the folder `out`."""
     trial = mutator.try_fault(
         "sensor/distance/longer", "A", "near", value=12.5, workspace=toycar, out=tmp_path / "o"

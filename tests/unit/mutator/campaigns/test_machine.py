@@ -47,7 +47,7 @@ def test_versions_come_from_package_metadata() -> None:
 
 
 def test_modules_are_reported_by_package() -> None:
-    """A module's name may differ from its package's name. Modules without a package are left out."""
+    """A module's name can differ from its package's name. Modules without a package are left out."""
     assert machine.packages_of(["yaml", "_yaml", "cv2", "nosuch"]) == ("opencv-python-headless", "pyyaml")
 
 

@@ -39,7 +39,7 @@ def alone(workspace: Workspace, path: Path, seed: int, **chosen: int) -> Plan:
 def test_a_plan_for_several_seeds_joins_the_plans_for_each_seed(
     toycar: Workspace, campaign: Callable[..., Path], more: dict[str, str]
 ) -> None:
-    """The choice of a seed selects one of the campaign's seeds."""
+    """`Choices(seed=...)` selects one of the campaign's seeds."""
     path = campaign(**more)
     plan, parts = make_plan(toycar, path), [alone(toycar, path, seed) for seed in (3, 4, 5)]
     assert plan.experiments == tuple(e for part in parts for e in part.experiments)

@@ -26,7 +26,7 @@ HAZARD = {"outcome": Outcome.HAZARD, "t_manifest": 2.5, "hazards": (("H3", 4.0),
 
 
 def lane_is_left(e: Experiment) -> dict[str, Any]:
-    """Make lane faults hazardous, except one, which crashes with a given message."""
+    """Make lane faults hazardous, except one, which crashes. Its message contains HTML."""
     if e.fault.fault_type != "lane":
         return {}
     if e.fault.value == 0.8:

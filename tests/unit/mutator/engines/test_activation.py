@@ -125,7 +125,7 @@ def test_a_step_can_have_several_observations_or_none(probe) -> None:
 
 
 @pytest.mark.parametrize("trigger", [at_time(0.2), Trigger(name="x", condition="d_rel <= 20.0")])
-def test_setting_the_state_of_a_probe_replaces_its_observations(probe, trigger: Trigger) -> None:
+def test_a_probe_whose_state_is_set_equals_one_that_observed(probe, trigger: Trigger) -> None:
     start = start_of(probe(trigger), SEEN)
     saw: dict = {}
     given: dict = {}

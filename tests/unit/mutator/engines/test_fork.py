@@ -56,7 +56,7 @@ def test_a_fork_starts_just_before_its_fault(fork: Fork) -> None:
     assert len(fork.processes()) <= 10
 
 
-def test_libraries_that_golden_imports_late_are_loaded_before_the_fork(fork: Fork) -> None:
+def test_libraries_that_the_golden_run_imports_late_are_loaded_before_the_fork(fork: Fork) -> None:
     fork.run(fork.job(at_time(2.0)))
     (seen,) = fork.engine._seen.values()
     assert isinstance(seen, Observed)

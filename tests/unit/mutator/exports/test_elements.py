@@ -1,4 +1,5 @@
-"""Runs as mutation testing reports: the structure that the schema requires, and the meaning of statuses."""
+"""Runs exported as mutation testing reports: the structure that the schema requires, and the meaning of
+statuses."""
 
 import json
 import re

@@ -111,7 +111,7 @@ def models(tmp_path: Path) -> FaultModels:
 
 
 def test_a_template_can_set_its_own_names(models: FaultModels) -> None:
-    """It is refused if the function uses the same names."""
+    """The template is refused if the function uses the same names."""
     assert "for y in [1]:" in injected(models, "outer", target="x")
     with pytest.raises(
         MutatorError, match=r"root/m.py:6: .* set 'y', a name that the function uses"

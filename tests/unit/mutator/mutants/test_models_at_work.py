@@ -91,7 +91,7 @@ def test_staleness_is_counted_in_steps_and_not_in_executions(toy: Make) -> None:
 
 
 def test_a_slow_call_returns_its_result_after_its_duration(toy: Make) -> None:
-    """Until then, no other call is made."""
+    """During that time, no other call is made."""
     made = toy("def f(get):\n    return get()\n", AnchorKind.RESULT, "get", "slow_call", duration=2 * STEP_S)
     count = counting()
     assert made.run("..xxxxxx..xxx", lambda: count) == [1, 2, 3, 3, 3, 3, 4, 4, 6, 7, 8, 8, 8]
@@ -250,7 +250,7 @@ def test_a_branch_condition_is_negated_or_fixed(toy: Make, holds: str, taken: li
         (AnchorKind.VALUE, "x"),
     ],
 )
-def test_an_exception_is_raised_while_active(toy: Make, kind: AnchorKind, name: str) -> None:
+def test_an_exception_is_raised_while_the_fault_is_active(toy: Make, kind: AnchorKind, name: str) -> None:
     """The anchor can be a statement or an expression."""
     made = toy("def f(x):\n    return x\n", kind, name, "exception", error="TimeoutError")
     assert made.run(".", lambda: 1) == [1]
@@ -258,7 +258,7 @@ def test_an_exception_is_raised_while_active(toy: Make, kind: AnchorKind, name: 
         made.run(".x", lambda: 1)
 
 
-def test_a_call_returns_none_while_active(toy: Make) -> None:
+def test_a_call_returns_none_while_the_fault_is_active(toy: Make) -> None:
     made = toy("def f(get):\n    return get()\n", AnchorKind.RESULT, "get", "none")
     count = counting()
     assert made.run(".x.", lambda: count) == [1, None, 3]

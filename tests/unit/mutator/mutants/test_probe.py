@@ -169,7 +169,7 @@ def test_the_probe_evaluates_conditions_like_the_harness(clone: Workspace) -> No
             assert fi.active("a") == evaluate(check_condition(condition), known)
 
 
-def test_drift_counts_steps_not_executions(clone: Workspace) -> None:
+def test_drift_grows_with_steps_and_not_with_executions(clone: Workspace) -> None:
     fi = probe(clone)
     drive(fi, "xx.x")
     for _ in range(5):
@@ -302,7 +302,7 @@ def test_a_bit_outside_the_type_is_an_error(clone: Workspace, value: Any, bit: i
         (None, 2.0, float),
     ],
 )
-def test_a_whole_number_takes_the_type_of_an_integer_value(
+def test_a_whole_number_gets_the_type_of_the_integer_that_it_replaces(
     clone: Workspace, value: Any, number: float, kind: type
 ) -> None:
     """The value can be an integer, a numpy integer, or an array of integers."""

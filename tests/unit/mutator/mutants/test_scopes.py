@@ -73,8 +73,8 @@ CLASS = "class C:\n    def f(self):\n        #\n        return __x\n"
 def test_an_inserted_binding_can_change_the_scope_of_a_name(
     source: str, inserted: str, moved: tuple[str, str, str, str] | None
 ) -> None:
-    """A name that was already local or declared keeps its scope. Attributes, keyword arguments and
-    comprehension variables do not bind names of the function."""
+    """A binding of a name that was already local or declared changes nothing. Attributes, keyword arguments
+    and comprehension variables do not bind names of the function."""
     place = next(i for i, line in enumerate(source.splitlines(), 1) if line.strip() == "#")
     made = source.replace("#", inserted)
     found = next(moved_names(source.replace("#", "pass").encode(), made.encode(), {place}), None)

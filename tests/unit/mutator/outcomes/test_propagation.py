@@ -1,4 +1,4 @@
-"""Which channels deviate from the golden run, and the table that lists them."""
+"""Which channels leave golden, and the table that lists them."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ def left(golden: dict, faulty: dict, *channels: Channel, t_end: float | None = N
     return departures({"t": T, **golden}, {"t": T, **faulty}, channels, "t", t_end)
 
 
-def test_a_channel_deviates_when_it_exceeds_its_tolerance() -> None:
+def test_a_channel_leaves_golden_when_it_exceeds_its_tolerance() -> None:
     """The channel's deviation is its largest difference."""
     faulty = {"a": stepped(2, 0.5), "b": stepped(1, 0.3) + stepped(4), "c": ZEROS}
     found = left({"a": ZEROS, "b": ZEROS, "c": ZEROS}, faulty, *(channel(n, 0.5) for n in "abc"))
@@ -47,7 +47,7 @@ def test_non_finite_values_are_compared() -> None:
 
 
 def test_channels_are_compared_at_their_own_times() -> None:
-    """If a message is late, its channel deviates when the message is first missing."""
+    """If a message is late, its channel leaves golden when the message is first missing."""
     golden = {"a": np.array([1.0, 2.0]), "a@": np.array([0.0, 0.3])}
     assert left(golden, dict(golden), channel("a")) == ()
     assert left(golden, golden | {"a": np.array([1.0, 5.0])}, channel("a")) == (("a", 0.3, 3.0),)
@@ -59,7 +59,7 @@ def test_a_channel_that_was_not_recorded_is_left_out() -> None:
     assert left({"a": ZEROS}, {"b": ZEROS}, channel("a"), channel("b")) == ()
 
 
-def test_all_channels_deviate_where_the_shorter_run_ends() -> None:
+def test_all_channels_leave_golden_where_the_shorter_run_ends() -> None:
     """A run that ends after the end of the drive is not shorter."""
     golden, faulty = {"t": T, "a": ZEROS}, {"t": T[:4], "a": ZEROS[:4]}
     assert departures(golden, faulty, [channel("a")], "t", None) == (("a", T[4], 0.0),)

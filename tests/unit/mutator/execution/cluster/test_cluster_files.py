@@ -33,8 +33,7 @@ async def opened(folder: Path, text: str, insecure: bool = False) -> str:
 
 
 def with_slurm(folder: Path, monkeypatch: pytest.MonkeyPatch, sbatch: str) -> None:
-    """Replace Slurm's commands with scripts: `sbatch` runs the given one, and `scancel` records the cancelled
-    jobs."""
+    """Replace Slurm's commands: `sbatch` runs the given script, and `scancel` records the cancelled jobs."""
     for name, script in (("sbatch", sbatch), ("scancel", "echo $1 >> cancelled")):
         (folder / name).write_text(f"#!/bin/sh\ncd {folder}\n{script}\n")
         (folder / name).chmod(0o755)

@@ -69,7 +69,7 @@ def host(sent: tuple[Bundle, Piece], tmp_path: Path) -> Host:
 
 
 def test_the_process_and_its_folder_are_removed_with_the_host(host: Host, sent: tuple[Bundle, Piece]) -> None:
-    """Until then, all pieces run in the same process."""
+    """All pieces run in the same process."""
     piece = sent[1]
     with attended(host):
         first = host.run(piece.packed(), lambda: True)
