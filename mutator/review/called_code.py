@@ -1,4 +1,4 @@
-"""Finds the target code that injected lines call, by name, so that reviewers see it.
+"""Finds, by name, the target code that injected lines call, so that reviewers can see it.
 
 Names are resolved through imports, transitively, to functions, classes and constants of the tree. Classes are
 included whole, with their bases; for `self`, only the named method is. Calls that depend on values (a method
@@ -24,7 +24,7 @@ _FURTHEST = 20  # most imports to follow for a name
 @dataclass(frozen=True, slots=True, order=True)
 class _Place:
     """A piece of the tree: `name` in the file at `path`, or the whole file (no name). For a method, `me` is
-    the class of its object, whose methods override those of its bases."""
+    the class of the object on which it is called."""
 
     path: str
     name: str
@@ -36,13 +36,13 @@ class CalledCode:
         self._tree = tree
 
     def of_lines(self, path: str, data: bytes) -> dict[str, str]:
-        """The code that injected lines call in `data`, the mutated file at `path`: the source of each place,
-        such as `car/weather.py Rain`. For a file that is not Python, this is the whole file."""
+        """Return the code that the injected lines in `data`, the mutated file at `path`, call: the source of
+        each place, such as `car/weather.py Rain`. Files other than Python are included whole."""
         module = source_names.read_module(path, data, Path())
         return self._closure(path, uses_in(module.tree, wanted=_injected(data)))
 
     def of_expressions(self, path: str, function: str, texts: Iterable[str]) -> dict[str, str]:
-        """The code that expressions would call in a function. Text that is not an expression is ignored."""
+        """Return the code that expressions would call in a function. Invalid expressions are ignored."""
         node, owner = self._module(path).function(function), function.rpartition(".")[0]
         found: list[Use] = []
         for text in texts:
@@ -154,7 +154,8 @@ class CalledCode:
 
 
 def _injected(data: bytes) -> Callable[[ast.expr], bool]:
-    """A predicate for injected nodes of a mutated file: inserted lines, and new values in changed lines."""
+    """A predicate for the injected nodes of a mutated file: those in inserted lines, and those in the new
+    parts of changed lines."""
     tags = {number: tag for number, line in enumerate(data.splitlines(), 1) if (tag := tag_of(line))}
     changed = [(line, first, end) for _, line, first, end in changed_parts(data)]
 

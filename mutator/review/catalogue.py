@@ -1,6 +1,6 @@
 """The groups to review: the mutants of a library or campaign by location and template.
 
-A group does not depend on which of its mutants are selected, or on triggers. Its id follows from its label;
+A group does not depend on triggers, or on which of its mutants are selected. Its id follows from its label;
 decisions are bound to its diff with holes, the target's code and the templates (`Material`).
 """
 
@@ -35,14 +35,14 @@ from mutator.workspace import Workspace
 
 @dataclass(frozen=True, kw_only=True)
 class Group:
-    """Mutants that differ only in values and triggers, or an operator's mutants of a function. `what` is the
-    label: location and template.
+    """Mutants that differ only in values and triggers, or all mutants that an operator makes in a function.
+    `what` is the label: location and template.
 
-    `shapes` are its diffs with holes, several if a template writes different lines for different numbers.
-    Their members are `faults`, by id. `runs` is the number of its experiments in a campaign; None if no
-    campaign is given. `trigger` and `hold` list the kinds, joined by `or`. `values` is the range of each
-    parameter in the specs. `seen` is the text that a decision is bound to. `made_from` are the files of specs
-    and templates.
+    `shapes` are the group's diffs with holes, several if a template writes different lines for different
+    numbers. The members of the shapes are the ids of `faults`. `runs` is the number of the group's
+    experiments in a campaign; None if no campaign is given. `trigger` and `hold` list the kinds that occur,
+    joined by `or`. `values` is the range of each parameter in the specs. `seen` is the text that a decision
+    is bound to. `made_from` are the files of the specs and templates.
     """
 
     id: str
@@ -83,7 +83,7 @@ def of_plan(workspace: Workspace, plan: Plan) -> tuple[Group, ...]:
     files = [one.file for one in plan.campaign.faults if one.file]
     named = [
         workspace.spec(file) for file in files if file.is_file()
-    ]  # links in a run's copy of a campaign have no targets
+    ]  # in a run folder's copy of a campaign, links may be dangling
     specs = (*workspace.specs(), *named)
     return _Catalogue(workspace.fault_models(), manifest, specs).groups(members, runs)
 
@@ -98,9 +98,9 @@ def of_library(
 ) -> tuple[Group, ...]:
     """The groups of the library's faults; the probe's group is last.
 
-    Each fault is built with every context of the tables and with a random time, as in campaigns that do not
-    set `hold`. Without `reading`, all readings are included. `specs` are spec files or globs (none: all);
-    MutatorError if one matches nothing.
+    Each fault is built with a trigger for every context of the tables and one for a random time, as in
+    campaigns that do not set `hold`. Without `reading`, all readings are included. `specs` are spec files, or
+    globs over spec names (none: all); MutatorError if one matches nothing.
     """
     models = workspace.fault_models()
     tables = map(workspace.context_table, workspace.context_tables)
@@ -211,7 +211,7 @@ class _Catalogue:
         )
 
     def _material_of_operator(self, fault: Fault, operator: Operator) -> Material:
-        """The texts that determine all mutants of an operator in a function, drawn or not."""
+        """The texts that determine all mutants of an operator in a function, selected or not."""
         at, tree = fault.injections[0].location, self.manifest.tree
         file, facts = parsed(tree, at.path), facts_of(tree, at.path)
         found = list(mutations_of(file, facts, at.function, self.models, [operator]))
@@ -223,7 +223,7 @@ class _Catalogue:
         )
 
     def _probe(self, runs: Mapping[str, int] | None) -> Group:
-        """The code in every mutant: the probe, its import, and the observing statement."""
+        """The group of the code that every mutant has: the probe, its import, and the observing statement."""
         location = self.manifest.observation.location
         what = f"the probe, observing at {groups.location_label(location)}"
         patch = build(self.manifest, self.models, None, always()).patch

@@ -17,11 +17,11 @@ class _Commit:
     """A commit with its author (as in `.mailmap`) and the co-authors that its message names."""
 
     id: str
-    author: str  # `Jane Doe <jane@x.org>`; co-authors too
+    author: str  # such as `Jane Doe <jane@x.org>`
     others: tuple[str, ...] = ()
 
     def is_by(self, reviewer: str) -> bool:
-        """Whether `reviewer` is an author: `Jane Doe`, `jane@x.org` or `Jane Doe <jane@x.org>`."""
+        """Whether `reviewer`, such as `Jane Doe`, `jane@x.org` or `Jane Doe <jane@x.org>`, is an author."""
         return any(_names(reviewer) & _names(one) for one in (self.author, *self.others))
 
 
@@ -43,8 +43,8 @@ def library_commit(workspace: Workspace) -> str | None:
 
 
 def check_four_eyes(approvals: Sequence[tuple[Group, str]]) -> None:
-    """Raise MutatorError if a reviewer approves a group that they changed last, or if its last author is
-    unknown."""
+    """Raise MutatorError if a reviewer approves a group that they changed last, or if a group's last author
+    is unknown."""
     known: dict[tuple[Path, ...], dict[Path, _Commit]] = {}
     for group, by in approvals:
         if group.made_from not in known:
@@ -66,7 +66,9 @@ def _last_changes(group: Group) -> dict[Path, _Commit]:
         top = git(path.parent, "rev-parse", "--show-toplevel")
         if top is None:
             raise _refusal(
-                f"cannot determine who last changed group {group.id}: no git clone", path, "put it under git"
+                f"cannot determine who last changed group {group.id}: it is not in a git clone",
+                path,
+                "put the file under git",
             )
         clones.setdefault(Path(top.strip()), []).append(path)
     return {top: _last_change(group, top, paths) for top, paths in clones.items()}
@@ -79,9 +81,9 @@ def _last_change(group: Group, top: Path, paths: Sequence[Path]) -> _Commit:
     if changes is None or changes.strip() or not told.strip():
         first = (changes or "").strip().partition("\n")[0].split(maxsplit=1)[-1:]
         raise _refusal(
-            f"cannot determine who last changed group {group.id}: not committed",
+            f"cannot determine who last changed group {group.id}: its latest change is not committed",
             Path(top, *first),
-            "commit first",
+            "commit the change first",
         )
     sha, author, *others = filter(None, told.strip("\n").split("\0"))
     return _Commit(sha, author, tuple(others))
@@ -91,6 +93,6 @@ def _refusal(got: str, where: Path, remedy: str) -> MutatorError:
     return MutatorError(
         got,
         where=where,
-        expected="a reviewer other than the author of the last change (`four_eyes` of this library)",
+        expected="a reviewer other than the author of the last change (`four_eyes` is set in this library)",
         remedy=remedy,
     )

@@ -48,7 +48,7 @@ _VERDICTS = {Kind.APPROVE: Verdict.APPROVED, Kind.REJECT: Verdict.REJECTED}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Change:
-    """An action of `by` on a group in its current state. Its text is stored as a remark."""
+    """An action of the reviewer `by` on a group in its current state. `text` is stored as a remark."""
 
     group: Group
     kind: Kind
@@ -68,7 +68,7 @@ class Conflict(CheckFailed):
 
 @dataclass(frozen=True, kw_only=True)
 class Review:
-    """The reviews of one target's groups, by group; `path` is the file, which may not exist.
+    """The reviews of one target's groups, by group; `path` is the file, which might not exist.
 
     With `four_eyes`, the author of a group's last change cannot approve it.
     """
@@ -131,13 +131,13 @@ class Review:
             return ""
         changed = self.changed(group)
         since = f" (changed since: {', '.join(changed)})" if changed else ""
-        older = "" if decision.bound.calls else " (before called code and values were kept)"
+        older = "" if decision.bound.calls else " (made before called code and values were stored)"
         return decision.words + since + older
 
 
 def load_review(workspace: Workspace, target: str) -> Review:
-    """Load the reviews of a target's groups; empty without a file. MutatorError with the line of a mistake.
-    Links are refused: errors would reveal the linked file's content, and a change would replace the link."""
+    """Load the reviews of a target's groups; empty if there is no file. MutatorError, with the line, for a
+    mistake. Links are refused: errors would reveal the linked file, and a change would replace the link."""
     path = workspace.library / "reviews" / f"{target}.yaml"
     if path.is_symlink():
         raise MutatorError(
@@ -261,6 +261,6 @@ def _line(text: str, argument: str) -> str:
     line = " ".join(text.split())
     if not line.isprintable():
         raise MutatorError(
-            f"{line!r}", argument=argument, expected="plain text", remedy="remove other characters"
+            f"{line!r}", argument=argument, expected="printable text", remedy="remove all other characters"
         )
     return line

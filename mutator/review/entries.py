@@ -56,7 +56,7 @@ class Decision:
     values: Values | None = None
 
     def changed(self, bound: Bound, values: Values) -> list[str]:
-        """The parts of the group that changed since, as text; empty if the decision is valid."""
+        """The parts of the group that changed since the decision, as text; empty if it is still valid."""
         beyond = _beyond(self.values, values) if self.values is not None else ""
         return self.bound.changed(bound) + ([f"values ({beyond})"] if beyond else [])
 

@@ -71,7 +71,7 @@ def _refusal(workspace: Workspace, plan: Plan, review: Review, refused: list[Gro
         "\n".join([f"{many} not approved:", *lines]),
         where=review.path,
         expected="a valid approval of each group",
-        remedy=f"review the rest: `mutator review walk {wanted} --by NAME`{at_once}",
+        remedy=f"review them: `mutator review walk {wanted} --by NAME`{at_once}",
     )
 
 

@@ -1,8 +1,8 @@
 """Groups patches that differ only in values: a diff with holes, and a table of the values in them.
 
-The members of a shape differ only in numbers, truth values and ids of their injected lines and, in the probe,
-in its ids and the lines that define the trigger. Values that are equal in all members are text; the others
-are holes.
+Patches of the same shape differ only in the numbers, truth values and ids of their injected lines and, in the
+probe, in ids and the lines that define the trigger. A value that is equal in all of them stays in the text;
+every other value becomes a hole.
 """
 
 import re
@@ -31,9 +31,9 @@ _VALUE = re.compile(rf"(?P<id>{INJECTION_ID})|{_NUMBER}")
 
 @dataclass(frozen=True, kw_only=True)
 class Shape:
-    """Patches that differ only in values. A member's patch is `parts` with its values in between.
+    """Patches that differ only in values. A member's patch is `parts` with the member's values in between.
 
-    Hole `places[i]` is between `parts[i]` and `parts[i + 1]`; a hole may be in several places. `values[m][h]`
+    Hole `places[i]` is between `parts[i]` and `parts[i + 1]`; a hole can be in several places. `values[m][h]`
     fills hole `h` in the patch of `members[m]`. `id` depends only on `name` and the text without values.
     """
 
@@ -115,7 +115,8 @@ def location_label(location: FaultLocation) -> str:
 
 
 def injection_label(injection: Injection) -> str:
-    """Location, model and parameters without numbers; names and truth values may decide what is injected."""
+    """Location, model and parameters without numbers. Names and truth values stay, because they can change
+    the injected code."""
     given = (
         f"{name}={value}" if value is None or isinstance(value, str | bool) else name
         for name, value in injection.params

@@ -20,7 +20,8 @@ _SHOWN_HOLE = "⟨⟩"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Material:
-    """The texts; `diff` has one for each shape of the diff, or one for each change that an operator makes."""
+    """The texts. `diff` has one text for each shape, or a pair of texts for each change that an operator
+    makes."""
 
     diff: Sequence[str] | Sequence[Sequence[str]]
     functions: Mapping[str, str]
@@ -63,7 +64,7 @@ def functions_of(tree: SourceTree, locations: Iterable[FaultLocation]) -> dict[s
 
 
 def fault_hunks(patch: str) -> str:
-    """The hunks with lines of a fault."""
+    """The hunks of a patch that contain lines of a fault."""
     kept = []
     for section in file_patches(patch):
         if not adds_file(section):

@@ -1,4 +1,4 @@
-"""The review page: every group with state, diff and values, in one self-contained file or served."""
+"""The review page: every group with its state, diff and values, in one self-contained file or served."""
 
 import shlex
 from collections.abc import Mapping, Sequence
@@ -78,8 +78,8 @@ def render_page(data: dict[str, Any]) -> str:
 
 
 def state_of(review: Review, group: Group) -> dict[str, Any]:
-    """The review of a group, as the page shows it. `digest` identifies the mutants, so that a page with other
-    mutants cannot decide about these."""
+    """The review of a group, as the page shows it. `digest` identifies the mutants, so that a page that shows
+    other mutants cannot decide about these."""
     decision, flag = review.decision(group.id), review.flag(group.id)
     return {
         "state": review.state(group).value,

@@ -1,6 +1,6 @@
-"""Shows what an image effect does: an image before it, and after it at up to three levels.
+"""Shows what an image effect does: an image before the effect, and images after it at up to three levels.
 
-Runs the target up to the injected lines and executes them there on its current image, with the values of
+Runs the target up to the injected lines and executes these on the target's current image, with the values of
 several mutants. This needs no support in the manifest. Results are cached by all their inputs.
 """
 
@@ -223,7 +223,7 @@ def _run(
         ended = execution.status is Status.OK
         raise MutatorError(
             f"no image of {location.path} {location.function}: "
-            + ("the run never reached it" if ended else execution.detail),
+            + ("the run never reached this function" if ended else execution.detail),
             where=scenario,
             expected="a run that reaches the image effect",
             remedy="see `mutator check --drive`",

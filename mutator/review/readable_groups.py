@@ -13,7 +13,7 @@ _ID_HOLE = re.compile(r"id(_\d+)?\Z")  # readers do not need ids
 
 
 def value_table(group: Group) -> tuple[list[str], list[list[str]]]:
-    """Headings and rows: the values of the holes, except ids, with a row for each fault."""
+    """The headings, and a row for each fault with the values of its holes, except ids."""
     faults = {fault.id: fault for fault in group.faults}
     names = list(dict.fromkeys(name for shape in group.shapes for name in _shown_holes(shape)))
     rows = []
@@ -48,5 +48,5 @@ def condition_lines(triggers: Sequence[Trigger]) -> list[str]:
     if len(times) == 1:
         lines.append("from a time on")
     elif times:
-        lines.append(f"from a time on, {len(set(times))} of them from {min(times)} s to {max(times)} s")
+        lines.append(f"from one of {len(set(times))} times on ({min(times)} s to {max(times)} s)")
     return lines

@@ -71,7 +71,7 @@ class Content:
 
 
 def load(path: Path, target: str) -> Content:
-    """Read an existing file for `target`; MutatorError with the line of a mistake."""
+    """Read an existing file for `target`; MutatorError, with the line, for a mistake."""
     model, source = read(path, _FileModel, SCHEMA, older={_FIRST: _from_first})
     if model.target != target:
         raise source.error(
@@ -171,7 +171,7 @@ def _given(remark: Remark) -> dict[str, str]:
 
 
 def _json(value: Any) -> str:
-    """The value on one line, which is also YAML."""
+    """The value as one line of JSON, which is also YAML."""
     return json.dumps(value, ensure_ascii=False)
 
 
@@ -207,7 +207,8 @@ def _merged(target: str, entries: Iterable[Entry]) -> dict[str, Entry]:
 
 
 def _one(group: str, what: str, parts: Sequence[Entry]) -> Entry:
-    """Merge decisions: rejected if any part was rejected, else approved. `by` names all with that verdict."""
+    """Merge decisions: rejected if any part was rejected, else approved. `by` names all reviewers with that
+    verdict."""
     decisions = [entry.decision for entry in parts if entry.decision]
     remarks = tuple(dict.fromkeys(remark for entry in parts for remark in entry.remarks))
     counting = [one for one in decisions if one.verdict is Verdict.REJECTED] or decisions

@@ -1,6 +1,6 @@
 """Stores the text that a reviewer saw when deciding on a group, and compares it with the current text.
 
-Each text begins with its digests, so that a text for another decision is ignored.
+Each text begins with the digests of its decision, so that a text for another decision is ignored.
 """
 
 import re
@@ -29,8 +29,8 @@ def keep(path: Path, text: str) -> None:
 
 
 def changes(path: Path, bound: Bound, text: str) -> str:
-    """A unified diff from what was seen when `bound` was decided to the current `text`; empty if nothing was
-    stored for this decision."""
+    """A unified diff from the stored text to the current `text`; empty if no text was stored for the decision
+    with the digests `bound`."""
     try:
         before = no_pipe(path).read_bytes().decode("utf-8", "surrogateescape")
     except OSError:
@@ -42,7 +42,7 @@ def changes(path: Path, bound: Bound, text: str) -> str:
 
 
 def _headed(diff: Iterable[str], new: Sequence[str]) -> Iterator[str]:
-    """The diff with each hunk's section after its `@@`: `calls: car/lens.py Light`."""
+    """The diff, with the hunk's section after each `@@` line, such as `calls: car/lens.py Light`."""
     for line in diff:
         hunk = _HUNK.match(line)
         yield f"{hunk[0]} {_section(new[: int(hunk[1]) - 1 + _AROUND])}\n" if hunk else line

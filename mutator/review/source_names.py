@@ -14,7 +14,8 @@ _COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
 
 @dataclass(frozen=True, slots=True)
 class Import:
-    """`from module import name`, or `import module` without a name; `level`: dots before the module."""
+    """`from module import name`, or `import module` if `name` is None. `level` is the number of dots before
+    the module."""
 
     module: str
     name: str | None = None
@@ -32,7 +33,8 @@ class Import:
 class Use:
     """A name that is not a local variable, with its attributes: `("effects", "Rain")`.
 
-    `imported` is its import inside the function, if any; `owner` is the class of a `self` or `super()`.
+    `imported` is the import inside the function that binds the name, if any. `owner` is the class of a `self`
+    or `super()`.
     """
 
     words: tuple[str, ...]
@@ -212,7 +214,7 @@ def _bound(node: _Function) -> tuple[frozenset[str], list[tuple[str, Import]]]:
         elif isinstance(one, ast.ExceptHandler | ast.MatchAs | ast.MatchStar) and one.name:
             names.add(one.name)
         if isinstance(one, ast.comprehension):
-            waiting += (one.iter, *one.ifs)  # its variables are local to it
+            waiting += (one.iter, *one.ifs)  # a comprehension's variables are local to it
         elif not isinstance(one, (*_SCOPES, ast.ClassDef)):
             waiting += ast.iter_child_nodes(one)
     return frozenset(names - outside - {name for name, _ in imports}), imports

@@ -105,7 +105,7 @@ def verdict_of(row: Row, about: Mapping[str, str]) -> str:
     if row.ending in _PLAIN:
         return _PLAIN[row.ending]
     if row.ending == Outcome.SDC.value:
-        return f"sdc: an actuator differed from the golden run from {row.t_manifest:.2f} s, without a hazard"
+        return f"sdc: an actuator first differed from the golden run at {row.t_manifest:.2f} s; no hazard"
     if row.ending != Outcome.HAZARD.value:
         return f"{row.ending.replace('_', ' ')}: {row.detail}"
     name, time = row.hazards[0]

@@ -86,7 +86,7 @@ class ActionModel(StrictModel, title="A control action"):
 
 
 class StructureModel(StrictModel, title="control_structure.yaml"):
-    """The controllers, what they control by which actions, and the feedback that they get."""
+    """The controllers, their control actions, what these control, and the feedback they get."""
 
     about: str = Field(description="What the control structure shows.")
     components: dict[str, ComponentModel] = Field(description="Name -> component.")
@@ -124,7 +124,7 @@ class FactorModel(StrictModel, title="A causal factor"):
         min_length=1, description="The links or components of the control structure where it goes wrong."
     )
     at: list[str] = Field(default_factory=list, description="The places in the target, as `file::function`.")
-    leads_to: list[str] = Field(min_length=1, description="The unsafe control actions that it may cause.")
+    leads_to: list[str] = Field(min_length=1, description="The unsafe control actions that it can cause.")
     faults: list[str] = Field(default_factory=list, description="The fault specs that represent it.")
     no_fault: str | None = Field(None, description="The reason why no fault spec represents it.")
 

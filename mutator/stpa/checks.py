@@ -22,8 +22,8 @@ def check_analysis(
 
     * Each hazard has an unsafe action that causes it; unsafe actions and context tables agree.
     * Each action is judged in all four categories; each unsafe action has a causal factor.
-    * Each factor's faults are injected at the factor's places and aim at hazards that it leads to; each spec
-      belongs to a factor.
+    * Each factor's faults are injected at the factor's places and aim at hazards that the factor leads to;
+      each spec belongs to a factor.
     """
     by_name = {spec.name: spec for spec in specs}
     return [
@@ -202,7 +202,7 @@ def _places(analysis: Analysis, manifest: TargetManifest) -> Iterator[MutatorErr
                     ("causal_factors", name, "at", i),
                     f"no place '{place}' in target {manifest.name}",
                     expected="file::Class.function",
-                    remedy="correct it" + suggestion(function, known),
+                    remedy="correct the place" + suggestion(function, known),
                 )
 
 

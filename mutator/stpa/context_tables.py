@@ -109,7 +109,7 @@ class _RowModel(StrictModel, title="A context"):
 
 
 class TableModel(StrictModel, title="contexts/*.yaml"):
-    """A context table. Its rows must cover every situation exactly once: [what is
+    """A context table. Its rows must cover every situation exactly once; see [what is
     proved](../explanation/hazard-analysis.md#what-is-proved-about-a-context-table).
     """
 
@@ -227,7 +227,7 @@ def load_hazards(path: Path) -> HazardList:
                     ("hazards", name, "leads_to", i),
                     f"accident '{accident}'",
                     expected=f"one of {', '.join(model.accidents)}",
-                    remedy="correct it or describe the accident",
+                    remedy="correct the name, or describe the accident",
                 )
     return HazardList(
         source=source,

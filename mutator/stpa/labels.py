@@ -1,6 +1,6 @@
 """Place labels next to their arrows, clear of boxes, other arrows and other labels.
 
-Lengths are in px, y points down. A label has two lines: what the arrow carries, and a second text from the
+Lengths are in px; y points down. A label has two lines: what the arrow carries, and a second text from the
 drawing.
 """
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 _STEP = 6  # step between the places that are tried
-_BESIDE, _ACROSS = 17, 25  # distance from line to line, next to an arrow and across it
+_BESIDE, _ACROSS = 17, 25  # distance between a label's lines, next to an arrow and across it
 _LETTER = 7  # average width of a letter
 _SHORTEST = 126  # room for text such as `1092 of 1128, 97 %`
 _ASCENT, _DESCENT = 12, 4
@@ -30,7 +30,7 @@ class Label:
 def place_labels(
     words: Mapping[str, str], arrows: Mapping[str, Sequence[Point]], boxes: Iterable[Area]
 ) -> dict[str, Label]:
-    """A place for the label of each arrow in `arrows` (its corners); the preferred one if no place is
+    """Find a place for the label of each arrow in `arrows` (lists of corners); the preferred place if none is
     clear."""
     taken = list(boxes)
     lines = {name: [_around(a, b) for a, b in pairwise(points)] for name, points in arrows.items()}
@@ -57,7 +57,7 @@ def _length(start: Point, end: Point) -> float:
 
 def _places(points: Sequence[Point], width: float) -> Iterator[Label]:
     """Yield places for a label, the best first: around the middle of a horizontal segment, or next to a
-    vertical one, near the tip, where fewest other arrows cross."""
+    vertical one, near the tip, where the fewest other arrows cross."""
     (x1, y1), (x2, y2) = _bearer(points)
     if y1 == y2:
         middle, free = (x1 + x2) / 2, max(abs(x1 - x2) - width, 0) / 2

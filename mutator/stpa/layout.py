@@ -1,6 +1,6 @@
 """Lay out a control structure: rows of boxes, and between them channels with one track per arrow.
 
-Lengths are in px, y points down. An arrow that cannot go straight up or down gets a separate track between
+Lengths are in px; y points down. An arrow that cannot go straight up or down gets a separate track between
 two rows; one that would cross a box runs along the left margin.
 """
 

@@ -9,7 +9,7 @@ from pydantic import Field
 from mutator.config.yaml_files import Source, StrictModel
 from mutator.triggers.conditions import RESERVED
 
-ROUNDING = 1e-9  # of a channel's unit; smaller differences can come from the order of sums
+ROUNDING = 1e-9  # in a channel's unit; smaller differences can come from the order of sums
 SUFFIXES = (".npz", ".csv", ".parquet", ".mcap")
 
 
@@ -60,7 +60,7 @@ class ChannelModel(StrictModel, title="A channel"):
         strict=False,
         description="`actuator`: what the controller commands; if it differs from the golden run, the fault "
         "has manifested. `truth`: the state of the world. `internal`: what the controller "
-        "believes.",
+        "assumes.",
     )
     component: str = Field(
         "",
@@ -71,9 +71,9 @@ class ChannelModel(StrictModel, title="A channel"):
         None,
         ge=0.0,
         allow_inf_nan=False,
-        description="How much it may differ from golden and still count as equal. An actuator that exceeds "
-        "it has manifested; a fault has reached a component if a channel of it does so. Default: 0 for "
-        f"actuators, {ROUNDING:g} of the unit for others, so that rounding does not count.",
+        description="The largest difference from the golden run that is ignored. If an actuator differs by "
+        "more, the fault has manifested; if a channel of a component does, the fault has reached it. "
+        f"Default: 0 for actuators, {ROUNDING:g} in the unit for others, to ignore rounding.",
     )
     about: str = Field("", description="What the channel contains.")
     time: str = Field(

@@ -36,8 +36,8 @@ class EntryModel(StrictModel, title="The entry"):
     )
     independent: list[str] = Field(
         default_factory=list,
-        description="Extra arguments for runs that must not use data left by other runs. These are the "
-        "equivalence check's runs and the mutants of files in `reads_itself`.",
+        description="Extra arguments for runs that must not use data left by other runs. These are the runs "
+        "of the equivalence check and of mutants of files in `reads_itself`.",
     )
     changes: dict[str, list[str] | ChangeModel] = Field(
         default_factory=dict, description="Name of a scenario change -> its arguments."
@@ -51,8 +51,8 @@ class FilmModel(StrictModel, title="Films"):
     """
 
     run: list[str] = Field(description="Extra arguments of the entry that make a run write a film.")
-    module: str = Field(description="The module that shows two films, which is run as `python -m`.")
-    args: list[str] = Field(description="Its arguments.")
+    module: str = Field(description="The module that shows two films. It is run as `python -m`.")
+    args: list[str] = Field(description="The module's arguments.")
     still: list[str] = Field(description="Extra arguments for a still.")
     pictures: list[str] = Field(
         default_factory=list,
@@ -76,7 +76,7 @@ def check_commands(entry: EntryModel, film: FilmModel | None, source: Source) ->
             ("entry", "stepwise"),
             f"'{stepwise}'",
             expected="a function of the entry module",
-            remedy="write its name alone, as `open_run` or `Drive.open`",
+            remedy="write only its name, such as `open_run` or `Drive.open`",
         )
     _check_runs(entry, source)
     if film is not None:

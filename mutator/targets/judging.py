@@ -71,7 +71,7 @@ class Hazard:
 
 
 class HazardModel(StrictModel, title="A hazard"):
-    """A hazard, by its name. Without `when` and `stl` it is taken from the record."""
+    """A hazard, by its name. Without `when` and `stl`, it is read from the record."""
 
     about: str = Field("", description="What the hazard is.")
     when: str | None = Field(
@@ -85,17 +85,17 @@ class HazardModel(StrictModel, title="A hazard"):
         description="Instead of `when`: a formula of signal temporal logic that must hold. rtamt evaluates "
         "it (`pip install rtamt`), and steps must be evenly spaced. The hazard occurs at the "
         "first step at which the formula does not hold. If the formula looks ahead, the hazard "
-        "occurs later, by the time that it looks ahead.",
+        "occurs that much later.",
     )
     for_s: float = Field(
         0.0,
         ge=0.0,
         allow_inf_nan=False,
-        description="How long the condition must hold to count as a hazard, in s.",
+        description="How long the condition must hold before the hazard occurs, in s.",
     )
     margin: str | None = Field(
         None,
-        description="The distance of a step from the hazard, in `unit`; negative in the hazard. If `when` "
+        description="The distance of a step from the hazard, in `unit`; negative if it holds. If `when` "
         "is a single comparison, the default is the difference of its two sides.",
     )
     unit: str = Field("-", description="The unit of the margin.")
@@ -119,7 +119,7 @@ class MetricModel(StrictModel, title="A metric"):
     at_end: str | None = Field(
         None, description="The value in the step of the first terminal hazard; empty if there is none."
     )
-    where: str | None = Field(None, description="Count only the steps in which this condition holds.")
+    where: str | None = Field(None, description="Use only the steps in which this condition holds.")
     unit: str = Field(description="The unit; `-` for none.")
     worse: _WORSE = Field(description="Which values are worse: `higher` or `lower`.")
     about: str = Field(description="What the metric measures.")
@@ -134,7 +134,7 @@ def read_hazards(
     recorded: bool,
     step_s: float,
 ) -> tuple[Hazard, ...]:
-    """Read a manifest's hazards; MutatorError with the line of a mistake.
+    """Read a manifest's hazards; MutatorError, with the line, for a mistake.
 
     `known` are the names that formulas may use, `recorded` says whether the target writes a record, and
     `step_s` is the length of a step in seconds.

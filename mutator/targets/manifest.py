@@ -63,10 +63,10 @@ class TargetManifest:
     entry_args: tuple[str, ...]  # with {scenario}, {seed}, {out}, {cache}, {root}
     stepwise: str | None  # function of the entry module: arguments -> a steppable run
     independent: tuple[str, ...]  # extra arguments for a run that must not use data left by other runs
-    reads_itself: tuple[str, ...]  # globs: files that a run itself reads; a mutant's run reads the mutant's
+    reads_itself: tuple[str, ...]  # globs: files of the tree whose content a run reads
     changes: Mapping[str, tuple[str, ...]]  # scenario change -> extra arguments
     step_s: float
-    armed_after_s: float  # by default, triggers are armed at this time, when the controller works
+    armed_after_s: float  # by default, triggers are armed at this time, when the controller is ready
     trace_file: str  # the trace in {out}; its suffix gives the format
     time_channel: str
     channels: tuple[Channel, ...]
@@ -76,7 +76,7 @@ class TargetManifest:
     metrics: tuple[Metric, ...]
     contact: Contact | None
     scene: Scene | None
-    alerts: tuple[str, ...]  # the alerts that count
+    alerts: tuple[str, ...]  # other alerts are ignored
     source: Source = field(repr=False, compare=False)  # the file's lines, for errors
     film: Film | None = None
     # change -> scenarios that it makes identical, e.g. because they differ only in traffic that it removes

@@ -47,21 +47,21 @@ class ManifestModel(StrictModel, title="The file"):
         None,
         min_length=1,
         description="Globs, relative to the root: the files of the tree. `**` also matches across folders. "
-        "Default: all files of the packages, including data, and the modules. A link counts as "
+        "Default: all files of the packages, including data, and the modules. A link is treated as "
         "the file or folder to which it points.",
     )
     overlay: str | None = Field(
         None,
         description="A folder of glue files, relative to this file or to the library, laid over the root. "
-        "All its files are part of the tree, and no fault may be injected there. It may contain "
-        "the entry module and the observed place.",
+        "All its files are part of the tree, and no fault may be injected there. It can contain "
+        "the entry module and the statement at which values are observed.",
     )
     forbid: list[str] = Field(
         default_factory=list, description="Globs: files in which no fault may be injected."
     )
     reads_itself: list[str] = Field(
         default_factory=list,
-        description="Globs: files that a run itself reads, because what it caches depends on them. The "
+        description="Globs: files of the tree that a run reads, because its cached data depends on them. The "
         "reference engine runs the mutants of such a file, with the arguments of "
         "`entry.independent`.",
     )
@@ -106,7 +106,7 @@ class ManifestModel(StrictModel, title="The file"):
     scene: SceneModel | None = Field(None, description="How to draw a drive from above.")
     alerts: list[str] = Field(
         default_factory=list,
-        description="The names of the alerts that count; other alerts in a record are ignored.",
+        description="The names of the alerts to use; other alerts in a record are ignored.",
     )
     film: FilmModel | None = Field(None, description="How to film runs. Without it, runs cannot be filmed.")
 
@@ -117,7 +117,7 @@ def upgrade_manifest(path: Path) -> Upgrade | None:
     if not isinstance(source.data, dict) or source.data.get("schema") != OLD:
         read(path, ManifestModel, SCHEMA)
         return None
-    load_manifest(path, root=path.parent)  # the target's tree may be missing
+    load_manifest(path, root=path.parent)  # the target's tree might be missing
     return upgraded_text(source)
 
 

@@ -209,7 +209,7 @@ def _is_plain(node: ast.AST) -> bool:
 
 
 class _Hypot(ast.NodeTransformer):
-    """Replace `hypot` by the probe's function, because the source at the place may not import it."""
+    """Replace `hypot` by the probe's function, because the target's file might not import `hypot`."""
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
         self.generic_visit(node)

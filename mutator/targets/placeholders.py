@@ -23,5 +23,5 @@ def check_placeholders(arguments: Sequence[str], known: Sequence[str], source: S
                     (*keys, i),
                     f"'{{{name}}}' in '{argument}'",
                     expected=f"one of {', '.join(f'{{{one}}}' for one in known)}",
-                    remedy="correct the name; braces around anything but a name stay as they are",
+                    remedy="correct the name; braces around anything but a name are left unchanged",
                 )

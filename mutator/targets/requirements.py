@@ -24,7 +24,7 @@ def read_requirements(texts: Sequence[str], source: Source) -> tuple[Requirement
             raise source.error(
                 ("requires", i),
                 f"'{text}'",
-                expected="a requirement as pip takes it, such as gymnasium>=1.0",
+                expected="a requirement in pip's syntax, such as gymnasium>=1.0",
                 remedy=f"correct it: {str(error).splitlines()[0]}",
             ) from None
     return tuple(found)

@@ -73,7 +73,7 @@ class _ActorModel(StrictModel, title="An actor"):
     visible: str = Field("True", description="The condition under which the actor is drawn.")
     believed: bool = Field(
         False,
-        description="Whether this is where the controller assumes something. It is drawn as an outline.",
+        description="Whether this is the place that the controller assumes. It is drawn as an outline.",
     )
     about: str = Field("", description="What the actor is.")
 
@@ -97,8 +97,8 @@ class SceneModel(StrictModel, title="The scene"):
     speed: str = Field(
         "0",
         description="The speed of the origin along x in m/s: a formula, for a drive in which poses are "
-        "relative to the car. With it, the road moves, and a car that falls behind the golden "
-        "run visibly does so.",
+        "relative to the car. With it, the road moves, and a car that is slower than in the golden "
+        "run visibly falls behind.",
     )
 
 

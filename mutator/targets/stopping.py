@@ -17,8 +17,8 @@ def stop_source(manifest: TargetManifest) -> str:
 
     `recorded` has the step's values, by their names in the trace. The code needs `math`, and `min` and `max`
     that propagate NaN. MutatorError if the target has no terminal hazard or no `entry.stepwise`, and for a
-    hazard that cannot be decided from one step: it must last, looks at earlier steps, is judged by the record
-    or by temporal logic, or uses a channel that is not recorded in each step.
+    hazard that cannot be decided from one step, because it has `for_s`, looks at earlier steps, is judged by
+    the record or by temporal logic, or uses a channel that is not recorded in each step.
     """
     if manifest.stepwise is None:
         raise _refused(manifest, ("entry",), "no `stepwise`", "a run that can be ended between two steps")
@@ -52,10 +52,10 @@ def _condition(manifest: TargetManifest, hazard: Hazard) -> str:
         judge = "temporal logic" if hazard.stl else "the target itself"
         raise _refused(manifest, keys, f"{hazard.name}, which is judged by {judge}", "a condition, `when`")
     if hazard.for_s and not own:
-        raise _refused(manifest, (*keys, "for_s"), f"{hazard.name} must last", "a condition of one step")
+        raise _refused(manifest, (*keys, "for_s"), f"{hazard.name} has `for_s`", "a condition of one step")
     calls = {ast.unparse(node.func) for node in ast.walk(parse(text)) if isinstance(node, ast.Call)}
     if earlier := calls & {"ever", "rate"}:
-        got = f"{hazard.name} asks for `{min(earlier)}`"
+        got = f"{hazard.name} uses `{min(earlier)}`"
         raise _refused(manifest, keys, got, "a condition of a single step")
     return text
 

@@ -1,4 +1,4 @@
-"""The conditions for valid results: preflight, equivalence check, library check, doctor.
+"""Checks that results are valid: preflight, equivalence check, library check, doctor.
 
 This package changes no result.
 """

@@ -1,4 +1,4 @@
-"""Audit a run folder: check that everything in it follows from its content. Executes nothing."""
+"""Audit a run folder: check, without running anything, that its files are unchanged and consistent."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ Problems = Iterator[MutatorError]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Check:
-    """One step of an audit; `what` must hold."""
+    """One step of an audit. `what` describes the `count` parts of the run that were checked."""
 
     what: str
     count: int
@@ -38,7 +38,7 @@ class Check:
 
     @classmethod
     def of(cls, what: str, count: int, problems: Problems) -> "Check":
-        """Collect all problems in a check. An error that `problems` raises comes last."""
+        """Collect all problems in a check. An error that `problems` raises is the last of them."""
         found = []
         try:
             for problem in problems:
@@ -52,15 +52,15 @@ class Check:
             ValueError,
             AttributeError,
         ) as err:  # damaged data
-            found.append(MutatorError(f"{what}: cannot be checked ({type(err).__name__}: {err})"))
+            found.append(MutatorError(f"cannot check {what} ({type(err).__name__}: {err})"))
         return cls(what=what, count=count, differences=tuple(found))
 
 
 def audit_checks(folder: RunFolder, workspace: Workspace | None) -> list[Check]:
     """Audit a complete run folder.
 
-    Trees and patches are compared only with the run's own sources. It is also a difference if `workspace` is
-    None or has other sources.
+    Trees and patches are compared only if `workspace` has the run's sources. If it is None or has other
+    sources, this is reported as a difference.
     """
     head = folder.head
     here = Check.of("sources that match those of the run", len(head["sources"]), _sources(folder, workspace))
@@ -137,7 +137,7 @@ def _plan(folder: RunFolder) -> Problems:
             yield MutatorError(f"{key} {head[key]}", where=run / HEAD, expected=expected)
     if Digest.of_file(run / CSV) != Digest.of(plan_csv(plan)):
         yield MutatorError(
-            "differs from the plan", where=run / CSV, expected=f"what {plan_file.EXPERIMENTS} has"
+            "differs from the plan", where=run / CSV, expected=f"the rows of {plan_file.EXPERIMENTS}"
         )
 
 

@@ -118,7 +118,7 @@ def _flaws_of_end(record: Record) -> Flaws:
     activation = record.activation
     follows = judge(activation=activation, t_manifest=record.t_manifest, hazards=record.hazards)
     if record.outcome != follows:
-        yield f"outcome {record.outcome}", f"{follows}, which follows from its times"
+        yield f"outcome {record.outcome}", f"{follows}, which follows from the recorded times"
     if record.t_manifest is not None and (activation is None or record.t_manifest < activation.first):
         yield f"manifested at {record.t_manifest} s", "a time at or after the activation"
     for what, events in (("hazards", record.hazards), ("alerts", record.alerts)):
@@ -145,7 +145,7 @@ def _flaws_of_bad_end(record: Record) -> Flaws:
     }
     for name, value in told.items():
         if value:
-            yield f"{name} {value}", f"none, as it ended as {record.status.value}"
+            yield f"{name} {value}", f"none, because the experiment ended as {record.status.value}"
 
 
 def _flaws_of_names(record: Record, head: Mapping[str, Any], tolerances: Mapping[str, float]) -> Flaws:
@@ -166,8 +166,8 @@ def _flaws_of_names(record: Record, head: Mapping[str, Any], tolerances: Mapping
 
 
 def _flaws_of_path(record: Record, head: Mapping[str, Any]) -> Flaws:
-    """The channels that left golden must be the target's, and the times before the drive ended. The first
-    actuator to leave golden gives the manifestation time."""
+    """Channels that the target does not have, times after the end of the drive, and a manifestation time that
+    is not the first time at which an actuator differs from the golden run."""
     if "channels" not in head:
         return
     end = inf if record.t_end is None else record.t_end + _TINY
@@ -180,7 +180,10 @@ def _flaws_of_path(record: Record, head: Mapping[str, Any]) -> Flaws:
     times = [first for name, first, _ in record.left if name in head["compared"]]
     manifested = record.t_manifest if record.t_manifest is not None and record.t_manifest <= end else None
     if record.status is Status.OK and min(times, default=None) != manifested:
-        yield f"actuators left golden at {times or 'no time'}", f"first at {manifested}, when it manifested"
+        yield (
+            f"actuators left golden at {times or 'no time'}",
+            f"first at {manifested}, as recorded",
+        )
 
 
 def _in_order(events: Events, activation: Activation | None) -> bool:
@@ -194,7 +197,8 @@ def _in_order(events: Events, activation: Activation | None) -> bool:
 def proof(
     folder: RunFolder, records: Sequence[Recorded], proven: Sequence[Recorded]
 ) -> Iterator[MutatorError]:
-    """Yield records of the proof that differ from the run's or are not in its sample, and missing ones."""
+    """Yield records of the proof that differ from those of the run or are not in the sample, and experiments
+    of the sample that have no record."""
     place = folder.path / equivalence.FOLDER
     if not place.is_dir():
         modes = {str(line.get("engine")) for line in folder.timings().values()}
@@ -208,7 +212,7 @@ def proof(
         if record is not None and record != one.record:
             yield one.difference(equivalence.difference(one.record, record), "what the run recorded")
         if one.record.experiment_id not in sampled:
-            yield one.difference("in the proof", "the sample that follows from the plan")
+            yield one.difference("in the proof", "only the sample, which follows from the plan")
     missing = sorted(sampled - {one.record.experiment_id for one in proven})
     if folder.verifiable and folder.finished and missing:
         yield MutatorError(

@@ -38,7 +38,7 @@ def _packed(folder: RunFolder, there: SeriesFolder) -> Iterator[MutatorError]:
         yield err
         return
     if index is None:
-        # otherwise, the run was killed before the index was written
+        # if segments are left, the run was killed before it wrote the index
         if any(there.path.glob("*.js")) and not segments(run):
             what = "the index of the chunks beside it"
             yield MutatorError("missing", where=path, expected=what, remedy=putting_aside(run))

@@ -1,4 +1,4 @@
-"""The canary: a fault known to be harmful. It fails its check only if every value of its variant is
+"""The canary: a fault known to be harmful. The check fails only if every value of the canary's variant is
 harmless."""
 
 from collections.abc import Callable, Iterable, Iterator
@@ -49,7 +49,7 @@ def judge(
         value = fault_label("", experiment.fault.value, experiment.fault.unit).strip()
         try:
             result = run(experiment)
-            if result.problem:  # retry, because the cause may lie outside; the message must not depend on it
+            if result.problem:  # retry: a cause outside the target must not change the message
                 result = run(experiment)
         except MutatorError as error:  # no mutant can be built with this value
             result = CheckRun(problem=error.got)

@@ -19,7 +19,7 @@ _REMEDIES = {
 }
 _UNKNOWN = (
     "no line of the target read a clock, drew without a seed or started a thread; "
-    "check its inputs (files, the network) and the state of its libraries"
+    "check the target's inputs (files, the network) and the state of its libraries"
 )
 
 
@@ -42,7 +42,8 @@ def likely(manifest: TargetManifest, watched: Mapping[str, Any], *, by_hash: boo
 
 
 def sets(manifest: TargetManifest) -> list[Place]:
-    """Lines of target files that depend on the order of a set. Files that may not have faults come last."""
+    """Lines of target files that depend on the order of a set. Files in which faults are forbidden come
+    last."""
     found = []
     for path in sorted(manifest.tree.files, key=lambda path: (matches(path, manifest.forbid), path)):
         if path.endswith(".py"):

@@ -15,13 +15,13 @@ from mutator.targets.manifest import TargetManifest
 def first_difference(manifest: TargetManifest, one: Path, other: Path) -> str:
     """Describe the first difference between two output folders; empty if there is none.
 
-    For traces: channel, step, time and both values. If the traces agree, the difference of the files.
+    The text names the channel, step and time, or the key of the record, and both values.
     """
     for name in manifest.outputs:
         if no_pipe(one / name).read_bytes() != no_pipe(other / name).read_bytes():
             in_trace = name == manifest.trace_file
             found = _in_traces(manifest, one, other) if in_trace else _in_records(one, other, name)
-            return found or f"in bytes of {name} that are no value of a channel: a time stamp, say"
+            return found or f"in bytes of {name} that are not values of a channel, such as a time stamp"
     return ""
 
 

@@ -32,7 +32,7 @@ LITTLE_MEMORY = 1e9  # bytes; two controllers with their solvers, and the runner
 
 def examine(workspace: "Workspace | MutatorError") -> list[Finding]:
     """Check interpreter, packages, machine, current folder, child processes, library and targets (including
-    whether each can be forked). `workspace` may be the error from looking for it, which becomes a finding."""
+    whether each can be forked). If no workspace was found, `workspace` is the error, which is reported."""
     findings = [_python(), *_packages(), _cores(), _memory(), _disk(), _folder(), _child()]
     if isinstance(workspace, MutatorError):
         remedy = workspace.remedy or ""
@@ -123,7 +123,7 @@ def _library(workspace: "Workspace") -> Iterator[Finding]:
         yield Finding(name="templates", level=Level.FAIL, found=str(e), remedy=e.remedy or "")
     names = workspace.targets
     if not names:
-        remedy = "a manifest in targets/ describes a controller tree"
+        remedy = "add a manifest to targets/ that describes a controller tree"
         yield Finding(name="target", level=Level.FAIL, found="no manifest in the library", remedy=remedy)
     for name in names:
         try:

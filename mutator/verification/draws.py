@@ -1,4 +1,5 @@
-"""Find unused draws, whose faults differ only in name, and parameters without effect."""
+"""Find draws that no parameter uses, so that their faults are all the same, and parameters that no template
+uses."""
 
 from collections.abc import Iterator
 
@@ -22,7 +23,7 @@ def unused_draws(specs: tuple[FaultSpec, ...], models: FaultModels) -> Finding:
         name=_NAME,
         level=Level.WARN,
         found=f"{len(places)} unused",
-        remedy="use it in a parameter (`by_m: NAME`), or remove it: its faults are all the same",
+        remedy="use the value in a parameter (`by_m: NAME`), or remove it, because no fault depends on it",
         places=tuple(places),
     )
 

@@ -1,8 +1,8 @@
 """Check a target by running it: `mutator check --drive`.
 
 Each scenario runs twice without a fault, with two hash seeds. In the second run, a probe counts how often
-each statement with faults executes, and calls that prevent determinism are noted. If the runs differ, further
-runs show the cause.
+each statement that a fault spec names executes, and calls that can make runs differ are noted. If the runs
+differ, further runs show the cause.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -43,9 +43,9 @@ _MOST = 20  # places listed in a finding
 def check_drive(workspace: Workspace, target: str, scenarios: Sequence[str] = ()) -> list[Finding]:
     """The findings from golden runs of the scenarios (default: those of the library's campaigns, or all).
 
-    They cover determinism and the causes of its absence, obstacles to forking, statements with faults that
-    never run, triggers that never hold, and harmless canaries. Raises MutatorError for an unknown scenario or
-    a mistake in the library; `check_library` reports all such mistakes.
+    The findings cover differences between equal runs, with likely causes, obstacles to forking, statements of
+    fault specs that never run, triggers that never hold, and harmless canaries. Raises MutatorError for an
+    unknown scenario or a mistake in the library; `check_library` reports all such mistakes.
     """
     with ScratchFolder("mutator-drive-") as scratch:
         return _Drive(workspace, target, scenarios, scratch).findings()
@@ -161,12 +161,12 @@ class _Drive:
     def _not_deterministic(self, name: str, golden: _Golden, *, by_hash: bool) -> Finding:
         where = first_difference(self.manifest, golden.first.out, golden.again.out)
         places, remedy = causes.likely(self.manifest, self._noted(golden), by_hash=by_hash)
-        which = "with two hash seeds, and not with one, they" if by_hash else "they"
+        which = ", but only if their hash seeds differ" if by_hash else ""
         likely = f"; likely {'cause' if len(places) == 1 else 'causes'}:" if places else ""
         return Finding(
             name=name,
             level=Level.FAIL,
-            found=f"two runs differ: {which} first differ {where}{likely}",
+            found=f"two runs differ{which}; they first differ {where}{likely}",
             places=tuple(places),
             remedy=remedy,
         )
@@ -186,7 +186,7 @@ class _Drive:
         noted = [place for golden in goldens.values() for place in causes.of_kind(self._noted(golden), CLOCK)]
         if not noted:
             return []
-        found = "are read, without effect on trace or record"
+        found = "the target reads clocks, but neither trace nor record depends on them"
         return [
             Finding(name="clocks", level=Level.OK, found=found, places=tuple(dict.fromkeys(noted))[:_MOST])
         ]
@@ -194,9 +194,9 @@ class _Drive:
     # Fast engines
 
     def _forking(self, goldens: Mapping[str, _Golden], *, well: bool) -> Finding:
-        """Whether a golden run can be forked between its steps.
+        """Report whether a golden run can be forked between its steps.
 
-        This is tried only if the run is fast and `well`, that is, deterministic. Otherwise only threads are
+        This is tried only if the run is fast and deterministic (`well`); otherwise, only its threads are
         checked.
         """
         scenario, golden = next(iter(goldens.items()))
@@ -208,7 +208,7 @@ class _Drive:
             why = (
                 f"because a golden run takes {golden.first.wall_s:.0f} s"
                 if well
-                else "because its golden run fails"
+                else "because a golden run fails or is not deterministic"
             )
             found = f"no threads prevent forking; forking was not tried, {why}"
             return Finding(name=fast_engines.NAME, level=Level.OK if well else Level.WARN, found=found)
@@ -235,7 +235,8 @@ class _Drive:
         self.reach.take(scenario, changes, execution.probe, execution.watched.get("seen", ()))
 
     def _reach_more(self) -> None:
-        """Run with the changes that faults and campaigns make, as long as something has not been reached."""
+        """Run with the changes that faults and campaigns make, until every statement and trigger is reached
+        or no changes are left."""
         own = list(dict.fromkeys(one.changes for one in self.reach.unexecuted if one.changes))
         for changes in own:
             for scenario in self.scenarios:

@@ -1,8 +1,8 @@
 """The equivalence check: rerun a sample of a campaign's experiments on the reference engine.
 
 Every record of the sample must be the same, including the trace digest. The check's runs use nothing from
-other runs (`entry.independent` of the manifest), so the check also covers what runs share. Their records are
-in `proof/` of the run folder, which is removed if no experiment was forked.
+other runs (`entry.independent` of the manifest), so the check also covers data that other runs share. Its
+records are in the run's folder `proof/`, which is removed if no experiment was forked.
 """
 
 from collections import Counter
@@ -95,7 +95,7 @@ def _marks(experiment: Experiment) -> Iterator[tuple[str, ...]]:
 
 
 def needless(folder: RunFolder) -> str | None:
-    """The most frequent reason why no experiment was forked; None if one was or still may be.
+    """The most frequent reason why no experiment was forked; None if one was forked or still can be.
 
     Always None for a shard, because merged shards must all have a proof or none.
     """

@@ -38,9 +38,9 @@ def check_library(workspace: Workspace, target: str) -> list[MutatorError]:
     * No placeholder may be left.
     * Manifests, models, specs, hazards and context tables must load.
     * The models' examples must hold.
-    * Every spec must expand in every reading, and every anchor match the target exactly once.
+    * Every spec must expand in every reading, and every anchor must match the target exactly once.
     * One mutant of every shape must compile and un-splice.
-    * Campaigns must load, and their studies find valid data.
+    * Campaigns must load, and their studies must find valid data.
     * A hazard analysis, if any, must have no gap.
     """
     found = _Found()
@@ -75,9 +75,9 @@ def check_library(workspace: Workspace, target: str) -> list[MutatorError]:
 def check_campaigns(
     workspace: Workspace, readings: Readings, manifest: TargetManifest | None = None
 ) -> list[MutatorError]:
-    """Problems of the library's campaigns, and those that their studies find in its data.
+    """Problems of the library's campaigns, and those that their studies find in the library's data.
 
-    With a `manifest`, also triggers that use values which this target does not observe.
+    With a `manifest`, triggers that use values which this target does not observe are problems too.
     """
     found, asked = _Found(), set[str]()
     for name in workspace.campaigns:

@@ -1,4 +1,4 @@
-"""The checks that must pass before a campaign starts: golden twice, null mutant, canary, anchors."""
+"""The checks that must pass before a campaign starts: equal golden runs, null mutants, canary, anchors."""
 
 import shutil
 from collections.abc import Iterator
@@ -187,7 +187,7 @@ class _Checks:
                 f"the golden run {other[0]} differs from the one this run began with",
                 where=self.folder.path,
                 expected="a machine, Python and packages that give the same bytes",
-                remedy="use those recorded in run.json, or run into another folder",
+                remedy="use the versions recorded in run.json, or choose another run folder",
             )
 
     def _packages(self, runs: Runs) -> list[str]:

@@ -81,7 +81,8 @@ def judge_null(first: CheckRun, null: CheckRun) -> str:
 
 
 def judge_same(goldens: Mapping[str, CheckRun]) -> str:
-    """The problem of golden runs, by scenario, that the manifest says are equal; empty if there is none."""
+    """The problem of golden runs (by scenario) that are equal according to the manifest; empty if there is
+    none."""
     (first, reference), *others = goldens.items()
     for name, run in others:
         if run.problem or reference.problem:

@@ -1,7 +1,7 @@
-"""Find which statements with faults, and which triggers, golden runs reach.
+"""Find out which statements of fault specs, and which triggers, golden runs reach.
 
 One mutant has a counting probe call at each of these statements. A statement is counted exactly when a fault
-in it would be active if its trigger always held.
+there would be active if its trigger always held.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -27,7 +27,7 @@ _MOST = 20  # places listed in a finding
 
 @dataclass(frozen=True, kw_only=True)
 class Wanted:
-    """A statement with faults, and the scenario changes that they need."""
+    """A statement that fault specs name, and the scenario changes that its faults need."""
 
     location: FaultLocation
     place: Place  # in the spec
@@ -63,7 +63,8 @@ class Reach:
         probe: Mapping[str, Any] | None,
         seen: Iterable[Sequence[float]],
     ) -> None:
-        """Remove what a run of the counting mutant reached, from its probe's report and its observations.
+        """Remove the statements and triggers that a run of the counting mutant reached, according to its
+        probe's report and its observations (`seen`).
 
         A statement is removed only if the run had the changes that its fault needs.
         """
@@ -84,13 +85,13 @@ class Reach:
                 "statement",
                 self._statements,
                 [one.place for one in self.unexecuted],
-                "a fault there is never active: anchor it elsewhere, or add a scenario that reaches it",
+                "faults there are never active: anchor them elsewhere, or add a scenario that gets there",
             ),
             self._finding(
                 "trigger",
                 self._triggers,
                 [one.place for one in self.untriggered],
-                "a fault with this trigger is never active: add a scenario that reaches it, or remove "
+                "faults with such a trigger are never active: add a scenario in which it holds, or remove "
                 "it from the campaigns",
             ),
         ]
@@ -98,7 +99,7 @@ class Reach:
     def _finding(self, noun: str, count: int, left: Sequence[Place], remedy: str) -> Finding:
         name, whole = f"{noun}s", counted(count, noun)
         if not left:
-            found = f"{whole}, {'which is' if count == 1 else 'all are'} reached" if count else "none"
+            found = f"{whole}, {'which is' if count == 1 else 'which are all'} reached" if count else "none"
             return Finding(name=name, level=Level.OK, found=found)
         found = f"{len(left)} of {whole} never reached in {', '.join(self._driven)}"
         places = tuple(left[:_MOST])

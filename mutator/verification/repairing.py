@@ -166,7 +166,7 @@ def _trusted(segment: Segment, known: Digest | None, data: bytes) -> list[dict[s
     """The content of the trustworthy lines after the head.
 
     If all checksums match although the file differs from the one that was closed, somebody recomputed the
-    checksums. Then lines are trusted only if the file was extended, up to the closed length.
+    checksums. Then lines are trusted only if the file was merely extended, and only up to the old length.
     """
     numbers = list(segment.lines)
     whole = segment.damaged or known is None or known.is_of(Digest.of(data))

@@ -25,7 +25,8 @@ class SetOrder:
 
 
 def places(source: bytes) -> list[SetOrder]:
-    """All such places of a Python file, in order; empty if the source is not valid Python."""
+    """All places in a Python file that depend on the order of a set, by line; empty if the source is not
+    valid Python."""
     try:
         tree = ast.parse(source)
     except (SyntaxError, ValueError, RecursionError):

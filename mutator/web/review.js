@@ -1,5 +1,5 @@
 "use strict";
-// The review page: find, inspect and decide on groups. The address after # keeps the view, so that it can be shared:
+// The review page: find, inspect and decide on groups. The address holds the view after the #, so that it can be shared:
 // #g=GROUP&q=words&state=new,changed&flag=1&diff=split
 
 const Review = (() => {
@@ -121,7 +121,7 @@ const Review = (() => {
       this.#apply();
     }
 
-    /** Update groups. A group that no longer matches the filter stays until the filter changes. */
+    /** Update groups. A group that no longer matches the filter stays visible until the filter changes. */
     #changed(ids) {
       for (const id of ids) this.cards.get(id).update(this.marks.pending(id));
       this.#apply({ isKept: true });
@@ -159,7 +159,7 @@ const Review = (() => {
     #conflict(id, words, item) {
       this.conflicts.set(id, item);
       const { decision, flag } = this.groups.get(id);
-      const other = decision ? `In the meantime: ${Card.told(decision)}.` : flag ? `In the meantime flagged by ${flag.by}.` : "In the meantime the decision was withdrawn.";
+      const other = decision ? `In the meantime: ${Card.told(decision)}.` : flag ? `In the meantime, ${flag.by} flagged this group.` : "In the meantime, the decision was withdrawn.";
       this.cards.get(id).conflict(`${other} Your mark was not saved: ${Card.name(item.kind).toLowerCase()}.`, item.kind);
       this.#say(id, "not saved", true);
       find("said").textContent = `${id}: ${words || other}`;

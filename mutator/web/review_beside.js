@@ -42,7 +42,7 @@ const Beside = (() => {
       ...found.levels.map(({ name, label }) => figure(`${name}-after`, `after, ${LEVELS[name] || name}:`, label)));
   }
 
-  /** The results of a group's experiments in a run, with links to a typical and the worst one. */
+  /** The results of a group's experiments in a run, with links to a typical experiment and the worst one. */
   async function typical(place, id, served, run) {
     if (place.dataset.run === run) return;
     place.dataset.run = run;

@@ -101,7 +101,7 @@ class Card {
     return this.isServed && state === { approve: "approved", reject: "rejected" }[kind];
   }
 
-  /** The state of the last mark, such as `saving` or `saved 15:20`. */
+  /** Show the state of the last mark, such as `saving`. */
   say(text, isBad = false) {
     const kept = this.#part("head").querySelector(".kept");
     kept.textContent = text;

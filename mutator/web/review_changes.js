@@ -1,6 +1,6 @@
 "use strict";
 // A diff of diffs: what a reviewer saw against the current state. Each line has a sign and, where the content is a diff,
-// that diff's sign, too.
+// that diff's sign too.
 
 const Changes = (() => {
   const { el } = Dom;

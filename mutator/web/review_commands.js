@@ -2,7 +2,7 @@
 // Turns the marks on a page without a server into commands that record the decisions.
 
 class Commands {
-  /** `changed(ids)` is called with the groups that have changed marks. */
+  /** `changed(ids)` is called with the ids of the groups whose marks changed. */
   constructor(data, changed) {
     Object.assign(this, { data, changed });
     this.marks = new Map(); // group id -> "approve" or "reject", in the order of marking

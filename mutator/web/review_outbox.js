@@ -1,11 +1,12 @@
 "use strict";
-// Sends each mark on a served page at once. Unconfirmed marks survive reloads and server restarts and are sent again.
+// Sends each mark on a served page as soon as it is made. Unconfirmed marks survive reloads and server restarts and are
+// sent again.
 // Every few seconds, asks the server for marks of other reviewers.
 
 class Outbox {
   static EVERY_MS = 5000;
   static MOST = 200; // changes per request
-  static OTHER = "its diff has changed, so reload this page";
+  static OTHER = "the diff of this group has changed, so reload this page";
 
   /** `events`: changed(ids), kept(ids), refused(id, words), conflict(id, words, item), offline(words or ""). */
   constructor(served, groups, events) {

@@ -7,7 +7,7 @@ class Stacks {
   /** `cards`: group id -> Card, in the order of the page; `actions`: mark(ids, kind), unfold(id). */
   constructor(cards, actions) {
     Object.assign(this, { cards, actions });
-    this.open = new Set(); // the `like` of open stacks
+    this.open = new Set(); // the numbers (`like`) of open stacks
     this.members = new Map(); // first id -> ids of the others
   }
 
@@ -32,7 +32,7 @@ class Stacks {
     return this.open.has(this.cards.get(id).group.like);
   }
 
-  /** The first group of the stack that has this group, and the other groups. */
+  /** The first group of the stack that contains this group, and the others. */
   of(id) {
     for (const [first, others] of this.members) if (first === id || others.includes(id)) return [first, ...others];
     return [id];
@@ -67,7 +67,7 @@ class Stacks {
     return others.length > lines.length ? [...lines, el("li.quiet", {}, `and ${others.length - lines.length} more`)] : lines;
   }
 
-  /** The part that distinguishes each text, without the words with which all begin and end. */
+  /** The part that distinguishes each text: without the words with which all texts begin and end. */
   static differences(texts) {
     const all = texts.map((text) => text.split(" ")), [first] = all;
     const shortest = Math.min(...all.map((words) => words.length));

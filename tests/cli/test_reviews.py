@@ -323,7 +323,7 @@ def test_only_approved_groups_run(cli: Cli, root: Path, tmp_path: Path) -> None:
     assert f"{len(groups)} groups of mutants are not approved" in refused.err
     for group in cli("review", "--campaign", "small", "--json").json:
         assert re.search(rf"{group['group']}  missing, {group['runs']} experiments?: ", refused.err)
-    assert "review the rest: `mutator review walk --campaign small --by NAME`" in refused.err
+    assert "review them: `mutator review walk --campaign small --by NAME`" in refused.err
     command = re.search(r"`mutator (review approve .*) --by NAME`", refused.err)
     assert command is not None
     cli(*command[1].split(), *JANE)

@@ -1,7 +1,7 @@
 """Array arithmetic in a fixed order, so that results do not depend on the processor's vector width.
 
-Matrix products and numpy's elementary functions depend on it. C library functions may differ in the last
-digit on a processor without fused multiply-add.
+Matrix products and numpy's elementary functions do. C library functions can differ in the last digit on a
+processor without fused multiply-add.
 """
 
 from collections.abc import Callable

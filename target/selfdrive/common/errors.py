@@ -17,7 +17,7 @@ class ConfigError(Exception):
 
 @contextmanager
 def writing(where: Path, *, expected: str, remedy: str) -> Iterator[None]:
-    """Turn file system errors in its block into a ConfigError that names `where`."""
+    """Turn file system errors in the `with` block into a ConfigError that names `where`."""
     try:
         yield
     except OSError as error:

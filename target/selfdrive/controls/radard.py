@@ -54,7 +54,7 @@ class Radard:
         self._vision.update(model.lead)
 
     def _likely_path(self, controls: ControlsState) -> Curve:
-        """The planned path while in control, else the path that the steering wheel describes."""
+        """The planned path while in control, else the path at the current steering angle."""
         if controls.active and not controls.steer_override:
             return model_curve(self._path.d_poly)
         return steering_curve(self._vehicle.curvature(controls.steering_angle, controls.v_ego))

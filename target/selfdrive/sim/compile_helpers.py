@@ -1,6 +1,6 @@
 """Compiles the slowest calculations: `python -m selfdrive.sim.compile_helpers`.
 
-Installing the harness does the same. Exit code 2 without a C compiler. Needs only Python.
+Installing the harness does the same. The exit code is 2 if there is no C compiler. Needs only Python.
 """
 
 import argparse

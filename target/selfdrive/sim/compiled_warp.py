@@ -47,7 +47,7 @@ class CompiledWarp:
 
 @cache
 def agrees(library: compiled.Library) -> bool:
-    """Check that the compiled code gives OpenCV's bits: versions that are older or without fused sums differ.
+    """Check that the compiled code gives OpenCV's bits: older versions and those without fused sums differ.
 
     A noisy picture, large enough for coarse positions, reveals different rounding.
     """

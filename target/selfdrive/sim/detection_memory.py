@@ -16,7 +16,7 @@ MOST = 20  # most numbers in an entry
 KEY, CHECK = 16, 8  # bytes
 _VALUE = struct.Struct(f"<q{MOST}d")
 ENTRY = KEY + CHECK + _VALUE.size  # 192 bytes
-WAYS = 8  # entries in a bucket; a key may be in any of them
+WAYS = 8  # entries in a bucket; a key can be in any of them
 BUCKETS = 1 << 19  # 2^22 entries, enough for two large campaigns: 805 MB when all are used
 _BUCKET = WAYS * ENTRY
 
@@ -68,8 +68,8 @@ class DetectionMemory:
 def _opened(path: Path):
     """The table's file, created if missing; None if that fails.
 
-    It is read and written by position, not mapped: a full disk is then an error, not a signal, and processes
-    that share the open file after a fork do not move each other's position.
+    It is read and written by position, not mapped, so that a full disk causes an error, not a signal, and
+    processes that share the open file after a fork do not move each other's position.
     """
     if not hasattr(os, "pwrite"):
         return None

@@ -35,7 +35,7 @@ Made = Iterator[np.ndarray]
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImageLibrary:
     """Frames in order, taken by the camera `model`, each `spacing` m (or, if None, 1 / `fps` s) after the
-    previous; after the last comes the first.
+    previous one; the first follows the last.
 
     `digest` covers all inputs of the frames.
     """

@@ -9,7 +9,7 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim.road_look import Look, OtherCar
 
 LENGTH = 4.4  # m of a car
-CAMERA_TO_BUMPER = 1.5  # m from the camera to the front bumper, where the lead's distance is measured from
+CAMERA_TO_BUMPER = 1.5  # m from the camera to the front bumper, from which the lead's distance is measured
 NEAREST, FURTHEST = 4.0, 400.0  # m ahead; a car can be drawn between them
 SHIFT = 4  # fractional bits of OpenCV's coordinates
 

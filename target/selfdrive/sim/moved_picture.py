@@ -94,7 +94,7 @@ def _inverse(matrix: np.ndarray) -> np.ndarray:
 
 
 def moved(frame: Picture, columns: int, region: Region) -> np.ndarray:
-    """Return the region of `frame` moved that far to the right; outside it, its last column is repeated."""
+    """Return the region of `frame` moved to the right; outside the frame, its last column is repeated."""
     last = frame.shape[1] - 1
     left, right = (min(max(end - columns, 0), last) for end in (region.left, region.right - 1))
     there = frame[region.top : region.bottom, left : right + 1]

@@ -38,7 +38,7 @@ class Recorder:
     """The rows of `CHANNELS` and the alerts. Row k is the state after step k."""
 
     def __init__(self) -> None:
-        self.alerts: list[tuple[str, float]] = []  # each time that one is raised
+        self.alerts: list[tuple[str, float]] = []  # each time an alert is raised
         self.engaged_from: float | None = None
         self.engaged_to: float | None = None
         self._rows = array("d")  # the newest rows, at least one

@@ -93,7 +93,7 @@ class RoadRenderer:
 
 
 def picture_to_car(model: CameraModel, first: int = 0) -> np.ndarray:
-    """Homography (3 x 3) from (u, v - `first`, 1) in the picture to (x, y, 1) on the road, from the car."""
+    """Homography (3 x 3) from (u, v - `first`, 1) in the picture to (x, y, 1) in the car's frame."""
     fall = model.fy * model.height / cos(model.pitch)
     foot = model.height * tan(model.pitch)
     below = np.array([(1.0, 0.0, 0.0), (0.0, 1.0, first - model.horizon), (0.0, 0.0, 1.0)])
@@ -103,7 +103,7 @@ def picture_to_car(model: CameraModel, first: int = 0) -> np.ndarray:
 
 
 def car_to_road(position: float, offset: float, heading: float) -> np.ndarray:
-    """From (x, y, 1) in the car's frame to (along, left of the lane's middle, 1) on the road."""
+    """Homography from (x, y, 1) in the car's frame to (along, left of the lane's middle, 1) on the road."""
     c, s = cos(heading), sin(heading)
     return np.array([(c, -s, position), (s, c, offset), (0.0, 0.0, 1.0)])
 

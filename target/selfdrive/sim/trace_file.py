@@ -1,4 +1,4 @@
-"""The bytes of trace.npz, as `numpy.savez` writes them, but faster.
+"""Produces the bytes of trace.npz, like `numpy.savez` but faster.
 
 `savez` copies channels through `zipfile` and its buffers; here they are taken directly from memory. Format:
 PKWARE's APPNOTE 6.3 (stored entries with a ZIP64 extra field each, dated 1980-01-01), and NumPy's .npy 1.0.

@@ -28,8 +28,8 @@ class Pictures:
     `frames` is a folder of user frames; None: a rendered road with these `marks` (both solid, or the right
     one dashed). `translation` is how frames follow the car's offset and heading: by the ground's homography,
     or by shifting, as in the paper's text or in its authors' code. The folder `cache` stores frames and
-    detections; None: nothing is stored. With `forget`, stored results are not used. Detection code that
-    depends on time needs `forget` or no cache; otherwise results are the same.
+    detections; None: nothing is stored. With `forget`, stored results are not used. Use `forget`, or no
+    cache, for detection code that depends on time; for other code, results are the same with and without.
     """
 
     detector: str = PAPER

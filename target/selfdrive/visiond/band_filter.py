@@ -38,7 +38,7 @@ def crests(road: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     side, single, double = (_mean(road, columns) for columns in (SIDE, SINGLE[0], DOUBLE[0]))
     single = _inner(single)
     sides = _sides(side, SINGLE[1])
-    # Most results overwrite one that is no longer needed, because new memory costs as much as the sums.
+    # Most results overwrite one that is no longer needed, because allocating memory is as slow as the sums.
     contrast = np.maximum(*sides)
     np.subtract(single, contrast, out=contrast)
     other = np.maximum(*_sides(side, DOUBLE[1]))

@@ -28,7 +28,7 @@ WINDOWS = 6, 29  # down, across
 SIZE = tuple((count - 1) * STRIDE + WINDOW for count in WINDOWS)  # px of the part that they cover
 PART = slice(FIRST_ROW, FIRST_ROW + SIZE[0]), slice(FIRST_COLUMN, FIRST_COLUMN + SIZE[1])
 THRESHOLD = 4.0  # lowest log odds of a window with a mark; see coded_threshold
-STEEP = 4.0  # times the mean squared gradient of the window: an edge
+STEEP = 4.0  # an edge's squared gradient, as a multiple of the window's mean
 LEAST_EDGES = 25  # px, in a window that is used
 NEIGHBOURS = 5  # points within the clusters' radius if all were evenly spread
 LEAST_POINTS = 30  # of a cluster
@@ -42,7 +42,7 @@ MISSING = 0  # column of a line without a cluster
 class CodedDetector:
     """Examines pictures of 640 x 480 pixels and remembers where it last saw the lines.
 
-    It is always certain: lines are parallel to the car, and so is its path. `calculated_by` identifies the
+    Its lines are always certain and parallel to the car, and so is its path. `calculated_by` identifies the
     compiled code in use, if any. Raises ConfigError for a camera with pictures of another size.
     """
 

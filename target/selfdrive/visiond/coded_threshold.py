@@ -1,8 +1,8 @@
 """Finds the threshold of the detector as coded: `python -m selfdrive.visiond.coded_threshold`.
 
-Uses only clean pictures. A threshold qualifies if at most ALLOWED of the windows inside the lane are
-classified as marks, and the fewest pictures have a line more than OFF away. The middle of the qualifying ones
-is used.
+Uses only clean pictures. Of the thresholds with which at most ALLOWED of the windows inside the lane are
+classified as marks, those with the fewest pictures that have a line more than OFF away qualify. The middle
+one is used.
 """
 
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ OFF = 0.3  # m
 TRIED = [0.25 * k for k in range(33)]  # log odds
 SEED, PICTURES = 0, 200
 OFFSET = 0.2  # m, standard deviation of the car's position
-BESIDE = 0.3  # m; a nearer window may show part of the line
+BESIDE = 0.3  # m; a nearer window can show part of the line
 
 
 def thresholds() -> list[tuple[float, float, float]]:

@@ -94,7 +94,7 @@ class CompiledPaperDetector(PaperDetector):
 
     def detect(self, view: CameraView) -> LaneLines:
         part = np.ascontiguousarray(view.picture[self._region.part])
-        if part.dtype != np.uint8 or part.shape != self._region.shape:  # a fault may cause this
+        if part.dtype != np.uint8 or part.shape != self._region.shape:  # a fault can cause this
             return super().detect(view)
         address, sums = part.ctypes.data, self._arrays["sums"]
         self._take_gradients(self._at, address)

@@ -72,7 +72,7 @@ class CompiledCrests:
         self._address = ctypes.addressof(self._bands)
 
     def __call__(self, road: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        if road.shape != self._shape or road.dtype != np.uint8:  # a fault may change a picture like this
+        if road.shape != self._shape or road.dtype != np.uint8:  # a fault can change a picture like this
             return crests(road)
         road = np.ascontiguousarray(road)
         self._bands.road = road.ctypes.data
@@ -82,7 +82,7 @@ class CompiledCrests:
 
 @cache
 def maps_alike(library: compiled.Library, model: CameraModel) -> bool:
-    """Whether maps have OpenCV's bits; other versions may interpolate differently."""
+    """Whether maps have OpenCV's bits; other versions can interpolate differently."""
     shape = model.rows, model.width
     noise = (
         (np.arange(model.rows * model.width, dtype=np.uint32) * 40503 >> 7).astype(np.uint8).reshape(shape)
@@ -92,7 +92,7 @@ def maps_alike(library: compiled.Library, model: CameraModel) -> bool:
 
 @cache
 def finds_alike(library: compiled.Library) -> bool:
-    """Whether crests have the bits of OpenCV's means; other versions may add in a different order."""
+    """Whether crests have the bits of OpenCV's means; other versions can add in a different order."""
     number = np.arange(48 * 260)
     road = (60 + number * 40503 % 65521 % 61 + 12 * (number % 260 % 37 < 3)).astype(np.uint8).reshape(48, 260)
     found, wanted = CompiledCrests(library, road.shape)(road), crests(road)
@@ -134,7 +134,7 @@ class CompiledVote:
         self, view: RoadView, road: np.ndarray, at: np.ndarray, weight: np.ndarray, belief: Belief
     ) -> Pose:
         if road.shape != self._shape or road.dtype != np.uint8 or not road.flags.c_contiguous:
-            return vote(view, road, at, weight, belief)  # a fault may change a picture like this
+            return vote(view, road, at, weight, belief)  # a fault can change a picture like this
         at, weight = np.ascontiguousarray(at, np.int64), np.ascontiguousarray(weight, np.float32)
         self._belief[:] = [*belief.left, *belief.dip, *belief.middle, *belief.width]
         points = at.ctypes.data, weight.ctypes.data, len(at)
@@ -147,7 +147,7 @@ class CompiledVote:
 
 @cache
 def votes_alike(library: compiled.Library, model: CameraModel) -> bool:
-    """Whether votes have the bits of OpenCV's filters; other versions may add in a different order."""
+    """Whether votes have the bits of OpenCV's filters; other versions can add in a different order."""
     view = RoadView(model)
     number = np.arange(400)
     road = (np.arange(len(view.drop) * len(view.y)) % 251).astype(np.uint8).reshape(len(view.drop), -1)

@@ -77,8 +77,8 @@ class MarkWindows:
 def _coarse_steps(net: LaneNet) -> float:
     """Largest number of steps per 1 for which weights fit into 16 bits and all sums into 32.
 
-    Features are not negative and a block's norm is at most 1, so its part of a sum is at most the norm of its
-    positive, or negative, weights.
+    Features are not negative and a block's norm is at most 1, so the block adds at most the norm of its
+    positive weights, or of its negative ones.
     """
     blocks = net.hidden.T.reshape(HIDDEN, -1, BLOCK_FEATURES).astype(float)
     signs = [np.maximum(part, 0.0) for part in (blocks, -blocks)]

@@ -12,7 +12,7 @@ from selfdrive.visiond.road_region import RoadRegion
 
 MIN_PIXELS = 24  # in a cluster, or a line, that is used
 MIN_SPREAD = 3.0  # standard deviation of its rows
-MAX_SLOPE = 0.15  # lines that diverge more from the car's heading are not its lane's
+MAX_SLOPE = 0.15  # lines that diverge more from the car's heading do not bound its lane
 BESIDE = 8.0  # m ahead, where the nearest line is determined
 CROWD = 0.8  # m; of lines this close, the one with more edges is used
 TRIES = 8  # clusters examined on each side, from the nearest
@@ -98,7 +98,7 @@ class EdgeLines:
     def _line(self, a: float, b: float, points: Points) -> tuple[RoadLine | None, int]:
         """The line through all edges near column = a * row + b, and their number.
 
-        None if they are not those of a mark.
+        None if these are not the edges of a mark.
         """
         own = points
         for reach in REACHES:
@@ -126,9 +126,9 @@ def _away(points: Points, a: float, b: float) -> np.ndarray:
 def _is_mark(away: np.ndarray, rising: np.ndarray) -> bool:
     """Whether the picture gets brighter left of the line's middle, and darker right of it.
 
-    `away` (m, right positive) is each edge's distance from the middle. A shadow's edge does only one of the
-    two; a dark seam is the reverse. The far edge of a seam beside the paint is left out; the rest must be as
-    sharp as paint.
+    `away` (m, right positive) is each edge's distance from the middle. At a shadow's edge, there is only one
+    of these changes; at a dark seam, they are reversed. The far edge of a seam beside the paint is ignored;
+    the other edges must be as sharp as paint.
     """
     brighter, darker = away[rising], away[~rising]
     least = LEAST_SHARE * away.size

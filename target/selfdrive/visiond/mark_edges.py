@@ -51,5 +51,5 @@ def edges(part: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def limits(power: np.ndarray) -> np.ndarray:
-    """Squared gradients above which edges are steep, for each tile, from the tiles' mean ones (float32)."""
+    """For each tile, the squared gradient above which edges are steep; `power` has the tiles' means."""
     return np.maximum(RATIO**2 * cv2.blur(power, (3, 3)), FLOOR**2)

@@ -40,7 +40,7 @@ class RoadView:
                 expected=f"at least {LEAST_ROWS}",
                 remedy="use larger pictures, or a camera that sees the road before the car",
             )
-        # Rows above this one are not used. It begins a row of every level, so the levels stay the same.
+        # Rows above this one are not used. At every level, a row begins here, so the levels stay the same.
         self._first = int(min(rows)) >> LEVELS << LEVELS
         self._levels = [_maps(model, of_level, self.y, level, self._first) for level, of_level in found]
         self.drop = np.array(rows, np.float32) - np.float32(model.horizon)

@@ -1,6 +1,6 @@
 """Roads and cameras for training the lane detector, varied far more than the simulated road.
 
-So the detector learns lane marks in general, not this road's. Tones are grey levels.
+The detector thus learns to recognise all kinds of lane marks. Tones are grey levels.
 """
 
 from dataclasses import replace

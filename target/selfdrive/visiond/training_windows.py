@@ -8,7 +8,7 @@ from selfdrive.visiond.road_region import RoadRegion
 from selfdrive.visiond.training_scenes import VIEWS, View, views
 
 EACH = 12  # most windows per picture with a mark, and without
-LEAST_PAINT = 40.0  # pixels of paint in a mark; windows with less, but some, are not used
+LEAST_PAINT = 40.0  # pixels of paint in a mark; windows between NO_PAINT and this are not used
 LEAST_CONTRAST = 6.0  # grey levels between paint and surroundings; windows with less are not used
 NO_PAINT = 2.0  # pixels
 RING = np.ones((7, 7), np.uint8)  # neighbourhood for comparison with paint

@@ -1,8 +1,8 @@
 """Finds the two parallel lines that explain the points of possible marks: first votes, then a fit.
 
-Lines along the road meet in one point of the picture, which the car's heading moves sideways, and an error of
-the camera's pitch moves up or down. A line `y` m beside the camera is seen, `drop` px below the known
-horizon, `left + y * metre * (drop + dip)` px left of the camera's column.
+Lines along the road meet in one point of the picture. The car's heading moves it sideways; an error of the
+camera's pitch moves it up or down. `drop` px below the known horizon, a line `y` m beside the camera appears
+`left + y * metre * (drop + dip)` px left of the camera's column.
 """
 
 from collections.abc import Callable
@@ -43,12 +43,12 @@ class Pose(NamedTuple):
 
     @property
     def middle(self) -> float:
-        """Of the lane (m, left positive)."""
+        """The lane's middle (m, left positive)."""
         return 0.5 * (self.y_left + self.y_right)
 
     @property
     def width(self) -> float:
-        """Of the lane (m)."""
+        """The lane's width (m)."""
         return self.y_left - self.y_right
 
 
@@ -67,7 +67,7 @@ class Belief(NamedTuple):
 class Voters:
     """The points, in px left of the camera's column and below the horizon; `weight` in rows.
 
-    `rows` is the number of the picture's rows that may have points.
+    `rows` is the number of the picture's rows that can have points.
     """
 
     def __init__(self, view: RoadView, points: Points, rows: float) -> None:
@@ -84,7 +84,7 @@ Vote = Callable[[RoadView, np.ndarray, np.ndarray, np.ndarray, Belief], Pose]
 
 
 def vote(view: RoadView, road: np.ndarray, at: np.ndarray, weight: np.ndarray, belief: Belief) -> Pose:
-    """Find the lines from belief and points, given by number in the map `road`, with weights (`crests`)."""
+    """Find the lines from `belief` and points: their numbers in the map `road` and weights (see `crests`)."""
     voters = Voters(view, points_at(at, weight, road), view.rows_with_content(road))
     return fit(elect(voters, belief), voters, belief)
 
@@ -174,7 +174,7 @@ def settled(state: np.ndarray, voters: Voters, expected: np.ndarray, believed: n
 
 
 def fit(pose: Pose, voters: Voters, belief: Belief) -> Pose:
-    """Fit `pose` to the points around its lines; belief decides what they leave open."""
+    """Fit `pose` to the points around its lines; `belief` decides what the points leave open."""
     means, sigmas = np.array([belief.left, belief.dip, belief.middle, belief.width]).T
     expected = np.array([(1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 0.5, 0.5), (0, 0, 1, -1)]) / sigmas[:, None]
     state, metre, error, count = settled(np.array(pose[:4]), voters, expected, means / sigmas)

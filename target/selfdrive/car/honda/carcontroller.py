@@ -12,7 +12,7 @@ from selfdrive.messages import CanFrame, CarControl, CarState
 BRAKE_ON = 0.02  # a demand of at least this much starts braking
 BRAKE_OFF = 0.005  # below this, braking ends
 BRAKE_GAP = 0.01  # smaller changes of the demand are ignored
-BRAKE_RISE = 1.0 * DT_CTRL  # per cycle; the brake may drop immediately
+BRAKE_RISE = 1.0 * DT_CTRL  # per cycle; the brake can drop immediately
 
 PEDALS_EVERY = 2  # cycles
 DISPLAY_EVERY = 10  # cycles

@@ -25,7 +25,7 @@ GEAR_CODES = {name: code for code, name in GEARS.items()}
 
 STEER_STATUS_NORMAL = 0
 STEER_STATUS_FAULT = 5  # assumed until the EPS reports otherwise
-STEER_STATUS_PASSING = (0, 2, 3, 4, 6)  # the EPS may temporarily refuse torque, but is not broken
+STEER_STATUS_PASSING = (0, 2, 3, 4, 6)  # the EPS might temporarily refuse torque, but is not broken
 
 RADAR_GOOD = 0x79
 NO_TRACK_DISTANCE = 255.0  # m; at this distance or more, there is no track

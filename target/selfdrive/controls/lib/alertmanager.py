@@ -7,8 +7,8 @@ from selfdrive.controls.lib.alerts import ALERTS, Alert
 
 
 class AlertManager:
-    """Alerts last for their duration after the last raise. Shown is the one with the highest priority, then
-    the newest."""
+    """An alert lasts for its duration after it was last raised. The alert with the highest priority is shown;
+    of several, the newest."""
 
     def __init__(self, table: Mapping[str, Alert] = ALERTS) -> None:
         self._table = table

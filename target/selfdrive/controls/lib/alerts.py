@@ -1,4 +1,4 @@
-"""Text and duration of each alert. Texts are ours; priorities and durations the original's."""
+"""Text and duration of each alert. The texts are ours; priorities and durations are the original's."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -8,7 +8,7 @@ LOWEST, LOW, MID, HIGH = range(4)
 
 
 class Alert(NamedTuple):
-    """An alert's text, appearance and sound; durations in s since the last raise."""
+    """An alert's text, appearance and sound; durations in s since it was last raised."""
 
     text1: str
     text2: str

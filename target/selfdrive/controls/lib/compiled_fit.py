@@ -33,7 +33,7 @@ class CompiledFit(CubicFit):
     def __call__(self, points: Sequence[float]) -> Poly:
         try:
             self._points[:] = array("d", points)
-        except (TypeError, OverflowError, BufferError):  # a fault may replace or drop points
+        except (TypeError, OverflowError, BufferError):  # a fault can replace or drop points
             return super().__call__(points)
         self._fit(*self._arguments)
         a, b, c, d = self._poly

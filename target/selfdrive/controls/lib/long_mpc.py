@@ -29,7 +29,7 @@ class LongitudinalMpc:
 
     Call `set_cur_state` with the plan's current speed and acceleration, then `update`. Results: `v_mpc`,
     `a_mpc` (m/s, m/s^2, 0.2 s ahead), `v_mpc_future` (m/s, 4 s ahead), `prev_lead_status` (whether the
-    solution is for a real lead and may become the plan), `new_lead` (whether the lead appeared or jumped in
+    solution is for a real lead and can become the plan), `new_lead` (whether the lead appeared or jumped in
     this update), `v_plan`, `a_plan`, `x_plan`, `x_lead_plan` (21 nodes, 0..10 s: every 0.2 s to 1 s, then
     every 0.6 s), and `resets` (the number of discarded solutions).
 

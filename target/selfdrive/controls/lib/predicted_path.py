@@ -17,7 +17,7 @@ def model_curve(poly: Poly) -> Curve:
 
 
 def steering_curve(curvature: float) -> Curve:
-    """The circle (curvature in 1/m) that the steering wheel describes."""
+    """The circle of this curvature (1/m), which the car follows at the current steering angle."""
 
     def curve(x: float) -> tuple[float, float]:
         # limited to the circle's extent

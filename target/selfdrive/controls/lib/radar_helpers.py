@@ -11,7 +11,7 @@ from selfdrive.messages import LeadData
 
 LEAD_GAINS = (0.1988689, 0.28555364)  # of the lead speed's Kalman filter at 20 Hz
 
-STATIONARY_SPEED = 4.0  # m/s; slower objects may be stationary
+STATIONARY_SPEED = 4.0  # m/s; slower objects can be stationary
 ONCOMING_SPEED = -3.9  # m/s
 STATIONARY_MIN_EGO = 4.0  # m/s; below this, no object is treated as stationary
 
@@ -79,7 +79,7 @@ class Track:
         self.oncoming = self.v_lead < ONCOMING_SPEED
 
     def fuse(self) -> None:
-        """Note that the camera sees the same object; one seen often enough is not stationary."""
+        """Note that the camera sees the same object. An object seen often enough is not stationary."""
         self.fusions += 1
         if self.fusions >= FUSIONS_FOR_MOVING:
             self.stationary = False
@@ -103,7 +103,7 @@ class Cluster:
         return total(values) / len(self._tracks)
 
     def is_lead(self, v_ego: float) -> bool:
-        """Return whether it drives ahead of the car or is about to cut in."""
+        """Return whether the cluster drives ahead of the car or is about to cut in."""
         if all(t.stationary for t in self._tracks) or all(t.oncoming for t in self._tracks):
             return False
         # lateral speed has more weight for closer vehicles, because the path is uncertain far ahead

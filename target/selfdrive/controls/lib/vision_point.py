@@ -19,7 +19,7 @@ MAX_SPEED_DIFF = 10.0  # m/s; cameras estimate speed badly
 
 
 class VisionPoint:
-    """Distance and relative speed of the camera's lead, which never becomes a lead alone.
+    """Distance and relative speed of the camera's lead, which never becomes a lead on its own.
 
     As in the original, the camera measures from the bumper but tracks are measured from the camera, 2.7 m
     further back; the match is wide enough for both.

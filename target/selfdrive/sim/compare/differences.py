@@ -135,7 +135,7 @@ def _complete(reference: Reference, tolerances: Tolerances) -> None:
 def _figures(
     reference: Reference, ours: dict[str, np.ndarray], limits: dict[str, float]
 ) -> tuple[FigureResult, ...]:
-    """Both figures use the reference's rows, except that our engagement uses every step."""
+    """Figures of reference and run use the reference's rows; only our time of engaging uses every step."""
     theirs = figures.key_figures(reference.steps, reference.channels)
     rows = {name: values[reference.steps] for name, values in ours.items()}
     mine = figures.key_figures(reference.steps, rows)
@@ -212,8 +212,8 @@ def crossings(seconds: np.ndarray, differences: np.ndarray, band: float) -> tupl
 def time_lag(steps: np.ndarray, reference: np.ndarray, channel: np.ndarray) -> float | None:
     """The channel's delay behind the reference (s, at most 1): the shift with the highest correlation.
 
-    None without enough variation. Of similarly good shifts, the smallest is used, because a steady slope fits
-    any shift.
+    None if a channel hardly varies. Of similarly good shifts, the smallest is used, because a steady slope
+    fits any shift.
     """
     apart: dict[int, float] = {}  # 1 minus correlation, by shift
     for shift in sorted(range(-_LONGEST_LAG, _LONGEST_LAG + 1), key=abs):

@@ -23,7 +23,7 @@ _FCW_BIT = 1 << COUNTED_ALERTS.index("fcw")
 
 
 class Column(NamedTuple):
-    """One column. `factor` converts its numbers to SI; `words` are the names that it may contain instead."""
+    """One column. `factor` converts its numbers to SI; `words` are the names in a column without numbers."""
 
     name: str
     channel: str

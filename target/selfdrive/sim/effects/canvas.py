@@ -1,4 +1,4 @@
-"""Draws many soft specks and streaks at once; tiles that repeat."""
+"""Draws many soft specks and streaks at once, and moves pictures that repeat like tiles."""
 
 from collections.abc import Callable
 

@@ -64,7 +64,7 @@ def weights(sigma: float, size: int) -> np.ndarray:
 
 @cache
 def agrees(library: compiled.Library, sigma: float, size: int) -> bool:
-    """Whether compiled code gives OpenCV's bits with this kernel; other OpenCV versions may round
+    """Whether compiled code gives OpenCV's bits with this kernel; other OpenCV versions can round
     differently."""
     fast, plain = CompiledGaussian(library, sigma, size), Gaussian(sigma, size)
     noise = (np.arange(48 * 72) * 40503 % 65521 % 256).astype(np.uint8).reshape(48, 72)

@@ -88,7 +88,7 @@ def _droplets(
 
 @cache
 def agrees(library: compiled.Library) -> bool:
-    """Whether compiled code draws NumPy's random numbers, which may differ between versions."""
+    """Whether compiled code draws NumPy's random numbers, which can differ between versions."""
     seen = []
     for drawn in (scattered.droplets, partial(_droplets, library)):
         random = np.random.Generator(np.random.PCG64(11))

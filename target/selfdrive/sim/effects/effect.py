@@ -18,7 +18,7 @@ WHITE = 255
 
 
 class Scene(Protocol):
-    """The world as an effect sees it; the simulator's ground truth is one."""
+    """The world as an effect sees it, such as the simulator's ground truth."""
 
     @property
     def t(self) -> float:
@@ -48,8 +48,8 @@ class Effect(ABC):
     """One effect at one amount, in `UNIT`, from `LEAST` to `MOST`, for one camera.
 
     Random numbers come from the seed and the effect's own stream, so two effects with one seed are
-    independent. No state is kept between pictures, so any of them may be requested in any order. Raises
-    ConfigError for an amount out of range.
+    independent. No state is kept between pictures, so they can be requested in any order. Raises ConfigError
+    for an amount out of range.
     """
 
     UNIT: ClassVar[str]

@@ -40,7 +40,7 @@ class PaperOcclusion(_OnLens):
     def _prepare(self, random: np.random.Generator) -> None:
         rows, columns = self.camera.rows, self.camera.width
         share = np.zeros((rows, columns), dtype=np.float32)
-        # The same random numbers for any amount, so that more blobs include fewer.
+        # The same random numbers for any amount, so that a higher amount has all blobs of a lower one.
         blobs = random.uniform(size=(self.MOST, 3))[: int(self.amount)]
         for column, row, size in blobs:
             radius = BLOB_RADII[0] + size * (BLOB_RADII[1] - BLOB_RADII[0])
@@ -51,7 +51,7 @@ class PaperOcclusion(_OnLens):
 
 
 class LensMud(_OnLens):
-    """Clods and spatters of mud over a share of the picture; more mud includes less."""
+    """Clods and spatters of mud over a share of the picture; higher amounts add mud to that of lower ones."""
 
     UNIT, LEAST, MOST = "of the picture", 0.0, 0.95
 

@@ -11,7 +11,7 @@ from selfdrive.sim.effects.effect import WHITE, Effect, Scene
 from selfdrive.sim.picture import Picture, Region
 
 WHITE_REFLECTANCE = 0.32  # reflectance shown as white in daylight; asphalt of 0.12 has level 95
-SUN_HEIGHT = radians(6.0), radians(12.0)  # drawn between
+SUN_HEIGHT = radians(6.0), radians(12.0)  # drawn from this range
 SUN_SIDE = radians(8.0)  # at most, to either side
 SUN_RADIUS = radians(0.27)
 ASPHALT_SLOPES = 0.25  # rms slope of surface facets
@@ -29,8 +29,8 @@ class SunGlare(Effect):
     """The low sun ahead: light scattered in lens and windscreen, and mirrored by the road.
 
     The amount is the scattering of the glass, as a multiple of Stiles and Holladay's law for glare, 10 *
-    illuminance / angle^2 (cd/m^2, lux, degrees). Light of sun and sky follow the Illuminating Engineering
-    Society's clear sky. The sun's position is drawn from the seed.
+    illuminance / angle^2 (cd/m^2, lux, degrees). The light of sun and sky follows the Illuminating
+    Engineering Society's clear sky. The sun's position is drawn from the seed.
     """
 
     UNIT, LEAST, MOST, MOVING = "times a clear eye", 0.0, 10.0, False

@@ -1,11 +1,11 @@
 """Rain, fog and snow as in the paper, by `thickness` from 1 to 10.
 
-Numbers are from the paper's table of effects and its text. Where it gives a range, thickness 1 is the mild
-end and 10 the strong end. What the paper leaves open follows from the weather in `visibility`: a streak is as
-long as a drop falls during the exposure, and there are as many flakes as a snowfall has that appear as large
-as the text's blocks. Streaks and flakes lie in layers, the farther ones shorter and slower. They fall across
-the screen, faster when the car drives faster, and wrap around, so their number is constant and each can be
-followed from picture to picture.
+Numbers are from the paper's table of effects and its text. Where the paper gives a range, thickness 1 is the
+mild end and 10 the strong end. What the paper leaves open follows from the weather in `visibility`: a streak
+is as long as a drop falls during the exposure, and a block is a flake that looks at least as large. Streaks
+and flakes lie in layers; in farther layers, they are shorter and slower. They fall across the picture, faster
+when the car drives faster, and wrap around, so their number is constant and each can be followed from picture
+to picture.
 """
 
 from math import cos, radians, sin
@@ -68,7 +68,7 @@ class PaperRain(_PaperWeather):
         """White streaks in random places. Falling drops wobble, so brightness varies along a streak."""
         rows, columns = self.camera.rows, self.camera.width
         most = STREAKS * int(self.MOST)
-        # The same random numbers for any thickness, so that more rain includes all streaks of less.
+        # The same random numbers for any thickness, so that heavier rain has all streaks of lighter rain.
         count = self._count(STREAKS, layer, len(NEARER))
         column, row, phase, wobble = random.uniform(size=(4, most))[:, :count]
         start = np.stack([columns * column, rows * row])

@@ -79,7 +79,7 @@ class Particles:
         return Streaks(start[:, chosen], end[:, chosen], width[chosen])
 
     def _moved(self, first: np.ndarray, scene: Scene, tall: float, along: float, fall: float) -> np.ndarray:
-        """Positions, as shares of boxes `tall` times as long as their reach, after particles moved.
+        """Positions, as shares of boxes `tall` times as long as their reach, after the particles moved.
 
         They move by `along` per metre driven and by `fall` per metre fallen.
         """

@@ -109,7 +109,7 @@ class Rain(_Precipitation):
         super()._prepare(random)
 
     def _affect(self, picture: np.ndarray | Picture, region: Region, scene: Scene) -> np.ndarray:
-        everything = whole(picture.shape)  # each drop shows most of it
+        everything = whole(picture.shape)  # each drop shows most of the picture
         through = super()._affect(picture[everything.part], everything, scene)
         return self._glass.seen(through, region, scene)
 

@@ -18,7 +18,7 @@ class Streak(NamedTuple):
 def streak_light(
     chances: np.ndarray, streak: Streak, levels: np.ndarray, box: np.ndarray, shape: tuple[int, int]
 ) -> np.ndarray:
-    """Grey levels (uint8) of streaks in a region, of that shape, of a canvas.
+    """Grey levels (uint8) of streaks in a region, of this `shape`, of a canvas.
 
     `chances` (passes, n, 2), float32, are the starts of streaks as shares of the canvas' columns and rows.
     `box` has the canvas' size, then the region's start. Each pass adds its level (uint8).

@@ -11,7 +11,7 @@ from selfdrive.common.camera_model import CameraModel
 NEAR, FAR = 5.0, 30.0  # m, measured part of the road
 BESIDE = 0.35  # m from a line's middle to bare road
 INNER = 0.5  # m; anything nearer to a line is not part of the lane's inside
-SAME = 0.5  # share of a mark's edge; at least this is treated as an edge like a mark's
+SAME = 0.5  # an edge with at least this share of a mark's edge is as strong as a mark's
 NOTICED = 8.0  # grey levels
 WEAKEST = 32.0  # Sobel value of a step of 8 grey levels; anything less is no edge
 

@@ -23,7 +23,7 @@ class _Tone(Effect):
 
 
 class Contrast(_Tone):
-    """Every level multiplied by a gain, limited to white. The paper's gains: 1.2 to 3.0."""
+    """Every level is multiplied by a gain and limited to white. The paper's gains: 1.2 to 3.0."""
 
     UNIT, LEAST, MOST = "gain", 0.0, 10.0
 
@@ -32,7 +32,7 @@ class Contrast(_Tone):
 
 
 class Brightness(_Tone):
-    """A bias added to every level. The paper's: 10 to 100."""
+    """A bias is added to every level. The paper's biases: 10 to 100."""
 
     UNIT, LEAST, MOST = "grey levels", -255.0, 255.0
 

@@ -1,7 +1,7 @@
 """The weather that each level of the paper's rain, fog, snow and occlusion represents.
 
-The text counts streaks, blocks and blobs and gives contrasts, but not how bad the weather is. Here this
-follows from the numbers of drops and flakes in front of the camera:
+The text gives numbers of streaks, blocks and blobs, and contrasts, but not how bad the weather is. Here, the
+weather follows from the numbers of drops and flakes in front of the camera:
 
 * rain: a streak is a drop of at least 1 mm within `REACH`, at the rate with that many drops (J. Marshall and
   W. Palmer, 1948);
@@ -31,9 +31,9 @@ SIZES, HALVINGS = 200, 40
 
 
 class Weather(NamedTuple):
-    """The weather outside."""
+    """The weather that a level represents."""
 
-    rate: float  # mm of water per hour; 0 without any
+    rate: float  # mm of water per hour; 0 for none
     range: float  # m, meteorological range
 
 

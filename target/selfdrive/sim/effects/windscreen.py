@@ -16,7 +16,7 @@ from selfdrive.sim.picture import Region
 DISTANCE = 0.05  # m from lens to glass
 RAKE = 0.52  # rad between glass and road
 SPREAD = 1.8  # a drop's diameter on the glass, relative to that in the air
-FALL = 6.5  # m/s, fall speed of drops of some mm
+FALL = 6.5  # m/s, fall speed of drops of a few mm
 EDGE = 3.0  # px, blur of a drop's edge, which is out of focus
 WIPE = 1.0  # s between wipes
 FASTEST = 40.0  # m/s; drops are prepared up to this speed
@@ -42,8 +42,8 @@ class Pixels(NamedTuple):
         return cls(places, sources, shares.astype(np.int16), ends)
 
     def within(self, region: Region, columns: int) -> "Pixels":
-        """Those in a region of the picture, which has `columns` columns; places are then relative to the
-        region."""
+        """The pixels in a region of the picture, which has `columns` columns; their places are then relative
+        to the region."""
         row, column = np.divmod(self.places, columns)
         down, right = row - region.top, column - region.left
         rows, width = region.shape
@@ -109,7 +109,7 @@ def shrunk(picture: np.ndarray, size: tuple[int, int]) -> np.ndarray:
 
 
 def _speed(v_ego: float) -> float:
-    """Speed (m/s) of drops relative to the glass, as if it were upright."""
+    """Speed (m/s) of drops relative to the glass, as if the glass were upright."""
     return max(v_ego, 0.0) + FALL / tan(RAKE)
 
 

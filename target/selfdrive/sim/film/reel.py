@@ -29,7 +29,7 @@ class SeenLine:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Frame:
-    """The moment of one picture: the world, the controller's view, its messages to the driver. SI units.
+    """The moment of one picture: the world, the controller's view and its messages to the driver. SI units.
 
     `d_rel` is None on a free road, `lines` if visiond published nothing, `radar` if radard has no lead.
     `plan` is the planned path, y at KNOTS. In the camera's view, the lane centre is at `middle` beside the

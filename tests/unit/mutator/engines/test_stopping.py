@@ -128,9 +128,9 @@ def test_engines_agree_on_a_run_that_stops_after_its_fault(
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("terminal: true", "terminal: true, for_s: 1", "H1 must last; expected a condition of one step"),
-        ("25 >= near", "ever(25 >= near)", "H1 asks for `ever`; expected a condition of a single step"),
-        ("25 >= near", "rate(near) > 5", "H1 asks for `rate`"),
+        ("terminal: true", "terminal: true, for_s: 1", "H1 has `for_s`; expected a condition of one step"),
+        ("25 >= near", "ever(25 >= near)", "H1 uses `ever`; expected a condition of a single step"),
+        ("25 >= near", "rate(near) > 5", "H1 uses `rate`"),
         (
             '{about: contact, when: "25 >= near and hypot(speed, 0) > 0", terminal: true}',
             "{terminal: true}",

@@ -106,14 +106,16 @@ def test_changes_that_git_does_not_know_are_refused(toycar: Workspace, root: Pat
     """The cases are an uncommitted change, an untracked file, and a library without git."""
     with (root / LANE).open("a") as file:
         file.write("# more\n")
-    with pytest.raises(MutatorError, match=r"lane\.yaml: cannot determine .* not committed.*commit first"):
+    with pytest.raises(
+        MutatorError, match=r"lane\.yaml: cannot determine .* not committed.*commit the change first"
+    ):
         say(toycar, "Jane Doe")
     git(root, "rm", "-q", "--cached", LANE)
     git(root, "commit", "-qm", "less")
     with pytest.raises(MutatorError, match="not committed"):
         say(toycar, "Jane Doe")
     (root / ".git").rename(root / "git")
-    with pytest.raises(MutatorError, match=r"no git clone.*put it under git"):
+    with pytest.raises(MutatorError, match=r"not in a git clone.*put the file under git"):
         say(toycar, "Jane Doe")
     assert say(toycar, "Jane Doe", Kind.REJECT).decision(lane(toycar).id)
 

@@ -148,7 +148,7 @@ def test_a_place_that_no_run_reaches_is_reported(lit: Lit) -> None:
     sensing = workspace.library.parent / "tree/toycar/sensing.py"
     text = sensing.read_text()
     sensing.write_text(text.replace("def sense(self, world):\n", "def sense(self, world):\n        return\n"))
-    with pytest.raises(MutatorError, match="the run never reached it"):
+    with pytest.raises(MutatorError, match="the run never reached this function"):
         drawn(workspace, next(g for g in groups_of(workspace) if g.faults))
 
 

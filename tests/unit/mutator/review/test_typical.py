@@ -104,7 +104,7 @@ def row(**given: Any) -> Row:
     [
         (
             {"outcome": Outcome.SDC},
-            "sdc: an actuator differed from the golden run from 2.50 s, without a hazard",
+            "sdc: an actuator first differed from the golden run at 2.50 s; no hazard",
         ),
         (
             {"outcome": Outcome.HAZARD, "hazards": (("H1", 4.25),), "alerts": ("fcw",), "t_alert": 3.0},

@@ -65,7 +65,7 @@ def test_a_valid_record_is_not_reported(record: MakeRecord, fields: dict[str, An
 @pytest.mark.parametrize(
     ("fields", "told"),
     [
-        ({"outcome": Outcome.SDC}, "outcome sdc; expected masked, which follows from its times"),
+        ({"outcome": Outcome.SDC}, "outcome sdc; expected masked, which follows from the recorded times"),
         ({"hazards": (("H1", 2.5),)}, "outcome masked; expected hazard"),
         ({"outcome": Outcome.NOT_ACTIVATED}, "outcome not_activated; expected masked"),
         ({"outcome": Outcome.SDC, "t_manifest": 1.5}, "manifested at 1.5 s; expected a time at or after"),
