@@ -79,7 +79,7 @@ def test_a_valid_record_is_not_reported(record: MakeRecord, fields: dict[str, An
         ({"trace_digest": ""}, "trace digest ''"),
         ({"max_dev": (("gas", 0.0),)}, "differences of gas; expected those of gas, brake"),
         ({"max_dev": (("gas", 0.1), ("brake", 0.0))}, "gas differs, but no manifestation is recorded"),
-        (BAD_END | {"status": Status.CRASHED, "outcome": Outcome.SDC}, "outcome sdc; expected none, as it"),
+        (BAD_END | {"status": Status.CRASHED, "outcome": Outcome.SDC}, "outcome sdc; expected none, because"),
         (BAD_END | {"status": Status.TIMEOUT, "trace_digest": "f"}, "trace_digest f; expected none"),
     ],
 )
