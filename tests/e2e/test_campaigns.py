@@ -309,7 +309,8 @@ os.write(1, (out / "results.csv").read_bytes())
 """
 
 
-@pytest.mark.parametrize("workers", [pytest.param(0, marks=pytest.mark.slow), 2])
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", [0, 2])
 def test_a_campaign_resumes_after_a_full_disk(
     toy: Workspace, finished: Path, tmp_path: Path, workers: int
 ) -> None:

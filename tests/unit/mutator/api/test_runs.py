@@ -221,6 +221,7 @@ def test_two_processes_can_request_the_same_series(driven: Run) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_the_code_of_the_notebook_page_runs(
     driven: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -6,7 +6,6 @@ import random
 import numpy as np
 import pandas as pd
 import pytest
-from statsmodels.stats.multitest import multipletests
 
 from mutator.statistics import contrasts
 from mutator.statistics.compare_tables import pairs_sheet
@@ -66,8 +65,11 @@ def test_holm_adjusts_as_in_the_textbook() -> None:
     assert contrasts.holm([]) == ()
 
 
+@pytest.mark.slow
 def test_holm_adjusts_as_statsmodels_does() -> None:
     """The p-values include ties, 0, 1, and tests without a result."""
+    from statsmodels.stats.multitest import multipletests  # slow to import
+
     draw = random.Random(1)
     for _ in range(20):  # one call of `multipletests` takes 50 ms
         p_values = [
