@@ -20,7 +20,7 @@ def follow(control: LongControl, car: CarState, p: Plan, cycles: int = 1) -> tup
     return output
 
 
-def test_off_has_zero_outputs_and_follows_the_cars_speed(params: CarParams) -> None:
+def test_while_off_outputs_are_zero_and_the_target_follows_the_car(params: CarParams) -> None:
     """While control is off, the target speed is at least 0.3 m/s."""
     control = LongControl(params)
     assert control.update(False, at(20.0), plan(30.0)) == (0.0, 0.0)

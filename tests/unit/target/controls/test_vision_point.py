@@ -48,7 +48,7 @@ def test_the_cameras_lead_is_assumed_to_be_on_the_path() -> None:
     assert seen().best_match([off, on], bend) is on
 
 
-def test_filter_is_a_kalman_filter_with_the_camera_s_variance() -> None:
+def test_the_filter_is_a_kalman_filter_with_the_cameras_variance() -> None:
     """Distance and speed are those of a Kalman filter with R = std^2 and, per cycle, Q = diag(0.5, 1)."""
     point, std = VisionPoint(), 3.0
     a, x, p = np.array([[1.0, 0.05], [0.0, 1.0]]), np.zeros(2), 1e2 * np.eye(2)

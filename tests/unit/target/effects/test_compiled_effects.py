@@ -170,7 +170,6 @@ def test_droplets_use_numpys_random_numbers(folder):
 
 @pytest.mark.parametrize("source", C_SOURCES, ids=lambda source: source.stem)
 def test_an_edited_effect_does_not_use_its_library(folder, tmp_path, monkeypatch, source):
-    """If any Python file that the C code replaces has changed, the library is not used."""
     compiled.use(folder)
     assert compiled.library(source) is not None
     named = compiled.stands_for(source.read_bytes())

@@ -68,10 +68,7 @@ def test_page_has_every_effect_and_level():
 
 @pytest.mark.slow
 def test_page_is_what_the_command_writes(tmp_path):
-    """The committed page is current.
-
-    After a change of effects or detectors, run `python -m selfdrive.sim.effects.page`.
-    """
+    """After a change of effects or detectors, run `python -m selfdrive.sim.effects.page`."""
     page.write(tmp_path)
     made, kept = (folder / "image-effects.md" for folder in (tmp_path, REFERENCE))
     assert made.read_text(encoding="utf-8") == kept.read_text(encoding="utf-8")

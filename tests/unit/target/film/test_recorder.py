@@ -35,7 +35,7 @@ def test_the_film_has_one_frame_for_each_camera_frame(drive):
     assert all(frame.picture is None for frame in reel.frames)
 
 
-def test_the_film_has_the_seen_lines_and_lead(drive):
+def test_the_film_has_the_detected_lines_and_lead(drive):
     """With ideal vision, both lines and the lead are at their true places."""
     frame = read_reel(drive() / "film").frames[-1]
     assert (frame.lines["left"].y[0], frame.lines["right"].y[0]) == (1.85, -1.85)

@@ -129,10 +129,10 @@ def test_the_sheet_is_grey_after_the_end_of_the_drive(reel):
         assert (pane.max(axis=-1) == pane.min(axis=-1)).all()
     right = later[600:, WIDTH - 200 :]
     assert (right.max(axis=-1) == right.min(axis=-1)).all()
-    assert (later[600:, :600] != whole.draw(21)[600:, :600]).any()  # another scale
+    assert (later[600:, :600] != whole.draw(21)[600:, :600]).any()  # the plots have another scale
 
 
-def test_pictures_of_another_shape_fit(reel, tmp_path, frame):
+def test_frames_of_another_shape_fit_the_sheet(reel, tmp_path, frame):
     cv2.imwrite(str(tmp_path / "a.jpg"), np.full((720, 1280), 128, np.uint8))
     model = CameraModel.from_view(width=1280, rows=720, horizon=300.0, focal=1000.0, height=1.4)
     wide = replace(reel({"picture": tmp_path / "a.jpg", "d_rel": None}), camera=model)

@@ -165,7 +165,6 @@ def test_the_library_is_not_used_with_another_version_of_daqp(
 
 @pytest.mark.parametrize("edited", ["mpc.c", "mpc_solver.py", "long_ocp.py", "lateral_ocp.py", "horizon.py"])
 def test_an_edited_problem_is_solved_by_casadi(all_compiled: Path, tmp_path: Path, edited: str) -> None:
-    """If a file that the C code replaces has changed, CasADi's solver is built."""
     target = tmp_path / "target"
     shutil.copytree(
         mpc_parts.C_FILE.parents[3] / "selfdrive",

@@ -82,7 +82,7 @@ def test_the_plan_keeps_the_speed_at_the_steady_gap(long_mpc, lead, v):
 
 
 @pytest.mark.parametrize(("gap", "sign"), [(30.0, -1), (60.0, 1)])
-def test_plan_closes_the_error_of_the_gap(long_mpc, lead, gap, sign):
+def test_the_plan_reduces_the_error_of_the_gap(long_mpc, lead, gap, sign):
     drive(long_mpc, 20.0, 0.0, lead(gap, 20.0), 20)
     assert long_mpc.a_mpc * sign > 0.01
     assert (long_mpc.v_mpc_future - 20.0) * sign > 0.1

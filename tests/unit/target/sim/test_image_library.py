@@ -16,7 +16,7 @@ from selfdrive.sim.road_look import DASH_PERIOD
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.sim.vision import DASHED, Pictures
 
-SHAPE = (5, 7, 9)  # an odd number of bytes a frame
+SHAPE = (5, 7, 9)  # an odd number of bytes per frame
 DIGEST = "ab" * 32
 
 

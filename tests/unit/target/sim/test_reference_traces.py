@@ -183,10 +183,8 @@ def lose_model(simulator, truths):
     ("disturb", "alert", "at", "hit"),
     [(lose_frames, "can_error", 7.085, 18.28), (lose_model, "model_error", 7.415, 19.30)],
 )
-def test_loss_of_an_input(s1, disturb, alert, at, hit):
-    """If CAN frames or the model are lost once the headway time is 2 s, alert and contact occur at
-    openpilot's times.
-    """
+def test_alert_and_contact_after_a_lost_input_occur_at_openpilots_times(s1, disturb, alert, at, hit):
+    """CAN frames or the model are lost once the headway time is 2 s."""
     record = faulty(s1, disturb)
     assert [event["name"] for event in record["alerts"]] == [alert]
     assert record["alerts"][0]["t"] == pytest.approx(at, abs=0.011)

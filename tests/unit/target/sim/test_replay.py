@@ -95,7 +95,7 @@ def test_lag(trace, late):
     assert time_lag(steps, 3.0 * np.sin(steps / 100), wave) == pytest.approx(late / 100, abs=0.011)
 
 
-def test_the_lag_of_a_constant_is_unknown_and_of_a_slope_zero():
+def test_a_constant_has_no_lag_and_a_slope_has_lag_zero():
     steps = np.arange(0, STEPS, 5)
     assert time_lag(steps, np.ones(len(steps)), np.ones(STEPS)) is None
     assert time_lag(steps, steps / 100, np.arange(STEPS) / 100) == 0.0

@@ -208,7 +208,6 @@ def test_the_lead_is_drawn_at_its_distance(standard, offset, heading):
 
 
 def test_a_lead_that_cannot_be_seen_is_not_drawn(standard):
-    """A lead that was hit or is out of sight leaves the image unchanged."""
     plain = standard.colour(3.0)
     assert np.array_equal(plain, standard.colour(3.0, lead=-3.0))
     assert np.array_equal(plain, standard.colour(3.0, lead=500.0))

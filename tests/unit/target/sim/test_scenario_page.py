@@ -27,7 +27,6 @@ def accepted(data: dict[str, Any]) -> tuple[bool, bool]:
 
 
 def test_page_and_schema_are_up_to_date() -> None:
-    """The committed page and schema match the parser's keys and bounds."""
     remedy = "run: python -m selfdrive.sim.scenario_page"
     assert (REFERENCE / "scenario.md").read_text() == scenario_page.page(), remedy
     assert json.loads((REFERENCE / "schemas" / "scenario.json").read_text()) == scenario_page.schema(), remedy

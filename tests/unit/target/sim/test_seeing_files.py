@@ -80,9 +80,9 @@ def memory() -> Path:
 
 
 def test_the_manifest_lists_every_file_that_affects_detection() -> None:
-    """A mutant of a file in the memory's key runs from the disk.
+    """A mutant of a file that the memory's key covers is run from the disk.
 
-    Faults in visiond and in the camera, which are not in the key, can be forked.
+    The key does not cover visiond and the camera, so their faults can be forked.
     """
     manifest = Workspace.find(root=ROOT).manifest("openpilot")
     package = ROOT / "target" / "selfdrive"

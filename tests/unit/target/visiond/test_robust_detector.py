@@ -137,7 +137,7 @@ def test_after_crossing_a_line_the_next_lane_is_found():
     road = renderer()
     detector = RobustDetector(road.model)
     for i in range(75):
-        offset = 0.05 * i  # at the end a lane further left
+        offset = 0.05 * i  # ends one lane further left
         lines = see(detector, road.grey(STEP * i, offset, 0.01))
         known = offset if offset < 1.85 else offset - 3.7 if offset > 2.4 else None
         if known is not None:
