@@ -60,7 +60,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
     cluster, insecure = config.getoption("campaign_cluster"), config.getoption("insecure_network")
     if cluster and getattr(config.option, "numprocesses", None):
-        raise pytest.UsageError("--campaign-cluster with -n: leave out -n, the cluster has its own workers")
+        raise pytest.UsageError("--campaign-cluster with -n: leave out -n (the cluster has its own workers)")
     try:
         deals = distributor(cluster, insecure=insecure) if cluster or insecure else None
     except MutatorError as err:

@@ -43,7 +43,8 @@ def _found(workspace: Workspace, campaign: str | Path, out: Path, choices: Choic
         raise MutatorError(
             f"holds a run of campaign '{head['campaign']}' whose text differs from {loaded.path}",
             where=out,
-            remedy="use another folder, or give the file of the run: " + str(out / "campaign.yaml"),
+            remedy="use another folder, or give the campaign file in the run folder: "
+            + str(out / "campaign.yaml"),
         )
     for name, value in asdict(choices).items():
         frozen = head["choices"].get(name)

@@ -178,7 +178,7 @@ class _Resolver:
         """Return the value; MutatorError for a text that resembles the draw's name, a likely typo."""
         assert not isinstance(param.value, Drawn)
         if isinstance(param.value, str) and self.draw and suggestion(param.value, [self.draw.name]):
-            raise self._wrong(param, f"'{self.draw.name}', the draw, or a less similar text")
+            raise self._wrong(param, f"'{self.draw.name}', the draw, or a text less similar to it")
         return param.value
 
     def _number(self, param: ParamSpec, schema: ParamSchema) -> float:

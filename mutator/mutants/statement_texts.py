@@ -65,7 +65,7 @@ def _unfit(file: ParsedFile, site: Site, what: str) -> MutatorError:
         what,
         where=file.where,
         line=site.first + 1,
-        expected="an anchor before or after a call, an assignment or a return that shares no line",
+        expected="an anchor before or after a call, an assignment or a return that is alone on its lines",
         remedy="anchor at another statement",
     )
 

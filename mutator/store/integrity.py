@@ -283,6 +283,6 @@ def patch_problems(
             if found
             else f"no patch of {experiment_id}",
             where=patches.file(experiment_id, worker),
-            expected=f"SHA-256 {known[:16]}, as the record says",
+            expected=f"SHA-256 {known[:16]}, as in the record",
             remedy=_remedy(patches.run, ""),
         )

@@ -227,7 +227,7 @@ def _no_pipe(path: Path) -> Path:
     raise MutatorError(
         "no file",
         where=path,
-        expected="lines",
+        expected="a file of lines",
         remedy="restore it from a copy of the run folder, or delete it; `mutator verify` lists what is lost",
     )
 

@@ -161,7 +161,7 @@ class _Writer:
                 raise self._refuse(f"{ast.unparse(node)!r}", "write ever(CONDITION)")
             return f"ever({self.boolean(node.args[0])})"
         raise self._refuse(
-            f"{ast.unparse(node)!r} is not a truth value", "compare it with something: t <= 2.0"
+            f"{ast.unparse(node)!r} is not a truth value", "compare it with a value, e.g. t <= 2.0"
         )
 
     def number(self, node: ast.expr) -> str:

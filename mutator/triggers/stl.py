@@ -127,7 +127,7 @@ def _refusal(error: Exception, formula: str, variables: Collection[str], step_s:
         said, remedy = f"a time that is not a multiple of the step, {step_s:g} s,", "use a multiple"
     return MutatorError(
         f"{said} in {formula!r}",
-        expected="a formula of signal temporal logic that looks back, or ahead for a given time, over "
+        expected="a formula of signal temporal logic that looks back, or ahead for a bounded time, over "
         + ", ".join(variables),
         remedy=remedy,
     )

@@ -221,7 +221,7 @@ def edited(workspace: Workspace, old: str, new: str) -> str:
         (
             "model: offset\n          unit: m\n          params: {by_m: error}",
             "model: stuck\n          unit: '1'\n          params: {value: -errror}",
-            "17: '-errror' for 'value'; expected 'error', the draw, or a less similar text",
+            "17: '-errror' for 'value'; expected 'error', the draw, or a text less similar to it",
         ),
         (
             "model: offset\n          unit: m\n          params: {by_m: error}",
