@@ -31,7 +31,7 @@ from mutator.workspace import Workspace  # noqa: E402
 
 WORTH_IT = 0.02  # of the CPU
 _LAST_S = (
-    0.06  # a fault active this shortly before the end was active to the end: it may act in each 5th step
+    0.06  # a fault active this shortly before the end was active to the end: it might act in every fifth step
 )
 
 

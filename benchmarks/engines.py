@@ -32,7 +32,7 @@ from mutator.store.run_folder import GoldenRun  # noqa: E402
 from mutator.triggers.kinds import always  # noqa: E402
 from mutator.workspace import Workspace  # noqa: E402
 
-GOAL_OF_WARM = 1.15  # fork's CPU over warm's times the share of simulated time after activation
+GOAL_OF_WARM = 1.15  # fork's CPU / (warm's CPU x share of time after activation)
 GOAL_OF_REFERENCE = 1 / 3
 
 

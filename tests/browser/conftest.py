@@ -226,7 +226,7 @@ SERIOUS = """async () => {
 
 @pytest.fixture(scope="session")
 def serious_faults() -> Callable[[Any], list[str]]:
-    """Return the serious accessibility faults that axe-core finds now."""
+    """Return a function that lists the serious accessibility faults that axe-core finds in a page."""
     package = pytest.importorskip("axe_playwright_python", reason="extra `test` is not installed")
     source = (Path(package.__path__[0]) / "axe.min.js").read_text(encoding="utf-8")
 

@@ -13,7 +13,7 @@ from mutator.web import asset
 
 NAMES = ("t", "gap", "speed", "closing")
 ODD = [0.0, -0.0, 1.0, -2.5, 1e-300, 1e300, np.inf, -np.inf, np.nan]
-COUNT = 150  # of each
+COUNT = 150  # formulas, and as many conditions
 
 
 def term(rng: random.Random, depth: int = 3) -> str:

@@ -290,7 +290,7 @@ def test_a_replay_pauses_at_the_end_of_the_drive_and_can_continue(replayed: Repl
 
 
 def test_the_plots_and_the_replay_show_the_same_time(replayed: Replayed) -> None:
-    """During playback, only values update less often."""
+    """The check is made during playback."""
     replayed.show(FACTS)
     seek(replayed, 2.2)
     replayed.page.evaluate("""() => {
@@ -308,7 +308,7 @@ def test_the_plots_and_the_replay_show_the_same_time(replayed: Replayed) -> None
 
 
 def test_past_events_stay_listed(replayed: Replayed) -> None:
-    """The place of an event on the road may be out of sight."""
+    """The place of an event on the road can be out of sight."""
     replayed.show(FACTS)
     seek(replayed, 2.02)
     assert replayed.texts(".states .chip") == ["fault active"]

@@ -220,7 +220,7 @@ def test_a_damaged_series_is_shown_with_the_command_that_restores_it(page: "Page
     assert f"mutator rerun {name} --trace --run {run}" in said
 
 
-def test_a_cell_of_the_heat_map_filters(page: "Page", rows: list[dict[str, str]]) -> None:
+def test_a_cell_of_the_heat_map_filters_the_list(page: "Page", rows: list[dict[str, str]]) -> None:
     """Filters for results do not change the counts. A second press removes the filter."""
     cell = '#heat button[aria-label^="sensor/lane in B:"]'
     here = [row for row in rows if (row["fault_type"], row["scenario"]) == ("lane", "B")]
@@ -298,7 +298,7 @@ def test_a_shared_link_restores_filter_order_and_experiment(page: "Page") -> Non
     assert "No such experiment" in page.page.inner_text("#experiment")
 
 
-def test_the_keyboard_is_enough(page: "Page") -> None:
+def test_the_page_can_be_used_with_the_keyboard_alone(page: "Page") -> None:
     """`/` searches, j and k move, Enter opens, Esc closes, ? helps."""
     keys, focused = page.page.keyboard, "document.activeElement.dataset.at"
     keys.press("/")

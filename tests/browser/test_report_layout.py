@@ -85,7 +85,8 @@ def scrolled(page: "Page") -> Iterator["Page"]:
 
 
 def test_paper_has_the_filtered_rows(page: "Page") -> None:
-    """There is a stated limit. Parts that are only for screens are left out."""
+    """The number of printed rows has a stated limit. Parts that are only for screens are left
+    out."""
     page.page.emulate_media(media="print")
     page.page.evaluate("dispatchEvent(new Event('beforeprint'))")
     assert len(page.column("experiment_id")) == EXPERIMENTS

@@ -89,7 +89,7 @@ def test_marks_become_commands(open_page: Callable[..., Any]) -> None:
 
 
 def test_similar_groups_are_folded(open_page: Callable[..., Any]) -> None:
-    """One key unfolds similar groups, and another marks all of them after a question."""
+    """One key unfolds similar groups, and another marks all of them after confirmation."""
     page = open_page("q=gap")
     assert shown(page) == 1
     assert page.inner_text("[data-do=unfold]:visible") == "1 more like this"
@@ -104,7 +104,7 @@ def test_similar_groups_are_folded(open_page: Callable[..., Any]) -> None:
     assert page.locator("[data-mark=approve][aria-pressed=true]:visible").count() == 2
 
 
-def test_all_filtered_groups_are_marked_after_a_question(open_page: Callable[..., Any]) -> None:
+def test_all_filtered_groups_are_marked_after_confirmation(open_page: Callable[..., Any]) -> None:
     page = open_page("q=gap")
     page.keyboard.press("Shift+R")
     assert page.inner_text("#ask-title") == "Reject 2 groups?"

@@ -216,7 +216,7 @@ def test_a_pending_approval_is_not_applied_to_later_code(
 
 @pytest.mark.slow
 def test_marks_survive_a_stopped_server(library: Workspace, serve: Callable[..., Any], visit: Visit) -> None:
-    """Marks wait in the tab and go to the next server."""
+    """Marks stay in the tab and are sent to the next server."""
     rmtree(library.library / "reviews", ignore_errors=True)
     with serve(library, token="first") as address:
         page = visit(address, ADDRESS)

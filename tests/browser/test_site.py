@@ -99,7 +99,7 @@ def test_pages_are_accessible(
 
 
 def test_search_finds_what_newcomers_look_for(site: Path, visited: Any) -> None:
-    """The page that answers a word is among the first results."""
+    """For each word, the page that answers it is among the first results."""
     missed = {}
     for words, page in FOUND.items():
         visited.goto(f"{(site / 'search.html').as_uri()}?q={words}")

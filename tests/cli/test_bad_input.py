@@ -174,7 +174,7 @@ def test_the_command_line_names_its_options(
     assert "`" not in answer.err.partition("to do")[2]
 
 
-def test_the_target_of_the_api_is_the_option_manifest(cli: Cli, own: Path, root: Path) -> None:
+def test_errors_about_the_target_name_the_option_manifest(cli: Cli, own: Path, root: Path) -> None:
     """The option --target is the controller's source."""
     targets = root / "fault_library" / "targets"
     (targets / "other.yaml").write_text((targets / "toycar.yaml").read_text())

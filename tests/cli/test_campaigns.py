@@ -25,7 +25,7 @@ Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, jso
 Reseal = Callable[..., None]  # recomputes every checksum and digest of a run folder
 
 TESTS = Path(__file__).parents[1]
-CHOSEN = ["--only", 'fault_type != "distance"']  # some of them always do harm, whatever their ids
+CHOSEN = ["--only", 'fault_type != "distance"']  # some of these always cause a hazard
 
 
 def mutator(root: Path, *words: object) -> subprocess.CompletedProcess[str]:
@@ -62,7 +62,7 @@ def experiment_with(run: Path, word: str) -> str:
 
 
 def test_plan_writes_the_plan_and_runs_nothing(cli: Cli, root: Path) -> None:
-    """The output has the expected time and disk space."""
+    """The output includes the expected time and disk space."""
     answer = cli("plan", "toy", "--out", "p", "--only", 'fault_type == "distance"', "-n", "4")
     assert answer.code == 0
     for wanted in ("sensor/distance", "guided", "random", "total", "with 4 workers", "MB of disk"):
@@ -350,11 +350,11 @@ def test_rerun_fails_if_the_record_differs(cli: Cli, run: Path, tmp_path: Path, 
     assert "DIFFERS" in answer.out
 
 
-def test_clean_deletes_run_folders_only(cli: Cli, root: Path) -> None:
+def test_clean_deletes_only_run_folders(cli: Cli, root: Path) -> None:
     cli("plan", "toy", "--out", "runs/p", "--limit", "2")
     Path("mine").mkdir()
     assert cli("clean", "mine", "--yes").code == 2
-    assert cli("clean", "runs/p").code == 2  # nobody to ask
+    assert cli("clean", "runs/p").code == 2  # there is no terminal to ask at
     assert Path("runs/p/run.json").exists()
     assert cli("clean", "runs/p", "--yes").code == 0
     assert not Path("runs/p").exists()

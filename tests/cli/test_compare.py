@@ -16,7 +16,7 @@ Write = Callable[..., Path]
 
 
 def worse(e: Experiment) -> dict[str, Any]:
-    """Return runs of which the second has a new hazard and no other change."""
+    """Return the changes of a record: a hazard for silence in scenario A."""
     hazard = {"outcome": Outcome.HAZARD, "hazards": (("H1", 3.0),)}
     return hazard if e.fault.fault_type == "silence" and e.scenario == "A" else {}
 

@@ -15,7 +15,7 @@ Complete = Callable[..., list[str]]
 
 @pytest.fixture
 def complete(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch) -> Complete:
-    """Return the completions after these words, of which the user is typing the last one."""
+    """Return the completions after these words, the last of which the user is still typing."""
 
     def ask(*words: str) -> list[str]:
         monkeypatch.setenv("_MUTATOR_COMPLETE", "complete_bash")

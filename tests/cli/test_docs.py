@@ -50,7 +50,7 @@ WORKED_THROUGH = [
 INDEX = CLONE / "docs" / "README.md"
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
-CAMPAIGN = "mutator run quickstart "  # both pages have its table
+CAMPAIGN = "mutator run quickstart "  # README and tutorial show its table
 TABLE = re.compile(r"^```text\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 BLOCK = re.compile(r"^```console\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 FENCE = re.compile(r"(?:^([^\n]*)\n\n)?^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -195,7 +195,7 @@ def test_every_command_of_a_page_prints_what_the_page_says(page: Path, work: Pat
 def test_lists_and_diffs_in_the_docs_are_current(
     cli: Cli, command: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """README and tutorial are tested here, because these outputs cost little."""
+    """The outputs of README and tutorial are tested here, because they are quick to produce."""
     monkeypatch.setenv("MUTATOR_ROOT", str(CLONE))
     monkeypatch.delenv("COLUMNS")
     said = {command: said for page in (README, TUTORIAL) for command, said in sessions(page)}

@@ -68,7 +68,7 @@ def test_a_film_adds_no_file_to_the_run(cli: Cli, name: str) -> None:
     assert "differs" not in answer.err
 
 
-def test_a_still_without_a_file_is_in_the_report(cli: Cli, name: str) -> None:
+def test_a_still_without_a_file_name_is_in_the_report(cli: Cli, name: str) -> None:
     """Without a file name, a still is stored next to the plots."""
     answer = cli("show", name, "--no-plot", "--still", "1.5", "--json").json
     assert [Path(path).name for path in answer["films"]] == [f"{name}-1.50s.jpg"]
@@ -113,7 +113,7 @@ def test_an_error_of_the_film_command_is_quoted(cli: Cli, name: str) -> None:
     assert not list(Path("runs/a").glob("film-*"))
 
 
-def test_a_target_without_films_says_so(cli: Cli, root: Path) -> None:
+def test_a_target_without_films_is_reported(cli: Cli, root: Path) -> None:
     manifest = root / "fault_library/targets/toycar.yaml"
     before, rest = manifest.read_text().split("film:\n")
     manifest.write_text(before + "trace:" + rest.split("trace:")[1])

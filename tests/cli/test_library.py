@@ -60,7 +60,7 @@ def test_check_reports_a_missing_anchor_with_its_line(cli: Cli, root: Path) -> N
     assert all(p["file"] == str(spec) and p["line"] for p in problems)
 
 
-def test_check_and_doctor_name_a_thread(cli: Cli, root: Path) -> None:
+def test_check_and_doctor_report_a_thread(cli: Cli, root: Path) -> None:
     """A target with threads cannot use the fast engines."""
     go = root / "tree" / "toycar" / "go.py"
     thread = "threading.Thread(target=threading.Event().wait, name='poll', daemon=True).start()"

@@ -184,7 +184,7 @@ def test_main_returns_the_code_of_a_verb(root: Path) -> None:
     ],
 )
 def test_a_command_works_without_standard_error(root: Path, tmp_path: Path, streams: str) -> None:
-    """Standard error may be closed, full or unread."""
+    """Standard error can be closed, full or unread."""
     words = ["plan", "small", "--out", str(tmp_path / "run"), "--root", str(root)]
     begin = f"import os, sys; {streams}; os.execv(sys.executable, [sys.executable, *sys.argv[1:]])"
     for code in (0, 2):

@@ -79,7 +79,7 @@ TREES: dict[str, tuple[dict[str, str], str, str]] = {
 
 
 @pytest.mark.parametrize("name", TREES)
-def test_a_first_library_runs_once_its_marks_are_deleted(
+def test_a_first_library_runs_once_its_todo_marks_are_deleted(
     name: str, cli: Cli, tree: Callable[..., Path], nowhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     files, manifest, place = TREES[name]
@@ -180,7 +180,7 @@ def test_a_tree_may_have_any_name(
     assert all("not filled in" in line for line in answer.out.splitlines()[:-1]), answer.out
 
 
-def test_check_prints_the_whole_comment_of_a_mark(
+def test_check_prints_the_whole_comment_of_a_todo_mark(
     cli: Cli, nowhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     cli("init", "faults", "--target", "installed:typer")

@@ -26,14 +26,14 @@ WORDS = ("run", "small", "--out", "run", "-n", "0", "--limit", 4, "--engine", "r
 
 @pytest.fixture(scope="module")
 def driven(tmp_path_factory: pytest.TempPathFactory) -> list[Any]:
-    """The run folder of the first test, kept for the others, and its final seal."""
+    """A list with the run folder that all tests share and, later, its seal."""
     return [tmp_path_factory.mktemp("driven") / "run"]
 
 
 @pytest.fixture
 def cut(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch, driven: list[Any]) -> Path:
-    """A run folder with finished experiments that the command did not complete. Each test has the same
-    library, so the command runs once."""
+    """A run folder with finished experiments that the command did not complete. The command runs only once,
+    because all tests have the same library."""
 
     def end(self: Session) -> None:
         raise MutatorError("the power is cut")
@@ -66,7 +66,7 @@ def last_block(path: Path) -> int:
     return data.rindex(b"FIB1", 0, read_blocks(path).blocks[-1].offset)
 
 
-def test_records_are_synced_after_what_they_refer_to(
+def test_files_are_synced_before_the_records_that_refer_to_them(
     cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     synced: dict[str, int] = {}
@@ -100,12 +100,12 @@ def test_records_are_synced_after_what_they_refer_to(
 
 @pytest.mark.parametrize("rest", ["cut off", "zeros"])
 def test_a_record_without_its_patch_is_refused(cli: Cli, cut: Path, seal: str, rest: str) -> None:
-    """Any part of the patch's block may survive. The repaired run has the original result."""
+    """Any part of the patch's block can survive. The repaired run has the original result."""
     [path] = (cut / "patches").iterdir()
     data, name = path.read_bytes(), read_blocks(path).blocks[-1].key
     for length in range(last_block(path), len(data)):
         path.write_bytes(data[:length].ljust(len(data) if rest == "zeros" else 0, b"\0"))
-        if path.read_bytes() == data:  # it ends with zeros
+        if path.read_bytes() == data:  # the block ends with zeros
             continue
         with pytest.raises(MutatorError, match=f"no patch of {name}.*--repair") as told:
             RunFolder.open(cut)
@@ -122,7 +122,7 @@ def test_a_record_without_its_patch_is_refused(cli: Cli, cut: Path, seal: str, r
 
 
 def test_a_lost_series_is_restored_by_a_rerun(cli: Cli, cut: Path) -> None:
-    """Any part of the series' block may survive. The run completes."""
+    """Any part of the series' block can survive. The run completes."""
     [path] = segments(cut)
     data = path.read_bytes()
     names = [block.key.split()[0] for block in read_blocks(path).blocks if block.kind]

@@ -156,7 +156,7 @@ def test_remarks_and_flags_are_stored_and_removed(cli: Cli, root: Path, known: d
     assert "--text: no text" in cli("review", "remark", first, *JANE, "--text", " ").err
 
 
-def test_the_status_shows_what_is_left(cli: Cli, root: Path, known: dict[str, str]) -> None:
+def test_the_status_shows_which_groups_are_left(cli: Cli, root: Path, known: dict[str, str]) -> None:
     gap = about(known, "offset(by, low, target=gap)")
     cli("review", "approve", *known, *JANE)
     cli("review", "flag", gap, *JANE)

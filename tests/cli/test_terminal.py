@@ -90,11 +90,11 @@ def test_progress_in_a_log(capsys: pytest.CaptureFixture[str]) -> None:
     ("seconds", "words"),
     [(0.4, "0 s"), (59.4, "59 s"), (59.6, "1 min 00 s"), (3599, "59 min 59 s"), (7500, "2 h 05 min")],
 )
-def test_durations(seconds: float, words: str) -> None:
+def test_durations_are_put_into_words(seconds: float, words: str) -> None:
     assert duration(seconds) == words
 
 
-def test_a_diff_for_reading_leaves_new_files_out() -> None:
+def test_a_diff_for_readers_leaves_out_new_files() -> None:
     text, note = readable(PATCH)
     assert text == PATCH[PATCH.index("diff --git a/p/a.py") :]
     assert "p/_fi.py" in note

@@ -68,7 +68,7 @@ def test_a_wrong_scenario_or_value_lists_the_choices(
 
 
 def test_generate_writes_each_mutant_of_a_campaign_once(cli: Cli, root: Path) -> None:
-    """Scenarios may share a mutant."""
+    """Scenarios can share a mutant."""
     index = cli("generate", "--campaign", "toy", "--out", "m", "--json").json
     assert 0 < len(index) <= 24
     assert len({line["mutant_id"] for line in index}) == len(index)

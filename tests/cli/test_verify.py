@@ -16,7 +16,7 @@ Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, jso
 
 @pytest.fixture(scope="module")
 def driven(tmp_path_factory: pytest.TempPathFactory) -> list[Any]:
-    """The run of the first test, kept for the others, and its seal."""
+    """A list with the run folder that all tests share and, later, its seal."""
     return [tmp_path_factory.mktemp("driven") / "run"]
 
 
@@ -101,7 +101,7 @@ def chunks() -> dict[str, str]:
 def test_rerun_restores_damaged_series(
     cli: Cli, sealed: str, what: str, become: Callable[[Path], None]
 ) -> None:
-    """The golden runs' chunk is rebuilt at once."""
+    """The golden runs' chunk is rebuilt at the first rerun."""
     before = {path.name: path.read_bytes() for path in Path("run/series").iterdir()}
     name, *others = packed().entries
     became = Path("run/series") / chunks()[what]
@@ -122,7 +122,7 @@ def test_rerun_restores_damaged_series(
             SeriesFolder(Path("run")).read(others[0])
     repaired = cli("verify", "run", "--repair")
     assert repaired.code == 1 and f"repaired: series/{became.name}" in repaired.out
-    if what != "index":  # the rerun one can be read
+    if what != "index":  # the rerun experiment's series can be read
         left = f"the series of {others[0]} and {len(others) - 1} more cannot be read"
         assert left in " ".join(repaired.out.split())
     assert (Path("run/damaged/series") / became.name).exists() == (become is flip)
@@ -154,7 +154,7 @@ def test_the_audit_names_the_command_that_restores_a_series(cli: Cli, sealed: st
 
 
 def test_damaged_blocks_of_patches_are_reported(cli: Cli, sealed: str) -> None:
-    """Every patch exists, because the damaged block is the first of two equal ones."""
+    """Every patch can be read, because the damaged block is the first of two equal ones."""
     [patches] = Path("run/patches").iterdir()
     data = patches.read_bytes()
     patches.write_bytes(data[:40] + b"?" + data[41:] + data)

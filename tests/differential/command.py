@@ -58,7 +58,8 @@ class Command:
             time.sleep(0.01)
 
     def others(self) -> Iterator[tuple[int, str]]:
-        """Living processes, with their command lines, that carry the mark or work in the run folder."""
+        """Yield the other living processes of the command, found by its mark or its run folder, with their
+        command lines."""
         out = str(self.out).encode()
         for folder in Path("/proc").glob("[0-9]*"):
             try:

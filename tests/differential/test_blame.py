@@ -371,7 +371,9 @@ def test_an_exception_in_a_repeated_statement_is_a_crash(
         pytest.param(3, "CPU time limit of 1 s", marks=pytest.mark.slow),
     ],
 )
-def test_before_the_first_activation(blamed: Blamed, number: int, detail: str) -> None:
+def test_a_bad_end_before_the_first_activation_is_a_harness_error(
+    blamed: Blamed, number: int, detail: str
+) -> None:
     record = blamed.record(sensed("fail"), scenario=f"early{number}")
     place = f" ({record.error.place})" if record.error else ""
     assert (record.error is not None) is (number < 2)

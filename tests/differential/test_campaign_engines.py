@@ -54,7 +54,7 @@ def test_killing_servers_or_workers_changes_no_table(
             if out.exists() and len(read_records(out)) > done + 2:
                 done = len(read_records(out))
                 for pid in _victims(out, victim):
-                    with suppress(ProcessLookupError):  # the death of another worker may have ended it
+                    with suppress(ProcessLookupError):  # it might have ended with another worker
                         os.kill(pid, signal.SIGKILL)
         process.wait()
     summary = run_campaign(toy, "toy", out, engine="fork")

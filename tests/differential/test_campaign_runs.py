@@ -32,7 +32,7 @@ def toy(toy: Workspace, kept_checks: None) -> Workspace:
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar) -> Path:
-    """The small campaign, run in one process without interruption. No test may write to its folder."""
+    """The small campaign, run in one process without interruption. Tests must not write to its folder."""
     folder = tmp_path_factory.mktemp("undisturbed")
     summary = run_campaign(copy_toycar(folder), "small", folder / "run")
     assert (summary.exit_code, summary.done, summary.ran) == (0, 12, 12)
@@ -133,8 +133,7 @@ def test_a_killed_campaign_resumes_to_the_same_bytes(
 
 @pytest.mark.slow
 def test_pytest_resumes_a_killed_run(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
-    """No process or registration of a killed worker is left. `test_a_killed_worker` shows that `mutator run`
-    resumes what pytest left."""
+    """No process or registration of a killed worker is left."""
     out = tmp_path / "run"
     command = Command(toy, out, "-m", "mutator", "run", "small", "--out", str(out), "-n", "2")
     command.wait_for_records(4)
@@ -165,8 +164,9 @@ def test_a_command_killed_during_its_checks_starts_again(
 
 
 @pytest.mark.slow
-def test_a_killed_worker(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
-    """A killed worker loses its chunk, the rest is run and the exit code is 3."""
+def test_a_run_with_a_killed_worker_exits_with_3_and_can_be_resumed(
+    toy: Workspace, tmp_path: Path, undisturbed: Bytes
+) -> None:
     out = tmp_path / "run"
     command = Command(toy, out, *pytest_words(out))
     command.wait_for_records(2)

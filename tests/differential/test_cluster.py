@@ -43,7 +43,7 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToyca
 
 @pytest.fixture(scope="module")
 def two(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machines]:
-    """A scheduler with two workers. No test may stop them."""
+    """A scheduler with two workers. Tests must not stop them."""
     machines = Machines(tmp_path_factory.mktemp("two") / "machines", nanny=False)
     machines.add("alpha")
     machines.add("beta")
@@ -79,7 +79,7 @@ def test_two_workers_give_the_same_bytes(
 
 
 @pytest.mark.slow
-def test_pytest_deals_out_to_a_cluster(
+def test_pytest_distributes_experiments_to_a_cluster(
     toy: Workspace, tmp_path: Path, undisturbed: tuple[Bytes, str], two: Machines
 ) -> None:
     words = [*pytest_words(tmp_path / "run", workers=0), "--campaign-cluster", str(two.file)]

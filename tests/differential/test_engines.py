@@ -214,7 +214,7 @@ def test_a_fault_in_a_context_is_forked(three: Engines, model: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("trigger", TRIGGERS)
 @pytest.mark.parametrize("model", MODELS)
-def test_every_model_under_every_trigger(three: Engines, model: str, trigger: str) -> None:
+def test_engines_agree_on_every_model_under_every_trigger(three: Engines, model: str, trigger: str) -> None:
     """A trigger that never holds gives the reference engine's bytes without a run."""
     how = RunMode.GOLDEN if trigger == "never" else RunMode.FORK
     for scenario in ("A", "B"):
@@ -236,8 +236,8 @@ def test_a_changed_value_is_forked(three: Engines) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("trigger", ["always", "for 1 s", "off and on"])
 @pytest.mark.parametrize("path", ["toycar/sensing.py", "toycar/driver.py"])
-def test_every_value_under_some_triggers(three: Engines, path: str, trigger: str) -> None:
-    """Every value, at each of its anchors, is changed by a model that fits or fails."""
+def test_engines_agree_on_every_value_under_some_triggers(three: Engines, path: str, trigger: str) -> None:
+    """Every value is changed at each of its anchors."""
     places = values(three, path)
     assert len(places) > 10
     changes: tuple[tuple[str, dict[str, Value]], ...] = (
@@ -267,10 +267,9 @@ def test_the_reference_engine_reruns_a_crash(three: Engines) -> None:
     assert (execution.mode, execution.status) == (RunMode.FORK, Status.OK)
 
 
-def test_the_step_limit_includes_golden_steps(
+def test_a_run_beyond_the_step_limit_times_out(
     tmp_path: Path, copy_toycar: Callable[[Path], Workspace]
 ) -> None:
-    """A fork times out after as many steps as in any other engine."""
     few = Engines(copy_toycar(tmp_path), tmp_path, replace(LIMITS, steps=100))
     try:
         job = few.job(fault(*MODELS["offset"]), TRIGGERS["from 2.01 s"])

@@ -21,7 +21,7 @@ CLONE = Path(__file__).parents[2]
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("campaign", "limit"), [("quickstart", 26), ("paper", 8)])
-def test_same_records(tmp_path: Path, campaign: str, limit: int) -> None:
+def test_the_engines_give_the_same_records(tmp_path: Path, campaign: str, limit: int) -> None:
     clone = Workspace.find(root=CLONE)
     plan = make_plan(clone, campaign, Choices(limit=limit))
     manifest, models = clone.manifest("openpilot"), clone.fault_models()

@@ -96,8 +96,8 @@ def fault(*locations: FaultLocation) -> Fault:
     return Fault("s", "m", "f", "as_described", None, "", "H1", injections)
 
 
-def test_all_values_in_one_mutant(three: Engines) -> None:
-    """Each active step counts once for each value."""
+def test_engines_agree_on_a_mutant_that_sets_all_values(three: Engines) -> None:
+    """Each value is counted once in each active step."""
     job = three.job(fault(*PLACES.values()), TRIGGERS["off and on"])
     execution = check_same(three, job, RunMode.FORK)
     assert execution.probe is not None
@@ -109,7 +109,7 @@ def test_all_values_in_one_mutant(three: Engines) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("trigger", TRIGGERS)
 @pytest.mark.parametrize("place", PLACES)
-def test_each_value_under_every_trigger(three: Engines, place: str, trigger: str) -> None:
+def test_engines_agree_on_each_value_under_every_trigger(three: Engines, place: str, trigger: str) -> None:
     how = RunMode.GOLDEN if trigger == "never" else RunMode.FORK
     execution = check_same(three, three.job(fault(PLACES[place]), TRIGGERS[trigger]), how)
     assert execution.status is Status.OK

@@ -48,7 +48,7 @@ def fault(*injections: Injection) -> Fault:
     return Fault("s", "m", "f", "as_described", None, "", "H1", injections)
 
 
-def test_all_limits_in_one_mutant(three: Engines) -> None:
+def test_engines_agree_on_a_mutant_with_all_limits(three: Engines) -> None:
     """The injections are limited to one instance, to some executions, and to both."""
     execution = check_same(three, three.job(fault(*INJECTIONS), TRIGGERS["for 1 s"]), RunMode.FORK)
     assert execution.probe is not None
@@ -61,6 +61,8 @@ def test_all_limits_in_one_mutant(three: Engines) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("trigger", TRIGGERS)
 @pytest.mark.parametrize("injection", INJECTIONS, ids=["instance", "value", "guard"])
-def test_each_limit_under_every_trigger(three: Engines, injection: Injection, trigger: str) -> None:
+def test_engines_agree_on_each_limit_under_every_trigger(
+    three: Engines, injection: Injection, trigger: str
+) -> None:
     how = RunMode.GOLDEN if trigger == "never" else RunMode.FORK
     check_same(three, three.job(fault(injection), TRIGGERS[trigger]), how)

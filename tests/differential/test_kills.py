@@ -22,7 +22,7 @@ pytestmark = pytest.mark.slow
 
 CLONE = Path(__file__).parents[2]
 INT, TERM, KILL = signal.SIGINT, signal.SIGTERM, signal.SIGKILL
-Kill = tuple[signal.Signals, bool]  # the second: a single worker instead of the command
+Kill = tuple[signal.Signals, bool]  # the flag: kill a single worker instead of the command
 EVERY: tuple[Kill, ...] = ((INT, False), (TERM, False), (KILL, False), (KILL, True), (TERM, True))
 
 
@@ -73,7 +73,7 @@ class Campaign:
         self.tree = workspace.manifest(workspace.target_name()).root
         self.before = contents(self.tree)
         self.random = random.Random(seed)
-        self.stages: list[str] = []  # the stages in which the kills came
+        self.stages: list[str] = []  # the stage of each kill
         began = time.monotonic()
         self.longest_s = 0.0
         self.results = self.finish(folder / "undisturbed", [])
@@ -106,7 +106,7 @@ class Campaign:
         return results_digest(out)
 
 
-def test_twenty_kills(tmp_path: Path, copy_toycar: Callable[[Path], Workspace]) -> None:
+def test_a_campaign_survives_twenty_kills(tmp_path: Path, copy_toycar: Callable[[Path], Workspace]) -> None:
     """INT, TERM and KILL are sent to the command or to one worker."""
     words = ["-m", "mutator", "run", "small", "-n", "2"]
     campaign = Campaign(copy_toycar(tmp_path), tmp_path, words, seed=5)
@@ -115,7 +115,7 @@ def test_twenty_kills(tmp_path: Path, copy_toycar: Callable[[Path], Workspace]) 
     assert len(set(campaign.stages)) > 1  # not all before the first experiment
 
 
-def test_kills_on_the_shipped_controller(tmp_path: Path) -> None:
+def test_a_campaign_on_the_shipped_controller_survives_kills(tmp_path: Path) -> None:
     """A run of 30 experiments without frames is killed six times."""
     for name in ("fault_library", "templates", "target"):
         shutil.copytree(CLONE / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))

@@ -201,19 +201,19 @@ def test_an_exit_handler_that_never_returns_is_a_timeout(misbehave: Misbehave) -
     assert [e.mode for e, _ in told.values()] == list(ENGINES)
 
 
-def test_a_failure_after_the_report_is_no_crash(misbehave: Misbehave) -> None:
+def test_a_failure_after_the_report_is_not_a_crash(misbehave: Misbehave) -> None:
     told = misbehave("import atexit, os\natexit.register(os._exit, 3)")
     assert [(e.status, e.mode) for e, _ in told.values()] == [(Status.OK, RunMode(name)) for name in ENGINES]
 
 
 def test_a_run_killed_after_its_report_has_failed(misbehave: Misbehave) -> None:
-    """A run that is killed so late may have incomplete files."""
+    """A run that is killed so late can have incomplete files."""
     told = misbehave("import atexit, os\natexit.register(os.kill, os.getpid(), 9)")
     ends = {(e.status, e.detail) for e, _ in told.values()}
     assert ends == {(Status.HARNESS_ERROR, "killed from outside by SIGKILL")}
 
 
-def test_a_thread_may_finish_after_the_run(misbehave: Misbehave) -> None:
+def test_a_thread_can_finish_after_the_run(misbehave: Misbehave) -> None:
     thread = (
         "import threading, time\nfrom pathlib import Path\nhere = Path.cwd()\n"
         "def work():\n    time.sleep(0.5)\n    (here / 'thread.txt').write_text('done')\n"
@@ -260,7 +260,7 @@ def test_exceeding_the_space_limit_is_a_timeout(misbehave: Misbehave, how: str) 
     assert {(e.status, e.detail) for e, _ in told.values()} == {(Status.TIMEOUT, "disk limit of 3 MiB")}
 
 
-def test_a_run_may_use_almost_all_its_space(misbehave: Misbehave) -> None:
+def test_a_run_can_use_almost_all_its_space(misbehave: Misbehave) -> None:
     """Existing files and holes do not count."""
     body = (
         "f = open('x', 'wb')\nf.write(bytes(2 << 20))\nf.close()\nimport os\nos.truncate('x', (3 << 20) - 1)"

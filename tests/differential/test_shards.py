@@ -214,7 +214,7 @@ def test_a_shard_with_a_failed_equivalence_check_is_refused(
     assert merge([copies["1/2"], copies["2/2"]], tmp_path / "out").is_file()
 
 
-def test_a_folder_with_a_run_is_not_merged_into(runs: Runs, tmp_path: Path) -> None:
+def test_shards_are_not_merged_into_a_folder_with_a_run(runs: Runs, tmp_path: Path) -> None:
     before = (runs["whole"] / "results.csv").read_bytes()
     with pytest.raises(MutatorError, match="holds a run"):
         merge([runs["1/2"], runs["2/2"]], runs["whole"])
@@ -259,7 +259,7 @@ def test_impossible_shards_are_refused(toy: Workspace, shard: str) -> None:
 
 
 @pytest.mark.slow
-def test_shards_of_the_shipped_controller(tmp_path: Path) -> None:
+def test_merged_shards_of_the_shipped_controller_equal_its_single_run(tmp_path: Path) -> None:
     clone = Workspace.find(root=Path(__file__).parents[2])
 
     def ran(name: str, workers: int, shard: str | None = None) -> Path:

@@ -1,4 +1,4 @@
-"""Runs shared by several scenarios run once, count in each, and are first proved to be equal."""
+"""A run that several scenarios share runs once and counts in each. A check first compares the scenarios."""
 
 import csv
 import json
@@ -38,8 +38,8 @@ def edit(path: Path, old: str, new: str) -> None:
 
 
 def two_scenarios(toy: Workspace, changes: str) -> Workspace:
-    """The faults of the small campaign that need the other car gone, on A and C, which differ only in that
-    car."""
+    """Return the toy with scenarios A and C, which differ only in the other car, and a campaign of the faults
+    that remove this car."""
     scenarios = toy.library / "scenarios"
     (scenarios / "C.yaml").write_text((scenarios / "A.yaml").read_text().replace("0.8", "0.1"))
     edit(toy.library / "targets" / "toycar.yaml", ALONE, changes)
@@ -106,7 +106,7 @@ def test_checks_compare_scenarios_declared_equal(runs: tuple[Path, Path]) -> Non
     assert [c["passed"] for c in checks if c["name"] == "same A+C+alone"] == [True]
 
 
-def test_part_of_a_shared_run_is_run_on_a_cluster(runs: tuple[Path, Path], tmp_path: Path) -> None:
+def test_one_experiment_of_a_shared_run_can_run_on_a_cluster(runs: tuple[Path, Path], tmp_path: Path) -> None:
     """A kill or a split of the work can leave one experiment of a shared run. Then a worker runs its own
     golden run."""
     folder = RunFolder.open(runs[0])

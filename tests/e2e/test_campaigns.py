@@ -71,9 +71,8 @@ def finished(finished_once: Finished, tmp_path: Path) -> Path:
     return Path(shutil.copytree(finished_once.run, tmp_path / "finished"))
 
 
-def test_bad_ends_are_results(toy: Workspace, tmp_path: Path) -> None:
-    """Loops, crashes, exits, exhausted memory and mutants that do not compile are statuses, not harness
-    errors."""
+def test_bad_endings_have_their_own_statuses(toy: Workspace, tmp_path: Path) -> None:
+    """Loops, crashes, exits, exhausted memory and mutants that do not compile are not harness errors."""
     summary = run_campaign(toy, "hostile", tmp_path / "run")
     assert (summary.exit_code, summary.harness_errors, summary.problem) == (0, (), "")
     found = {row["fault_type"]: (row["status"], row["outcome"]) for row in rows_of(tmp_path / "run")}

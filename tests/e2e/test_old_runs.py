@@ -72,7 +72,7 @@ def assert_same_cells(new: Path, old: Path) -> None:
     assert {*gone.columns} <= {"h2", "t_h2", "max_dev_steer"} and (gone == "").all(axis=None)
 
 
-def test_there_is_one_for_each_schema() -> None:
+def test_there_is_a_fixture_for_each_schema() -> None:
     schemas = [RunFolder.open(path / "small").head["schema"] for path in FIXTURES]
     assert [path.name.replace("-", "/") for path in FIXTURES] == schemas
     assert schemas == [f"run/{number}" for number in range(1, len(schemas) + 1)] and schemas[-1] == SCHEMA
@@ -137,7 +137,7 @@ def test_an_old_run_exports_in_every_format(cli: Cli, place: Path, fixture: Path
         assert file.read_text().count("<testcase ") == EXPERIMENTS
     elif format is Format.MCAP:
         written = {path.stem for path in file.iterdir()}
-        has_series = (fixture / "small" / "series").is_dir()  # other tests may have made some in `place`
+        has_series = (fixture / "small" / "series").is_dir()  # other tests might have made some in `place`
         assert KEPT in written and len(written) == (EXPERIMENTS if has_series else 1)
     else:
         mutants = json.loads(file.read_text())["files"]["toycar/sensing.py"]["mutants"]

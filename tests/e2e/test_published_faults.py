@@ -48,7 +48,7 @@ def rows(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[dict[str, s
 def test_hazards_and_alerts_are_those_of_the_original(
     rows: dict[str, list[dict[str, str]]], variant: str
 ) -> None:
-    """Hazard counts may differ by two, because the values are drawn again."""
+    """Hazard counts can differ by up to two, because the values are drawn again."""
     runs, hazards, kind, alerts, t_alert = ORIGINAL[variant]
     found = rows[variant]
     assert len(found) == runs

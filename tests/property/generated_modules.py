@@ -170,7 +170,7 @@ class ModuleWriter(StatementWriter):
         kinds = self.rng.choice(["ValueError", "(ValueError,\n TypeError)", "Exception"])
         name = self.rng.choice(scope.pool)
         lines += [*self.gap(indent), f"{indent}except{star} {kinds} as {name}:"]
-        if star:  # nothing may leave such a block
+        if star:  # no statement can leave such a block
             inner = indent + self.rng.choice(_UNITS)
             lines += [*self.assignment(scope.inside(), inner), *self.call(scope, inner)]
         else:

@@ -41,7 +41,7 @@ class Scope:
     made: list[int] = field(default_factory=lambda: [0])  # statements so far
 
     def inside(self, **changes: Any) -> "Scope":
-        """Return the scope of a block that may be skipped: variables set there are not known afterwards."""
+        """Return the scope of a block that might be skipped: variables set there are not known afterwards."""
         return replace(self, known=[*self.known], **changes)
 
 
@@ -80,7 +80,7 @@ class StatementWriter:
     # Expressions; the value is a number
 
     def expression(self, scope: Scope, depth: int = 2) -> str:
-        """Return an expression, which may span several lines."""
+        """Return an expression, which can span several lines."""
         if depth <= 0 or self.chance(0.3):
             return self.rng.choice([self.number(), self.number(), *self.rng.choices(scope.known, k=3)])
         e, f = (self.expression(scope, depth - 1) for _ in "ef")

@@ -31,7 +31,7 @@ def _homes(code: types.CodeType, lines: Lines) -> Iterator[tuple[tuple[str, int,
     stack, counts = [code], Counter[tuple[str, int]]()
     while stack:
         one = stack.pop()
-        # not from `co_consts`, which may contain unreachable functions
+        # not from `co_consts`, which can contain unreachable functions
         steps = dis.get_instructions(one)
         stack += [step.argval for step in steps if isinstance(step.argval, types.CodeType)]
         if one is not code and one.co_firstlineno in lines.injected:

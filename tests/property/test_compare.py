@@ -49,7 +49,7 @@ def test_a_run_does_not_differ_from_itself(row: Row) -> None:
 
 
 @given(rows(), rows())
-def test_what_is_worse_one_way_is_better_the_other(a: Row, b: Row) -> None:
+def test_swapping_two_runs_swaps_better_and_worse(a: Row, b: Row) -> None:
     """A different hazard can be a change either way."""
     there = Pair(None, None, a, b).changes - {Change.OTHER_HAZARD}  # type: ignore[arg-type]
     back = Pair(None, None, b, a).changes - {Change.OTHER_HAZARD}  # type: ignore[arg-type]

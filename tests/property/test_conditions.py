@@ -61,7 +61,7 @@ def test_no_observation_raises(text: str, a: str, b: str, values: dict[str, floa
 
 @settings(max_examples=300, deadline=None)
 @given(st.text(max_size=40) | st.text(alphabet="gap speed<=>()[].'_+-*/0123456789,:andort", max_size=40))
-def test_any_text_is_answered(text: str) -> None:
+def test_any_text_is_accepted_or_refused(text: str) -> None:
     try:
         code = to_code(check_condition(text, variables=VARIABLES))
     except MutatorError:
@@ -73,14 +73,14 @@ def test_any_text_is_answered(text: str) -> None:
 
 @settings(max_examples=200, deadline=None)
 @given(CONDITIONS, st.lists(OBSERVED, min_size=1, max_size=6))
-def test_a_trace_is_decided_as_its_steps_are(text: str, steps: list[dict[str, float]]) -> None:
+def test_a_trace_gives_the_same_results_as_its_single_steps(text: str, steps: list[dict[str, float]]) -> None:
     try:
         canonical = check_condition(text, variables=VARIABLES)
     except MutatorError as error:
         assert "characters" in str(error)
         return
     columns = {name: np.array([step[name] for step in steps]) for name in VARIABLES}
-    if not {"min", "max"} & set(re.findall(r"\w+", text)):  # these two return NaN depending on order
+    if not {"min", "max"} & set(re.findall(r"\w+", text)):  # their result depends on the place of a NaN
         assert holds(canonical, columns).tolist() == [evaluate(canonical, step) for step in steps]
 
 

@@ -31,10 +31,10 @@ def contexts_at(conditions: dict[str, str], hwt: float, rs: float, v_ego: float)
 
 
 @given(CONDITION, CONDITION, ANYWHERE, ANYWHERE, ANYWHERE)
-def test_what_is_proved_holds_everywhere(
+def test_a_proved_table_has_one_context_for_every_observation(
     first: str, second: str, hwt: float, rs: float, v_ego: float
 ) -> None:
-    """In a proved table every observation, including infinite ones, is in exactly one context."""
+    """Observations can be infinite."""
     texts = {"A": first, "B": f"not ({first}) and ({second})", "C": f"not ({first}) and not ({second})"}
     right = {row: check_condition(text) for row, text in texts.items()}
     assert measure_coverage(right).place is None

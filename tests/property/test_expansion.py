@@ -48,7 +48,7 @@ def test_draws_lie_in_their_ranges(
 
 @settings(max_examples=100, deadline=None)
 @given(SEEDS, st.integers(1, 4))
-def test_no_value_twice_and_no_zero(seed: int, decimals: int) -> None:
+def test_values_are_unique_and_not_zero(seed: int, decimals: int) -> None:
     ranges = tuple((-2.5 + 0.5 * i, -1.5 + 0.5 * i) for i in range(10))
     draw = Draw(key="k", name="x", unit="m", kind="reals", ranges=ranges, decimals=decimals)
     values = draw_values(draw, seed)
@@ -57,7 +57,7 @@ def test_no_value_twice_and_no_zero(seed: int, decimals: int) -> None:
 
 @settings(max_examples=50, deadline=None)
 @given(SEEDS, RANGES, st.integers(1, 29))
-def test_more_ranges_leave_earlier_values_alone(
+def test_more_ranges_do_not_change_earlier_values(
     seed: int, ranges: tuple[tuple[float, float], ...], count: int
 ) -> None:
     whole = Draw(key="k", name="x", unit="m", kind="reals", ranges=ranges)
@@ -67,7 +67,7 @@ def test_more_ranges_leave_earlier_values_alone(
 
 @settings(max_examples=20, deadline=None)
 @given(SEEDS)
-def test_readings_are_matched(seed: int) -> None:
+def test_both_readings_have_the_same_values(seed: int) -> None:
     """Both readings have the same specs and values in the same order, and unique ids."""
     described, coded = library(seed, "as_described"), library(seed, "as_coded")
     assert [(f.spec, f.value, f.unit) for f in described] == [(f.spec, f.value, f.unit) for f in coded]
@@ -76,6 +76,6 @@ def test_readings_are_matched(seed: int) -> None:
 
 @settings(max_examples=10, deadline=None)
 @given(SEEDS, st.permutations(SPECS), st.sampled_from(CLONE.readings().names))
-def test_order_does_not_matter(seed: int, specs: list, reading: str) -> None:
+def test_the_order_of_specs_does_not_matter(seed: int, specs: list, reading: str) -> None:
     found = {f.id for s in specs for f in expand(s, seed, reading, models=MODELS, manifest=MANIFEST)}
     assert found == {f.id for f in library(seed, reading)}

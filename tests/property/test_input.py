@@ -36,7 +36,7 @@ PLAIN = st.recursive(
     | st.text(max_size=200).map(str.encode)
     | st.text("a: -[]{}#&*!|>'\"\n\t%@", max_size=60).map(str.encode)
 )
-def test_any_bytes(tmp_path: Path, data: bytes) -> None:
+def test_any_bytes_are_read_or_refused(tmp_path: Path, data: bytes) -> None:
     """Arbitrary bytes are read as strict YAML or raise a MutatorError that names the file."""
     path = tmp_path / "x.yaml"
     path.write_bytes(data)
@@ -48,8 +48,7 @@ def test_any_bytes(tmp_path: Path, data: bytes) -> None:
 
 @settings(max_examples=100, deadline=None, suppress_health_check=QUIET)
 @given(PLAIN)
-def test_plain_data_survives(tmp_path: Path, value: object) -> None:
-    """Plain data keep their values, and each part has a line."""
+def test_plain_data_keep_their_values(tmp_path: Path, value: object) -> None:
     path = tmp_path / "x.yaml"
     path.write_text(yaml.safe_dump(value, allow_unicode=True, default_style='"'), encoding="utf-8")
     text = path.read_text(encoding="utf-8")
@@ -62,7 +61,7 @@ def test_plain_data_survives(tmp_path: Path, value: object) -> None:
 
 @settings(max_examples=150, deadline=None, suppress_health_check=QUIET)
 @given(st.data())
-def test_a_damaged_spec(tmp_path: Path, data: st.DataObject) -> None:
+def test_a_damaged_spec_is_read_or_refused(tmp_path: Path, data: st.DataObject) -> None:
     lines = SPEC.read_text().splitlines()
     i = data.draw(st.integers(0, len(lines) - 1))
     how = data.draw(st.sampled_from(["drop", "double", "garble", "indent"]))
@@ -88,7 +87,7 @@ def test_a_damaged_spec(tmp_path: Path, data: st.DataObject) -> None:
 @settings(max_examples=150, deadline=None)
 @given(st.binary(max_size=100) | st.text("def f(x):\n=1#\"'\\ \t;", max_size=80).map(str.encode))
 @example(b"#\x80")  # LibCST has no line for it
-def test_any_source(data: bytes) -> None:
+def test_any_source_is_read_or_refused(data: bytes) -> None:
     """Arbitrary bytes are read as Python that can be spliced, or raise a MutatorError."""
     try:
         file = parse_file("x.py", data, Path("root"))
@@ -99,16 +98,16 @@ def test_any_source(data: bytes) -> None:
 
 
 @given(st.floats() | st.integers(-(10**30), 10**30))
-def test_numbers_survive_rendering(value: float) -> None:
-    """A rendered number is exact to the last bit, also as a signed term."""
+def test_rendered_numbers_are_exact(value: float) -> None:
+    """Signed terms are exact, too."""
     assert repr(eval(literal(value))) == repr(value)
     if value == value:
         assert eval(f"0 {signed(value)}") == value
 
 
 @given(st.floats(), st.floats(allow_nan=False), st.sampled_from(["float", "np.float64", "np.float32"]))
-def test_a_term_without_a_point_adds_the_same(variable: float, value: float, kind: str) -> None:
-    """A whole number written as an integer adds to a float, of numpy or not, with the same bits."""
+def test_a_whole_number_adds_the_same_as_a_float(variable: float, value: float, kind: str) -> None:
+    """The sum has the same bits, with or without numpy."""
     sign = "-" if math.copysign(1.0, value) < 0 else "+"
     with np.errstate(all="ignore"):
         texts = (f"{kind}(x) {signed(value)}", f"{kind}(x) {sign} {literal(abs(value))}")
@@ -158,8 +157,9 @@ def test_input_that_takes_long_to_parse_is_refused_at_once(tmp_path: Path, shape
     st.lists(st.sampled_from(["[", "]", "{", "}", "- ", "? ", ": ", ",", "\n", "a", "'", " ", "%"])),
     st.data(),
 )
-def test_any_shape(tmp_path: Path, words: list[str], data: st.DataObject) -> None:
-    """Brackets, dashes and line endings in any order and number are read or refused quickly."""
+def test_any_punctuation_is_read_or_refused_quickly(
+    tmp_path: Path, words: list[str], data: st.DataObject
+) -> None:
     text = "".join(word * data.draw(st.sampled_from([1, 1, 1, 1000, 50_000])) for word in words)
     path = tmp_path / "x.yaml"
     path.write_text(text, encoding="utf-8")
@@ -183,8 +183,7 @@ NESTED = {
 
 
 @pytest.mark.parametrize("nested", NESTED)
-def test_nested_expressions(nested: str) -> None:
-    """Expressions of any depth are read or refused quickly. Those that are read can be evaluated."""
+def test_nested_expressions_are_evaluated_or_refused_quickly(nested: str) -> None:
     began = time.process_time()
     with suppress(MutatorError):
         evaluate(check_condition(NESTED[nested]), {"t": 1.0})

@@ -76,7 +76,7 @@ def varied(draw: st.DrawFn) -> Fault:
 
 @st.composite
 def others(draw: st.DrawFn) -> Fault:
-    """Return a fault of any model at a location in the library. Optional fields may be missing."""
+    """Return a fault of any model at a location in the library. Optional fields can be missing."""
     manifest, models = paper()
     model = models.get(draw(st.sampled_from(sorted(models.models))))
     fault = draw(st.sampled_from(faults()))

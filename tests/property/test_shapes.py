@@ -49,7 +49,7 @@ def alike(draw: st.DrawFn) -> list[tuple[Fault, Trigger]]:
 
 @settings(max_examples=15, deadline=None)
 @given(st.lists(alike(), min_size=1, max_size=3))
-def test_every_patch_is_given_back(families: list[list[tuple[Fault, Trigger]]]) -> None:
+def test_each_patch_can_be_restored_from_its_shape(families: list[list[tuple[Fault, Trigger]]]) -> None:
     """The diff with holes, filled with a member's values, is that member's patch."""
     manifest, models, _ = setting()
     made = {}

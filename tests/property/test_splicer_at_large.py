@@ -40,7 +40,7 @@ def proved(sources: Iterable[tuple[object, bytes]], run: Run | None, variables: 
     return figures
 
 
-PARTS = 8  # of what takes long, for as many workers
+PARTS = 8  # of a slow test, for as many workers
 
 
 @pytest.mark.parametrize(
@@ -67,7 +67,7 @@ def test_mutants_of_the_standard_library_are_correct(part: int | None) -> None:
     assert all(figures.anchors[kind] >= len(chosen) for kind in KINDS)
 
 
-def test_a_seed_makes_one_module() -> None:
+def test_a_seed_always_gives_the_same_module() -> None:
     assert ModuleWriter(7).module() == ModuleWriter(7).module() != ModuleWriter(8).module()
 
 

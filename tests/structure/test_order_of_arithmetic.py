@@ -106,12 +106,12 @@ def test_results_depend_on_no_order() -> None:
         "from numpy import dot",
     ],
 )
-def test_such_a_line_is_found(line: str) -> None:
+def test_an_order_dependent_line_is_found(line: str) -> None:
     assert len(list(found(line))) == 1
 
 
 @pytest.mark.parametrize(
     "line", ["a = total(b)", "a = b.sum()", "a = math.exp(b)", "a = b.argsort(kind='stable')"]
 )
-def test_others_are_not(line: str) -> None:
+def test_an_order_independent_line_is_not_found(line: str) -> None:
     assert not list(found(line))

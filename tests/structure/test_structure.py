@@ -123,11 +123,11 @@ def test_code_inside_a_target_imports_only_numpy_and_the_standard_library() -> N
     assert not strangers_in_target(CLONE)
 
 
-def test_no_function_bears_its_modules_name() -> None:
+def test_no_function_has_its_modules_name() -> None:
     assert not namesakes(CLONE)
 
 
-def test_every_package_says_what_it_is_for() -> None:
+def test_every_package_has_a_long_docstring() -> None:
     for path in (CLONE / "mutator").rglob("__init__.py"):
         text = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8")))
         assert text and len(text) > 60, path

@@ -9,7 +9,8 @@ from .tally import Tally
 
 @pytest.fixture
 def seeds(request: pytest.FixtureRequest) -> Callable[[int], Sequence[int]]:
-    """Return the seeds of that many cases. `--tries` overrides the number, `--seed` picks one seed."""
+    """Return a function that gives the seeds of a number of cases. `--tries` overrides the number, and
+    `--seed` picks one seed."""
     tries, seed = request.config.getoption("tries"), request.config.getoption("seed")
     return lambda usual: [seed] if seed is not None else range(tries or usual)
 

@@ -107,7 +107,7 @@ class Misdeed:
     def write(self, workspace: Workspace) -> None:
         imports = [f"import {name}" for name in MODULES]
         body = ["    " + line for line in (*imports, *self.lines)]
-        # not rendered: the lines may look like Jinja2
+        # not rendered: the lines can look like Jinja2
         code = ['if _fi.active("{{ fi }}"):{% raw %}', "    if _fi.steps() == 1:"]
         text = "\n".join([*code, *("    " + line for line in body), "{% endraw %}"])
         names = {"name": self.name, "model": self.model, "more": "raises: true\n" * self.raises}

@@ -145,7 +145,7 @@ def verify(place: Place) -> Told:
     found, genuine = contents(place.run) if code == 0 else {}, contents(place.genuine)
     ledger = json.loads(genuine["digests.json"])
     known = [*ledger["files"], "digests.json"]
-    # Nothing may be added to a finished run. The final files of an unfinished run are unknown.
+    # Nothing must be added to a finished run. The final files of an unfinished run are unknown.
     audited = {
         name: found[name] for name in found if name in known or (ledger["finished"] and AUDITED.match(name))
     }
@@ -174,7 +174,7 @@ def api(place: Place) -> Told:
 
 
 def rows(place: Place) -> Told:
-    """Return rows of the results that the undamaged folder lacks. There must be none. A killed run may lack
+    """Return rows of the results that the undamaged folder lacks. There must be none. A killed run can lack
     some, because the same command runs them again."""
     told = api(place)
     if told.code != 0:

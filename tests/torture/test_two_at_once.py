@@ -72,7 +72,7 @@ class Pair:
             if struck.poll() is None:
                 struck.send_signal(chance.choice((*SIGNALS, signal.SIGSTOP)))
                 struck.send_signal(signal.SIGCONT)
-        for one in (other, running):  # the folder may hold files of both
+        for one in (other, running):  # the folder can hold files of both
             one.process.wait()
         said = {one: one.end() for one in (other, running)}
         ends = [self._judge(one, said[one], name if one is other else "run") for one in both]

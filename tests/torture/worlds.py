@@ -43,7 +43,7 @@ class World:
             kind = chance.choice(sorted(kinds))
             how, touched = damage(self.place.folder, kinds[kind], chance, self.damages)
             told = self._tell(reader) if self.reseal is None else self._resealed(reader)
-        # if digests.json is damaged, or all digests match, the error may name any file
+        # if digests.json is damaged, or all digests match, the error can name any file
         at_large = kind == "digests.json" or self.reseal is not None
         touched += TABLES if kind in ("records", "timings") else ()  # derived from both
         named = ["seal", *kinds, *chain(*kinds.values())] if at_large else touched
@@ -125,7 +125,8 @@ def _first(told: object, right: object) -> str:
 
 
 class TooLong(Exception):
-    """A time limit is exceeded. This is not a TimeoutError, which is an OSError: readers expect OSErrors."""
+    """A time limit is exceeded. Unlike a TimeoutError, this is not an OSError, because readers expect
+    those."""
 
 
 @contextmanager
