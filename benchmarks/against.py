@@ -3,8 +3,8 @@
 `python benchmarks/against.py CLONE [--campaign NAME]`. CLONE is a checkout of the older commit, installed
 into its .venv as its README says. Both versions run alternately, each time with an empty cache. Code that an
 old version compiles with a separate command is compiled before its clock starts. CPU time covers all
-processes. Wall time needs otherwise idle cores. Idle is the time of cores without work. The exit code is 1 if
-a run fails.
+processes. Wall time needs otherwise idle cores. Idle time is the time in which a core has no work. The exit
+code is 1 if a run fails.
 """
 
 import argparse
@@ -113,7 +113,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("clone", type=Path, help="checkout of the older commit")
     parser.add_argument("--campaign", default="paper_sample")
-    parser.add_argument("--limit", metavar="N", help="so many of its experiments")
+    parser.add_argument("--limit", metavar="N", help="number of its experiments")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--json", type=Path, metavar="FILE")

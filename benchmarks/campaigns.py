@@ -44,7 +44,7 @@ def summary_of(name: str, took: dict[str, float], count: int) -> None:
 def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--campaign", default="paper_smoke")
-    parser.add_argument("--limit", metavar="N", help="so many of its experiments")
+    parser.add_argument("--limit", metavar="N", help="number of its experiments")
     parser.add_argument("--engine", help="reference, warm or fork, if not the one that mutator chooses")
     parser.add_argument("--rounds", type=int, default=1)
     parser.add_argument("--json", type=Path, metavar="FILE")

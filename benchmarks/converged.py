@@ -92,7 +92,9 @@ def _saved(record: Record, golden: str, series: SeriesFolder) -> tuple[str, floa
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("run", type=Path, help="folder of a finished campaign")
-    parser.add_argument("--library", type=Path, metavar="DIR", help="its fault library, if it is another one")
+    parser.add_argument(
+        "--library", type=Path, metavar="DIR", help="the campaign's fault library, if not the default one"
+    )
     parser.add_argument("--json", type=Path, metavar="FILE")
     options = parser.parse_args(arguments)
     saved, total = bound(RunFolder.open(options.run), Workspace.find(root=ROOT, library=options.library))

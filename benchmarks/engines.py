@@ -120,7 +120,9 @@ def _cpu() -> float:
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--campaign", default="paper")
-    parser.add_argument("--library", type=Path, metavar="DIR", help="another fault library, of an example")
+    parser.add_argument(
+        "--library", type=Path, metavar="DIR", help="another fault library, such as that of an example"
+    )
     parser.add_argument("--experiments", type=int, default=200, metavar="N")
     parser.add_argument("--skip", action="append", default=[], choices=("reference", "warm", "fork"))
     parser.add_argument("--json", type=Path, metavar="FILE")

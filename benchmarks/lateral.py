@@ -1,7 +1,8 @@
 """Measure the lateral behaviour at 60 mph: overshoot, settling time and steady error.
 
-`python benchmarks/lateral.py [--figure FILE.svg]` simulates L01 to L03 and a step of the lane and prints a
-table. With `--figure` it plots offset, steering angle and torque over time. Equal sources give equal bytes.
+`python benchmarks/lateral.py [--figure FILE.svg]` simulates scenarios L01 to L03 and a step of the lane and
+prints a table. With `--figure` it plots offset, steering angle and torque over time. Equal sources give equal
+bytes.
 """
 
 import argparse

@@ -1,7 +1,7 @@
 """Measure the cost of a million experiments without their runs.
 
 `python benchmarks/million.py [--sizes N ...] [--keep DIR]`. It measures plan, tables, resume, report and page
-at three sizes. The runs are synthetic (`made_up_run.py`) and kept in DIR for the next time. Each row is a
+at three sizes. The runs are synthetic (`made_up_run.py`) and kept in DIR for later calls. Each row is a
 separate process, with CPU and wall seconds and the peak memory of the process and its children together.
 Shared pages count once, and memory is sampled twice a second. The page opens in the system's Chromium,
 headless. Its wall time is from the navigation until its list is usable. Growth is the CPU time per experiment
@@ -134,8 +134,8 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--sizes", type=int, nargs="+", default=SIZES)
     parser.add_argument("--rows", nargs="+", choices=ROWS, default=list(ROWS))
-    parser.add_argument("--keep", type=Path, help="keep the runs here, and use those that are here")
-    parser.add_argument("--json", type=Path, help="write the figures here")
+    parser.add_argument("--keep", type=Path, help="keep the runs in this folder, and reuse its runs")
+    parser.add_argument("--json", type=Path, help="write the figures to this file")
     parser.add_argument("--row", nargs=3, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.row:

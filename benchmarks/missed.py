@@ -1,8 +1,8 @@
-"""How often the geometric detector misses a line in bad weather: `python benchmarks/missed.py`.
+"""Measure how often the geometric detector misses a line in bad weather: `python benchmarks/missed.py`.
 
 Three cameras see rendered roads of all kinds through the strongest rain, snow and occlusion of the paper. A
-frame counts as missed if a line is not found, or is more than 0.3 m off 10 m ahead. Only roads with both
-lines found in fair weather count.
+frame counts as missed if a line is not found, or is off by more than 0.3 m at 10 m ahead. Only roads of which
+both lines are found in fair weather are used.
 """
 
 import argparse
@@ -43,7 +43,7 @@ def is_found(
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.partition(":")[0] + ".")
-    parser.add_argument("--roads", type=int, default=60, help="for each camera (60)")
+    parser.add_argument("--roads", type=int, default=60, help="roads for each camera (60)")
     parser.add_argument("--seeds", type=int, default=5, help="pictures of each road and effect (5)")
     options = parser.parse_args()
     cv2.setNumThreads(1)
@@ -62,7 +62,7 @@ def main() -> int:
                 for seed in range(1, options.seeds + 1):
                     missed[kind] += not is_found(model, kind(10, seed, model).apply(clean, moment), truth)
     pictures = options.seeds * roads
-    print(f"{roads} roads; {unfit} more are missed in fair weather")
+    print(f"{roads} roads; {unfit} more are left out, because a line is missed in fair weather")
     for kind, count in missed.items():
         print(f"{kind.__name__:<16} missed {count:>5} of {pictures}  {count / pictures:6.1%}")
     return 0

@@ -1,11 +1,11 @@
 """Measure how many mutants a second are built.
 
-`python benchmarks/mutants.py [--sample N] [--rounds N] [--json FILE]`. Mutants are built from reused changes,
-spliced, or spliced with each file parsed again by LibCST. First it builds the mutant of every experiment of
-the paper's campaign, including diff, compile check and digests. Then the three ways build the same sample
-alternately, in rounds. The mutants of operators, each at a different place, are found in the shipped
-controller, whose files are parsed before. Times are CPU times of this process. The exit code is 1 if either
-kind misses the goal.
+`python benchmarks/mutants.py [--sample N] [--rounds N] [--json FILE]`. There are three ways to build a
+mutant: from reused changes, by splicing, and by splicing after LibCST has parsed each file again. First, the
+benchmark builds the mutant of every experiment of the paper's campaign, including diff, compile check and
+digests. Then the three ways build the same sample alternately, in rounds. The mutants of operators, each at a
+different place, are found in the shipped controller, whose files are parsed beforehand. Times are CPU times
+of this process. The exit code is 1 if either kind misses the goal.
 """
 
 import argparse

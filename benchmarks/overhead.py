@@ -4,8 +4,8 @@
 faults of the paper's campaign with ideal vision, each of which first acts at its own time in the last steps
 of a 30 s run. All of a worker's steps are included: mutant, run, comparison with golden, patch, record. It
 prints the CPU of the worker, of its children and of the processes from which they fork, and the CPU of 30 s
-of the same simulation. With `--against`, a checkout of an older commit runs alternately. Compare the ratio.
-The exit code is 1 if the overhead exceeds its goal.
+of the same simulation. With `--against`, a checkout of an older commit runs alternately. Compare the ratios,
+not the times. The exit code is 1 if the overhead exceeds its goal.
 """
 
 import argparse
@@ -162,7 +162,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--experiments", type=int, default=200, metavar="N")
     parser.add_argument("--against", type=Path, metavar="CLONE", help="checkout of an older commit")
-    parser.add_argument("--rounds", type=int, default=3, help="of both versions, with --against")
+    parser.add_argument("--rounds", type=int, default=3, help="rounds of both versions, with --against")
     parser.add_argument("--json", type=Path, metavar="FILE")
     options = parser.parse_args(arguments)
     if options.against:

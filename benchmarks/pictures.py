@@ -1,9 +1,10 @@
 """Compare the time of a frame in a run between this version and an older one.
 
 `python benchmarks/pictures.py CLONE`. CLONE is a checkout of the older commit. Each version has its own
-interpreter, compiled helpers and empty cache. They process new frames alternately. It prints the CPU time of
-moving a frame to the car's pose, image effect and detection together, and the ratio. A detector or effect
-that the older version lacks is left out. Different lines are reported.
+interpreter, compiled helpers and empty cache. The versions process new frames alternately. It prints the CPU
+time of moving a frame to the car's pose, image effect and detection together, and the ratio. A detector or
+effect that the older version lacks is left out. A case in which the versions find different lines is
+reported.
 """
 
 import argparse
@@ -131,7 +132,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("clone", type=Path, nargs="?", help="checkout of the older commit")
     parser.add_argument("--take", type=Path, help=argparse.SUPPRESS)
-    parser.add_argument("--detectors", nargs="+", metavar="NAME", help="only these")
+    parser.add_argument("--detectors", nargs="+", metavar="NAME", help="measure only these detectors")
     parser.add_argument("--effects", nargs="+", choices=EFFECTS, default=list(EFFECTS), metavar="NAME")
     parser.add_argument("--rounds", type=int, default=10)
     parser.add_argument("--count", type=int, default=20, help="pictures of a round")

@@ -1,8 +1,8 @@
-"""How many of the places that make a value are reached by anchors: `python benchmarks/places.py`.
+"""Count the places that make a value, and those that anchors reach: `python benchmarks/places.py`.
 
 The places are in eight modules of third-party packages, chosen before any count (`MODULES` says why), each in
 the version of constraints.txt. They are counted with `ast` alone, not with the harness's own search. A place
-may count in several kinds: an argument that is a sum is an argument and arithmetic. Goal: 90 % of all.
+can belong to several kinds: an argument that is a sum is an argument and arithmetic. Goal: 90 % of all.
 """
 
 import argparse

@@ -2,8 +2,8 @@
 
 `python benchmarks/planning.py`. It measures planning, freezing, reaching the first experiment and resuming a
 complete run. In the complete run, which is synthetic, every experiment has a record of a masked fault. The
-cached checks of a start are synthetic, too. A start ends where the first mutant would be run (no workers).
-Each time is also printed per experiment and relative to planning.
+cached checks of a start are synthetic, too. A start ends before the first mutant runs, without workers. Each
+time is also printed per experiment and relative to planning.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""Measure the cost of finding which channels left golden.
+"""Measure the cost of finding which channels diverged from the golden run.
 
 `python benchmarks/propagation.py [--repeat N]`. The CPU of an experiment's verdict with all channels of the
 manifest is compared with that for only the needed channels, and with the CPU of the run. The run is one

@@ -1,9 +1,9 @@
-"""Which difference between the readings makes image faults hazardous: `python benchmarks/seeing.py`.
+"""Find the differences between the readings that make image faults hazardous: `python benchmarks/seeing.py`.
 
-The paper's text and its authors' code differ in how frames are made and seen. This enables each difference
-alone and then all of them, on the reference plant, and counts the runs that end in a hazard: an effect at
-each level in every context that a scenario reaches. If all of them together cause hazards, it also removes
-each difference, and tries other thresholds of the detector as coded. `--csv FILE` stores every run.
+The paper's text and its authors' code differ in how frames are made and seen. The benchmark enables each
+difference alone and then all of them, on the reference plant, and counts the runs that end in a hazard: an
+effect at each level in every context that a scenario reaches. If all of them together cause hazards, it also
+removes each difference, and tries other thresholds of the detector as coded. `--csv FILE` stores every run.
 """
 
 import argparse
@@ -265,7 +265,7 @@ def main() -> int:
         "--levels", type=int, nargs="+", choices=range(1, 11), default=[5, 10], metavar="LEVEL"
     )
     parser.add_argument("--effects", nargs="+", choices=KINDS, default=list(KINDS), metavar="NAME")
-    parser.add_argument("--csv", type=Path, metavar="FILE", help="keep every run")
+    parser.add_argument("--csv", type=Path, metavar="FILE", help="store every run in this file")
     options = parser.parse_args()
     runs: dict[Case, Ending] = {}
     with TemporaryDirectory() as frames:
@@ -281,7 +281,7 @@ def main() -> int:
             all_of(FIRST, options.effects)
             bad = {case.effect for case, end in runs.items() if case.row == ALL and end.hazard}
             all_of(THEN, [name for name in options.effects if name in bad])
-    print(f"Hazards at levels {options.levels}, in every context that is reached of {options.scenarios}.\n")
+    print(f"Hazards at levels {options.levels}, in every context that scenarios {options.scenarios} reach.\n")
     report(runs, [*FIRST, *THEN])
     for name, about in DIFFERENCES.items():
         print(f"{name}: {about}")

@@ -198,7 +198,7 @@ def _fresh(root: Path, place: str, *words: str) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("scenario", nargs="?", type=Path, default=ROOT / "fault_library/scenarios/S1.yaml")
-    parser.add_argument("--repeat", type=int, default=3, help="runs, of which the fastest counts")
+    parser.add_argument("--repeat", type=int, default=3, help="runs, of which the fastest is reported")
     parser.add_argument("--plain", action="store_true", help="without compiled code")
     parser.add_argument("--against", type=Path, metavar="CLONE", help="checkout of an older commit")
     parser.add_argument("--rounds", type=int, default=7, help="fresh interpreters of each version")

@@ -111,7 +111,7 @@ def main() -> None:
     parser.add_argument(
         "parts", nargs="*", metavar="PART", help=f"of {', '.join(parts)}; all if none is given"
     )
-    parser.add_argument("--repeat", type=int, default=300, help="calls, of which the median counts")
+    parser.add_argument("--repeat", type=int, default=300, help="calls, of which the median is reported")
     options = parser.parse_args()
     for part in options.parts:
         if part not in parts:
