@@ -222,7 +222,7 @@ def test_a_temporal_formula_is_judged_after_its_horizon(write: Write) -> None:
     rule = "(gap < 2) implies eventually[0:2](gap > 3)"
     found = judged(write(f'hazards: {{LATE: {{stl: "{rule}", unit: m}}}}\n'))
     assert found.hazards == (("LATE", 3.0),)  # below 2 m at 1 s, and not above 3 m by 3 s
-    assert dict(found.metrics) == {"margin_late": -1.0}  # at 1 s; the record ends too early for 4 s and 5 s
+    assert dict(found.metrics) == {"margin_late": -1.0}  # at 1 s; the trace ends too early for 4 s and 5 s
     with pytest.raises(MutatorError, match=r"cart.yaml:20: unknown name 'speeed' in"):
         write('hazards: {LATE: {stl: "historically(speeed < 3)"}}\n')
     with pytest.raises(MutatorError, match=r"cart.yaml:20: a time that is not a multiple of the step, 1 s"):

@@ -29,7 +29,7 @@ WORST_FIRST = {
     "s2-a": CONTACT,
     "s2-b": CONTACT,
     "s0": CONTACT | {"severity": "S0", "delta_v": "0"},
-    # H2 and H3 alternate, although H3's numbers are larger; only margins of hazards that occurred count
+    # H2 and H3 alternate, although H3's numbers are larger; only margins of hazards that occurred are used
     "deep-2": HAZARD | {"margin_h2": "-0.3"},
     "deep-3": LEFT | {"margin_h3": "-500"},
     "both": LEFT | {"t_h2": "3", "margin_h2": "-0.2", "margin_h3": "-2"},  # second of H2, third of H3

@@ -94,7 +94,7 @@ SCALE = Scale(
         ({"metrics": (("delta_v", 11.0),)}, "S3", 3.5, 3.25),  # the limit belongs to the higher class
         ({"metrics": ()}, None, 3.5, 3.25),  # no contact
         ({"t_end": 1.5}, None, 3.5, 3.25),  # a contact before the fault was active
-        ({"t_manifest": 6.0}, "S2", 3.5, None),  # another hazard came first
+        ({"t_manifest": 6.0}, "S2", 3.5, None),  # the hazard came before the manifestation
         ({"t_manifest": None}, "S2", 3.5, None),
         ({"hazards": (), "outcome": Outcome.SDC, "metrics": ()}, None, None, None),
     ],

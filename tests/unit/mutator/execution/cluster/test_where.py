@@ -132,7 +132,7 @@ def test_without_dask_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch)
 def test_a_scheduler_that_does_not_answer_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(connecting, "CONNECT_S", 2.0)
     with socket.socket() as silent:
-        silent.bind(("127.0.0.1", 0))  # no other process listens there
+        silent.bind(("127.0.0.1", 0))  # bound but not listening
         address = f"tcp://127.0.0.1:{silent.getsockname()[1]}"
         with pytest.raises(MutatorError, match=rf"no Dask scheduler answers at {address} \(.*refused"):
             run(opened(parse(address)))
