@@ -56,7 +56,7 @@ def browser() -> Iterator[Any]:
 
 
 def record(experiment: Experiment, number: int, patch: bytes) -> Record:
-    """Return a synthetic record with that patch. Of ten, two are not activated, and three end in a hazard.
+    """Return a synthetic record with that patch. Of ten records, two are not activated and three are hazards.
     One is a harness error and one a crash."""
     status = {3: Status.HARNESS_ERROR, 4: Status.CRASHED}.get(number, Status.OK)
     active = number % 5 > 0

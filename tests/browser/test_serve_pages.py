@@ -81,7 +81,9 @@ def test_an_experiment_is_rerun_from_its_report(address: str, visit: Visit, fold
 
 
 @pytest.mark.slow
-def test_a_try_a_campaign_and_a_cancelled_job(address: str, visit: Visit, folder: Path) -> None:
+def test_a_try_and_a_campaign_run_and_a_job_can_be_cancelled(
+    address: str, visit: Visit, folder: Path
+) -> None:
     """A campaign becomes a listed run, and a cancelled job leaves no files."""
     page = visit(address)
     page.fill("[name=spec]", "sensor/distance")

@@ -31,7 +31,7 @@ def test_every_verb_is_in_the_help_under_a_heading(cli: Cli) -> None:
 
 
 @pytest.mark.parametrize("verb", VERBS)
-def test_each_verb_explains_itself(cli: Cli, verb: str) -> None:
+def test_each_verb_has_a_help_text(cli: Cli, verb: str) -> None:
     answer = cli(verb, "--help")
     assert answer.code == 0
     assert answer.out.startswith(f"Usage: mutator {verb} ")
@@ -164,7 +164,7 @@ def test_an_unexpected_error_is_a_defect_with_a_traceback(
 
 
 @pytest.mark.parametrize("words", ["list --json", "list targets", "--help"], ids=["long", "short", "help"])
-def test_a_closed_pipe_is_no_error(words: str) -> None:
+def test_a_closed_pipe_is_not_an_error(words: str) -> None:
     clone = Path(__file__).parents[2]
     command = f"{sys.executable} -m mutator {words} | true; exit ${{PIPESTATUS[0]}}"
     done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False, cwd=clone)

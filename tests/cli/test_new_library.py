@@ -39,7 +39,7 @@ def test_init_refuses_a_folder_with_content(cli: Cli, nowhere: Path) -> None:
     assert [path.name for path in nowhere.iterdir()] == ["thesis.tex"]
 
 
-def test_init_for_a_program(cli: Cli, nowhere: Path) -> None:
+def test_init_writes_a_library_for_a_program(cli: Cli, nowhere: Path) -> None:
     assert cli("init", "faults", "--json").json == {"folder": "faults"}
 
 
@@ -202,7 +202,7 @@ def test_the_new_readme_names_commands_that_exist(cli: Cli, nowhere: Path) -> No
     assert "variants:" in (nowhere / "faults/fault_library/faults/controller/value.yaml").read_text()
 
 
-def test_init_for_an_installed_package(cli: Cli, nowhere: Path) -> None:
+def test_init_writes_a_library_for_an_installed_package(cli: Cli, nowhere: Path) -> None:
     assert "places to fill in" in cli("init", "faults", "--target", "installed:typer").out
     manifest = (nowhere / "faults/fault_library/targets/typer.yaml").read_text()
     assert "root: installed:typer\n" in manifest

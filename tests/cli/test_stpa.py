@@ -29,7 +29,7 @@ def test_the_analysis_is_printed_and_drawn(cli: Cli, nowhere: Path) -> None:
     assert (nowhere / "structure.svg").read_text().startswith("<svg ")
 
 
-def test_the_analysis_as_json(cli: Cli, nowhere: Path) -> None:
+def test_the_analysis_is_printed_as_json(cli: Cli, nowhere: Path) -> None:
     answer = cli("--root", CLONE, "stpa", "--json")
     assert answer.json["problems"] == []
     assert answer.json["hazards"]["H3"]["leads_to"] == ["A1", "A3"]

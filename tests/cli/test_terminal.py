@@ -68,7 +68,7 @@ def notify_all(notify: Callable[[Progress], None]) -> None:
     notify(replace(run, done=4, per_s=1.52, remaining_s=195.0))
 
 
-def test_progress_in_a_terminal(capsys: pytest.CaptureFixture[str], terminal: None) -> None:
+def test_a_terminal_shows_a_progress_bar(capsys: pytest.CaptureFixture[str], terminal: None) -> None:
     """The bar shows the count, the rate, the outcomes so far, and the remaining time."""
     with campaign_progress(Terminal()) as notify:
         notify_all(notify)
@@ -77,7 +77,7 @@ def test_progress_in_a_terminal(capsys: pytest.CaptureFixture[str], terminal: No
         assert wanted in err
 
 
-def test_progress_in_a_log(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_log_shows_lines_of_progress(capsys: pytest.CaptureFixture[str]) -> None:
     with campaign_progress(Terminal()) as notify:
         notify_all(notify)
     assert capsys.readouterr().err.splitlines() == [

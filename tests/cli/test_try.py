@@ -41,7 +41,7 @@ def test_try_reports_hazards_of_the_fault_free_run(cli: Cli, root: Path) -> None
     assert cli(*words, "--json").json["golden_hazards_s"] == {"TOO_FAST": 0.0}
 
 
-def test_try_as_json(cli: Cli, root: Path) -> None:
+def test_try_prints_json(cli: Cli, root: Path) -> None:
     """The same fault always has the same id."""
     words = ("try", "sensor/lane", "-s", "A", "--value", "2.4", "--trigger", "1", "--json")
     one, two = cli(*words).json, cli(*words).json

@@ -39,8 +39,8 @@ def with_trouble(toy: Workspace, folder: Path, trouble: str, head: str, limits: 
 
 @pytest.fixture
 def misbehave(tmp_path: Path, copy_toycar: Callable[[Path], Workspace]) -> Iterator[Misbehave]:
-    """Run a mutant that executes `trouble` in its output folder, in each engine. `head` runs when the target
-    is loaded."""
+    """Return a function that runs a mutant on each engine. The mutant executes `trouble` in its output folder,
+    and the target executes `head` when it is loaded."""
     made: list[Engines] = []
 
     def run(
@@ -109,10 +109,10 @@ def test_ten_daemons_end_with_the_run(misbehave: Misbehave, tmp_path: Path) -> N
     notes.mkdir()
     told = misbehave(DAEMONS.format(notes=str(notes)))
     seen = [int(path.name) for path in notes.iterdir()]
-    assert len(seen) > 3 * 12, "those that fork had the time to"
+    assert len(seen) > 3 * 12, "the forking daemons did not fork often enough"
     assert [pid for pid in seen if lives(pid)] == []
     time.sleep(0.1)
-    assert len(list(notes.iterdir())) == len(seen), "none that left no note in time"
+    assert len(list(notes.iterdir())) == len(seen), "a daemon left a note after the run"
     assert [(e.status, e.mode) for e, _ in told.values()] == [(Status.OK, RunMode(name)) for name in ENGINES]
 
 

@@ -163,7 +163,7 @@ def test_rerun_gives_the_same_record_and_a_trace(
     assert not rerun(toy, finished, single.experiment.id)[1]
 
 
-def test_one_experiment_without_a_campaign(toy: Workspace, finished: Path, tmp_path: Path) -> None:
+def test_one_experiment_can_run_without_a_campaign(toy: Workspace, finished: Path, tmp_path: Path) -> None:
     experiment = plan_file.read_all(finished)[0]
     single = run_single(toy, toy.manifest("toycar"), experiment, tmp_path / "alone")
     assert single.record.status is Status.OK
@@ -179,7 +179,9 @@ def test_one_experiment_without_a_campaign(toy: Workspace, finished: Path, tmp_p
         run_single(toy, toy.manifest("toycar"), experiment, tmp_path / "broken")
 
 
-def test_harness_errors_run_again(toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_harness_errors_are_run_again(
+    toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     execute, hit = ReferenceEngine.execute, []
 
     def flaky(self: ReferenceEngine, job: Job, folder: Path) -> Execution:
@@ -233,7 +235,7 @@ def test_pytest_settings_of_the_user_do_not_reach_the_campaign(
     assert {name: os.environ[name] for name in told} == told
 
 
-def test_scenarios_in_a_folder_of_the_library(toy: Workspace, tmp_path: Path) -> None:
+def test_scenarios_can_be_in_a_subfolder_of_the_library(toy: Workspace, tmp_path: Path) -> None:
     (toy.library / "scenarios" / "more").mkdir()
     shutil.move(toy.scenario("A"), toy.library / "scenarios" / "more" / "A.yaml")
     path = toy.campaign("small")

@@ -57,7 +57,7 @@ def test_mistakes_under_pytest_have_clear_errors(
     assert "Traceback" not in answer.stdout + answer.stderr
 
 
-def test_pytest_without_a_campaign_is_untouched(toy: Workspace) -> None:
+def test_the_plugin_does_nothing_without_a_campaign(toy: Workspace) -> None:
     """The plugin imports no other part of the harness."""
     test = "import sys\n\ndef test_it():\n    assert 'mutator.execution.session' not in sys.modules\n"
     (toy.library.parent / "test_it.py").write_text(test)
@@ -67,7 +67,7 @@ def test_pytest_without_a_campaign_is_untouched(toy: Workspace) -> None:
 
 
 @pytest.mark.slow
-def test_pytest_in_one_process(toy: Workspace, tmp_path: Path) -> None:
+def test_pytest_runs_a_campaign_in_one_process(toy: Workspace, tmp_path: Path) -> None:
     """The items are the same as with xdist."""
     words = ("--campaign", "small", "--campaign-out", tmp_path / "run")
     answer = pytest_campaign(toy, *words)

@@ -66,7 +66,7 @@ def test_only_a_contact_has_a_contact_speed(run: Path) -> None:
     assert all(bool(speed) == bool(delta_v) for speed, delta_v in contacts)
 
 
-def test_nearly_all_are_forked(run: Path) -> None:
+def test_nearly_all_experiments_are_forked(run: Path) -> None:
     ended = {row["experiment_id"] for row in rows(run) if row["status"] == "ok"}
     timings = RunFolder.open(run).timings()
     forked = {name for name in ended if timings[name]["engine"] == RunMode.FORK}

@@ -77,7 +77,7 @@ def change(run: Path, **values: Any) -> str:
     return str(record["experiment_id"])
 
 
-# Forgeries that an editor can make. With `deep`, all digests and ids match, except those that `reseal`
+# Forgeries that are possible in a text editor. With `deep`, all digests and ids match, except those that `reseal`
 # computes.
 
 

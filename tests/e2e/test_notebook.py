@@ -23,7 +23,7 @@ def run(path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[str,
 
 
 @pytest.mark.parametrize("path", [COMPARISON, RESEARCH], ids=lambda path: path.stem)
-def test_notebooks_are_kept_without_outputs(path: Path) -> None:
+def test_notebooks_are_stored_without_outputs(path: Path) -> None:
     notebook = nbformat.read(path, as_version=4)
     nbformat.validate(notebook)
     code = [cell for cell in notebook.cells if cell.cell_type == "code"]

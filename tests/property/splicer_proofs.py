@@ -23,7 +23,7 @@ from .anchors_by_ast import AFTER, BEFORE, Spot, spots
 from .injected_statements import Beside, Lines, take_out
 from .names_in_bytecode import is_carried_out, keeps_names
 
-Run = Callable[[bytes], object]  # what a source does
+Run = Callable[[bytes], object]  # executes a source and returns what it did
 _MODELS = Workspace.find(root=Path(__file__).parents[2]).fault_models()
 _VARIABLE = "?"
 _INJECTIONS: tuple[tuple[str, dict[str, Any]], ...] = (

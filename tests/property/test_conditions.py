@@ -84,7 +84,7 @@ def test_a_trace_gives_the_same_results_as_its_single_steps(text: str, steps: li
         assert holds(canonical, columns).tolist() == [evaluate(canonical, step) for step in steps]
 
 
-def test_formulas_over_a_trace() -> None:
+def test_formulas_are_evaluated_over_a_trace() -> None:
     """The formulas are a choice, a division by 0, and a rate of change."""
     trace = {
         "t": np.array([0.0, 0.5, 1.5]),

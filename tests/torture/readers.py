@@ -27,7 +27,7 @@ TABLES = (
     "propagation.parquet",
     "timings.parquet",
 )  # verified if they exist
-HOW = re.compile(  # of a report
+HOW = re.compile(  # the parts of a report with timings
     r"^## (How the experiments were run|Where the time went)$.*?^(?=## )", re.MULTILINE | re.DOTALL
 )
 
@@ -140,7 +140,7 @@ def _export(format: str) -> Reader:
 
 
 def verify(place: Place) -> Told:
-    """Return every file that a passing audit vouches for."""
+    """Return the files that a passing audit covers."""
     code, out, err = cli("verify", place.run)
     found, genuine = contents(place.run) if code == 0 else {}, contents(place.genuine)
     ledger = json.loads(genuine["digests.json"])

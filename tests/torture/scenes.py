@@ -34,11 +34,11 @@ KILLS = 3  # of one command, at most
 class Scene:
     name: str
     workspace: Workspace
-    at: Path  # the folder of everything that happens
+    at: Path  # the folder in which everything happens
     words: tuple[object, ...]
-    told: Callable[[], Told]  # of the command's output
-    home: Path | None = None  # the folder's content before; None: nothing
-    fresh_cache: bool = False  # runs the checks, too
+    told: Callable[[], Told]  # reads the command's result
+    home: Path | None = None  # the initial content of `at`, if any
+    fresh_cache: bool = False  # the checks run, too
     victims: Sequence[str] = ("command", "group")
     takes_s: float = math.inf  # the command's shortest duration
 
@@ -52,7 +52,7 @@ class Scene:
             began, command = time.monotonic(), self._command()
             kills.append(struck(command, chance, self.victims, self.takes_s))
             command.end()  # with all processes that it started
-            if kills == [None]:  # it completed; the machine is less busy now
+            if kills == [None]:  # the command completed before any signal
                 self.takes_s = min(self.takes_s, time.monotonic() - began)
             if self._is_done(command):
                 break
@@ -70,7 +70,9 @@ class Scene:
         return command.process.returncode == 0 or merged
 
     def undisturbed(self) -> Told:
-        if self.home is None and not self.fresh_cache:  # the duration of later runs, with cached checks
+        if (
+            self.home is None and not self.fresh_cache
+        ):  # fills the cache, so that the checks do not add to the duration
             self._begin()
             self._command().end()
         self._begin()

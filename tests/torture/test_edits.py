@@ -28,7 +28,7 @@ pytestmark = pytest.mark.slow
 TRIES = 60
 WORDS = ("small", "--limit", "2", "--engine", "fork")
 OLDER = Path(__file__).parents[1] / "fixtures" / "run-1" / "small"
-FILES = {kind: pattern for kind, pattern in PATTERNS.items() if kind != "review"}  # there is none
+FILES = {kind: pattern for kind, pattern in PATTERNS.items() if kind != "review"}  # the toy has no review
 CHOICES = (
     *(("--seed", "4"), ("--seed", "3"), ("--limit", "3"), ("--engine", "reference"), ("--engine", "warm")),
     *(("-n", "1"), ("--only", "value > 1"), ("--shard", "1/2"), ("--reading", "as_coded")),

@@ -104,7 +104,7 @@ def judged(told: Told, right: Told, touched: Iterable[str]) -> tuple[End, str]:
     if not any(Path(name).name in told.said for name in touched):
         return End.WRONG, "no file is named"
     if not any(words in told.said for words in ("to do: ", "expected: ")) and told.code == 2:
-        return End.WRONG, "nothing is said of what to do"
+        return End.WRONG, "no remedy is given"
     return End.REFUSED, ""
 
 

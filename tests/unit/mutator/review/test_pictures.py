@@ -57,7 +57,7 @@ def grey(jpeg: bytes) -> float:
     return float(np.asarray(Image.open(io.BytesIO(jpeg))).mean())
 
 
-def test_three_levels_of_an_effect(lit: Lit) -> None:
+def test_an_effect_is_shown_at_three_levels(lit: Lit) -> None:
     """The levels are the least, a middle and the largest value."""
     workspace, group = lit()
     found = drawn(workspace, group)

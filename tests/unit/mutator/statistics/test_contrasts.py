@@ -92,7 +92,7 @@ def test_mcnemar_is_exact() -> None:
     assert contrasts.mcnemar(contrasts.pairs(results(*made))).p == pytest.approx(2 * 0.5**8)
 
 
-def test_pairs_per_injected_and_per_activated_guided_fault(frame: pd.DataFrame) -> None:
+def test_pairs_are_counted_per_injected_and_per_activated_fault(frame: pd.DataFrame) -> None:
     lines = [line[:7] for line in pairs_sheet(frame).lines]
     assert lines == [
         ("all", "total", 5, 1, 1, 2, 1),

@@ -29,7 +29,7 @@ FRAME = pd.DataFrame(
 )
 
 
-def test_the_spread_of_each_metric_by_fault_type() -> None:
+def test_each_metric_has_its_spread_by_fault_type() -> None:
     """Median, worse quartile and worst value, as computed by hand. Experiments without activation or value
     are left out."""
     sheet = metrics_sheet(FRAME, METRICS)
@@ -51,7 +51,7 @@ def test_without_values_there_is_no_table() -> None:
     assert severity_sheet(frame.drop(columns="severity")).lines == ()
 
 
-def test_classes_of_severity_by_fault_type() -> None:
+def test_severity_classes_are_counted_by_fault_type() -> None:
     """The first column counts contacts of any class."""
     rows = severity_sheet(FRAME).table().rows
     counts = [[row[0], *(cell.partition("(")[2].partition(";")[0] for cell in row[1:])] for row in rows]

@@ -106,7 +106,7 @@ def test_the_note_warns_of_several_draws(faults: dict[str, Fault]) -> None:
     assert "without weights" not in score_sheet(frame, faults, GOLDEN, [small]).note
 
 
-def test_scores_by_operator(faults: dict[str, Fault]) -> None:
+def test_scores_are_given_by_operator(faults: dict[str, Fault]) -> None:
     frame = results(drive("a", HIT), drive("b", ACTIVE, fault_type="branch"), {"fault_id": "x"} | HIT)
     found = lines(score_sheet(frame, faults, GOLDEN))
     assert found["arithmetic", "mutants", "permanent"]["hazard"] == share(1, 1)

@@ -77,7 +77,7 @@ def test_arguments_have_placeholders_and_changes(toy: Workspace) -> None:
         manifest.arguments(scenario=Path("s"), seed=0, out=Path("o"), changes=("no_lead",))
 
 
-def test_placeholders_anywhere_in_an_argument(toy: Workspace) -> None:
+def test_placeholders_can_be_anywhere_in_an_argument(toy: Workspace) -> None:
     """Each placeholder is replaced once. Other braces stay."""
     path = toy.library / "targets" / "toy.yaml"
     text = path.read_text().replace("alone: [--alone, --quiet]", 'alone: ["--in={out}/x", \'{"a": {}}\']')
