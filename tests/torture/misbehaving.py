@@ -264,7 +264,7 @@ class Misbehaving:
         ]
         if left:
             return f"it leaves {', '.join(map(str, left))}"
-        return "" if contents(self.tree) == self.before else "the tree of the user is another one"
+        return "" if contents(self.tree) == self.before else "the user's tree has changed"
 
     def table(self) -> str:
         names = sorted({name for name, _ in self.verdicts})

@@ -67,7 +67,7 @@ def test_the_report_links_to_the_page_of_the_study(run: Path) -> None:
     assert "STUDY.md" not in written.markdown.read_text()
     assert "study.html" not in Page(written.page.read_text()).links
     assert not (run / "report" / "study.html").exists()
-    assert "these results are not enough for it" in written.markdown.read_text()
+    assert "these results cannot be compared with it" in written.markdown.read_text()
 
 
 def test_an_experiment_outside_the_plan_has_no_figure(run: Path) -> None:
