@@ -26,7 +26,7 @@ def owned(run: Path, patience_s: float = _PATIENCE_S) -> Iterator[None]:
                 f"in use by process {os.read(fd, 32).decode(errors='replace').strip() or '(unknown)'}",
                 where=run,
                 expected="one command at a time in a run folder",
-                remedy="wait until it ends, or use another folder",
+                remedy="wait until that process ends, or use another folder",
             )
         with raising_disk_full(run):
             os.ftruncate(fd, 0)

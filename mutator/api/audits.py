@@ -30,7 +30,7 @@ class Audit:
     run: Path  #: the run folder
     facts: Mapping[str, str]  #: facts about the run, by name
     checks: tuple[Check, ...]  #: the checks: `what`, `count` and `differences` of each
-    seal: str | None  #: the seal computed from the content; None: not finished, or not verifiable
+    seal: str | None  #: the seal computed from the content; None if the run is unfinished or not verifiable
     repaired: tuple[str, ...] = ()  #: the damaged parts that were set aside
 
     def __repr__(self) -> str:

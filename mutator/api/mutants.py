@@ -17,7 +17,7 @@ from mutator.targets.manifest import TargetManifest
 class BuiltMutant:
     """A fault with a trigger, built into a target."""
 
-    fault: Fault  #: the fault that is built in
+    fault: Fault  #: the injected fault
     trigger: Trigger  #: when it is active
     mutant: Mutant  #: the changed files, and the digest of the tree
     manifest: TargetManifest  #: the target's manifest

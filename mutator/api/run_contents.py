@@ -97,7 +97,7 @@ class RunContents:
 
     @property
     def harness_errors(self) -> dict[str, str]:
-        """Experiments at which the harness failed, with the reasons; `mutator.run` retries them."""
+        """Experiments in which the harness failed, with the reasons; `mutator.run` retries them."""
         texts = self._texts
         failed = texts[texts["status"] == Status.HARNESS_ERROR.value]
         return dict(zip(failed["experiment_id"], failed["detail"], strict=True))

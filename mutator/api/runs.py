@@ -78,7 +78,7 @@ def merge_runs(shards: Sequence[str | Path], out: str | Path, *, accept_versions
 class Run(RunContents):
     """A run folder, read on demand."""
 
-    #: the result of the call of `mutator.run` that returned it; None for a loaded run
+    #: the summary, if `mutator.run` returned this object; None for a loaded run
     summary: Summary | None = None
 
     def __repr__(self) -> str:

@@ -142,7 +142,7 @@ def _by_reason(found: dict[str, str]) -> dict[str, list[str]]:
 
 
 def _cost_line(cost: "Cost") -> str:
-    source = "measured in this folder" if cost.measured else "from a default rate, nothing measured yet"
+    source = "measured in this folder" if cost.measured else "estimated from a default rate"
     time, disk = duration(cost.wall_s), cost.disk_bytes / 1e6
     who = counted(cost.workers, "worker")
     return f"{time} with {who} ({duration(cost.cpu_s)} of CPU), {disk:.0f} MB of disk; {source}"

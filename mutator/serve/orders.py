@@ -125,7 +125,7 @@ class Desk:
 
     def _rerun(self, order: Rerun) -> Work:
         trace = ["--trace"] if order.kind == "plot" else []
-        what = "exact plot" if trace else "again"
+        what = "exact plot" if trace else "rerun"
         return self._of_experiment(order, what, "rerun", order.experiment, *trace)
 
     def _film(self, order: Film) -> Work:

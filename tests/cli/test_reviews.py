@@ -171,7 +171,9 @@ def test_the_status_shows_which_groups_are_left(cli: Cli, root: Path, known: dic
     assert lines[3:] == ["flagged:", f"  {gap}  by Jane Doe: {known[gap]}"]
     told = cli("review", "status", "--campaign", "small").out
     assert re.search(
-        rf"^small lacks:\n  {gap}  changed \({re.escape(changed)}\), \d+ exp", told, re.MULTILINE
+        rf"^approvals that small lacks:\n  {gap}  changed \({re.escape(changed)}\), \d+ exp",
+        told,
+        re.MULTILINE,
     )
     facts = cli("review", "status", "--json").json
     assert facts["states"] == {"new": 0, "changed": 1, "rejected": 0, "approved": 4}
