@@ -77,8 +77,8 @@ def change(run: Path, **values: Any) -> str:
     return str(record["experiment_id"])
 
 
-# Forgeries that are possible in a text editor. With `deep`, all digests and ids match, except those that `reseal`
-# computes.
+# Forgeries that are possible in a text editor. With `deep`, all digests and ids match, except those that
+# `reseal` computes.
 
 
 def an_outcome(run: Path, deep: bool) -> None:
