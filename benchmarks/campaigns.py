@@ -69,7 +69,7 @@ def main() -> int:
         for key in ("wall_s", "cpu_s")
     }
     print(f"two workers: {ratios['wall_s']:.2f} times as fast, for {1 / ratios['cpu_s']:.2f} times the CPU")
-    print(f"the same results: {same}")
+    print(f"results are the same: {same}")
     if options.json:
         facts = {"campaign": options.campaign, "experiments": count, "first": first, "same": same}
         options.json.write_text(json.dumps(facts | {"workers": figures}, indent=1) + "\n")

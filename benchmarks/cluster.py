@@ -196,9 +196,11 @@ def ends(seed: int) -> None:
                 count += len(one.places)
         ended, busy, pieces = simulated(folder, some, random.Random(seed))
     last, middle = max(ended), mean(ended)
-    print(f"ends: {count:,} experiments, {WORKERS} workers, {pieces} pieces: the last ends at {last:.1f} s,")
+    print(
+        f"ends: {count:,} experiments, {WORKERS} workers, {pieces} pieces: the last one ends at {last:.1f} s,"
+    )
     after, at_work = 100 * (last / middle - 1), 100 * busy / (last * WORKERS)
-    print(f"{after:.1f} % after the mean of all; at work {at_work:.1f} % of the time")
+    print(f"{after:.1f} % after the mean of all workers; workers are busy {at_work:.1f} % of the time")
 
 
 def simulated(

@@ -29,7 +29,7 @@ KINDS = (None, *DETECTORS)
 
 
 def run(kind: str | None, cache: Path, helpers: Path | None) -> tuple[float, bytes]:
-    """Return CPU seconds and the trace of one run with frames that no other run has seen."""
+    """Return CPU seconds and the trace of one run with frames that no other run has used."""
     (cache / FILE).unlink(missing_ok=True)
     compiled.use(helpers)
     pictures = Pictures(detector=kind, cache=cache) if kind else None
@@ -64,7 +64,7 @@ def main() -> int:
             name = f"{kind} detector, nothing known" if kind else "without pictures"
             figures[name] = {"without": spent[False], "with": spent[True]}
             print(f"{name:34} {without:6.2f} s  compiled {having:6.2f} s  ratio {having / without:.2f}")
-    print("the same traces:", same)
+    print("traces are the same:", same)
     if options.json:
         options.json.write_text(json.dumps({"unit": "s", "runs": figures}, indent=1) + "\n")
     return 0 if same else 1

@@ -101,7 +101,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for kind, count in saved.runs.most_common():
         print(f"{count:6} runs {kind}: at most {saved.cpu_s[kind] / total:6.2%} of the CPU of all runs")
     share = sum(saved.cpu_s.values()) / total
-    print(f"all together at most {share:.2%} of {total:.1f} s (worth it from {WORTH_IT:.0%} on)")
+    print(f"all together at most {share:.2%} of {total:.1f} s (worthwhile at {WORTH_IT:.0%} or more)")
     if options.json:
         facts = {"runs": saved.runs, "cpu_s": saved.cpu_s, "total_cpu_s": total, "share": share}
         options.json.write_text(json.dumps(facts, indent=1) + "\n")

@@ -169,7 +169,7 @@ def _compared(found: dict[str, Measured]) -> dict[str, object]:
     records = [measured.records for measured in found.values()]
     facts: dict[str, object] = {"same": all(other == records[0] for other in records)}
     good = facts["same"]
-    print(f"the same records: {facts['same']}")
+    print(f"records are the same: {facts['same']}")
     if "fork" in found and "warm" in found:
         fork, warm = found["fork"], found["warm"]
         share = fork.steps / warm.steps

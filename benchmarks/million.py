@@ -55,7 +55,7 @@ def resume(size: int, run: Path) -> None:
     """Repeat the command when there is nothing left to do."""
     summary = run_campaign(Workspace.find(root=made_up_run.ROOT), run / "campaign.yaml", run)
     if summary.done < size or summary.ran:
-        raise SystemExit(f"{summary.done} done, {summary.ran} now")
+        raise SystemExit(f"the run was not finished: {summary.ran} experiments ran now")
 
 
 def table(size: int, run: Path) -> None:
@@ -65,7 +65,7 @@ def table(size: int, run: Path) -> None:
 def report(size: int, run: Path) -> None:
     written = building.write(run, Workspace.find(root=made_up_run.ROOT))
     if written.rows < size:
-        raise SystemExit(f"a report of {written.rows}")
+        raise SystemExit(f"the report has only {written.rows} experiments")
 
 
 def page(size: int, run: Path) -> float:

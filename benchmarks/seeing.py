@@ -168,7 +168,7 @@ class FaultyCamera(PictureCamera):
         effect = drawing(case.effect, case.level, coded, number, self.model)
         moment = Moment(0.0, truth.position, truth.v_ego) if coded and not redrawn else truth
         affected = effect.apply(picture, moment)
-        assert isinstance(affected, Picture), "made of a picture"
+        assert isinstance(affected, Picture), "the effect returned no Picture"
         return affected
 
 
@@ -207,7 +207,7 @@ class MixedDetector:
         return line._replace(prob=0.0) if line.y == self._nowhere[side] else line
 
     def _sent(self, lines: list[RoadLine]) -> list[RoadLine]:
-        """Return the lines, with a missing one 8 m to the left. If none is seen, return the last ones."""
+        """Return the lines, with a missing one 8 m to the left. If no line is found, return the previous ones."""
         if any(line.prob > 0.0 for line in lines):
             pairs = zip(lines, self._nowhere, strict=True)
             self._last = [line if line.prob > 0.0 else RoadLine(y=nowhere) for line, nowhere in pairs]

@@ -226,7 +226,7 @@ def print_parts(scenario: Scenario) -> None:
         per_step = 1000 * seconds / scenario.steps
         return f"  {name:26} {per_step:.4f} ms a step  {seconds / total:6.1%}  {calls} calls"
 
-    print(f"\nOwn CPU time of each part in a timed run ({total:.3f} s, what measuring takes included):")
+    print(f"\nOwn CPU time of each part in a timed run ({total:.3f} s, including the cost of measuring):")
     for name, parts in GROUPS.items():
         keys = [part_name(*part) for part in parts]
         print(line(name, sum(watch.seconds[key] for key in keys), sum(watch.calls[key] for key in keys)))

@@ -106,7 +106,7 @@ def test_the_path_names_the_component_that_stopped_a_masked_fault(opened: "Page"
     opened.page.wait_for_selector("section.path p:has-text('never active')")
 
 
-def test_the_control_structure_counts_and_filters(opened: "Page") -> None:
+def test_the_control_structure_shows_counts_and_filters_the_list(opened: "Page") -> None:
     """A link leads to the experiments whose faults passed it, and a box to those that it stopped."""
     count = "#ways [data-link='commands'] .count"
     opened.choose("kind", "sensor/lane")

@@ -91,7 +91,7 @@ def test_an_opened_experiment_shows_its_diff_spec_and_commands(page: "Page", run
     )
     assert f"mutator rerun {name} --run {run}" in commands
     [again] = [command for command in commands if command.startswith("mutator try sensor/")]
-    assert again.endswith(" --reading as_described"), "the reading is named, whichever is the default"
+    assert again.endswith(" --reading as_described"), "the command does not name the reading"
     page.page.go_back()
     page.page.wait_for_selector("#experiment", state="hidden")
 
@@ -109,7 +109,7 @@ def test_the_list_stays_next_to_an_opened_experiment(page: "Page") -> None:
         == f"{page.page.inner_text('#experiment h2')} in {page.column('scenario')[1]} - {title}"
     )
     boxes = [page.page.locator(name).bounding_box() for name in ("#grid", "#experiment")]
-    assert boxes[0]["x"] + boxes[0]["width"] <= boxes[1]["x"], "beside it, not beneath it"
+    assert boxes[0]["x"] + boxes[0]["width"] <= boxes[1]["x"], "the experiment is not beside the list"
     assert page.page.locator("#grid tr.open").get_attribute("data-at") == "1"
     page.page.click("#grid tr[data-at] >> nth=2")
     assert page.page.inner_text("#experiment .place") == f"3 of {count}"

@@ -176,7 +176,7 @@ def test_every_command_of_a_page_prints_what_the_page_says(page: Path, work: Pat
     printed = work_through(page, work)
     if os.environ.get("UPDATE_DOCS"):
         rewrite(page, printed)
-        pytest.skip("the page was written anew")
+        pytest.skip("the page was rewritten")
     for (command, output), (_, said) in zip(printed, found, strict=True):
         assert [VARYING.sub("...", line) for line in lines_of(output)] == [
             VARYING.sub("...", line) for line in said

@@ -87,7 +87,7 @@ def test_check_reports_an_unused_draw(cli: Cli, root: Path) -> None:
     )
 
 
-def test_check_drive_also_shows_what_passed(cli: Cli, root: Path) -> None:
+def test_check_drive_also_lists_passed_checks(cli: Cli, root: Path) -> None:
     answer = cli("check", "--drive", "--scenario", "A")
     assert answer.code == 0
     for name in ("golden A: the same bytes twice", "fast engines: ", "statements: ", "triggers: ", "canary "):

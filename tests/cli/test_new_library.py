@@ -166,7 +166,7 @@ def test_a_tree_with_a_controller_and_an_unreadable_file_has_no_warning(
 
 
 @pytest.mark.parametrize("name", ["my tree: {v#2}", "123", "null", "1e3"])
-def test_a_tree_may_have_any_name(
+def test_a_tree_can_have_any_name(
     name: str, cli: Cli, nowhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A name with a special meaning in YAML is quoted."""

@@ -31,7 +31,7 @@ class Machines:
         self.scheduler = self._started("scheduler", words)
         deadline = time.monotonic() + 60.0
         while not self.file.exists():
-            assert time.monotonic() < deadline and self.scheduler.poll() is None, "no scheduler"
+            assert time.monotonic() < deadline and self.scheduler.poll() is None, "no scheduler started"
             time.sleep(0.05)
 
     def add(self, name: str, **environment: str) -> None:

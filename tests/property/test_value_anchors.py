@@ -81,7 +81,8 @@ def active(node: ast.expr) -> bool:
 
 
 class Inactive(ast.NodeTransformer):
-    """What a module does while no fault is active. `kept` are the expressions with changed values."""
+    """Removes the injected conditions, as if no fault were active. `kept` are the expressions with changed
+    values."""
 
     def __init__(self) -> None:
         self.kept: list[str] = []

@@ -80,7 +80,7 @@ class Elsewhere:
 
 
 @pytest.mark.parametrize("name", SURROUNDINGS)
-def test_a_command_completes_what_it_began_in_any_surroundings(
+def test_a_command_completes_in_any_surroundings(
     name: str,
     toy: Workspace,
     tmp_path: Path,

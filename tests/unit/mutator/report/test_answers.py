@@ -101,7 +101,7 @@ def test_the_worst_experiment_is_first(said: dict[str, Answer]) -> None:
     assert answer.links == (Link("All 4 hazards", "outcome=hazard&sort=rank"),)
 
 
-def test_an_alert_after_the_hazard_is_no_warning(said: dict[str, Answer]) -> None:
+def test_an_alert_after_the_hazard_is_not_a_warning(said: dict[str, Answer]) -> None:
     answer = said["unwarned"]
     assert answer.says == (
         "3 of 4 hazards (75 %) were silent (no alert before the hazard): 2 with no alert at all, 1 with an "

@@ -92,7 +92,7 @@ def test_the_report_states_its_origin(run: Path) -> None:
             assert fact in text
 
 
-def test_the_report_says_who_reviewed_what_ran(run: Path) -> None:
+def test_the_report_names_the_reviewers(run: Path) -> None:
     assert "reviewed" not in building.write(run, None).markdown.read_text()
     approvals = {"schema": gate.SCHEMA, "target": "toycar", "groups": [{"by": "Jane"}, {"by": "Joe"}]}
     write_json(run / gate.FILE, approvals)

@@ -121,7 +121,7 @@ def called(line: str, tag: str = TAG, **changed: str) -> dict[str, str]:
         ("picture = Sense()", {"car/eye.py Sense", "car/eye.py helper", "car/eye.py LEVEL"}),
     ],
 )
-def test_names_lead_to_what_is_called(line: str, found: set[str]) -> None:
+def test_called_code_is_found_by_its_name(line: str, found: set[str]) -> None:
     """Imports, modules, bases and `self` are followed, and variables and annotations are not."""
     assert set(called(line)) == found
 

@@ -67,7 +67,7 @@ def test_a_spec_is_not_named_by_its_path(client: Client, spec: str) -> None:
     "name",
     ["run.json", "digests.json", "campaign.yaml", "plan/faults.jsonl", "owner.lock", "report/made_from.json"],
 )
-def test_only_what_a_report_shows_is_served(client: Client, name: str) -> None:
+def test_only_files_that_a_report_shows_are_served(client: Client, name: str) -> None:
     path = client.place / "runs/night" / name
     path.parent.mkdir(exist_ok=True)
     if not path.exists():

@@ -25,7 +25,7 @@ def test_another_host_is_refused(client: Client, path: str, host: str | None) ->
     assert "<" not in answer.text
 
 
-def test_the_host_may_be_localhost(client: Client) -> None:
+def test_localhost_is_an_accepted_host(client: Client) -> None:
     assert client.get("/", Host=f"localhost:{client.port}").status == 200
 
 

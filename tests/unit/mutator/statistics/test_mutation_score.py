@@ -42,7 +42,7 @@ def lines(sheet: Any) -> dict[tuple[str, str, str], dict[str, Any]]:
     return {line[:3]: dict(zip(sheet.heads, line, strict=True)) for line in sheet.lines}
 
 
-def test_a_mutant_counts_once_for_all_its_drives(faults: dict[str, Fault]) -> None:
+def test_a_mutant_is_counted_once_for_all_its_runs(faults: dict[str, Fault]) -> None:
     frame = results(drive("a", HIT), drive("a", ACTIVE), drive("b", CHANGED), drive("c", {}))
     found = lines(score_sheet(frame, faults, GOLDEN))
     total = found["all", "mutants", "permanent"]

@@ -84,7 +84,7 @@ def test_only_damaged_lines_are_lost(path: Path, change: str) -> None:
 
 
 @pytest.mark.parametrize("keep", [1, 20, -1, -2])
-def test_an_incomplete_last_line_is_no_damage(path: Path, keep: int) -> None:
+def test_an_incomplete_last_line_is_not_damage(path: Path, keep: int) -> None:
     lines = path.read_bytes().splitlines(keepends=True)
     path.write_bytes(b"".join(lines[:-1]) + lines[-1][:keep])
     segment = read_segment(path)
@@ -122,7 +122,8 @@ def test_a_line_that_a_full_disk_cut_off_is_removed(
 
 
 def test_a_full_disk_on_sync_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A file system with late allocation may report it only then. The record can still be read."""
+    """A file system with late allocation can report a full disk only when it syncs. The record can still be
+    read."""
     writer = LineWriter(tmp_path / "records" / "a.jsonl", HEAD)
     writer.append({"value": 1})
 

@@ -39,7 +39,7 @@ def test_all_values_are_read_bit_by_bit(one: np.ndarray, other: np.ndarray, coun
     assert found.about == {"end": 1.0}
 
 
-def test_values_equal_to_golden_take_no_space() -> None:
+def test_values_equal_to_the_golden_run_take_no_space() -> None:
     values = np.random.default_rng(1).random((20, 600)).astype("<f4")
     golden = Series(t=np.arange(600) / 20, rows=list(values), every=[1] * 20, about={})
     assert len(encode(golden, golden)) < 100

@@ -37,7 +37,7 @@ def test_boxes_do_not_overlap_and_are_inside(layout: Layout) -> None:
         assert box.x >= 0 and box.x + box.width < layout.width and box.bottom < layout.height
 
 
-def test_arrows_join_their_boxes_and_cross_no_other(analysis: Analysis, layout: Layout) -> None:
+def test_arrows_join_their_boxes_and_cross_no_other_box(analysis: Analysis, layout: Layout) -> None:
     for name, link in analysis.structure.links.items():
         points = layout.arrows[name].points
         for place, point in ((link.from_, points[0]), (link.to, points[-1])):

@@ -128,7 +128,7 @@ def test_a_damaged_entry_is_replaced(checked: tuple[Workspace, RunFolder], cache
     assert list(cache.parent.iterdir()) == [cache]
 
 
-def test_a_cache_that_cannot_be_created_is_no_error(
+def test_a_cache_that_cannot_be_created_is_not_an_error(
     checked: tuple[Workspace, RunFolder], tmp_path: Path
 ) -> None:
     (tmp_path / "file").write_text("")

@@ -117,7 +117,7 @@ def test_a_damaged_first_block_removes_all_records_of_its_file(run: Path) -> Non
 
 
 @pytest.mark.parametrize("name", ["checks.json", "golden/A/log.npz"])
-def test_what_run_can_rebuild_is_moved_aside(run: Path, name: str) -> None:
+def test_files_that_run_can_rebuild_are_moved_aside(run: Path, name: str) -> None:
     """The run is then unfinished, so that `run` rebuilds the file."""
     (run / name).write_bytes(b"other")
     said, folder = repaired(run)
