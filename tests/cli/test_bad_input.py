@@ -160,7 +160,7 @@ def test_a_run_folder_of_a_newer_schema_is_refused(cli: Cli, root: Path) -> None
     [
         (["diff", "own.yaml", "--trigger", "near >"], "error: --trigger: "),
         (["plan", "toy", "--out", "own.yaml"], "to do: choose another --out"),
-        (["plan", "toy", "--out", "p", "--only", "value > 1e9"], "to do: widen --only, --exclude or"),
+        (["plan", "toy", "--out", "p", "--only", "value > 1e9"], "to do: widen --only or the campaign"),
         (["run", "toy", "--out", "p", "--shard", "3/2"], "error: --shard: '3/2'"),
         (["list", "--library", "gone"], "to do: correct --library or MUTATOR_LIBRARY, --root or"),
     ],
