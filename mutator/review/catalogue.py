@@ -83,7 +83,7 @@ def of_plan(workspace: Workspace, plan: Plan) -> tuple[Group, ...]:
     files = [one.file for one in plan.campaign.faults if one.file]
     named = [
         workspace.spec(file) for file in files if file.is_file()
-    ]  # in a run folder's copy of a campaign, links may be dangling
+    ]  # in a run folder's copy of a campaign, links can be dangling
     specs = (*workspace.specs(), *named)
     return _Catalogue(workspace.fault_models(), manifest, specs).groups(members, runs)
 

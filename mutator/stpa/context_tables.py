@@ -83,7 +83,7 @@ class ContextTable:
 
 @dataclass(frozen=True, kw_only=True)
 class HazardList:
-    """Accidents and hazards: id -> description; and the accidents that each hazard may cause."""
+    """Accidents and hazards: id -> description; and the accidents that each hazard can cause."""
 
     source: Source
     accidents: Mapping[str, str]
@@ -121,11 +121,11 @@ class TableModel(StrictModel, title="contexts/*.yaml"):
 
 class _HazardModel(StrictModel, title="A hazard"):
     about: str = Field(description="What the hazard is.")
-    leads_to: list[str] = Field(description="The accidents that it may cause.")
+    leads_to: list[str] = Field(description="The accidents that it can cause.")
 
 
 class HazardsModel(StrictModel, title="hazards.yaml"):
-    """Accidents, and the hazards that may lead to them."""
+    """Accidents, and the hazards that can lead to them."""
 
     accidents: dict[str, str] = Field(description="Id -> description.")
     hazards: dict[str, _HazardModel] = Field(description="Id -> hazard.")

@@ -19,8 +19,8 @@ class ChangeModel(StrictModel, title="A change"):
 
 
 class EntryModel(StrictModel, title="The entry"):
-    """Arguments may contain placeholders: `{scenario}` is the scenario's file, `{seed}` the seed, `{out}` the
-    folder for trace and record. `{cache}` is a folder that all runs of the target share. It may be missing,
+    """Arguments can contain placeholders: `{scenario}` is the scenario's file, `{seed}` the seed, `{out}` the
+    folder for trace and record. `{cache}` is a folder that all runs of the target share. It can be missing,
     unwritable or damaged, and `mutator cache` deletes from it, so results must not depend on it. `{root}` is
     the target's root, to which a run must never write."""
 

@@ -15,7 +15,7 @@ INSTALLED = "installed:"  # prefix of an import package's name, as `root` of a m
 
 
 def find_root(root: str, source: Source, requires: Sequence[Requirement]) -> Path:
-    """Find the folder that a manifest's `root` names; it may not exist. An installed package is not
+    """Find the folder that a manifest's `root` names; it might not exist. An installed package is not
     imported."""
     if root == SHIPPED_TARGET:
         return shipped_folder() / "target"

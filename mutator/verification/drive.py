@@ -115,7 +115,7 @@ class _Drive:
         if one.problem or (one.digest == other.digest and not other.problem):
             return _Golden(first, watched, watched)
         again = replace(self._job("again", scenario, self.setting), hash_seed=_OTHER_HASH_SEED)
-        if other.problem:  # watching may be the cause
+        if other.problem:  # watching might be the cause
             counting = self._counting(scenario, self.setting)
             watched = self._run(replace(counting, name=f"unwatched-{scenario}", watch=False))
         return _Golden(first, watched, self._run(again))

@@ -14,7 +14,7 @@ class Level(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Place:
-    """A line that a finding is about, and what is there. `file` may be relative to the target's root."""
+    """A line that a finding is about, and what is there. `file` can be relative to the target's root."""
 
     file: str
     line: int | None

@@ -35,7 +35,7 @@ T = TypeVar("T")
 def check_library(workspace: Workspace, target: str) -> list[MutatorError]:
     """Every problem of library, templates and target, in file order.
 
-    * No placeholder may be left.
+    * All placeholders must be filled in.
     * Manifests, models, specs, hazards and context tables must load.
     * The models' examples must hold.
     * Every spec must expand in every reading, and every anchor must match the target exactly once.

@@ -11,7 +11,7 @@ from mutator.verification.unreached import FOLDER
 
 def entry(key: str) -> Path:
     """The path for checks with this digest. Machines with a shared home folder have separate entries, because
-    the digest may not cover everything that changes last digits."""
+    the digest might not cover everything that changes last digits."""
     return caches.of_checks() / digest([key, platform.node()])
 
 

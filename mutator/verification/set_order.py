@@ -44,7 +44,7 @@ class _Scope:
         self._own = list(_own(node))
         self._orderless = self._to_be_ordered()
         self.sets = outer
-        for _ in range(2):  # twice, because a name may be assigned from another
+        for _ in range(2):  # twice, because a name can be assigned from another
             self.sets |= frozenset(self._assigned())
 
     def places(self) -> Iterator[SetOrder]:

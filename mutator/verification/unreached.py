@@ -30,7 +30,7 @@ Arming = tuple[float, Callable[..., bool]]  # arming time of a trigger (s), and 
 
 def write_observed(folder: Path, key: str, seen: Iterable[Sequence[float]]) -> None:
     path = folder / FOLDER / f"{key}.npy"
-    path.parent.mkdir(parents=True, exist_ok=True)  # scenario names may contain folders
+    path.parent.mkdir(parents=True, exist_ok=True)  # scenario names can contain folders
     np.save(path, np.array(list(seen), dtype=float))
 
 

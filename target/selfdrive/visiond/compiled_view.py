@@ -10,7 +10,7 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.visiond.road_view import LEVELS, RoadView
 
 C_SOURCE = Path(__file__).with_name("road_view.c")
-MORE = 4  # pixels past the end of a picture that C may read
+MORE = 4  # pixels past the end of a picture that C can read
 
 
 class _Level(ctypes.Structure):

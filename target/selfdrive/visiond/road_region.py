@@ -12,7 +12,7 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.errors import ConfigError
 from selfdrive.visiond.hog import STRIDE, WINDOW
 
-NEAR, FAR = 4.9, 30.0  # m ahead; the nearest row is always examined, the furthest may be left out
+NEAR, FAR = 4.9, 30.0  # m ahead; the nearest row is always examined, the furthest can be left out
 SIDE = 3.8  # m: a lane's line when the car is almost in the next lane
 TURN = 0.08  # m wider per metre ahead
 

@@ -27,7 +27,7 @@ BESIDE = 0.8  # m from a line, where points by chance are counted
 ROUNDS = (0.30, 0.20, 0.15, 0.15)  # m from a line, where points are used in each round of the fit
 ALIKE = 10.0  # points with the same error, because neighbours are not independent
 FAINT = 0.02  # share of rows that makes a line probable if there are no other points; a dash is 0.05
-BLUR = 0.5, 0.05  # px and m by which a point may miss its mark
+BLUR = 0.5, 0.05  # px and m by which a point can miss its mark
 
 
 class Pose(NamedTuple):

@@ -27,7 +27,7 @@ class CameraPane:
     def __init__(self, model: CameraModel, width: int, height: int) -> None:
         self._model, self._width = model, width
         self._scale = width / model.width
-        self._top = height - round(model.rows * self._scale)  # top row of the picture; may be < 0
+        self._top = height - round(model.rows * self._scale)  # top row of the picture; can be < 0
         near = max(0.0, model.distance(model.rows - 1.0))
         self._x = np.concatenate([[near], np.arange(np.ceil(near + 0.1), KNOTS[-1] + 1.0)])
 
