@@ -85,7 +85,8 @@ class Reach:
                 "statement",
                 self._statements,
                 [one.place for one in self.unexecuted],
-                "faults there are never active: anchor them elsewhere, or add a scenario that gets there",
+                "faults there are never active: anchor them elsewhere, or add a scenario that reaches these "
+                "statements",
             ),
             self._finding(
                 "trigger",
