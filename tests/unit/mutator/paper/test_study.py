@@ -57,7 +57,7 @@ def test_without_a_library_there_are_no_observations(run: Path) -> None:
 
 
 def test_the_report_links_to_the_page_of_the_study(run: Path) -> None:
-    """The page of the study is deleted if the results are no longer enough for the study."""
+    """The page of the study is deleted if the results can no longer be compared with the study."""
     written = building.write(run, HERE)
     assert "[STUDY.md](STUDY.md)" in written.markdown.read_text()
     assert "study.html" in Page(written.page.read_text()).links
