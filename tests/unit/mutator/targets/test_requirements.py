@@ -55,9 +55,7 @@ def test_check_and_doctor_report_a_missing_package(lacking: Workspace) -> None:
 
 def test_an_invalid_requirement_is_refused_at_its_line(toycar: Workspace) -> None:
     requiring(toycar, "numpy >> 2")
-    with pytest.raises(
-        MutatorError, match=r"toycar.yaml:3: 'numpy >> 2'; expected a requirement in pip"
-    ):
+    with pytest.raises(MutatorError, match=r"toycar.yaml:3: 'numpy >> 2'; expected a requirement in pip"):
         toycar.manifest("toycar")
 
 
