@@ -207,7 +207,7 @@ class MixedDetector:
         return line._replace(prob=0.0) if line.y == self._nowhere[side] else line
 
     def _sent(self, lines: list[RoadLine]) -> list[RoadLine]:
-        """Return the lines, with a missing one 8 m to the left. If no line is found, return the previous ones."""
+        """Return the lines, with a missing one 8 m to the left. Without any line, return the last ones."""
         if any(line.prob > 0.0 for line in lines):
             pairs = zip(lines, self._nowhere, strict=True)
             self._last = [line if line.prob > 0.0 else RoadLine(y=nowhere) for line, nowhere in pairs]

@@ -251,7 +251,7 @@ def test_engines_agree_on_every_value_under_some_triggers(three: Engines, path: 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("model", ENDS)
-def test_every_bad_end_has_the_same_message(three: Engines, model: str) -> None:
+def test_every_bad_ending_has_the_same_message(three: Engines, model: str) -> None:
     execution = check_same(three, three.job(fault(model, GAP, {"target": "gap"}), TRIGGERS["from 2.01 s"]))
     assert execution.status is (Status.TIMEOUT if model == "hang" else Status.CRASHED)
     check_same(three, three.job(fault(*MODELS["offset"]), TRIGGERS["from 2.01 s"]), RunMode.FORK)

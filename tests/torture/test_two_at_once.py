@@ -26,7 +26,7 @@ pytestmark = pytest.mark.slow
 
 TRIES = 60
 WORDS = ("small", "--limit", "2", "--engine", "fork")
-BUSY = ("in use", "run under way", "deleted by another command")
+BUSY = ("in use", "another command deleted the folder")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,7 +91,7 @@ class Pair:
         code = command.process.returncode
         end, why = judged(Told(code=code, said=said), Told(code=0, said=""), [""])
         if end is End.REFUSED and name == "verify" and code == 1:
-            return End.WRONG, "a run under way is taken for a damaged one"
+            return End.WRONG, "an unfinished run is taken for a damaged one"
         if end is End.REFUSED and name in ("run", "verify --repair") and not any(w in said for w in BUSY):
             known = "not a run folder" in said or "no results" in said
             return (

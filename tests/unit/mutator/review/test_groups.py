@@ -97,7 +97,7 @@ def test_the_id_of_a_shape_does_not_depend_on_its_members(toycar: Workspace) -> 
         "+x = 3.0  # fi:01234567",
     ],
 )
-def test_any_text_round_trips(patch: str) -> None:
+def test_a_patch_of_any_text_round_trips(patch: str) -> None:
     (shape,) = shapes([("a", "", patch), ("b", "", patch)])
     assert shape.patch(1) == patch
 
@@ -111,7 +111,7 @@ def test_numbers_outside_injected_lines_are_part_of_the_shape() -> None:
     assert without_values(patch) == without_values(patch.replace("y = 4", "y = -5.5e-7"))
 
 
-def test_a_tag_of_several_injections_has_no_numbers() -> None:
+def test_the_ids_in_a_tag_are_not_part_of_the_shape() -> None:
     """Mutants that change the same two values have the same shape."""
     patch = (
         "diff --git a/a.py b/a.py\n--- a/a.py\n+++ b/a.py\n@@ -1,1 +1,1 @@\n-x = y, z\n"

@@ -64,7 +64,7 @@ def test_the_run_of_a_job_is_complete_and_can_be_compared(busy: Client) -> None:
 
 
 @pytest.mark.slow
-def test_an_exact_plot_is_stored_where_rerun_stores_it(busy: Client) -> None:
+def test_an_exact_plot_is_stored_like_that_of_rerun(busy: Client) -> None:
     about = {"run": "first", "experiment": experiment(busy)}
     answer = busy.post("/api/jobs", {"kind": "plot", **about})
     job = busy.ended(answer.json["id"])
@@ -100,7 +100,7 @@ def test_jobs_wait_and_are_cancelled_without_leaving_a_process(busy: Client) -> 
 
 
 @pytest.mark.slow
-def test_a_job_that_fails_says_why(busy: Client) -> None:
+def test_a_failed_job_gives_the_reason(busy: Client) -> None:
     target = busy.place / "toy/tree/toycar/sensing.py"
     whole = target.read_text()
     target.write_text(whole + "# changed\n")
@@ -117,7 +117,7 @@ def job(**given: Any) -> Job:
 
 
 def test_the_output_of_a_job_is_plain_text() -> None:
-    """If the output is too long, its beginning is cut."""
+    """If the output is too long, its beginning is cut off."""
     made = job()
     made.hear(f"\x1b[31m/srv/data/{HOSTILE}\x07\u202e\n".encode())
     made.hear(b"\xff\xfe\n")

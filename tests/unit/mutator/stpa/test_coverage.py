@@ -44,12 +44,12 @@ def test_a_table_that_covers_everything_once_is_proved(conditions: tuple[str, ..
 def test_the_first_wrong_cell_is_named(
     conditions: tuple[str, ...], place: str, rows: tuple[str, ...]
 ) -> None:
-    """A wrong cell has no context or several."""
+    """A cell is wrong if it has no context or several."""
     found = prove(*conditions)
     assert (found.place, found.rows) == (place, rows)
 
 
-def test_neighbouring_numbers_leave_no_cell_between() -> None:
+def test_there_is_no_cell_between_neighbouring_numbers() -> None:
     found = prove("rs <= 1.0", "rs >= 1.0000000000000002")
     assert found.place is None and found.cells == 4
 

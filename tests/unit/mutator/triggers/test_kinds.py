@@ -46,7 +46,7 @@ def test_random_times_are_starts_of_steps() -> None:
     assert {draw_time(i, "k", first_s=0.1, last_s=0.2, step_s=0.1) for i in range(50)} == {0.1, 0.2}
 
 
-def test_random_times_need_an_interval() -> None:
+def test_random_times_need_a_valid_seed_and_interval() -> None:
     with pytest.raises(MutatorError, match="seed -1; expected 0 or more"):
         draw_time(-1, "k", first_s=1.0, last_s=2.0, step_s=0.01)
     with pytest.raises(MutatorError, match="expected an interval"):
