@@ -90,7 +90,6 @@ def test_clearing_deletes_links_but_not_their_targets(filled: Path) -> None:
 def test_making_room_deletes_the_least_recently_used_files_of_a_target(
     filled: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Files are deleted only if space is short."""
     assert caches.make_room("car") == []
     monkeypatch.setattr(caches, "TARGET_BYTES", 2 * 12_288)
     assert [entry.path.name for entry in caches.make_room("car")] == ["hog.so"]

@@ -49,7 +49,6 @@ def drive(workspace: Workspace, **given: Any) -> mutator.Trial:
 def test_the_error_for_a_wrong_argument_uses_its_python_name(
     toycar: Workspace, tmp_path: Path, call: Callable[[Any, Path], Any], argument: str
 ) -> None:
-    """The MutatorError names the argument, not a command-line option."""
     out = tmp_path / "out"
     with pytest.raises(MutatorError) as caught:
         call(toycar, out)

@@ -15,7 +15,6 @@ from mutator.workspace import Workspace
 
 
 def test_a_mutant_has_a_diff_a_patch_and_files(toycar: Workspace, tmp_path: Path) -> None:
-    """The written tree is the patched target."""
     mutant = mutator.build_mutant("sensor/distance/longer", "near", value=12.5, workspace=toycar)
     assert "gap = gap + 12.5" in mutant.diff
     assert set(mutant.files) == {"toycar/_fi.py", "toycar/go.py", "toycar/sensing.py"}

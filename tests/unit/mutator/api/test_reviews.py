@@ -10,7 +10,6 @@ from mutator.workspace import Workspace
 
 
 def test_a_decision_is_stored(toycar: Workspace, tmp_path: Path) -> None:
-    """The review page is written, too."""
     found = mutator.load_review(specs=["sensor/lane"], workspace=toycar)
     group = found.undecided[0]
     assert found.find([group.id[:8]]) == [group]

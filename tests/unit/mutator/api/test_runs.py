@@ -200,7 +200,6 @@ def test_a_rerun_is_compared_with_the_campaigns_record(driven: Run) -> None:
 
 
 def test_two_processes_can_request_the_same_series(driven: Run) -> None:
-    """Each process gets the complete series."""
     [name] = driven.results.index
     library = driven.workspace.library
     look = (

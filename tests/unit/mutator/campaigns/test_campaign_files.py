@@ -165,7 +165,6 @@ def test_a_plan_looks_up_only_the_changes_of_its_reading(toycar: Workspace) -> N
 
 
 def test_an_unknown_study_is_refused_with_its_line(toycar: Workspace, tmp_path: Path) -> None:
-    """By default, a campaign has no study."""
     path = tmp_path / "mine.yaml"
     path.write_text(TEXT)
     assert make_plan(toycar, path).campaign.study is None

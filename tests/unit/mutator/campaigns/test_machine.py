@@ -41,7 +41,6 @@ def test_without_an_installed_mutator_every_package_is_listed(monkeypatch: pytes
 
 
 def test_versions_come_from_package_metadata() -> None:
-    """A missing package has no version."""
     found = machine.versions(["numpy", "no-such-package"])
     assert found == {"numpy": metadata.version("numpy"), "no-such-package": None}
 

@@ -169,7 +169,6 @@ def test_an_unknown_name_is_reported_with_its_line(
 
 
 def test_scenarios_must_be_inside_the_library(toycar: Workspace) -> None:
-    """A subfolder of the library is allowed."""
     path, file = toycar.campaign("toy"), toycar.scenario("A")
     text = path.read_text()
     path.write_text(text.replace("[A, B]", f"[A, {file}]"))

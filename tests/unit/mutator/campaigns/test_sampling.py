@@ -38,7 +38,6 @@ def test_a_sample_is_balanced(many: list[Experiment], count: int) -> None:
 
 
 def test_if_a_variant_has_too_few_experiments_others_fill_its_share(many: list[Experiment]) -> None:
-    """No experiment is picked twice."""
     picked = pick(many, 60, seed=1)
     counts = Counter(e.fault.spec for e in picked)
     assert counts["radar/jamming/no_data"] == 8
@@ -75,7 +74,6 @@ def test_values_are_spread_evenly_over_the_range(count: int, wanted: int, indice
 
 
 def test_a_proportional_sample_keeps_pairs_and_the_share_of_each_variant(many: list[Experiment]) -> None:
-    """The sample is half of the plan."""
     picked = pick_in_proportion(many, 56, seed=1)
     assert len(picked) == len({e.id for e in picked}) == 56
     assert Counter(e.fault.spec for e in picked) == dict(zip(SPECS, (40, 4, 12), strict=True))

@@ -128,7 +128,6 @@ def test_the_table_of_severity_classes_contains_each_pair_once(found: Comparison
 
 
 def test_the_scale_of_the_second_run_applies_to_both_runs(runs: tuple[Path, ...]) -> None:
-    """A remark says that the scales differ."""
     found = compare(runs[0], runs[2])
     assert found.changed == ()
     assert {p.row_a.severity for p in found.pairs} == {"", "S2"}
@@ -140,7 +139,6 @@ def test_the_scale_of_the_second_run_applies_to_both_runs(runs: tuple[Path, ...]
 def test_without_severity_classes_no_change_of_severity_is_reported(
     runs: tuple[Path, ...], order: tuple[int, int]
 ) -> None:
-    """A gate on severity is refused."""
     found = compare(*(runs[i] for i in order))
     assert not found.having(Change.HIGHER_SEVERITY) + found.having(Change.LOWER_SEVERITY)
     assert "Severity is not compared: without has no classes." in found.remarks

@@ -42,7 +42,6 @@ def test_the_longest_suffix_of_a_key_is_its_unit() -> None:
     ],
 )
 def test_values_are_converted_between_units(number: float, source: str, target: str, expected: float) -> None:
-    """The result is a float, exact except for rounding."""
     result = units.convert(number, units.UNITS[source], units.UNITS[target])
     assert result == pytest.approx(expected, rel=1e-15)
     assert isinstance(result, float)

@@ -34,7 +34,6 @@ def gone(pid: int) -> bool:
 
 
 def test_forking_processes_have_one_thread_and_end_with_the_engine(fork: Fork) -> None:
-    """The server leaves no scratch files."""
     for time_s in (2.0, 4.0, 3.0):
         assert fork.run(fork.job(at_time(time_s))).mode is RunMode.FORK
     pids = fork.processes()
@@ -101,7 +100,6 @@ def test_waiting_processes_end_with_the_server(fork: Fork) -> None:
 
 
 def test_a_killed_guard_is_reported_by_the_next_run(fork: Fork) -> None:
-    """No process keeps running."""
     fork.run(fork.job(at_time(2.0)))
     pids = fork.processes()
     os.kill(fork.pool._process.pid, signal.SIGKILL)
@@ -127,7 +125,6 @@ time.sleep(60)
 
 @pytest.mark.slow
 def test_the_server_ends_when_its_engine_is_killed(toycar: Workspace, tmp_path: Path) -> None:
-    """All waiting processes end, too."""
     arguments = [toycar.library, toycar.templates, tmp_path, Path(__file__).parents[1]]
     engine = subprocess.Popen(
         [sys.executable, "-c", ENGINE, *map(str, arguments)], stdout=subprocess.PIPE, text=True

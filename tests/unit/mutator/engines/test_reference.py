@@ -69,7 +69,6 @@ def test_a_mutant_of_a_file_that_runs_read_uses_no_shared_caches(
 
 
 def test_a_successful_run_leaves_its_trace_and_record(run: Run) -> None:
-    """The CPU time is recorded."""
     execution = run()
     assert (execution.status, execution.detail) == (Status.OK, "")
     assert {path.name for path in execution.out.iterdir()} == {"log.npz", "said.json"}
@@ -105,7 +104,6 @@ def test_each_kind_of_ending_has_its_status(run: Run, body: str, status: Status,
 
 
 def test_a_syntax_error_in_executed_code_is_a_crash(run: Run) -> None:
-    """The error is reported with its position."""
     execution = run(entry("if :"))
     assert execution.status is Status.CRASHED
     assert "go.py" in execution.detail
@@ -377,7 +375,6 @@ def test_jobs_run_in_order_and_their_folders_are_deleted(
 def test_two_threads_can_use_one_engine(
     run: Run, toycar: Workspace, manifest: TargetManifest, tmp_path: Path
 ) -> None:
-    """Each thread works in a separate folder."""
     work = tmp_path / "side"
     work.mkdir()
     engine = ReferenceEngine(manifest, prepare_base(manifest, tmp_path / "base"), work, LIMITS)

@@ -75,7 +75,6 @@ def drive(fork: Fork, engine: Engine, after: AfterHazard, at: float = 2.0) -> Re
 
 
 def test_a_stopped_run_equals_the_beginning_of_the_complete_run(stopping: Fork) -> None:
-    """Every engine stops at the same step."""
     fork = stopping.engine
     null = build(stopping.manifest, stopping.models, None, always()).files
     work = stopping.folder / "warm"

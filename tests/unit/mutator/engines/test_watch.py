@@ -101,7 +101,6 @@ def test_reproducible_values_are_not_reported(line: str, noted: dict[str, list[d
 
 
 def test_a_clock_read_by_a_package_is_reported_at_the_targets_line(tmp_path: Path) -> None:
-    """The report also gives the package's line."""
     package, tree = tmp_path / "site-packages" / "pid", tmp_path / "tree"
     for folder in (package, tree):
         folder.mkdir(parents=True)

@@ -98,7 +98,6 @@ def test_a_difference_in_the_activation_step_is_sdc(judged: Callable[..., Record
 
 
 def test_hazards_and_alerts_after_the_activation_are_kept(judged: Callable[..., Record]) -> None:
-    """They are sorted by time."""
     said = {
         "hazards": {"H1": 0.9, "H3": 0.3, "TOO_FAST": None},
         "alert_events": [{"name": "brake_hard", "t": t} for t in (0.1, 0.6, 0.7)] + [{"name": "x", "t": 0.5}],

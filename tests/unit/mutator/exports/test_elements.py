@@ -135,7 +135,6 @@ def test_a_mutant_of_an_operator_replaces_its_expression(
 
 
 def test_a_mutant_with_a_hazard_is_killed(report: dict[str, Any]) -> None:
-    """The other mutants survive."""
     for _, mutant in mutants(report):
         lane = mutant["description"].startswith("sensor/lane/")
         assert mutant["status"] == ("Killed" if lane else "Survived")

@@ -24,7 +24,6 @@ def declare(workspace: Workspace, first: str, second: str) -> None:
 
 
 def test_the_first_reading_is_the_default(toy: Workspace) -> None:
-    """Readings keep the order of the file."""
     declare(toy, "printed", "measured")
     readings = load_readings(toy.library)
     assert (readings.names, readings.default) == (("printed", "measured"), "printed")
@@ -46,7 +45,6 @@ def test_a_library_without_the_file_has_one_reading(toy: Workspace) -> None:
 
 
 def test_specs_use_the_declared_readings_as_keys(toy: Workspace) -> None:
-    """The faults have these readings, too."""
     for path in toy.spec_files():
         text = path.read_text().replace("as_described:", "printed:").replace("as_coded:", "measured:")
         path.write_text(text)

@@ -90,7 +90,6 @@ def test_a_module_with_the_probes_name_is_refused(toy: Workspace, name: str) -> 
 
 
 def test_the_patch_the_tree_and_the_digest_agree(toy: Workspace, tmp_path: Path) -> None:
-    """The target itself remains unchanged."""
     manifest = toy.manifest("toy")
     before = manifest.tree.digest
     made = build(toy, toy_faults(toy)["both"])
@@ -105,7 +104,6 @@ def test_the_patch_the_tree_and_the_digest_agree(toy: Workspace, tmp_path: Path)
 
 
 def test_ids_depend_on_everything_that_determines_a_mutant(toy: Workspace) -> None:
-    """Here, the fault, the trigger and the target vary."""
     faults = toy_faults(toy)
     first = build(toy, faults["longer"])
     assert first == build(toy, faults["longer"])
@@ -180,7 +178,6 @@ def test_locations_of_handwritten_faults_are_checked(
 
 
 def test_a_mutant_that_does_not_compile_is_invalid(toy: Workspace, tmp_path: Path) -> None:
-    """The error names the file and the line."""
     templates = Path(shutil.copytree(toy.templates, tmp_path / "templates"))
     (templates / "stuck.py.j2").write_text("nonlocal {{ target }}\n")
     broken = Workspace(library=toy.library, templates=templates)
@@ -191,7 +188,6 @@ def test_a_mutant_that_does_not_compile_is_invalid(toy: Workspace, tmp_path: Pat
 
 
 def test_an_invalid_trigger_is_refused(toy: Workspace) -> None:
-    """Either the condition is invalid, or the hold `for` has no duration."""
     with pytest.raises(MutatorError, match="is not a truth value"):
         build(toy, None, Trigger(name="x", condition="__import__('os')"))
     with pytest.raises(MutatorError, match="without a time; expected hold_s"):

@@ -187,7 +187,6 @@ def test_an_unsuitable_value_is_refused(clone: Workspace, location: FaultLocatio
 
 
 def test_a_model_that_changes_no_value_is_refused(clone: Workspace) -> None:
-    """A parameter that names a variable is also refused."""
     file = parse_file("m.py", SOURCE.encode(), Path("x"))
     for model, params in (("omission", ()), ("offset", (("by", 1.0), ("target", "LOW")))):
         with pytest.raises(MutatorError, match=r"cannot change the value|expected no variable"):

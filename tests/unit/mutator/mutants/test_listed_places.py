@@ -123,7 +123,6 @@ def test_models_work_at_the_places_that_list_them(shipped: Workspace, listed: li
 
 
 def test_the_places_of_one_function_can_be_listed(shipped: Workspace) -> None:
-    """The error for an unknown function suggests a similar name."""
     file = parse_file("m.py", SOURCE, Path("x"))
     found = places_of(file, shipped.fault_models(), "other")
     assert {one.location.function for one in found} == {"other"}

@@ -98,7 +98,6 @@ def test_a_slow_call_returns_its_result_after_its_duration(toy: Make) -> None:
 
 
 def test_a_slow_call_that_fails_is_repeated_in_the_next_step(toy: Make) -> None:
-    """The exception propagates."""
     made = toy("def f(get):\n    return get()\n", AnchorKind.RESULT, "get", "slow_call", duration=1.0)
     with pytest.raises(ZeroDivisionError):
         made.run("x", lambda: lambda: 1 / 0)
@@ -219,7 +218,6 @@ def test_only_two_different_arguments_without_stars_can_be_swapped(
 @pytest.mark.parametrize("model", ["slow_call", "swapped_arguments"])
 @pytest.mark.parametrize(("kind", "name"), [(AnchorKind.VALUE, "x + 1"), (AnchorKind.AFTER_ASSIGN, "y")])
 def test_a_model_of_a_call_needs_a_call_anchor(toy: Make, model: str, kind: AnchorKind, name: str) -> None:
-    """The error names the anchor."""
     params: dict[str, Value] = {"duration": 1.0} if model == "slow_call" else {"first": 1, "second": 2}
     with pytest.raises(
         MutatorError, match=rf"m.py:2: model {model} needs more than .*; expected a call: an anchor `result`"

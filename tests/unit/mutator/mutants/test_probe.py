@@ -178,7 +178,6 @@ def test_drift_grows_with_steps_and_not_with_executions(clone: Workspace) -> Non
 
 
 def test_stored_values_are_reset_at_each_activation(clone: Workspace) -> None:
-    """The active time is reset, too."""
     fi = probe(clone)
     seen = []
     for i, mark in enumerate(".xxx.xx"):
@@ -305,7 +304,6 @@ def test_a_bit_outside_the_type_is_an_error(clone: Workspace, value: Any, bit: i
 def test_a_whole_number_gets_the_type_of_the_integer_that_it_replaces(
     clone: Workspace, value: Any, number: float, kind: type
 ) -> None:
-    """The value can be an integer, a numpy integer, or an array of integers."""
     found = probe(clone).like(value, number)
     assert type(found) is kind
     assert found == number or math.isnan(number)

@@ -52,7 +52,6 @@ def test_the_evaluated_decision_agrees_with_observe(clone: Workspace) -> None:
 
 
 def test_probes_of_two_triggers_differ_only_in_their_settings(clone: Workspace) -> None:
-    """The settings can be found by name."""
     other = Trigger(name="x", condition="t >= 3.0", hold=Hold.FOR, hold_s=2.5, armed_after_s=1.0)
     rests, found = [], []
     for trigger in (TRIGGER, other):

@@ -62,7 +62,6 @@ def test_a_reusable_change_equals_the_spliced_one(text: str, guard: bool) -> Non
 
 @pytest.mark.parametrize("text", TEXTS)
 def test_a_change_of_a_value_and_inserted_lines_can_be_reused_together(text: str) -> None:
-    """The changed line can be the last one of the file."""
     file = parse_file("m.py", text.encode("latin-1" if "latin" in text else "utf-8"), Path("root"))
 
     def changed(name: str, value: str) -> tuple[ReusableChange, Change, list[bytes]]:

@@ -35,7 +35,6 @@ def spliced(text: str | bytes, kind: AnchorKind, name: str = "x", *, guard: bool
 
 
 def test_lines_are_inserted_next_to_the_statement() -> None:
-    """Each line has the statement's indentation and a tag."""
     text = "def f(x):\n    # why\n    x = 1  # set\n    # then\n    return x\n"
     assert spliced(text, AnchorKind.AFTER_ASSIGN).decode() == (
         "def f(x):\n    # why\n    x = 1  # set\n"
@@ -138,7 +137,6 @@ def test_only_a_statement_alone_on_its_lines_can_be_wrapped(text: str, kind: Anc
 
 
 def test_several_edits_at_one_statement_can_be_combined() -> None:
-    """A guard stays directly above its statement."""
     file = parsed("def f(x):\n    if x:\n        x = 1\n    g(1)\n    return x\n")
     edits = [
         edit(file, AnchorKind.BEFORE_CALL, "g", guard=True),

@@ -57,7 +57,6 @@ def test_steps_after_the_end_of_the_drive_affect_only_max_dev() -> None:
 
 
 def test_a_channel_is_compared_at_its_own_times() -> None:
-    """A run that ends earlier differs, too."""
     own, times = np.array([0.0, 0.2]), T + 0.01
     golden = {"t": T, "gas": np.array([1.0, 2.0]), "gas@": own}
     faulty = {**golden, "t": times}
@@ -197,7 +196,6 @@ def test_a_record_is_read(tmp_path: Path) -> None:
     ],
 )
 def test_an_incomplete_record_is_a_bad_output(tmp_path: Path, text: str) -> None:
-    """The times of hazards and alerts are required."""
     (tmp_path / "record.json").write_text(text)
     with pytest.raises(BadOutput):
         load_record(MANIFEST, tmp_path)

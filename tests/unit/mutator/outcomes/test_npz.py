@@ -24,7 +24,6 @@ def written(save=np.savez, **arrays: np.ndarray) -> bytes:
 
 
 def test_the_fast_reader_returns_the_same_arrays_as_numpy() -> None:
-    """Names, order, types, shapes and values are the same."""
     found = npz.members(written(**ARRAYS))
     assert found is not None
     assert list(found) == list(ARRAYS)

@@ -296,7 +296,6 @@ def test_a_chain_has_feedback_too() -> None:
 
 
 def test_a_path_through_a_loop_has_each_component_once() -> None:
-    """The path ends at the process."""
     links: dict[str, Any] = {name: one.model_dump(by_alias=True) for name, one in STRUCTURE.links.items()}
     links["back"] = {"from": "speed", "to": "finder", "label": ""}
     circle = replace_links(links)

@@ -79,7 +79,6 @@ def test_reading_tables_leaves_no_thread(run: Path) -> None:
 
 
 def test_columns_follow_the_targets_hazards_and_channels(run: Path) -> None:
-    """The CSV file and the frames have the same columns."""
     table = Results.up_to_date(run)
     columns = list(next(table.lines()))
     at = columns.index("t_manifest")

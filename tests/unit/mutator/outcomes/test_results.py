@@ -35,7 +35,6 @@ MakeRecord = Callable[..., Record]
 def test_the_row_of_a_run_with_a_hazard_has_the_expected_cells(
     experiment: Callable[..., Experiment], record: MakeRecord
 ) -> None:
-    """Among them are flags, simulation times, alerts in order, and the reaction time."""
     one = experiment(24, method=Method.RANDOM, trigger="random/C2")
     kept = record(
         one.id,
@@ -188,7 +187,6 @@ def folder(toycar: Workspace, tmp_path: Path, record: MakeRecord) -> RunFolder:
 
 
 def test_tables_are_sorted_and_complete(folder: RunFolder) -> None:
-    """Only the hazards and channels of the target appear."""
     rows = list(csv.DictReader(results.build(folder.path).open()))
     assert (len(rows), folder.planned) == (22, 24)
     ids = [row["experiment_id"] for row in rows]

@@ -153,7 +153,6 @@ def test_a_channel_with_its_own_times_keeps_its_newest_value(
 def test_a_series_is_read_back_from_its_file(
     tmp_path: Path, manifest: TargetManifest, record: Callable[..., Record]
 ) -> None:
-    """Writing the series again gives the same file."""
     one = record(alerts=(("brake_hard", 2.5),))
     keep_series(tmp_path, manifest, trace(), trace(speed=T), one)
     path = SeriesFolder(tmp_path).kept(one.experiment_id)

@@ -41,7 +41,6 @@ def test_other_versions_can_be_accepted() -> None:
 
 
 def test_the_rate_of_each_machine_is_reported() -> None:
-    """The number of refused workers is reported, too."""
     now = [0.0]
     crew = Crew(STRETCH, accept=False, now=lambda: now[0])
     for name, host in (("a", "alpha"), ("b", "alpha"), ("c", "beta")):

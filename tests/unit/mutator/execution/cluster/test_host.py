@@ -83,7 +83,6 @@ def test_the_process_and_its_folder_are_removed_with_the_host(host: Host, sent: 
 
 
 def test_a_killed_process_is_reported_with_its_experiment(host: Host, sent: tuple[Bundle, Piece]) -> None:
-    """The next piece gets a new process."""
     with attended(host):
         killer = threading.Thread(target=lambda: os.kill(_first(host), signal.SIGKILL))
         killer.start()
