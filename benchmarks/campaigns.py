@@ -1,8 +1,9 @@
 """Measure whole campaigns with one worker and with two.
 
-`python benchmarks/campaigns.py [--campaign paper_smoke]`. A first run, which is not measured, fills the
-caches (frames, detections, passed checks). Then one worker and two alternate. CPU time covers all processes.
-Wall time needs otherwise idle cores. The exit code is 1 if a run fails or the results differ in a byte.
+`python benchmarks/campaigns.py [--campaign paper_smoke]`. A first run fills the caches (frames,
+detections, passed checks) and is not compared. Then runs with one worker and with two alternate. CPU time
+covers all processes. Wall time needs otherwise idle cores. The exit code is 1 if a run fails or any byte of
+the results differs.
 """
 
 import argparse
@@ -44,7 +45,7 @@ def summary_of(name: str, took: dict[str, float], count: int) -> None:
 def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--campaign", default="paper_smoke")
-    parser.add_argument("--limit", metavar="N", help="number of its experiments")
+    parser.add_argument("--limit", metavar="N", help="run only N experiments of the campaign")
     parser.add_argument("--engine", help="reference, warm or fork, if not the one that mutator chooses")
     parser.add_argument("--rounds", type=int, default=1)
     parser.add_argument("--json", type=Path, metavar="FILE")

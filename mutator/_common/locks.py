@@ -70,7 +70,7 @@ def register_worker(run: Path) -> int:
 
 
 def living_workers(run: Path) -> list[int]:
-    """The process ids of the workers in `run`; remove entries of dead workers."""
+    """Return the process ids of the workers in `run`, and remove the entries of dead workers."""
     living = []
     for path in sorted((run / WORKERS).glob("[0-9]*")):
         try:

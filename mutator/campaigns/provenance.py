@@ -25,7 +25,7 @@ _OWN = Path(__file__).parents[1]  # the harness
 
 
 def sources(workspace: Workspace, manifest: TargetManifest, scenarios: set[str]) -> dict[str, str]:
-    """Return the digest, by name, of everything outside the plan that affects results."""
+    """Return the digests, by name, of all files outside the plan that affect results."""
     return {
         "target": manifest.tree.digest,
         "manifest": digest(manifest.path.read_bytes()),
@@ -73,13 +73,13 @@ def check_versions(folder: RunFolder, *, accept: bool = False) -> tuple[str, ...
 
 
 def other_versions(run: Path, what: str, found: Iterable[str]) -> MutatorError:
-    """Return an error, not raised, about different versions; its text begins with `what`."""
+    """Return, without raising it, an error about different versions. Its text begins with `what`."""
     return MutatorError(
         f"{what} other versions: {'; '.join(found)}",
         where=run,
         argument="accept_versions",
         expected="the same Python and packages for a whole run",
-        remedy="restore them, or accept other versions: `accept_versions`",
+        remedy="restore the earlier versions, or accept the new ones: `accept_versions`",
     )
 
 

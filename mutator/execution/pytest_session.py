@@ -38,7 +38,7 @@ class HarnessErrors(Exception):
 
 
 class CampaignItem(pytest.Item):
-    """An item with work of a campaign. It fails only for harness errors; known ones have no traceback."""
+    """An item that does part of a campaign's work. It fails only for harness errors."""
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
         if isinstance(excinfo.value, HarnessErrors | MutatorError):

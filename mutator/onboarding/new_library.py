@@ -124,7 +124,7 @@ def _of_loop(best: LoopCandidate | None) -> dict[str, Any]:
         "value": first,
         "others": f"Other values of {best.name}: {places}"
         if places
-        else f"No other value is computed at {best.path}:{best.line}",
+        else f"{best.name} ({best.path}:{best.line}) computes no other value",
     }
 
 

@@ -59,7 +59,7 @@ def _check_complete(data: dict[str, Any], keys: tuple[str, ...], source: Source,
             at,
             f"no `{missing[0]}`",
             expected=f"this key in a manifest of {OLD}",
-            remedy=f"add it, or write {NEW}",
+            remedy=f"add it, or convert the manifest to {NEW}",
         )
 
 

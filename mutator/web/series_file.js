@@ -10,7 +10,7 @@ const SeriesFile = (() => {
   let index = null; // promise of the index
   const SIGN = 0x7fffffff, NONE = 0x7fc00000; // NONE: the bits of a missing value
 
-  /** The function that each file calls, with its name. */
+  /** Each file calls this function with the file's name and text. */
   function loaded(name, text) {
     waiting.get(name)?.(text);
   }
@@ -44,7 +44,7 @@ const SeriesFile = (() => {
     return new Response(stream).arrayBuffer(); // this also verifies the checksum
   }
 
-  /** The entries' owners and positions; null: nothing was packed. */
+  /** Each experiment's entry, and the entries' positions; null if nothing was packed. */
   async function readIndex() {
     const bytes = await read("index", "index");
     if (!bytes) return null;

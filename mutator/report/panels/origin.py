@@ -1,4 +1,4 @@
-"""The panel of provenance: how the experiments were executed, and what reproduces them."""
+"""The provenance panel: how the experiments were executed, and what is needed to reproduce them."""
 
 from mutator._common.tables import Table
 from mutator.campaigns.studies import study_problems

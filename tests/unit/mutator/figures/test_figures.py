@@ -34,7 +34,7 @@ def texts(file: Path) -> list[str]:
     return ["".join(e.itertext()) for e in ET.parse(file).getroot().iter("{http://www.w3.org/2000/svg}text")]
 
 
-def test_each_run_is_in_exactly_one_part_of_a_bar(frame: pd.DataFrame) -> None:
+def test_each_run_with_a_hazard_is_in_exactly_one_part_of_a_bar(frame: pd.DataFrame) -> None:
     assert list(hazards.hazard_sets(frame)) == ["H1", "several", "", "", "", "H2"]
 
 
