@@ -280,7 +280,7 @@ def _print_end(
         terminal.say(f"seal: {summary.seal}")
     if summary.harness_errors:
         terminal.say(
-            f"harness errors, left out of all rates; the same command retries them: {len(summary.harness_errors)}"
+            f"harness errors, left out of rates; the same command retries them: {len(summary.harness_errors)}"
         )
         for name, detail in summary.harness_errors[:5]:
             terminal.say(f"  {name}: {detail}", style="red")
