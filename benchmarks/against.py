@@ -2,7 +2,7 @@
 
 `python benchmarks/against.py CLONE [--campaign NAME]`. CLONE is a checkout of the older commit, installed
 into its .venv as its README says. Both versions run alternately, each time with an empty cache. Code that an
-old version compiles with a separate command is compiled before its clock starts. CPU time covers all
+old version compiles with a separate command is compiled before the measurement. CPU time covers all
 processes. Wall time needs otherwise idle cores. Idle time is the time in which a core has no work. The exit
 code is 1 if a run fails.
 """
@@ -28,7 +28,7 @@ Parts = dict[str, dict[str, float]]  # by stage: wall_s, cpu_s
 
 
 def run(clone: Path, campaign: str, workers: int, more: list[str]) -> Parts:
-    """Run a campaign with the version of `clone` and no caches. Return the time of each part."""
+    """Run a campaign with the version of `clone` and empty caches. Return the times of each stage."""
     python = sys.executable if clone == ROOT else str(clone / ".venv" / "bin" / "python")
     with tempfile.TemporaryDirectory() as place:
         # older versions ignore XDG_CACHE_HOME for frames, detections and helpers

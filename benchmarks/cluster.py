@@ -3,9 +3,9 @@
 `python benchmarks/cluster.py [overhead] [intake] [ends] [--campaign NAME]`. Without a name, it measures all
 three. `overhead` is the CPU time of all processes for a campaign on two Dask workers of this machine and on
 two local workers, alternately and with warm caches. `intake` is the number of results a second that the
-command takes from two workers, whose engine takes no time. Patches and series have their usual size. `ends`
-simulates 64 workers that run 10,000 experiments with a campaign's durations, and compares the end of the last
-worker with the mean.
+command accepts from two workers with a simulated engine that takes no time. Patches and series have their
+usual size. `ends` simulates 64 workers that run 10,000 experiments with a campaign's durations, and compares
+the time at which the last worker ends with the mean.
 """
 
 import argparse
@@ -45,7 +45,7 @@ from mutator.workspace import Workspace
 ROOT = Path(__file__).resolve().parents[1]
 WORKERS, EXPERIMENTS = 64, 10_000
 GOLDEN_S = 1.2  # of CPU for a worker's golden run
-RECORD = {  # the most frequent kind in a campaign
+RECORD = {  # a record of the most frequent kind in a campaign
     "activation": {"count": 1200, "first": 4.11, "last": 16.1},
     "alerts": [["fcw", 9.81]],
     "detail": "",
@@ -105,7 +105,7 @@ def planned(name: str = "paper") -> Iterator[tuple[Workspace, RunFolder, tuple[P
         yield workspace, folder, pending(folder, {})
 
 
-# A worker's task with an engine that takes no time. Dask sends these functions as they are.
+# These functions replace a worker's and take no time. Dask sends them to the workers.
 
 
 def facts(packages: Any) -> dict[str, Any]:

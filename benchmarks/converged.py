@@ -30,9 +30,7 @@ from mutator.store.series_format import Series  # noqa: E402
 from mutator.workspace import Workspace  # noqa: E402
 
 WORTH_IT = 0.02  # of the CPU
-_LAST_S = (
-    0.06  # a fault active this shortly before the end was active to the end: it might act in every fifth step
-)
+_LAST_S = 0.06  # a fault that acts in every fifth step until the end may be last active this long before it
 
 
 @dataclass

@@ -1,7 +1,7 @@
 """Measure the CPU time of the paper's lane detector.
 
 `python benchmarks/detect.py [--repeat N]`. It prints the median CPU time (ms, one thread) of a detection,
-compiled and in Python, and of the steps in Python. The frames show the rendered road, clean and with rain,
+compiled and in Python, and of each step in Python. The frames show the rendered road, clean and with rain,
 snow and noise. A run of 30 s makes 600 detections. The last column divides the time of the detection that a
 run uses (the compiled one, if it exists) by its goal. The exit code is 1 if a detection misses its goal.
 """
@@ -36,7 +36,7 @@ from selfdrive.visiond.mark_edges import edges  # noqa: E402
 from selfdrive.visiond.paper_detector import EPS, MIN_SAMPLES, PaperDetector  # noqa: E402
 from selfdrive.visiond.road_region import RoadRegion  # noqa: E402
 
-GOAL, FOUL_GOAL = 1.5, 4.0  # ms for a detection, in fair weather and foul
+GOAL, FOUL_GOAL = 1.5, 4.0  # ms for a detection, in clear and in bad weather
 COLUMNS = "compiled", "Python", "hog", "edges", "dbscan", "lines", "edge pixels", "of the goal"
 
 
@@ -62,8 +62,8 @@ def pictures(model: CameraModel) -> dict[str, np.ndarray]:
 
 
 def measure(model: CameraModel, picture: np.ndarray, repeat: int) -> list[float]:
-    """Return medians (ms) of the detection, compiled (NaN if it is not) and in Python, and of the latter's
-    steps with every steep edge; also the number of edge pixels."""
+    """Return the median times (ms) of the compiled detection (NaN if there is none), of the detection in
+    Python and of its steps, then the number of edge pixels."""
     fast, plain, region = build_paper_detector(model), PaperDetector(model), RoadRegion(model)
     view = CameraView(0.0, 0.0, 0.0, (), 0.0, picture)
     hog, lines = Hog(*region.shape), EdgeLines(model, region)

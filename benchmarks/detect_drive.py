@@ -1,8 +1,8 @@
 """Measure the geometric and the as-coded detector's time for a frame, as medians over a run.
 
-`python benchmarks/detect_drive.py [--repeat N] [--plain]`, on one core, in clear and in bad weather. It uses
-compiled code unless given `--plain`; the last column says whether it did. Times are CPU times of this
-process. The exit code is 1 if a median is above its goal.
+`python benchmarks/detect_drive.py [--repeat N] [--plain]`. It uses one core, clear and bad weather, and
+compiled code unless given `--plain`; the last column says whether the code was compiled. Times are CPU times
+of this process. The exit code is 1 if a median is above its goal.
 """
 
 import argparse
@@ -60,7 +60,7 @@ def drive(marks: str, weather: str | None, amount: float) -> list[np.ndarray]:
 
 
 def times(detector: RobustDetector | CodedDetector, pictures: list[np.ndarray], repeat: int) -> list[float]:
-    """Return the CPU time (ms) of each detection. Only the first has no history."""
+    """Return the CPU time (ms) of each detection. Only the first has no previous frame."""
     found = []
     for k in range(repeat):
         view = CameraView(

@@ -68,7 +68,7 @@ class Bench:
         return self.folder / "golden" / GoldenRun.of(experiment, several_seeds=False).key
 
     def steps(self, experiment: Experiment) -> int:
-        """Return the steps of the golden run, which every run that ends well also has."""
+        """Return the number of steps of the golden run, and so of every run that ends normally."""
         trace = golden.load_trace(self.manifest, self.golden(experiment))
         return len(trace[self.manifest.time_channel])
 
@@ -85,7 +85,7 @@ class Bench:
             execution.out.rename(self.folder / "golden" / one.key)
 
     def measure(self, name: str, experiments: Sequence[Experiment]) -> tuple[Measured, float]:
-        """Return an engine's time for all the experiments and, before that, for each golden run."""
+        """Return an engine's measurements, and the CPU (s) of a first pass with an experiment per golden run."""
         engine = self.engines[name]()
         runner = Runner(
             self.manifest, self.models, engine, Goldens(self.manifest, self.golden), self.workspace.scenario
@@ -94,7 +94,7 @@ class Bench:
         before = _cpu()
         for key in firsts:
             list(runner.run([key]))
-        engine.close()  # only then are its processes counted
+        engine.close()  # CPU time includes the engine's processes only once they have ended
         first_s = _cpu() - before
         before, measured = _cpu(), Measured()
         for finished in runner.run(sorted(experiments, key=lambda e: (e.scenario, e.changes, e.method))):

@@ -45,7 +45,7 @@ MORE_MEMORY_MB = 5.0  # of a worker, between 1,000 and 50,000 experiments
 
 
 def plan_of(workspace: Workspace, size: int) -> Plan:
-    """Return the paper's campaign, in as many scenarios as needed, cut to size."""
+    """Return a plan of the paper's campaign in as many scenarios as needed, cut to `size` experiments."""
     text = workspace.campaign("paper").read_text()
     names = list(workspace.scenarios)
     scenarios = names[: -(-size // 2256)]  # a scenario has 282 faults, 4 contexts and 2 methods
@@ -84,7 +84,7 @@ def _channels() -> tuple[str, ...]:
 
 
 def _left(number: int) -> tuple[tuple[str, float, float], ...]:
-    """Return divergences of almost every channel, each at another time."""
+    """Return divergences of almost every channel, each at a different time."""
     start = 2.05 + number % 997 / 100
     names = [name for place, name in enumerate(_channels()) if (number + place) % 7]
     return tuple((name, start + place / 100, number / (7 + place)) for place, name in enumerate(names))

@@ -31,7 +31,7 @@ Trace = Mapping[str, np.ndarray]
 
 
 def drive(name: str, step: float) -> Trace:
-    """Simulate a scenario. `step` moves its lane to the left instead of the car's start."""
+    """Simulate a scenario. With a `step`, the car starts centred, and the lane later moves to the left."""
     simulator = Simulator()
     simulator.reset(load_scenario(ROOT / "fault_library" / "scenarios" / f"{name}.yaml"), 0)
     if step:
@@ -44,7 +44,7 @@ def drive(name: str, step: float) -> Trace:
 
 
 def measure(trace: Trace, start: float, band: float) -> tuple[float, ...]:
-    """Return the largest offset and the largest to the other side (m), the settling time (s), the steady
+    """Return the largest offset and the overshoot to the other side (m), the settling time (s), the steady
     error (m), the largest torque, and the time (s) at full torque. Settled means within `band` of the steady
     offset."""
     t, offset = trace["t"], trace["lateral_offset"]

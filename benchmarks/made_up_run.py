@@ -52,9 +52,9 @@ ROOT = Path(__file__).resolve().parents[1]
 SEED = 11_280  # experiments of a seed
 KINDS = 480  # different records, used in turn
 PATCHES = 240  # different patches
-SERIES, SERIES_MOST = 48, 150_000  # different series, and experiments with a series, to fit 500 MB
+SERIES, SERIES_MOST = 48, 150_000  # different series; experiments with a series, limited to fit 500 MB
 WORKERS, PIECE = 2, 20  # files, and consecutive experiments in one of them
-_WHOLE_EVERY = 256  # patches, as in the writer of patches
+_WHOLE_EVERY = 256  # the first of this many patches is stored whole, as in mutator.store.patches
 _NO_ID = "0" * 16
 
 
@@ -203,12 +203,12 @@ def write_segments(
 
 
 def _patch_of(count: int, patches: int) -> int:
-    """Return the number of an experiment's patch: 0, the first, wherever a file stores a patch whole."""
+    """Return the index of an experiment's patch: 0 where a file stores a whole patch."""
     return count % patches if count % _WHOLE_EVERY else 0
 
 
 def _blocks(patches: Sequence[bytes]) -> list[tuple[int, bytes]]:
-    """Return the first patch whole, and each other one as a difference from it."""
+    """Return the first patch whole, and the others as differences from it."""
     packer = _Packer()
     return [packer.block(patch) for patch in patches]
 
@@ -246,7 +246,7 @@ def write_proof(
 def write_series(
     workspace: Workspace, folder: RunFolder, ids: Sequence[str], experiments: Sequence[Experiment]
 ) -> None:
-    """Write a packed index in which the experiments that fit share a few series."""
+    """Write packed series. The experiments that fit the budget share a few of them."""
     manifest, place = workspace.manifest("openpilot"), folder.path / "series"
     place.mkdir()
     first = folder.goldens[0]

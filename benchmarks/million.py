@@ -4,9 +4,9 @@
 at three sizes. The runs are synthetic (`made_up_run.py`) and kept in DIR for later calls. Each row is a
 separate process, with CPU and wall seconds and the peak memory of the process and its children together.
 Shared pages count once, and memory is sampled twice a second. The page opens in the system's Chromium,
-headless. Its wall time is from the navigation until its list is usable. Growth is the CPU time per experiment
-relative to that of the smallest size. `new here` means a machine that has not seen the run before and
-verifies all of it; afterwards only its bytes are compared.
+headless. Its wall time runs from the navigation until its list is usable. Growth is the CPU time per
+experiment relative to that of the smallest size. `new here` means a machine that has not verified the run
+before; afterwards only its bytes are compared.
 """
 
 import argparse

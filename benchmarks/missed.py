@@ -1,8 +1,8 @@
 """Measure how often the geometric detector misses a line in bad weather: `python benchmarks/missed.py`.
 
 Three cameras see rendered roads of all kinds through the strongest rain, snow and occlusion of the paper. A
-frame counts as missed if a line is not found, or is off by more than 0.3 m at 10 m ahead. Only roads of which
-both lines are found in fair weather are used.
+frame counts as missed if a line is not found, or is off by more than 0.3 m at 10 m ahead. Roads on which a
+line is missed in clear weather are left out.
 """
 
 import argparse

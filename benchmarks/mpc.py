@@ -49,7 +49,7 @@ def steer(mpc: LateralMpc) -> None:
 
 
 def cpu_us(task: Callable[[], object], divisor: int = 1) -> float:
-    """Return the CPU time of `task` in microseconds, for one of `divisor` parts."""
+    """Return the CPU time of `task` in microseconds, divided by `divisor`."""
     start = process_time()
     task()
     return (process_time() - start) / divisor * 1e6

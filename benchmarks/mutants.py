@@ -41,7 +41,7 @@ def rate(make: Callable[[Experiment], object], experiments: list[Experiment]) ->
 
 
 def operators(manifest: TargetManifest, models: FaultModels, count: int) -> tuple[float, float]:
-    """Return operators' mutants per second of CPU: found in the controller, without equal code, and built."""
+    """Return how many mutants of operators are found (without equal code) and built per second of CPU."""
     find_mutations(manifest, models, [Operator.RETURN], PLACES)  # parses the files, as every campaign must
     start = process_time()
     found = find_mutations(manifest, models, list(Operator), PLACES)

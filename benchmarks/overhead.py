@@ -1,11 +1,11 @@
 """Measure the cost of an experiment without its simulation.
 
 `python benchmarks/overhead.py [--experiments 200] [--against CLONE] [--json FILE]`. The fork engine runs
-faults of the paper's campaign with ideal vision, each of which first acts at its own time in the last steps
-of a 30 s run. All of a worker's steps are included: mutant, run, comparison with golden, patch, record. It
-prints the CPU of the worker, of its children and of the processes from which they fork, and the CPU of 30 s
-of the same simulation. With `--against`, a checkout of an older commit runs alternately. Compare the ratios,
-not the times. The exit code is 1 if the overhead exceeds its goal.
+faults of the paper's campaign with ideal vision, each of which first acts at a different time in the last
+steps of a 30 s run. All of a worker's steps are included: mutant, run, comparison with golden, patch, record.
+It prints the CPU of the worker, of its children and of the processes from which they fork, and the CPU of 30
+s of the same simulation. With `--against`, a checkout of an older commit runs alternately. Compare the
+ratios, not the times. The exit code is 1 if the overhead exceeds its goal.
 """
 
 import argparse
@@ -76,7 +76,7 @@ class Bench:
         self.common = (self.manifest, prepare_base(self.manifest, folder / "base"), self.work, limits)
 
     def golden(self) -> float:
-        """Simulate the golden run and return the CPU time (s) in addition to that of a two-step run."""
+        """Simulate the golden run and return its CPU time (s) minus that of a two-step run."""
         job = Job(name="golden", scenario=self.workspace.scenario(SCENARIO), seed=1)
         engine = ReferenceEngine(*self.common)
         whole = engine.execute(job, self.folder / "golden")

@@ -23,7 +23,7 @@ from mutator.mutants.injection_edits import injection_edit
 from mutator.targets.source_tree import SourceTree, read_tree
 from mutator.workspace import Workspace
 
-MODULES = (  # module, distribution, why
+MODULES = (  # module, distribution, why it was chosen
     ("highway_env.vehicle.controller", "highway-env", "a vehicle's controller"),
     ("can.bit_timing", "python-can", "timing of a bus: properties, checks, integer arithmetic"),
     ("cantools.database.utils", "cantools", "codecs of messages: bytes, formats, dictionaries"),
@@ -220,7 +220,7 @@ class Counting(ast.NodeVisitor):
 
 
 class Reach:
-    """What a file's anchors lead to."""
+    """The places in a file that anchors reach."""
 
     def __init__(self, file: ParsedFile, models: FaultModels, tree: SourceTree) -> None:
         self.file, self.models, self.tree = file, models, tree
@@ -233,7 +233,7 @@ class Reach:
         return _spot(site.node) in self.spots or (bool(site.name) and self.is_assigned(site))
 
     def sets(self, site: Site) -> bool:
-        """Whether the probe can set the place. It builds the edit with all modules of the package in view."""
+        """Return whether the probe can set the place, by building the edit against the whole package."""
         function, _, name = site.name.rpartition(":")
         kind = AnchorKind.DEFAULT if site.kind == "default" else AnchorKind.CONSTANT
         location = FaultLocation(path=self.file.path, function=function, anchor=Anchor(kind=kind, name=name))

@@ -1,9 +1,9 @@
-"""Measure the CPU time of work around the paper's 11,280 experiments.
+"""Measure the CPU time of the work around the paper's 11,280 experiments.
 
 `python benchmarks/planning.py`. It measures planning, freezing, reaching the first experiment and resuming a
 complete run. In the complete run, which is synthetic, every experiment has a record of a masked fault. The
-cached checks of a start are synthetic, too. A start ends before the first mutant runs, without workers. Each
-time is also printed per experiment and relative to planning.
+cached checks are synthetic, too. A start uses no workers and ends before the first mutant runs. Each time is
+also printed per experiment and relative to planning.
 """
 
 import argparse
@@ -34,7 +34,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 class Table:
-    """Prints times as they are measured. The others are relative to the first."""
+    """Prints times as they are measured, with ratios to the first one."""
 
     def __init__(self) -> None:
         self.count = 0  # experiments

@@ -36,7 +36,7 @@ window.player = Replay.show(document.getElementById("place"), series, facts);
 
 
 def made_series(manifest: TargetManifest) -> dict[str, Any]:
-    """Return a run in which the fault lets every channel diverge from 5 s on."""
+    """Return a run in which the fault makes every channel diverge from 5 s onwards."""
     t = np.arange(0.0, DURATION, STEP)
     made = {c.name: 0.1 * np.sin(t + i) for i, c in enumerate(manifest.channels)}
     made |= {

@@ -2,9 +2,9 @@
 
 `python benchmarks/report_page.py [--json FILE]`. The experiments are those of the paper's campaign, with more
 seeds if needed. Their records are synthetic. The page opens in the system's Chromium, headless. Times are
-wall times in the browser from the navigation, best of several: until the table is usable, then for the first
-filter, sort, search and opened experiment. The exit code is 1 if 11,280 experiments do not open in a second
-or take more than 8 MB.
+wall times in the browser, the best of several: from the navigation until the table is usable, then for the
+first filter, sort, search and opened experiment. The exit code is 1 if 11,280 experiments do not open in a
+second or take more than 8 MB.
 """
 
 import argparse
@@ -71,8 +71,8 @@ TIMED = f"""async () => {{
     return performance.now() - began;
 }}"""
 CLEARED = f"async () => {{ document.querySelector('#chips .clear, #chips .chip')?.click(); {SHOWN} }}"
-SERIES = 48  # different ones
-STEPS = {  # what a reader does first
+SERIES = 48  # different series
+STEPS = {  # a reader's first actions
     "filter": "document.querySelector('#heat .cell:not(.nothing)').click()",
     "sort": "document.querySelector('[data-column=t_hazard] button').click()",
     "search": "const s = document.querySelector('#search'); s.value = 'chaff 35';"
@@ -112,7 +112,7 @@ def patches(workspace: Workspace, experiments: Sequence[Experiment]) -> Iterator
 
 
 def write_series(workspace: Workspace, records: Sequence[Record], out: Path) -> float:
-    """Write series of traces with realistic lengths, each for many records. Return KB of the index."""
+    """Write series of realistic lengths, each shared by many records. Return the size of the index in KB."""
     manifest = workspace.manifest("openpilot")
     draw = np.random.default_rng(1)
     names = [channel.name for channel in manifest.channels]

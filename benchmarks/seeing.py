@@ -1,9 +1,10 @@
 """Find the differences between the readings that make image faults hazardous: `python benchmarks/seeing.py`.
 
 The paper's text and its authors' code differ in how frames are made and seen. The benchmark enables each
-difference alone and then all of them, on the reference plant, and counts the runs that end in a hazard: an
-effect at each level in every context that a scenario reaches. If all of them together cause hazards, it also
-removes each difference, and tries other thresholds of the detector as coded. `--csv FILE` stores every run.
+difference alone and then all of them, on the reference plant, with every effect at each level in every
+context that a scenario reaches, and counts the runs that end in a hazard. If all of them together cause
+hazards, it also removes each difference in turn, and tries other thresholds of the detector as coded. `--csv
+FILE` stores every run.
 """
 
 import argparse
@@ -66,7 +67,7 @@ DIFFERENCES = {
 ARMED_FROM = 1.5  # s, without ARMING
 THRESHOLDS = 2.0, 3.0  # in addition to the detector's own
 SAFE_HEADWAY = 2.0  # s
-CONTEXTS: dict[str, Callable[[float, float], bool]] = {  # of headway time and of how much slower the lead is
+CONTEXTS: dict[str, Callable[[float, float], bool]] = {  # by headway time and how much slower the lead is
     "C1": lambda hwt, slower: hwt <= SAFE_HEADWAY and slower <= 0.0,
     "C2": lambda hwt, slower: hwt <= SAFE_HEADWAY and slower > 0.0,
     "C3": lambda hwt, slower: hwt > SAFE_HEADWAY and slower <= 0.0,
@@ -81,9 +82,9 @@ KINDS: dict[str, tuple[type[Effect], type[Effect]]] = {  # as described, as code
     "brightness": (effects.Brightness, effects.Brightness),
     "blur": (effects.AveragingBlur, effects.AveragingBlur),
 }
-DRAWINGS = 20  # of an effect as described: each frame uses the next of these seeds
+DRAWINGS = 20  # number of seeds of an effect as described: each frame uses the next one
 CYCLE = 0.05  # s between frames
-FRAMES = "SEEING_FRAMES"  # environment variable with the folder where runs share their frames
+FRAMES = "SEEING_FRAMES"  # environment variable that names the folder of shared frames
 
 
 class Row(NamedTuple):
@@ -97,7 +98,7 @@ class Row(NamedTuple):
 
 
 class Case(NamedTuple):
-    """A run. If `effect` is "", it is the fault-free run."""
+    """A run, fault-free if `effect` is ""."""
 
     row: Row
     scenario: str
@@ -127,7 +128,7 @@ THEN = [
 
 
 class TrueLabels(ReferencePlant):
-    """The reference plant with frames that show the car's true side."""
+    """The reference plant, without swapping left and right in frames."""
 
     mirrors = False
 
@@ -174,7 +175,7 @@ class FaultyCamera(PictureCamera):
 
 @cache
 def drawing(name: str, level: int, coded: bool, number: int, camera: CameraModel) -> Effect:
-    """Return one of the effect's drawings at a level of 1 to 10."""
+    """Return the effect at a level of 1 to 10, drawn with one of its seeds."""
     kind = KINDS[name][coded]
     amounts = LEVELS[kind]
     return kind(amounts[-(-level * len(amounts) // 10) - 1], 1 + number, camera)
@@ -240,7 +241,7 @@ def faulty(free: dict[Case, Ending], names: Iterable[str], levels: Sequence[int]
 
 
 def report(runs: dict[Case, Ending], rows: Sequence[Row]) -> None:
-    """Return Markdown: for each row the hazards of each effect, and the result of its fault-free runs."""
+    """Print Markdown: for each row the hazards of each effect, and the result of its fault-free runs."""
     print("| differences |", *(f"{name} |" for name in KINDS), "fault-free |")
     print("| --- |" + " --- |" * (len(KINDS) + 1))
     for row in rows:

@@ -155,7 +155,7 @@ def run_in_parts(scenario: Scenario) -> tuple[Stopwatch, float]:
 
 
 def against(clone: Path, scenario: Path, rounds: int) -> bool:
-    """Print the times of start and loop in both versions. Return whether the goals are reached."""
+    """Print the times of start and loop in both versions. Return whether the goals are met."""
     with tempfile.TemporaryDirectory() as place:
         versions = {"older": clone.resolve(), "this": ROOT}
         times: dict[str, list[dict[str, float]]] = {name: [] for name in versions}

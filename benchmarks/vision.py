@@ -47,7 +47,7 @@ def show(name: str, spent: list[float], goal: float | None = None) -> bool:
 
 
 def render(repeat: int) -> bool:
-    """Draw consecutive frames of the standard road, straight and from the side."""
+    """Draw consecutive frames of the standard road, from its middle and from aside, turned."""
     renderer = RoadRenderer(CameraModel(), "dashed", 0)
     straight = times(lambda number: renderer.grey(number * SPACING), repeat)
     aside = times(lambda number: renderer.grey(number * SPACING, 0.5, 0.02), repeat)
@@ -82,7 +82,7 @@ def library(repeat: int) -> bool:
 
 
 def runs(repeat: int) -> bool:
-    """Simulate 30 s without frames, with new ones, and with remembered ones."""
+    """Simulate 30 s without frames, with new ones, and with cached ones."""
     scenario, good = load_scenario(ROOT / "fault_library/scenarios/S1.yaml"), True
     show("runs: without pictures", times(lambda number: simulate(scenario, 0), 2))
     with TemporaryDirectory() as folder:
