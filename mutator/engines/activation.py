@@ -17,7 +17,7 @@ from mutator.mutants.probe import decision_in
 from mutator.triggers.over_time import ARITHMETIC, COMPARE
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)  # hashed by identity: thousands of values are slow to hash
+@dataclass(frozen=True, kw_only=True, eq=False)  # hashed by identity, as hashing all values is slow
 class Observed:
     """What a probe observes in a golden run.
 
@@ -42,7 +42,7 @@ class Observed:
 class Start:
     """The point where a mutant leaves the golden run: before `step`, after `observed` observations.
 
-    `began` is the time of the earliest of these observations, `t` of the last (s); None without observations.
+    `began` is the time (s) of the earliest of these observations, `t` that of the last; None without any.
     """
 
     step: int
@@ -59,7 +59,7 @@ def first_active(own: str, seen: Observed) -> Start | None:
     return _first_active(*decision_in(own), seen)
 
 
-@lru_cache(maxsize=64)  # cached, because faults share triggers: the contexts of the hazard analysis
+@lru_cache(maxsize=64)  # cached, because faults share triggers (contexts of the hazard analysis)
 def _first_active(armed_t: float, condition: str, seen: Observed) -> Start | None:
     if not seen.values:
         return None
@@ -79,7 +79,7 @@ def _first_active(armed_t: float, condition: str, seen: Observed) -> Start | Non
 
 
 def _holds(function: ast.FunctionDef, values: dict[str, Any]) -> Any:
-    """Evaluate a condition for each observation. The arithmetic on numpy's doubles equals Python's."""
+    """Evaluate a condition for each observation. Arithmetic on numpy's doubles gives Python's results."""
     with np.errstate(all="ignore"):
         for node in function.body:
             if isinstance(node, ast.Assign):

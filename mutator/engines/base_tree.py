@@ -1,4 +1,4 @@
-"""The pristine tree to which the trees of runs are linked, as copying takes up to a tenth of a run's time."""
+"""The pristine tree. Runs link to its files, because copying takes up to a tenth of a run's time."""
 
 import os
 import shutil
@@ -12,8 +12,8 @@ _Stamp = tuple[int, int, int, int]
 class BaseTree:
     """The pristine tree in `folder`, made by `prepare_base`.
 
-    A run can write through its links and so change this tree. The engine then restores the tree, and repeats
-    each run made meanwhile on a copy without links.
+    A run can write through its links and so change this tree. The engine then restores the tree, and repeats,
+    on a copy without links, each run made meanwhile.
     """
 
     def __init__(self, folder: Path) -> None:

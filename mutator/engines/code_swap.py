@@ -42,8 +42,8 @@ class CodeSwap:
     """Everything that turns a loaded pristine program into the mutant.
 
     The parts of `probe` run in order; `own` is the source of the first (`probe.parts_of`). `imports` are the
-    modules that injected lines import. `settings` has modules and the code of their lines that set values in
-    the probe. These modules must already be loaded, because loading a module runs those lines with the
+    modules that injected lines import. `settings` has, for each module, the code of its lines that set values
+    in the probe. These modules must already be loaded, because loading a module runs those lines with the
     module's own constants.
     """
 
@@ -203,7 +203,7 @@ def same(one: CodeType, other: CodeType) -> bool:
 
 
 def essence(code: CodeType) -> tuple[object, ...]:
-    """Return a key of what the code does; equal for functions that do the same."""
+    """Return a key for what the code does. Functions that do the same have equal keys."""
     return (*_essence(code), *map(essence, _inner(code)))
 
 

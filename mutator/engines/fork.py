@@ -43,7 +43,7 @@ _Key = tuple[str, int, tuple[str, ...]]
 
 
 class ForkEngine:
-    """Arguments as for ReferenceEngine. `null` has the files of the null mutant."""
+    """Takes the arguments of ReferenceEngine; `null` has the files of the null mutant."""
 
     def __init__(
         self,

@@ -40,7 +40,7 @@ def not_loadable(manifest: TargetManifest, base: Path, home: Path) -> Refused | 
 
 
 def not_forked(manifest: TargetManifest, models: FaultModels, faults: Iterable[Fault]) -> dict[str, str]:
-    """Return variants that only the reference engine can run, with the reason, from one fault of each."""
+    """Return the variants that only the reference engine can run, with the reason. Tests a fault of each."""
     variants = {fault.spec: fault for fault in faults}
     if why := not_forkable(manifest):
         return dict.fromkeys(variants, why)

@@ -112,7 +112,7 @@ class Execution:
 class Engine(Protocol):
     """Runs jobs and yields each with its result, in any order. `out` stays valid until the next result.
 
-    Never change the output folder: if the trigger never holds, it is the golden run's.
+    Callers must not change `out`: if the trigger never holds, it is the golden run's.
     """
 
     def run(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Execution]]: ...

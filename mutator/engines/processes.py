@@ -26,7 +26,7 @@ _REPORT = {"ended": str, "disk_full": bool, "outside": list, "probe": object}
 _NAMES = ("outside", "modules", "libraries", "threads")  # lists of texts in a report
 _LOG_TAIL = 4000
 _LEAST_FREE = 4 << 20  # with less free space than this, a failed run is not blamed on the target
-_TRIAL = 1 << 20  # nor if a file of this size cannot be written
+_TRIAL = 1 << 20  # the same applies if a file of this size cannot be written
 _OUTSIDE_SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT)
 
 
@@ -46,7 +46,7 @@ class Ended:
 def check_limits(limits: Limits) -> None:
     """Raise MutatorError if this process's own limits are lower than the campaign's.
 
-    Otherwise a run could end here that would not end elsewhere.
+    With lower limits, a run could be stopped that finishes elsewhere.
     """
     wanted = (
         (resource.RLIMIT_AS, "memory_mb", limits.memory_mb << 20, "ulimit -v"),
@@ -139,8 +139,8 @@ def tail(path: Path) -> str:
 def read_report(path: Path, **more: type) -> dict[str, Any] | None:
     """Return the child's report; None if it is missing, incomplete or invalid.
 
-    Each field is checked, because a run can write anything to this file. `more` are fields of one engine
-    only.
+    Each field is checked, because a run can write anything to this file. `more` has fields that only
+    one engine reports.
     """
     try:
         report: dict[str, Any] = json.loads(no_pipe(path).read_bytes())

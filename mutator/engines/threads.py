@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-_LISTED = 4  # names to list, because a pool can have dozens
+_LISTED = 4  # the most names to list, because a pool can have dozens of threads
 _NUMBERS = "OMP_NUM_THREADS, OPENBLAS_NUM_THREADS"
 _KNOWN = (  # start of a thread's name, what the thread is, how to turn it off
     (

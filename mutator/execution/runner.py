@@ -236,7 +236,7 @@ class Runner:
 
     def _failed(self, experiment: Experiment, built: Mutant, execution: Execution) -> Record:
         status, detail = assign_blame(execution, built.files, self._raising(experiment, built))
-        # the count of a crash is reproducible; that of a time-out depends on the machine's speed
+        # the number of activations before a crash is reproducible; before a time-out it is not
         activation = activation_of(execution.probe or {}) if status is Status.CRASHED else None
         bare = _bare(experiment, status, detail, built, activation)
         return replace(bare, error=error_of(execution.raised))

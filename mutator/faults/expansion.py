@@ -27,7 +27,7 @@ def expand(
     models: FaultModels,
     manifest: TargetManifest,
 ) -> tuple[Fault, ...]:
-    """Return the faults of `spec` in `reading` (None: the library's default), by variant and range.
+    """Return the faults of `spec` in `reading` (None: the library's default), ordered by variant and range.
 
     The same seed draws the same values for every reading, trigger, scenario and method. MutatorError
     (file:line) for an unknown model, parameter or change, a wrong unit, a value out of range, and a location

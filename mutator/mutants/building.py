@@ -64,7 +64,7 @@ class Mutant:
 
 
 def build(manifest: TargetManifest, models: FaultModels, fault: Fault | None, trigger: Trigger) -> Mutant:
-    """Build the mutant of `manifest`'s tree with `fault` under `trigger`, or the null mutant without a fault.
+    """Build the mutant of `manifest`'s tree with `fault` under `trigger`; without a fault, the null mutant.
 
     `fault.hold` overrides `trigger.hold`. MutatorError with candidates if an anchor is missing or ambiguous,
     InvalidMutant if the result does not compile.

@@ -99,7 +99,7 @@ def _expression(
 
 
 def _extent(lines: Sequence[str], node: ast.expr) -> tuple[_Point, _Point]:
-    """Return begin and end of a node: line and column in characters, from 0. `ast` counts UTF-8 bytes."""
+    """Return where a node begins and ends: line and character column, from 0. `ast` counts UTF-8 bytes."""
     assert node.end_lineno is not None and node.end_col_offset is not None
 
     def point(line: int, column: int) -> _Point:

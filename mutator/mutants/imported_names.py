@@ -39,7 +39,7 @@ def importers(tree: SourceTree, path: str, name: str) -> tuple[str, ...]:
     """Return `module.NAME` for each place that imports the constant `name` of the module at `path`.
 
     MutatorError with the places where it cannot be set: star imports, imports into a class, and modules that
-    set the name in another way, too.
+    also set the name in another way.
     """
     files = [tree.derived(file, _imports) for file in tree.files if file.endswith(".py")]
     exported = {file.module: file.exported for file in files}
@@ -111,7 +111,7 @@ def _exported(tree: ast.Module) -> frozenset[str] | None:
 
 
 def _of_body(body: Iterable[ast.stmt], path: str, *, inside: bool) -> Iterator[_Import]:
-    """Yield imports of a module or its classes. Imports in functions last for one call only."""
+    """Yield imports of a module or its classes, not of functions, where imports last for one call only."""
     for statement in body:
         match statement:
             case ast.ImportFrom(module=module, names=names, level=level, lineno=line):

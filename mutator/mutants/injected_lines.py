@@ -14,7 +14,7 @@ from mutator.model import Injection
 
 IMPORT_TAG = "probe"  # on the line that imports the probe
 OBSERVE_TAG = "observe"  # on the statement that passes the ground truth to the probe
-ORIGINAL = "original"  # the original value in a line that sets a value
+ORIGINAL = "original"  # name of the original value in a line that sets a value
 # an id in quotes, in a name or in a tag, which can have several ids; not a number of eight digits
 INJECTION_ID = (
     r"(?:(?:(?<=[\"'_])|(?<=fi:))[0-9a-f]{8}(?![0-9A-Za-z.])"
@@ -52,8 +52,8 @@ _SETTING = re.compile(
 class Tag:
     """The tag at the end of an injected line."""
 
-    id: str  # of the injection, IMPORT_TAG or OBSERVE_TAG; several ids are joined with `+`
-    guarded: int  # lines that a guard indents
+    id: str  # an injection's id, IMPORT_TAG or OBSERVE_TAG; several ids are joined with `+`
+    guarded: int  # number of lines that a guard indents
     code: bytes  # the line without the tag
     was: bytes | None = None  # the target's line that this line replaces
 

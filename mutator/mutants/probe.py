@@ -160,7 +160,7 @@ def was_triggered(report: Mapping[str, Any] | None) -> bool:
 
 
 def activation_of(report: Mapping[str, Any]) -> Activation | None:
-    """Return the first and last execution of any injection, and their number; None if there is none."""
+    """Return the first and last execution of any injection, and the number of executions; None if none."""
     injections = report.get("injections")
     ran = [i for i in injections.values() if i and i["count"]] if isinstance(injections, dict) else []
     if not ran:

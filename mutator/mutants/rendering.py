@@ -26,7 +26,7 @@ from mutator.faults.fault_models import NAMES, FaultModel, ParamSchema, SnippetK
 from mutator.model import Value
 from mutator.mutants.normalized_source import normalized
 
-_EXACT = 2.0**53  # every integer up to this is a double
+_EXACT = 2.0**53  # every integer up to this is exact as a double
 _EXPECTED = {  # by parameter type
     "variable": "the name of a variable",
     "import": "a dotted name to import",
@@ -117,7 +117,7 @@ _FAILURES = (TypeError, ValueError, ArithmeticError, AttributeError, LookupError
 def snippet(
     model: FaultModel, params: Mapping[str, Value], fi: str, statements: Mapping[str, str] | None = None
 ) -> tuple[str, ...]:
-    """Return the model's lines for these parameters, untagged, 4 spaces a level.
+    """Return the model's lines for these parameters, untagged, indented by 4 spaces a level.
 
     `fi` is the injection's id; `statements` are the source texts that the model needs. MutatorError if the
     template fails or its result is not whole lines of Python.

@@ -1,8 +1,8 @@
 """The splicer: inserts tagged lines between the lines of a source file, and removes them again.
 
 Edits are whole lines, so everything else keeps its bytes, such as line ends, tabs and comments. A guard also
-indents the statement it wraps; its tag has the number of lines. A line with a changed expression is replaced
-by one that keeps the old line in its tag.
+indents the statement it wraps; its tag has the number of these lines. A line with a changed expression is
+replaced by one that keeps the old line in its tag.
 """
 
 from codecs import BOM_UTF8
@@ -250,9 +250,7 @@ def _margin(line: bytes) -> bytes:
 
 
 def _end_of_file(pieces: list[Piece], added: list[bytes], newline: bytes) -> list[bytes]:
-    """Keep a missing newline at the end of the file: move the newline from the last added line to the old
-    last line.
-    """
+    """If the file lacks a newline at its end, keep it so: move the last added line's to the old last line."""
     last = pieces[-1]
     if last.lines[-1].endswith((b"\n", b"\r")):
         return added

@@ -1,4 +1,4 @@
-"""Selects mutations: by operator, by place in the source, by lines that golden runs execute."""
+"""Selects mutations by operator, by place in the source, and by the lines that golden runs execute."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass

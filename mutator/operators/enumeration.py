@@ -16,7 +16,7 @@ from mutator.operators.names import Operator
 from mutator.operators.rules import rules_for
 
 LEFT_OUT = "left out"
-_ID = "ffffffff"  # no operator template writes it
+_ID = "ffffffff"  # an id that no operator template writes
 
 
 def mutations_of(

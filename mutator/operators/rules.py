@@ -108,7 +108,7 @@ def _comparison(node: ast.expr) -> Iterator[Rule]:
 
 
 def _constants(node: ast.expr) -> list[Value]:
-    """Return distinct replacements of a constant: 0, 1, -1, one more, one less, negated, all of its type."""
+    """Return distinct replacements of a constant, of its type: 0, 1, -1, one more, one less, negated."""
     sign = 1
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
         sign, node = -1, node.operand

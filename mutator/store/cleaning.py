@@ -19,7 +19,7 @@ _TRIES, _PAUSE_S = 50, 0.1
 
 
 def clean(path: Path) -> None:
-    """Delete the run folder. MutatorError as in `check`, and while a command or its workers use it."""
+    """Delete the run folder. MutatorError as in `check`, or if a command or its workers use it."""
     check(path)
     with owned(path, patience_s=0.0):
         found = check(path)  # check again, because now nobody else can write to the folder

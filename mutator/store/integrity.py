@@ -29,7 +29,7 @@ _MANY = 5  # at most this many experiments are named in one message
 def problems(
     run: Path, head: Head, ledger: Ledger | None, shard: Shard | None, *, anew: bool = False
 ) -> Iterator[MutatorError]:
-    """Yield every problem of a run folder that runs `shard`.
+    """Yield every problem of a run folder in which `shard` runs.
 
     For a finished run that this machine has verified before, only file bytes are compared, unless `anew`.
     """
@@ -90,7 +90,7 @@ def key_of(run: Path, found: Mapping[str, Digest | None]) -> str:
 
 
 def share(run: Path, head: Head, shard: Shard | None) -> dict[str, int]:
-    """Return the ids and positions of the experiments that a run folder runs, in plan order.
+    """Return the ids and positions of the experiments that run in a run folder, in plan order.
 
     MutatorError if the plan has a duplicate, or if its length does not match its chunks.
     """

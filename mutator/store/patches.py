@@ -164,7 +164,7 @@ def rewrite(path: Path, patches: Iterable[tuple[str, bytes]]) -> None:
 
 
 def packed_patches(patches: Iterable[tuple[str, bytes]]) -> bytes:
-    """Return the blocks of patches that do not depend on earlier ones: a whole file or a part of one."""
+    """Return patches as blocks that need no earlier blocks, for a whole file or a part of one."""
     packer, blocks = _Packer(), []
     for experiment_id, data in patches:
         kind, content = packer.block(data)

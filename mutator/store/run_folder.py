@@ -272,7 +272,7 @@ class RunFolder:
 
     @property
     def base(self) -> Path:
-        """The unmodified copy of the tree from which runs are created."""
+        """The pristine tree, from which the trees of runs are made."""
         return self.work / "base"
 
     def find(self, prefix: str) -> str:

@@ -57,7 +57,7 @@ class Series:
 def encode(one: Series, golden: Series | None = None) -> bytes:
     """Encode a run; the same run always gives the same bytes. Without `golden`, it is a golden run.
 
-    A faulty run begins with the times of `golden`.
+    The times of a faulty run begin with those of `golden`.
     """
     known = 0
     if golden is not None and len(one.t):

@@ -40,7 +40,7 @@ def time_of(trigger: Trigger) -> float | None:
 
 
 def draw_time(seed: int, key: str, *, first_s: float, last_s: float, step_s: float) -> float:
-    """Draw the time of a step from `first_s` to `last_s` (both included), each with the same probability.
+    """Draw the time of a step from `first_s` to `last_s` (both included). All steps are equally likely.
 
     `seed` and `key` determine the result, which is rounded to nine decimals for readability.
     """

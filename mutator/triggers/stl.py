@@ -22,7 +22,7 @@ _SAME_LENGTH = 0.01  # tolerance in steps; times are sums of steps, or rounded
 
 
 def check(formula: str, variables: Collection[str], step_s: float) -> None:
-    """Raise MutatorError for a formula that cannot be evaluated in steps of `step_s`, or without rtamt."""
+    """Raise MutatorError if rtamt is missing, or cannot evaluate the formula in steps of `step_s`."""
     # NaN suffices: no arithmetic fails on it
     _evaluated(formula, {name: np.full(1, np.nan) for name in (*variables, TIME)}, step_s)
 

@@ -112,7 +112,7 @@ class Experiment {
   #commands() {
     const { el } = Dom;
     const id = this.text("experiment_id"), run = this.facts.run();
-    const tried = this.text("module") === "operators" ? [] // specs have no operators
+    const tried = this.text("module") === "operators" ? [] // an operator's fault has no spec
       : [el("p", {}, "Try a variation: change the value, trigger or scenario in this command:"), this.command(this.#try())];
     return el("div", {}, el("p", {}, "Rerun it and compare it with its record; show its diff, times and plot:"),
       this.command(`mutator rerun ${id} --run ${run}`), this.command(`mutator show ${id} --run ${run}`), tried);

@@ -105,7 +105,7 @@ class HeatMap {
     }));
   }
 
-  /** The same for given values (null: no value), each with its number of runs. */
+  /** The text, description and colour of values (null: no value), each given with its number of runs. */
   static #coloured({ turn }, told) {
     const values = told.map(([value]) => value ?? NaN);
     const known = values.filter(Number.isFinite), low = Math.min(...known), high = Math.max(...known);

@@ -28,7 +28,7 @@ const Formula = (() => {
     return made;
   }
 
-  /** Whether the condition has held by then. */
+  /** For each step, whether the condition has held so far. */
   function ever(holds) {
     let found = false;
     return holds.map((now) => (found = found || now));

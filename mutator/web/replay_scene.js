@@ -97,7 +97,7 @@ class ReplayScene {
   /** A mark at the followed actor's position during an event: a line across, and its name at the bottom. */
   #pin({ kind, x, label }, i) {
     const { context, colours, height } = this, at = this.#x(x);
-    if (at < 0 || at > this.width) return; // without the name, because it would be cut
+    if (at < 0 || at > this.width) return; // out of view, so the name would be cut off
     context.strokeStyle = colours[kind] ?? colours.ink;
     context.lineWidth = 1.4;
     context.setLineDash(kind === "hazard" ? [] : [4, 3]);

@@ -97,7 +97,7 @@ class Outbox {
       const by = this.queue[0].by;
       const batch = this.queue.filter((item) => item.by === by).slice(0, this.isSingle ? 1 : Outbox.MOST);
       const changes = batch.map(({ group, kind, text }) => ({ group, kind, text }));
-      const seen = Object.fromEntries(batch.map((item) => [item.group, item.seen]).reverse()); // of a group's first mark
+      const seen = Object.fromEntries(batch.map((item) => [item.group, item.seen]).reverse()); // as of a group's first mark
       const digests = Object.fromEntries(batch.map((item) => [item.group, item.digest]).reverse()); // of the shown diffs
       const answer = await this.#ask(this.address, { changes, by, seen, digests });
       if (!this.#answered(answer, batch)) {

@@ -67,7 +67,7 @@ class Stacks {
     return others.length > lines.length ? [...lines, el("li.quiet", {}, `and ${others.length - lines.length} more`)] : lines;
   }
 
-  /** The part that distinguishes each text: without the words with which all texts begin and end. */
+  /** Each text without the words with which all texts begin and end. */
   static differences(texts) {
     const all = texts.map((text) => text.split(" ")), [first] = all;
     const shortest = Math.min(...all.map((words) => words.length));

@@ -1,5 +1,5 @@
 "use strict";
-// The results as columns. Search, counts and sorting take less than the time between two keystrokes for 100,000 experiments.
+// The results as columns. For 100,000 experiments, search, counts and sorting take less time than passes between two keystrokes.
 
 const Rows = (() => {
   /** The filters: column, title, the name of an empty cell and, for cells with several values, the separator. */
@@ -134,7 +134,7 @@ const Rows = (() => {
     /**
      * The rows that match `query` and `chosen` (facet name -> set of values).
      * `counts` has the number of rows for each facet value, given the other facets' choices.
-     * `apart` has the rows that fail at most in the facets of `free`, which a map over these counts.
+     * `apart` has the rows that match all facets except perhaps those in `free`. A map over these facets counts them.
      */
     filter(query, chosen, free = []) {
       const found = this.#searched(query);
@@ -167,7 +167,7 @@ const Rows = (() => {
       return { rows, apart, counts: new Map(this.facets.map((f, i) => [f.name, counts[i]])) };
     }
 
-    /** Sentences on a state's unknown columns and filters, and on filters for values that these results do not have. */
+    /** Sentences about a state's unknown columns and filters, and about filters for values that these results lack. */
     unknown({ query, chosen, unknown }) {
       const made = unknown.map((name) => `This page has no filter "${name}"`);
       for (const token of query.toLowerCase().split(/\s+/)) {

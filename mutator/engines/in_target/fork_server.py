@@ -63,7 +63,7 @@ class Abandoned(Exception):
 
 
 class Process:
-    """A waiting process. `run` is its golden run, before `step`; None before any run."""
+    """A waiting process. `run` is its golden run, stopped before `step`; None before any run."""
 
     def __init__(self, start: dict[str, Any], connection: socket.socket) -> None:
         self.start = start
@@ -176,7 +176,7 @@ class Process:
         return {**ended, "threads": [], "touched": self.touched()}
 
     def become(self, job: dict[str, Any]) -> NoReturn:
-        """In a new child: become a mutant of the run so far, finish it, and report."""
+        """In a new child: continue the run so far as a mutant to its end, and report."""
         self.connection.close()
         log = os.open(job["log"], os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o644)
         os.dup2(log, 1)

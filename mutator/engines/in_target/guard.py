@@ -1,7 +1,7 @@
 """Run code in a separate process within limits, and end everything it started. Standard library only.
 
-The waiting process is a subreaper: it adopts the processes that its descendants leave in any session, and
-kills them. As a script, `guard.py PARENT PROGRAM WORDS...` becomes that program, but dies with its parent.
+The waiting process is a subreaper: it adopts and kills the processes that its descendants leave, in any
+session. As a script, `guard.py PARENT PROGRAM WORDS...` becomes that program, but dies with its parent.
 """
 
 import ctypes
@@ -28,7 +28,7 @@ _libc = ctypes.CDLL(None)
 
 
 class Space:
-    """Limit of `disk_mb` MiB on what the folder `home` may use in addition to its present content."""
+    """A limit on how much the folder `home` can grow: `disk_mb` MiB."""
 
     def __init__(self, home: str, disk_mb: int) -> None:
         self._home = home
@@ -106,7 +106,7 @@ def _prctl(option: int, value: int) -> None:
 
 
 def _wait(pid: int, caller: int, deadline: float, space: Space | None) -> str:
-    """Wait until the child has ended (unreaped) or must be stopped; return the reason."""
+    """Wait until the child ends, without reaping it, or must be stopped; return the reason to stop it."""
     handle, pause = os.pidfd_open(pid), _LOOK_S
     poll = select.poll()
     poll.register(handle, select.POLLIN)

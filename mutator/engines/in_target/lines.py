@@ -17,7 +17,7 @@ _TOOL = 1  # the tool id that `sys.monitoring` reserves for coverage
 class Lines:
     """Notes lines of the tree at `tree`, once a line in `since` of the file `path` has run.
 
-    A fault cannot act in lines that run only earlier.
+    A fault cannot act in lines that run only before that.
     """
 
     def __init__(self, tree: str, path: str, since: Iterable[int]) -> None:

@@ -1,7 +1,7 @@
-"""A replacement for the probe in a tree that is run for its pictures. Standard library and numpy only.
+"""A replacement for the probe in a tree that is run only to draw pictures. Standard library and numpy only.
 
-At the place of an image effect, the lines of every effect in ASKED are executed on the variables of that
-place, each on the same picture. The pictures before and after are written to the run's folder, and the run
+At the place of an image effect, every effect in ASKED is applied to the same picture, with the variables of
+that place. The pictures before and after are written to the run's folder, and the run
 ends.
 """
 

@@ -170,7 +170,7 @@ def asked(probe: Any, tree: str, name: str) -> dict[str, Any]:
 
 
 def describe(err: BaseException, tree: str, probe: str | None) -> dict[str, Any]:
-    """Return how a run failed, in a reproducible text. `probe` is the name of the probe's module."""
+    """Describe reproducibly how a run failed. `probe` is the name of the probe's module."""
     kind = type(err)
     if probe and (kind.__module__, kind.__name__) == (probe, "StepLimit"):
         return {"ended": "steps"}

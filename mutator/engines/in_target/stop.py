@@ -15,7 +15,7 @@ def drive(run: Any, source: str | None) -> bool:
             run.step()
         return False
     over = compiled(source)
-    recorded = run.recorded  # looked up now: without it, fail before the fault is active
+    recorded = run.recorded  # if it is missing, fail here, before the fault is active
     while not run.done:
         run.step()
         if over(recorded()):

@@ -11,7 +11,7 @@ from typing import Any
 
 # attributes that lead to the function of a method, property or wrapper
 _INSIDE = ("__func__", "fget", "fset", "fdel", "func", "__wrapped__")
-_OWN_REFERENCES = 3  # to a code object: from its function, a local, an argument
+_OWN_REFERENCES = 3  # references to a code object: from its function, a local, an argument
 
 
 class SwapRefused(Exception):
@@ -32,7 +32,7 @@ def install(name: str, parts: Sequence[types.CodeType]) -> Any:
 
 
 def swap_code(functions: Sequence[Sequence[Any]], probe: types.ModuleType) -> None:
-    """Replace the code of each function (module, path, old code, new code): of all or of none."""
+    """Replace the code of all functions (module, path, old code, new code), or of none."""
     name = probe.__name__.rpartition(".")[2]
     found = [(live_function(module, path, old), new) for module, path, old, new in functions]
     for function, new in found:
@@ -72,7 +72,7 @@ def live_function(module: str, path: Sequence[str], code: types.CodeType) -> typ
 
 
 def _functions(named: Any) -> Iterator[types.FunctionType]:
-    """Yield the functions behind a name: itself, those of a method or property, and wrapped ones."""
+    """Yield the functions of a named object: itself, those of a method or property, and wrapped ones."""
     if isinstance(named, types.FunctionType):
         yield named
     if named is not None and not isinstance(named, type):
@@ -86,7 +86,7 @@ def _mangled(holder: Any, name: str) -> str:
 
 
 def keep_observations(probe: Any, holder: str, names: Sequence[str]) -> list[tuple[float, ...]]:
-    """Make the probe keep its observations; return the list of them: the time, then the values of `names`.
+    """Make the probe keep its observations in the returned list: each has the time and the values of `names`.
 
     `holder` is the name of the object in which the probe keeps the time.
     """

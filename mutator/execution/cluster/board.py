@@ -94,7 +94,7 @@ class Board:
     def take(self, worker: str, *, ahead: bool = False) -> Piece | None:
         """Return the next piece for a worker, or None.
 
-        With `ahead`, the piece waits at the worker while another one runs there; None near the end of the
+        With `ahead`, the piece waits at the worker while another piece runs there; None near the end of the
         work.
         """
         if ahead and self._waiting * self._mean_s(Kind.RUN) < 2 * self._at_once * LEAST_S:
@@ -124,7 +124,7 @@ class Board:
         return True
 
     def give_back(self, piece: Piece, worker: str) -> None:
-        """Put back a piece that a worker could not finish, for a reason other than the piece."""
+        """Put back a piece that a worker could not finish for a reason unrelated to the piece."""
         if (out := self._out.get(piece.number)) is None:
             return
         if not out.goes_on_without(worker):

@@ -20,7 +20,7 @@ class Refused(Exception):
 
 
 class Cut(Refused):
-    """The scheduler lost its connection to the command briefly, and dropped all tasks."""
+    """The scheduler briefly lost its connection to the command, and dropped all tasks."""
 
 
 def submit(client: Client, address: str, function: Callable[..., _T], *arguments: Any) -> "Future[_T]":

@@ -183,7 +183,7 @@ def _serve(connection: Connection, runner: PieceRunner) -> None:
 
 
 def _refuse(connection: Connection, err: Exception) -> None:
-    """Answer the first piece with the reason why this process can run nothing."""
+    """Answer the first piece with the reason why this process cannot run anything."""
     with suppress(EOFError):
         piece = Piece.of(connection.recv_bytes())
         text = str(err if isinstance(err, MutatorError) else shortage(err) or repr(err))

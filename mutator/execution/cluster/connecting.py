@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from distributed import Client, Security
     from distributed.deploy.cluster import Cluster
 
-CONNECT_S = 10.0  # before giving up on a silent scheduler
+CONNECT_S = 10.0  # wait before giving up on a silent scheduler
 _ADDRESS = re.compile(
     r"(?P<protocol>tcp|tls)://(?P<host>\[[0-9a-fA-F:.]+\]|[^\s:/@\[\]]+):(?P<port>\d{1,5})/?"
 )
@@ -44,7 +44,7 @@ def checked_address(address: str, *, where: Path | None = None) -> str:
 
 
 def is_closed(address: str) -> bool:
-    """Return whether others cannot connect or read the traffic, which uses TLS or stays on this machine.
+    """Return whether TLS, or an address on this machine, prevents others from connecting and listening in.
 
     Host names except `localhost` are not looked up.
     """

@@ -15,7 +15,7 @@ _RECENT = 20  # finished pieces used to measure a worker's rate
 
 @dataclass
 class _Member:
-    """An admitted worker: its machine, and the time and number of experiments of its last pieces."""
+    """An admitted worker: its machine, and the time and number of experiments for each of its last pieces."""
 
     host: str
     finished: deque[tuple[float, int]] = field(default_factory=lambda: deque(maxlen=_RECENT))
@@ -46,7 +46,7 @@ class Crew:
     def objection(self, facts: Mapping[str, Any]) -> str:
         """Return why a worker is refused; empty if it is admitted.
 
-        For the same reasons, its machine could not resume the run.
+        For the same reasons, the run could not be resumed on its machine.
         """
         if facts["mutator"] != VERSION:
             return f"mutator {facts['mutator']}, here {VERSION}"

@@ -27,10 +27,10 @@ from mutator.execution.session import Session
 from mutator.verification import equivalence
 
 _LOOK_S = 0.5  # between two checks of the present workers
-_ALONE_S = 60.0  # without any worker, after which the command gives up
+_ALONE_S = 60.0  # time without any worker after which the command gives up
 _AHEAD = 2  # pieces per thread of a worker: one waits while the other runs
 _FAILURES = 3  # consecutive failures after which a worker gets no more work
-_PAUSE_S = 0.1  # before an idle worker asks again
+_PAUSE_S = 0.1  # pause before an idle worker asks again
 _PART_S = 5.0  # time for workers to drop the run
 _PATIENCE_S = 30.0  # time for the scheduler to answer
 

@@ -76,8 +76,8 @@ class Piece:
 class Result:
     """The result of a piece. If it is not done, `text` says why, and `at` is the experiment that was running.
 
-    `records` and `timings` are lines of the run folder's files without checksums. `patches` and `series` are
-    blocks of these files.
+    `records` and `timings` are lines for the run folder, without checksums. `patches` and `series` are blocks
+    for its block files.
     """
 
     number: int
