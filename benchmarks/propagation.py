@@ -38,7 +38,7 @@ def main() -> int:
     before = getrusage(RUSAGE_CHILDREN)
     trial = mutator.try_fault("radar/chaff", "S1", "C2", workspace=workspace)
     after = getrusage(RUSAGE_CHILDREN)
-    run_ms = 1000 * (after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime) / 2  # golden and faulty
+    run_ms = 1000 * (after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime) / 2  # for both runs
     manifest, out = workspace.manifest("openpilot"), trial.folder / "faulty"
     golden, faulty = load_channels(manifest, trial.single.golden), load_channels(manifest, out)
     needed = [*dict.fromkeys((*manifest.compared, *manifest.judged))]
