@@ -59,7 +59,7 @@ def _none_yet(path: str, data: bytes, root: Path) -> dict[ReuseKey, ReusableChan
 
 
 def reuse_key(file: ParsedFile, edits: Sequence[Edit], ids: Sequence[str]) -> ReuseKey:
-    """Return what edits must have in common to share a reusable change; `ids` are those in their lines."""
+    """Return what edits must have in common to share a reusable change; `ids` are the ids in their lines."""
     return tuple(
         (e.index, e.rank, e.reindent, e.unit, normalized(b"".join(e.lines).decode(file.encoding), ids))
         for e in in_order(edits)
@@ -73,7 +73,7 @@ def inserted_lines(edits: Sequence[Edit]) -> list[bytes]:
 def always_compiles(file: ParsedFile, change: ReusableChange, key: ReuseKey) -> bool:
     """Return whether the change compiles with all lines that have this key, i.e. with normalized ones.
 
-    It then un-splices too, because that depends only on the tags, which are part of the key.
+    The change then also un-splices, because that depends only on the tags, which are part of the key.
     """
     texts = (text.rstrip("\r\n") for *_, text in key)  # the file's last line can lack a line end
     lines = "\n".join(texts).encode(file.encoding).splitlines()

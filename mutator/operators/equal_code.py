@@ -21,7 +21,7 @@ class Distinct:
 
 
 def distinct(file: ParsedFile, mutations: Iterable[Mutation]) -> Distinct:
-    """Keep the mutations of a file whose code, while active, differs from the original and earlier ones."""
+    """Keep a file's mutations whose active code differs from the original and from earlier mutations."""
     known: dict[range, list[object]] = {}  # by function, the original's code first
     kept: list[Mutation] = []
     equal = twins = invalid = 0

@@ -7,8 +7,8 @@ from mutator.mutants.expressions import Expression
 from mutator.mutants.statements import Statement
 from mutator.operators.names import Operator
 
-_LONGEST = 60  # characters on either side of a change
-_AROUND = 20  # unchanged characters kept at either end
+_LONGEST = 60  # characters; longer texts are abbreviated
+_AROUND = 20  # unchanged characters kept before and after the change
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -27,8 +27,8 @@ from mutator.errors import MutatorError
 from mutator.store.lines import read_segment
 
 SCHEMA, FILE = "digests/1", "digests.json"
-_WORTH_THREADS = 20_000_000  # bytes from which threads save time
-SEGMENTS = ("records", "proof")  # folders of append-only files; their digests are added when they are closed
+_WORTH_THREADS = 20_000_000  # the least number of bytes for which threads save time
+SEGMENTS = ("records", "proof")  # folders of append-only files; digests are added when the files are closed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -59,7 +59,7 @@ _SHAPES: dict[str, Any] = {
     "stretches": [_STRETCH],
     "chunks": [[int]],
 }
-_SIZES = {"goldens": (2, 3), "chunks": (3,), "metrics": (4,), "channels": (5,)}  # of each item
+_SIZES = {"goldens": (2, 3), "chunks": (3,), "metrics": (4,), "channels": (5,)}  # allowed lengths of items
 
 
 class Head(dict[str, Any]):

@@ -22,7 +22,7 @@ class Stretch:
     platform: str  # operating system, kernel, kind of processor
     cpu: str | None = None  # the processor's model
     blas: Sequence[Mapping[str, Any]] = ()  # `library`, `version`, `kernel`, `threads` of what numpy loads
-    threads: Mapping[str, str] = field(default_factory=dict)  # settings in the target's environment
+    threads: Mapping[str, str] = field(default_factory=dict)  # thread settings in the target's environment
     # `commit` and `changed` of the git clones of mutator, library, templates and target
     git: Mapping[str, Mapping[str, Any]] | None = None
     records: str = "*"  # glob of the session's files in records/, timings/ and proof/, without suffix

@@ -12,7 +12,7 @@ const Diff = (() => {
   const TAGS = JSON.parse(document.getElementById("tags").textContent);
   const MARK = TAGS.mark.replace(/[^\w\s]/g, "\\$&");
   const TAG = new RegExp(`${MARK}\\S+[^\\n]*$`);
-  // Lines that every mutant has, because it calls the probe.
+  // Lines that every mutant has, because each mutant calls the probe.
   const PROBE = new RegExp(`${MARK}(?:${TAGS.probe.join("|")})\\b`);
   // In order: holes of a shape, tag of an injected line, comment, string (complete or to the end of the line), number, word.
   const REST =

@@ -27,7 +27,7 @@ class Experiment {
       return;
     }
     if (row >= 0 && row === this.row && this.isOpen) {
-      this.#showPlace(); // filters may have changed the list
+      this.#showPlace(); // the filters might have changed the list
       return;
     }
     const wasOpen = this.isOpen, hadFocus = this.place.contains(document.activeElement);

@@ -31,7 +31,7 @@ class ReplayClock {
   }
 
   pause() {
-    if (!this.isPlaying) return; // a replay that is no longer on the page is paused repeatedly; it must not request more frames
+    if (!this.isPlaying) return; // a replay that has left the page is paused repeatedly, and must not request more frames
     this.isPlaying = false;
     this.#ask();
   }

@@ -27,7 +27,7 @@ const ReplayData = (() => {
   /** The time (s) of the end of the drive. */
   const until = (series) => series.tEnd ?? series.end;
 
-  /** The largest difference of golden and faulty up to the end of the drive: {by, t}; `by` is 0 if they are equal. */
+  /** The largest difference between golden and faulty up to the end of the drive: {by, t}; `by` is 0 if they are equal. */
   function largest(channel, end) {
     const found = { by: 0, t: NaN };
     for (let i = 0; i < channel.t.length && channel.t[i] <= end + TINY; i++) {
@@ -38,7 +38,7 @@ const ReplayData = (() => {
     return found;
   }
 
-  /** The root mean square difference of golden and faulty, from activation to the end of the drive, as a share of the axis.
+  /** The root mean square difference between golden and faulty, from activation to the end of the drive, as a share of the axis.
    *  Where only one of them has a value, the difference is the whole axis. */
   function apart(channel, { low, high }, begin, end) {
     let sum = 0, count = 0;

@@ -143,7 +143,7 @@ class ReplayPlots {
     return this.view.from <= this.series.start && this.view.to >= this.series.end;
   }
 
-  /** Zoom in by a number of steps (out: negative) around a time. */
+  /** Zoom in by a number of steps (negative: out) around a time. */
   zoom(steps, around = this.clock.t) {
     const { from, to } = this.view, { start, end } = this.series;
     const span = Math.min(end - start, Math.max(ReplayPlots.NARROWEST, (to - from) / ReplayPlots.FACTOR ** steps));

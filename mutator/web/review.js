@@ -1,5 +1,5 @@
 "use strict";
-// The review page: find, inspect and decide on groups. The address holds the view after the #, so that it can be shared:
+// The review page: find, inspect and decide on groups. The part of the address after # is the view, so that it can be shared:
 // #g=GROUP&q=words&state=new,changed&flag=1&diff=split
 
 const Review = (() => {

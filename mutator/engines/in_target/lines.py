@@ -15,7 +15,7 @@ _TOOL = 1  # the tool id that `sys.monitoring` reserves for coverage
 
 
 class Lines:
-    """Notes lines of the tree at `tree`, once a line in `since` of the file `path` has run.
+    """Notes the lines that run in the tree `tree`, beginning with the first in `since` of the file `path`.
 
     A fault cannot act in lines that run only before that.
     """
@@ -47,7 +47,7 @@ class Lines:
         return files
 
     def _note(self, file: str, line: int) -> bool:
-        """Note a line of the tree. At the first observation, start again and return True."""
+        """Note a line of the tree. At the first observation, discard earlier lines and return True."""
         first = not self._begun and file == self._path and line in self._since
         if first:
             self._begun = True

@@ -18,7 +18,7 @@ ASKED: dict[str, Any] = json.loads("{}")  # file, picture, effects; filled in by
 FILE = "pictures.npz"
 
 _folder = Path.cwd()
-_left = 0  # observations that the run may still make
+_left = 0  # how many more observations the run can make
 _drawn = False
 
 
