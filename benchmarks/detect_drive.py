@@ -1,8 +1,8 @@
 """Measure the geometric and the as-coded detector's time for a frame, as medians over a run.
 
-`python benchmarks/detect_drive.py [--repeat N] [--plain]`. It uses one core, clear and bad weather, and
-compiled code unless given `--plain`; the last column says whether the code was compiled. Times are CPU times
-of this process. The exit code is 1 if a median is above its goal.
+`python benchmarks/detect_drive.py [--repeat N] [--plain]`. It runs on one core, in clear and in bad weather,
+with compiled code unless given `--plain`; the last column says whether the code was compiled. Times are CPU
+times of this process. The exit code is 1 if a median is above its goal.
 """
 
 import argparse

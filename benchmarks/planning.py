@@ -2,8 +2,8 @@
 
 `python benchmarks/planning.py`. It measures planning, freezing, reaching the first experiment and resuming a
 complete run. In the complete run, which is synthetic, every experiment has a record of a masked fault. The
-cached checks are synthetic, too. A start uses no workers and ends before the first mutant runs. Each time is
-also printed per experiment and relative to planning.
+cached checks are synthetic, too. The start uses no workers and ends before the first mutant runs. Each time
+is also printed per experiment and relative to planning.
 """
 
 import argparse
