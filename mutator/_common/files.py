@@ -28,7 +28,7 @@ class DiskFull(MutatorError):
 
 
 def is_disk_full(err: BaseException | None) -> bool:
-    """Whether a full disk or quota caused an error, including errors of other libraries."""
+    """Whether a full disk or quota caused an error, even if a library wraps or rewords it."""
     seen: list[BaseException] = []  # a chain of causes can be circular
     while err is not None and not any(err is one for one in seen):
         if getattr(err, "errno", None) in _NO_SPACE or any(os.strerror(n) in str(err) for n in _NO_SPACE):
@@ -72,7 +72,8 @@ def raising_disk_full(where: Path) -> Iterator[None]:
 
 
 def check_is_text(path: Path) -> None:
-    """Raise MutatorError for a path that this environment cannot encode: digests and tables contain paths."""
+    """Raise MutatorError for a path that this environment cannot encode, because digests and tables contain
+    paths."""
     try:
         str(path).encode()
     except UnicodeEncodeError:
@@ -106,7 +107,7 @@ def remove_folder(path: Path) -> None:
     """Delete a folder that a run wrote to, as far as permissions allow, even if it is nested deeply or
     read-only.
 
-    `shutil.rmtree` recurses, and fails at a depth of some hundred folders.
+    `shutil.rmtree` recurses, and fails at a depth of a few hundred folders.
     """
     if path.is_symlink():
         return
@@ -201,7 +202,7 @@ def writing_atomic(path: Path) -> Iterator[BinaryIO]:
 
 
 def is_half_written(name: str) -> bool:
-    """Whether a killed `write_atomic` or `half_written` left the file of that name."""
+    """Whether a file of this name is left over from a killed `write_atomic` or `half_written`."""
     return complete(name) != name
 
 

@@ -68,7 +68,7 @@ def plain(value: Any) -> Any:
     return value
 
 
-# for speed, as a plan can have a million ids, `plain` converts only types that JSON does not have
+# for speed (a plan can have a million ids), `plain` converts only the types that JSON lacks
 _ENCODER = json.JSONEncoder(default=plain, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
 
 

@@ -1,4 +1,5 @@
-"""Locks that let only one command use a run folder. They are flocks, which end with their process."""
+"""Locks that let only one command use a run folder. They use `flock`, so the kernel releases them when the
+process ends."""
 
 import fcntl
 import os

@@ -23,10 +23,10 @@ _SHOWN = 3  # the maximum number of changed files that an error names
 
 
 def shipped_folder() -> Path:
-    """The folder that holds the shipped target/, fault_library/ and templates/.
+    """Return the folder that holds the shipped target/, fault_library/ and templates/.
 
-    Once per process, compare the unpacked files with the archive. MutatorError if they differ or cannot be
-    unpacked.
+    Once per process, the unpacked files are compared with the archive. MutatorError if they differ or cannot
+    be unpacked.
     """
     return _unpacked(ARCHIVE, _home()) if ARCHIVE.exists() else CLONE
 

@@ -1,4 +1,4 @@
-"""Plan campaigns. Imports nothing that reads runs, so that planning starts fast."""
+"""Plan campaigns. This module imports nothing that reads runs, so that planning starts fast."""
 
 from pathlib import Path
 

@@ -55,7 +55,8 @@ class ReviewedGroups:
         return replace(self, groups=groups)
 
     def find(self, starts: Sequence[str]) -> list[Group]:
-        """Return the groups whose ids start with `starts`; MutatorError unless each fits one group."""
+        """Return the groups whose ids start with `starts`; MutatorError unless each start fits exactly
+        one."""
         found: dict[str, Group] = {}
         for start in starts:
             hits = [group for group in self.groups if group.id.startswith(start)]

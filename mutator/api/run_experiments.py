@@ -122,8 +122,8 @@ class RunExperiment(ExperimentResult):
 
     @property
     def fault_path(self) -> FaultPath | None:
-        """How far the fault propagated along the control structure; None if unknown, never active, or without
-        an outcome.
+        """How far the fault propagated along the control structure; None if that is unknown, if the fault was
+        never active, or without an outcome.
         """
         ways = self.run.ways
         return ways.path(self.experiment, self.record) if ways and self.record else None

@@ -1,4 +1,5 @@
-"""Shell completion of names in the library, run folders and experiment ids. Reads little, to be fast."""
+"""Shell completion of names in the library, run folders and experiment ids. Completion reads few files, so it
+is fast."""
 
 import csv
 from collections.abc import Callable, Iterable

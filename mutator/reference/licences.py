@@ -53,7 +53,7 @@ def constrained(clone: Path) -> tuple[str, ...]:
 def stated_licence(name: str) -> str | None:
     """Return the licence that an installed package states; None if it is not installed.
 
-    This is its licence expression (PEP 639), else its classifier, else the first line of the free text.
+    This is the licence expression (PEP 639), else the classifier, else the first line of the free text.
     """
     try:
         stated = metadata.metadata(name)

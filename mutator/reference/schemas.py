@@ -70,7 +70,7 @@ def file_formats(declared: Readings) -> tuple[Format, ...]:
 
 
 def definitions(model: type[StrictModel]) -> dict[str, dict[str, Any]]:
-    """Return the JSON Schema of every model in a file of `model`, by short name (`Variant`), the file's
+    """Return the JSON Schema of every model in a file of `model`, by short name (`Variant`), that of `model`
     first.
 
     Each has the class's title, its docstring in one line, and descriptions of its properties.

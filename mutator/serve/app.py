@@ -33,7 +33,7 @@ Answer = Callable[[Request], Awaitable[Response]]
 
 @dataclass(kw_only=True)
 class Site:
-    """The content of the server: a library, runs, and jobs, `at_once` in parallel."""
+    """The content of the server: a library, runs, and jobs (at most `at_once` at a time)."""
 
     workspace: Workspace
     runs: Runs

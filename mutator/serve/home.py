@@ -10,7 +10,7 @@ from jinja2 import Environment, StrictUndefined
 from mutator.errors import MutatorError
 from mutator.workspace import Workspace
 
-_MOST_PAIRS = 20  # of runs offered for comparison
+_MOST_PAIRS = 20  # pairs of runs offered for comparison
 
 
 def home_page(workspace: Workspace, runs: Sequence[Mapping[str, Any]]) -> str:

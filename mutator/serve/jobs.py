@@ -21,7 +21,7 @@ from mutator.store.progress import Tail
 
 _KEEPER = "mutator.serve.keeper"
 _COLUMNS = "200"  # line width of a job's output; pages wrap the lines
-_LOG_BYTES = 100_000  # of a job's output; only the end is kept
+_LOG_BYTES = 100_000  # only the last bytes of a job's output are kept
 _MOST_JOBS = 200  # jobs to keep: the newest of those that have ended
 _MOST_WAITING = 50
 _NEWS = ("the same as", "no record to compare", "film: ", "verdict: ", "outcomes: ")
@@ -50,7 +50,7 @@ class Job:
     id: str
     work: Work
     state: State = State.QUEUED
-    progress: float | None = None  # of the current stage, from 0 to 1
+    progress: float | None = None  # progress of the current stage, from 0 to 1
     message: str = ""
     result: str | None = None
     started: datetime | None = None

@@ -1,7 +1,7 @@
 """Runs a job as a child process, and ends all its processes when the server ends.
 
-`python -m mutator.serve.keeper FD WORDS...` runs `mutator WORDS...`. FD is the reading end of a pipe of the
-server. When the other end closes, the keeper asks the command to end, and later kills it with its
+`python -m mutator.serve.keeper FD WORDS...` runs `mutator WORDS...`. FD is the reading end of a pipe from the
+server. When the writing end closes, the keeper asks the command to end, and later kills it with its
 descendants. If the keeper itself is killed, the kernel kills the command.
 """
 
@@ -10,7 +10,7 @@ import sys
 
 from mutator.engines.in_target import guard
 
-PATIENCE_S = 20.0  # for a command to clean up workers, scratch folders and half-written files
+PATIENCE_S = 20.0  # a command's time to clean up workers, scratch folders and half-written files
 
 
 def main() -> int:

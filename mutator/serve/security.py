@@ -21,9 +21,9 @@ from mutator.comparison import pages
 from mutator.web import asset
 
 HOST = "127.0.0.1"
-MOST_BYTES = 1_000_000  # of a request's body
+MOST_BYTES = 1_000_000  # the longest body of a request
 _METHODS = ("GET", "HEAD", "POST")
-_OWN_SITE = ("same-origin", "none")  # sent by browsers for their own pages and for typed addresses
+_OWN_SITE = ("same-origin", "none")  # what browsers send for a site's own pages and for typed addresses
 
 
 class Guarded:

@@ -56,7 +56,7 @@ BLOCK = re.compile(r"^```console\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 FENCE = re.compile(r"(?:^([^\n]*)\n\n)?^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 CODE = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
 FILE = re.compile(r"`([^`\s]+)`[^`]*:$")
-# Also `[text]: page.md` and images; no links to the web.
+# Links to pages and images, but not to the web.
 LINK = re.compile(r"\]\(([^)#:\s]*)(?:#([^)\s]+))?\)")
 IMAGE = re.compile(r"""<(?:img|source) [^>]*\bsrc(?:set)?="([^"#:\s]+)\"""")
 # Parts that differ between machines: durations, and the seal, which covers all versions.
@@ -65,7 +65,7 @@ VARYING = re.compile(
 )
 
 
-# A package called mutator on an index is another project.
+# The package called mutator on the public index is another project.
 BY_NAME = re.compile(r"\b(?:pip|pipx|uv)\b[^\n`]*\b(?:install|add)\b[^\n`]*(?<![\w/.-])mutator(?![\w/.*-])")
 
 
@@ -233,7 +233,7 @@ def test_links_lead_somewhere(page: Path) -> None:
 
 @pytest.mark.parametrize("page", PAGES, ids=name)
 def test_no_page_installs_by_name(page: Path) -> None:
-    """The name on the index belongs to another project."""
+    """On the public index, the name `mutator` belongs to another project."""
     assert not BY_NAME.search(page.read_text(encoding="utf-8"))
 
 

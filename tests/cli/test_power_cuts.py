@@ -26,14 +26,14 @@ WORDS = ("run", "small", "--out", "run", "-n", "0", "--limit", 4, "--engine", "r
 
 @pytest.fixture(scope="module")
 def driven(tmp_path_factory: pytest.TempPathFactory) -> list[Any]:
-    """A list with the run folder that all tests share and, later, its seal."""
+    """A list of the run folder that all tests share and, once it is known, the folder's seal."""
     return [tmp_path_factory.mktemp("driven") / "run"]
 
 
 @pytest.fixture
 def cut(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch, driven: list[Any]) -> Path:
-    """A run folder with finished experiments that the command did not complete. The command runs only once,
-    because all tests have the same library."""
+    """An unfinished run folder in which all experiments have run. The command runs only once, because all
+    tests have the same library."""
 
     def end(self: Session) -> None:
         raise MutatorError("the power is cut")

@@ -16,7 +16,7 @@ Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, jso
 
 @pytest.fixture(scope="module")
 def driven(tmp_path_factory: pytest.TempPathFactory) -> list[Any]:
-    """A list with the run folder that all tests share and, later, its seal."""
+    """A list of the run folder that all tests share and, once it is known, the folder's seal."""
     return [tmp_path_factory.mktemp("driven") / "run"]
 
 
@@ -50,7 +50,7 @@ def test_an_audit_is_printed_on_one_page(cli: Cli, sealed: str) -> None:
 
 
 def test_the_seal_is_shown_wherever_a_run_ends(cli: Cli, sealed: str) -> None:
-    """`run` prints the seal even with nothing left to do, and so do JSON and report."""
+    """`run` prints the seal even if nothing is left to do. The JSON output and the report have it, too."""
     again = cli("run", "small", "--out", "run", "-n", "0", "--json")
     assert (again.code, again.json["ran"], again.json["seal"]) == (0, 0, sealed)
     assert f"| seal | {sealed} |" in Path("run/report/REPORT.md").read_text()
@@ -154,7 +154,7 @@ def test_the_audit_names_the_command_that_restores_a_series(cli: Cli, sealed: st
 
 
 def test_damaged_blocks_of_patches_are_reported(cli: Cli, sealed: str) -> None:
-    """Every patch can be read, because the damaged block is the first of two equal ones."""
+    """Every patch can still be read, because the damaged block is the first of two equal ones."""
     [patches] = Path("run/patches").iterdir()
     data = patches.read_bytes()
     patches.write_bytes(data[:40] + b"?" + data[41:] + data)

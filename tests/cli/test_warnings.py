@@ -43,7 +43,7 @@ def test_a_chosen_value_without_effect_gets_a_warning(
 
 
 def test_a_plan_warns_of_values_without_effect(cli: Cli, root: Path) -> None:
-    """With a bound, the same value can have an effect."""
+    """With a lower bound, an offset of 0 can have an effect."""
     spec = root / "fault_library" / "faults" / "sensor" / "lane.yaml"
     listed = spec.read_text().replace(
         "reals_from: {first: [0.0, 0.1], step: 0.8, last: [2.4, 2.5]}", "values: [0, 1]"

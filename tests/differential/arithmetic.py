@@ -43,7 +43,7 @@ def digests() -> Iterator[tuple[str, str]]:
         for level in (4, 9):
             yield from seen(detector, level)
     for path in sorted(SCENARIOS.glob("*.yaml")):
-        for plant in PLANTS if path.stem[0] != "L" else PLANTS[:1]:  # the other detector knows no bends
+        for plant in PLANTS if path.stem[0] != "L" else PLANTS[:1]:  # the other plant has no bends
             yield f"{path.stem} on the {plant} plant", trace(path, plant, None)
     for detector in DETECTORS:
         pictures = Pictures(detector=detector, marks=vision.DASHED)
@@ -66,7 +66,8 @@ def roads() -> dict[str, np.ndarray]:
 
 
 def seen(detector: str, level: int) -> Iterator[tuple[str, str]]:
-    """Return the detections through each effect up to that level, and the frames themselves."""
+    """Yield digests of the frames of each effect at `level`, or at its last level if it has fewer, and of the
+    detections in them."""
     model = CameraModel()
     road = RoadRenderer(model, WORN, seed=3)
     frames = [road.grey(m.position, 0.3, 0.01) for m in MOMENTS]

@@ -66,7 +66,7 @@ def stage(out: Path) -> str:
 
 
 class Campaign:
-    """A command that is killed at random moments of its undisturbed duration, and repeated."""
+    """A command that first runs without kills, and is then killed at random moments and repeated."""
 
     def __init__(self, workspace: Workspace, folder: Path, words: Sequence[str], seed: int) -> None:
         self.workspace, self.folder, self.words = workspace, folder, words
@@ -80,7 +80,7 @@ class Campaign:
         self.longest_s = time.monotonic() - began
 
     def kill_and_resume(self, kills: Sequence[Kill]) -> None:
-        """Use new folders, each with its own checks, until all kills have happened."""
+        """Run the command in new folders, each with its own checks, until all kills have happened."""
         left, number = list(kills), count()
         while left:
             assert self.finish(self.folder / f"killed{next(number)}", left) == self.results

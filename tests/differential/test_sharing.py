@@ -1,4 +1,5 @@
-"""A run that several scenarios share runs once and counts in each. A check first compares the scenarios."""
+"""A run that several scenarios share is executed once and counted in each scenario. A check first compares
+the scenarios."""
 
 import csv
 import json

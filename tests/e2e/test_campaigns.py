@@ -255,7 +255,8 @@ def test_a_campaign_that_cannot_be_planned_leaves_no_folder(toy: Workspace, tmp_
 
 
 def test_a_run_keeps_its_options(toy: Workspace, finished: Path) -> None:
-    """A run resumes without its options repeated. Other options or texts are refused."""
+    """A run can be resumed without repeating its options. Other options, or another campaign text, are
+    refused."""
     assert run_campaign(toy, "small", finished, choices=Choices(seed=3)).exit_code == 0
     for choices in (
         Choices(seed=4),

@@ -172,7 +172,7 @@ def test_approvals_of_an_old_run_still_apply(cli: Cli, place: Path) -> None:
 
 
 def test_an_old_run_is_not_resumed(cli: Cli, place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Another mutator version or changed sources are refused by name."""
+    """The error names the version that planned the run, or the changed sources."""
     shutil.copytree(place / "small", copy := place / "resumed")
     shutil.copytree(place / "toy", library := place / "changed")
     before = sorted((path, path.stat().st_mtime_ns) for path in copy.rglob("*") if path.name != "owner.lock")

@@ -43,7 +43,7 @@ RAISING = ["exception", "reordering", "repetition", "slow_call", "swapped_argume
 
 @pytest.fixture
 def folder(tmp_path: Path, clone: Workspace) -> Path:
-    """A copy of the templates, so that tests can break them."""
+    """A copy of the templates, which tests can break."""
     return Path(shutil.copytree(clone.templates, tmp_path / "templates"))
 
 

@@ -60,7 +60,7 @@ def test_a_channel_that_was_not_recorded_is_left_out() -> None:
 
 
 def test_all_channels_leave_golden_where_the_shorter_run_ends() -> None:
-    """A run that ends after the end of the drive is not shorter."""
+    """A run that ends after the end of the drive is not treated as shorter."""
     golden, faulty = {"t": T, "a": ZEROS}, {"t": T[:4], "a": ZEROS[:4]}
     assert departures(golden, faulty, [channel("a")], "t", None) == (("a", T[4], 0.0),)
     assert departures(golden, faulty, [channel("a")], "t", float(T[3])) == ()

@@ -117,7 +117,7 @@ def test_a_row_has_the_severity_and_the_times_to_the_hazard(
 
 
 def test_run_json_determines_the_columns_of_severity(experiment: Callable[..., Experiment]) -> None:
-    """A run has all columns, only the times, or, if it is older, none."""
+    """A run has all of these columns, only the times, or, if it is older, none."""
     scale = {"severity": SCALE.plain()}
     times = ["fault_tolerant_time", "manifest_to_hazard"]
     heads: list[tuple[dict[str, object], list[str]]] = [

@@ -14,7 +14,7 @@ NONE = np.zeros_like(T)
 
 
 def during(begin: float, end: float) -> np.ndarray:
-    """An array of half of full gas or brake from `begin` until before `end`, in seconds."""
+    """Half of full gas or brake from `begin` until just before `end` (in s), and none otherwise."""
     return np.where((begin - 0.01 < T) & (end - 0.01 > T), 0.5, 0.0)
 
 

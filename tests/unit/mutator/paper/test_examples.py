@@ -133,7 +133,7 @@ def test_matching_experiments_are_tried_until_one_shows_the_action(place: Path) 
 
 
 def test_a_query_without_a_match_is_reported(place: Path) -> None:
-    """Nor does a query match if the run lacks the action's channel."""
+    """A query also has no match if the run lacks the action's channel."""
     assert "no experiment of this run matches" in drawn(place, replace(BRAKE, query='module == "radar"')).note
     assert "records no sail" in drawn(place, replace(BRAKE, actions=("sail",))).note
 

@@ -41,7 +41,7 @@ def test_each_metric_has_its_spread_by_fault_type() -> None:
         ("total", "speed", "m/s", "higher", 6, 6.5, 7.75, 9.0),
     ]
     assert [line[6:8] for line in sheet.lines[:2]] == [(1.0, 5.0), (5.0, 9.0)]
-    assert all(math.isnan(cell) for cell in sheet.lines[2][6:8] if isinstance(cell, float))  # of one run
+    assert all(math.isnan(cell) for cell in sheet.lines[2][6:8] if isinstance(cell, float))  # one run only
 
 
 def test_without_values_there_is_no_table() -> None:

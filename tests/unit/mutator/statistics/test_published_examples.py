@@ -91,7 +91,7 @@ def test_wilcoxon() -> None:
 
 
 def test_newcombe() -> None:
-    """56 of 70 less 48 of 80 has the interval 0.0524 to 0.3339 (Newcombe, Statistics in Medicine 17 (1998)
+    """56 of 70 minus 48 of 80 has the interval 0.0524 to 0.3339 (Newcombe, Statistics in Medicine 17 (1998)
     873-890, table II, method 10)."""
     found = of_difference(share(56, 70), share(48, 80))
     assert found.estimate == pytest.approx(0.2)

@@ -62,7 +62,7 @@ def test_the_interval_of_the_median_equals_that_of_lifelines(sample: dict[str, A
     high = sample["median_high"]
     if high == sample["at"][-1] and sample["survival"][-1] == 0.0:
         high = math.inf
-    if math.isnan(found.median_low):  # at no time near one half
+    if math.isnan(found.median_low):  # the interval of the curve never contains one half
         assert min(sample["low"]) > 0.5 and math.isnan(found.median_high)
     else:
         assert found.median_low == pytest.approx(sample["median_low"])
@@ -79,7 +79,7 @@ def test_the_published_curve_of_freireich() -> None:
 
 
 def test_the_published_medians_of_miller() -> None:
-    """The medians are 31 weeks if maintained and 23 if not, as R's `survfit` prints for its data set
+    """The medians are 31 weeks with maintenance and 23 without, as R's `survfit` prints for its data set
     `aml`."""
     medians = [reaction(LIFELINES[name]).median for name in ("maintained", "not maintained")]
     assert medians == [31.0, 23.0]

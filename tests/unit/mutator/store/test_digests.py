@@ -61,7 +61,7 @@ def test_every_changed_byte_is_found(run: Path) -> None:
 
 @pytest.mark.parametrize("content", ["{}", '{"schema": "digests/1"}', "[]", "", '{"schema": "digests/9"}'])
 def test_a_file_that_is_not_a_ledger_is_refused(run: Path, content: str) -> None:
-    """The file is truncated, or has another kind or a newer schema."""
+    """The file is truncated, or is of another kind or a newer schema."""
     (run / digests.FILE).write_text(content)
     with pytest.raises(MutatorError, match=r"digests\.json"):
         digests.read(run)
@@ -127,7 +127,7 @@ def test_a_file_announced_for_deletion_can_be_missing(run: Path) -> None:
 
 
 def test_segments_are_entered_when_they_are_closed(run: Path) -> None:
-    """An incomplete last line is cut."""
+    """An incomplete last line is cut off."""
     path = segment(run, "records/0001-gw0.jsonl", 1, 2)
     whole = path.read_bytes()
     path.write_bytes(whole + b'{"sum":"0123')

@@ -38,7 +38,7 @@ def test_the_newest_line_replaces_the_first(tmp_path: Path) -> None:
 
 
 def test_a_damaged_line_is_reported_before_any_is_read(tmp_path: Path) -> None:
-    """An incomplete last line, as a kill leaves it, is no error."""
+    """An incomplete last line, which a kill can leave, is not an error."""
     things(tmp_path, a=[{"experiment_id": "aa", "n": 10}, {"experiment_id": "bb", "n": 20}])
     path = tmp_path / "a.jsonl"
     data = path.read_bytes()

@@ -31,7 +31,7 @@ def manifest(clone: Workspace) -> TargetManifest:
 
 @pytest.fixture
 def folder(clone: Workspace, tmp_path: Path) -> Path:
-    """A copy of the analysis, which a test may break."""
+    """A copy of the analysis, which a test can break."""
     return Path(shutil.copytree(clone.library / "stpa", tmp_path / "stpa"))
 
 

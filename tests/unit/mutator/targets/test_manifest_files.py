@@ -153,7 +153,7 @@ def test_the_root_can_be_the_shipped_controller(toy: Workspace) -> None:
 
 
 def test_a_manifest_is_a_snapshot(toy: Workspace) -> None:
-    """Only a manifest that is loaded later has an edit of the tree. Bytecode is not part of a tree."""
+    """Only a manifest that is loaded later includes an edit of the tree. Bytecode is not part of a tree."""
     manifest = toy.manifest("toy")
     before = manifest.tree
     (manifest.root / "toycar" / "__pycache__").mkdir()

@@ -29,7 +29,7 @@ def made(
 
 @pytest.fixture
 def run(made: Path, tmp_path: Path) -> Path:
-    """A finished run of 24 experiments, which a test may damage."""
+    """A finished run of 24 experiments, which a test can damage."""
     return Path(shutil.copytree(made, tmp_path / "run"))
 
 
@@ -163,7 +163,7 @@ def test_a_damaged_ledger_is_rebuilt_from_the_files(run: Path, content: bytes | 
 
 
 def test_a_damaged_campaign_file_or_plan_is_not_repaired(run: Path) -> None:
-    """A user can replace the file by a copy."""
+    """A user can replace the file with a copy."""
     (run / "campaign.yaml").write_text("other")
     assert repair(RunFolder.unverified(run)) == []
     assert (run / "campaign.yaml").read_text() == "other"
