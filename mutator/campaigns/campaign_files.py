@@ -48,7 +48,7 @@ class Campaign:
 
     name: str
     about: str
-    study: str | None  # the published work with which reports compare
+    study: str | None  # the published work with which reports compare the run
     path: Path
     source: bytes
     target: str
@@ -85,11 +85,11 @@ class Campaign:
         return _in(self.setting, reading)
 
     def setting_keys(self, reading: str) -> Keys:
-        """Return the keys in the campaign file under which `setting_in` is."""
+        """Return the keys of the value of `setting_in` in the campaign file."""
         return ("setting", reading) if reading in self.setting else ("setting",)
 
     def error(self, keys: Keys, got: str, *, expected: str, remedy: str) -> MutatorError:
-        """Return an error, not raised, that points into the campaign file."""
+        """Return, for the caller to raise, an error that points into the campaign file."""
         return self.yaml.error(keys, got, expected=expected, remedy=remedy)
 
 

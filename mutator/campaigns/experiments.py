@@ -286,7 +286,7 @@ class Expansion:
 
     @contextmanager
     def _placed(self, keys: Keys) -> Iterator[None]:
-        """Report errors without a line at `keys` of the campaign file; leave errors with a line unchanged."""
+        """Locate errors that lack a line number at `keys` of the campaign file; leave others unchanged."""
         try:
             yield
         except MutatorError as err:

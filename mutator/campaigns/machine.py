@@ -68,7 +68,7 @@ def blas() -> tuple[dict[str, Any], ...]:
 def _installed() -> dict[str, tuple[str, list[str]]]:
     """Return the version and requirements of each installed package.
 
-    If a package is installed twice, these are of the one that Python imports.
+    If a package is installed twice, return those of the copy that Python imports.
     """
     found: dict[str, tuple[str, list[str]]] = {}
     for distribution in metadata.distributions():
@@ -108,7 +108,7 @@ def required() -> frozenset[str]:
 def packages_of(modules: Iterable[str]) -> tuple[str, ...]:
     """Return the packages that provide these top-level modules. Modules without a package are omitted."""
     providers = metadata.packages_distributions()
-    # the modules of an editable installation can be missing in `providers`; try the module's name
+    # the modules of an editable installation can be missing from `providers`; try the module's name
     names = (name for module in modules for name in providers.get(module, [module]))
     return tuple(sorted({canonicalize_name(name) for name in names} & _installed().keys()))
 

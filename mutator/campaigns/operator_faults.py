@@ -25,7 +25,7 @@ class OperatorFault:
 
 
 class OperatorFaults:
-    """Creates the operator faults of selections. What it enumerates for one seed is used again for others."""
+    """Creates the operator faults of selections. Mutants enumerated for one seed are reused for others."""
 
     def __init__(self, manifest: TargetManifest, models: FaultModels, limits: Limits) -> None:
         self._manifest, self._models, self._limits = manifest, models, limits

@@ -23,7 +23,7 @@ def same_in(manifest: TargetManifest, changes: Sequence[str]) -> tuple[str, ...]
 
 
 def in_turn(runs: Iterable[list[Experiment]]) -> list[list[Experiment]]:
-    """Order runs to share the most work: by golden run, then by trigger, then by time."""
+    """Order runs so that they share the most work: by golden run, then by trigger, then by time."""
 
     def turn(run: list[Experiment]) -> tuple[str, tuple[str, ...], float, str]:
         first = run[0]

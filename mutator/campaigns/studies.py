@@ -50,7 +50,7 @@ def find_study(name: str) -> Study:
 
 
 def study_problems(name: str, study: Study, workspace: Workspace) -> list[MutatorError]:
-    """Return the problems of a study's data in a fault library. A check that raises is one, too."""
+    """Return the problems of a study's data in a fault library. Exceptions from the check are included."""
     try:
         problems = list(study.check(workspace))
     except MutatorError as error:

@@ -1,2 +1,2 @@
-"""Compares two runs of the same faults, experiment by experiment. Runs nothing and writes nothing to run
-folders."""
+"""Compares two runs of the same faults, experiment by experiment. This package runs nothing and does not
+change run folders."""

@@ -38,8 +38,8 @@ class _Files:
         return tag_of(file[line - 1]) if 0 < line <= len(file) else None
 
     def injected_at(self, at: _At, tag: Tag, in_probe: bool) -> Sequence[str]:
-        """Return the ids of the injections whose code is at this position, which can be none: a changed line
-        also has unchanged parts.
+        """Return the ids of the injections whose code is at this position. There can be none, because a
+        changed line also has unchanged parts.
         """
         if tag.was is None:
             return tag.ids if tag.of_fault and not (in_probe and tag.asks_probe) else ()
@@ -78,7 +78,7 @@ def _source(raised: Raised, files: _Files) -> _Source | None:
     if raised.kind == RecursionError.__name__:  # any call can be the one that exceeds the limit
         own = tuple(dropwhile(lambda at: is_probe(at[0]) or files.tag_at(at) is not None, own))
     found = [source for stack in (own, *others) if (source := _on_stack(stack, files))]
-    return min(found, key=lambda source: source.tag is not None, default=None)  # the probe comes first
+    return min(found, key=lambda source: source.tag is not None, default=None)  # prefer the probe
 
 
 def _on_stack(stack: Stack, files: _Files) -> _Source | None:

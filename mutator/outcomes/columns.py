@@ -233,7 +233,7 @@ def check_names(manifest: TargetManifest) -> None:
 
 
 def plan_row(experiment: Experiment) -> dict[str, object]:
-    """Return the `PLAN_COLUMNS` of one experiment. If the value is text, it is part of `variant`."""
+    """Return the `PLAN_COLUMNS` of one experiment. If the fault's value is text, it is part of `variant`."""
     fault, trigger = experiment.fault, experiment.trigger
     variant = fault.spec.split("/", 2)[-1]
     is_text = isinstance(fault.value, str)

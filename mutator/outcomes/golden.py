@@ -135,7 +135,7 @@ def load_record(manifest: TargetManifest, out: Path) -> dict[str, Any]:
 
 
 def _check_is_of_output(err: Exception) -> None:
-    """Raise Shortage if mutator ran out of memory or files, which is not the fault of the run."""
+    """Raise Shortage if mutator ran out of memory or file handles, which is not the fault of the run."""
     if short := shortage(err):
         if isinstance(err, MemoryError):
             with suppress(MemoryError):
@@ -180,8 +180,8 @@ def compare(
 ) -> Difference:
     """Compare channels value by value. NaN equals NaN.
 
-    If one trace is shorter, the traces differ from its end. If their times differ, the traces differ from the
-    first different time. `t_end` is the end of the drive if that is before the end of the run.
+    If one trace is shorter, the traces differ from its end onward; if their times differ, from the first
+    different time onward. `t_end` is the end of the drive if that is before the end of the run.
     """
     end = np.inf if t_end is None else t_end + _TINY
     first = end_of_shorter(golden[time], faulty[time])

@@ -72,7 +72,7 @@ def places(texts: "pd.DataFrame") -> "np.ndarray":
 def _turn(
     texts: "pd.DataFrame", ending: "np.ndarray", has_class: "np.ndarray", by_id: "np.ndarray"
 ) -> "np.ndarray":
-    """Return the ranks of `_turns` for each row of a frame, infinite without a margin."""
+    """Return the ranks of `_turns` for each row of a frame; infinite for rows without a margin."""
     import numpy as np
     import pandas as pd
 

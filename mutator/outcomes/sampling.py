@@ -161,7 +161,7 @@ def _points(
     for row, differs in enumerate((golden != faulty).any(axis=1).tolist()):
         steps = set(hazards)
         if differs:
-            gap = _gap(golden[row], faulty[row])  # row by row, because all rows do not fit into a cache
+            gap = _gap(golden[row], faulty[row])  # row by row: all rows would not fit into the CPU cache
             apart = gap > 0.0
             peaks = {int(np.argmax(apart)), int(np.argmax(gap[: max(drive, 1)])), int(np.argmax(gap)), end}
             steps |= {step for step in peaks if apart[step]}

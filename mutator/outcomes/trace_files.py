@@ -24,7 +24,7 @@ class BadTrace(ValueError):
 
 
 def own_times(name: str) -> str:
-    """Return the name under which a channel's own times are stored; it lacks values at some steps."""
+    """Return the name for the times of a channel that lacks values at some steps."""
     return f"{name}@"
 
 

@@ -23,10 +23,10 @@ def first_events(events: Iterable[tuple[str, float]], activation: Activation | N
 
 
 def judge(*, activation: Activation | None, t_manifest: float | None, hazards: Events) -> Outcome:
-    """Return the first that applies of not_activated, hazard, sdc and masked.
+    """Return the first of not_activated, hazard, sdc and masked that applies.
 
     `hazards` are those at or after activation. A hazard applies even without an actuator difference, because
-    the fault may act on the world directly.
+    the fault can act on the world directly.
     """
     if activation is None:
         return Outcome.NOT_ACTIVATED

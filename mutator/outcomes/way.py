@@ -85,7 +85,7 @@ def _in_causal_order(
     """Sort the nodes so that each follows all nodes that feed it.
 
     If several nodes can come next, or none because of a cycle, the one with the most `steps` to the process
-    does.
+    comes next.
     """
     left = sorted(nodes, key=lambda name: -steps.get(name, len(nodes)))
     order: list[str] = []

@@ -52,7 +52,7 @@ class Pair:
         )
 
     def applied(self, channel: str) -> tuple[Steps, Steps]:
-        """Return the steps between `start` and `end` in which golden and faulty apply `channel`."""
+        """Return the steps from `start` to `end` in which the golden and the faulty run apply `channel`."""
         within = (self.t >= self.start) & (self.t <= self.end)
         return within & (self.golden[channel] > APPLIED), within & (self.faulty[channel] > APPLIED)
 
@@ -71,17 +71,17 @@ class Wanted:
     title: str
     query: str  # finds candidate runs by the columns of results.csv
     order: str  # candidates are examined in the order of this column, largest first
-    confirmed: str  # describes what the look finds
+    confirmed: str  # describes what `look` finds
     look: Look
     actions: tuple[str, ...]  # channels of the action, whose panels are shaded
     panels: tuple[tuple[str, str], ...]  # (channel, meaning), from the top
-    hazard: str | None  # the search ends here; None: at the end of the run
+    hazard: str | None  # ends the search; None: the end of the run does
 
 
 def brake_too_short(pair: Pair) -> Steps | None:
-    """Return the steps in which only golden brakes.
+    """Return the steps in which only the golden run brakes.
 
-    None unless faulty brakes, but at most half as long as golden.
+    None unless the faulty run brakes, too, but at most half as long.
     """
     golden, faulty = pair.applied("brake")
     if not BRAKE_S <= pair.seconds(faulty) <= SHORT * pair.seconds(golden):
@@ -90,7 +90,7 @@ def brake_too_short(pair: Pair) -> Steps | None:
 
 
 def at_a_wrong_time(channel: str) -> Look:
-    """Return a look for steps in which only faulty applies `channel`, if they last long enough."""
+    """Return a function that finds steps in which only the faulty run applies `channel`, for long enough."""
 
     def look(pair: Pair) -> Steps | None:
         golden, faulty = pair.applied(channel)
@@ -103,7 +103,7 @@ def at_a_wrong_time(channel: str) -> Look:
 def both_unavailable(pair: Pair) -> Steps | None:
     """Return the steps after the last gas or brake of the faulty run.
 
-    None unless that was soon after the alert and golden still uses both.
+    None unless that was soon after the alert and the golden run still uses both.
     """
     used = (pair.faulty["gas"] > 0) | (pair.faulty["brake"] > 0)
     last = pair.t[used].max(initial=pair.start)

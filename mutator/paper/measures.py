@@ -32,7 +32,7 @@ __all__ = [
 ]
 
 
-_BOUNDS_A_MEDIAN = 6  # fewer runs all lie on one side of the true median in more than 5 % of cases
+_BOUNDS_A_MEDIAN = 6  # with fewer runs, all lie on one side of the true median in more than 5 % of cases
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,7 +99,7 @@ def stratified(runs: pd.DataFrame, *, of: str) -> Estimate:
 
 
 def paired(runs: pd.DataFrame, *, of: str) -> Estimate:
-    """Return how often, in pairs of a guided and a random run with one hazard, the guided run has the hazard.
+    """Of the pairs in which only one run has a hazard, return the share in which it is the guided run.
 
     The Clopper-Pearson interval agrees with McNemar's exact test. `of` is a query on pairs, with column names
     that end in `_guided` and `_random`.

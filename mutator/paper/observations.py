@@ -34,7 +34,7 @@ class Rule(StrictModel):
 
     Shares and differences are fractions; times are in s. `above`, `below` and `within` (plus or minus) are
     bounds for the whole interval. With `some`, at least one run must have the property; with `never`, no run
-    must have it. If no run has it, a verdict needs an interval that ends at or below the given share.
+    may have it. If no run has it, a verdict needs an interval that ends at or below the given share.
     """
 
     above: float | None = None
@@ -203,7 +203,7 @@ def judge(
 
 
 def together(verdicts: Sequence[Verdict]) -> Verdict:
-    """Return FAILS if any verdict is, else UNDECIDED if any is or there is none, else HOLDS."""
+    """Return FAILS if any verdict is FAILS, else HOLDS if all (at least one) are HOLDS, else UNDECIDED."""
     for verdict in (Verdict.FAILS, Verdict.UNDECIDED):
         if verdict in verdicts:
             return verdict

@@ -43,7 +43,7 @@ def table(observation: JudgedObservation) -> Table:
 
 
 def published(one: JudgedClaim) -> str:
-    """Return what the paper says on a claim, counts first."""
+    """Return what the paper says about a claim, counts first."""
     found = one.claim.published()
     return "; ".join(text for text in (found.text if found else "", one.claim.told) if text) or "-"
 

@@ -43,7 +43,7 @@ def answers_of(run: ReportedRun) -> tuple[Answer, ...]:
 
 
 def _told(run: ReportedRun) -> pd.DataFrame:
-    """The usable experiments with rank, course and warning. Those that an answer can list have texts, too."""
+    """The usable experiments with rank, course and warning. Those that answers can list also have texts."""
     frame = run.frame
     told = frame.assign(place=frame[PLACE], course=frame[COURSE], warning=warnings_of(frame))
     shown = worst_of(told)

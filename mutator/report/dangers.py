@@ -1,4 +1,4 @@
-"""The most dangerous results: the worst experiments, and the fault types with most hazards."""
+"""The most dangerous results: the worst experiments, and the fault types with the most hazards."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -61,7 +61,7 @@ class Filming:
         golden: Path | None = None,
     ) -> bool:
         """Rerun an experiment's faulty run, and the golden run unless it is given, and write `shots`.
-        Returns whether the new record equals `known`; true if `known` is None. Raise MutatorError if the
+        Return whether the new record equals `known`; true if `known` is None. Raise MutatorError if the
         faulty run left no film or the target's command fails."""
         with ScratchFolder("mutator-film-") as scratch:
             single = run_single(

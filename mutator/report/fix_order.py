@@ -16,7 +16,7 @@ LISTED = 5  # maximum number of fault types listed
 
 def first_to_fix(frame: pd.DataFrame, paths: FoundPaths | None, *, has_alerts: bool) -> Answer:
     """Answer which fault types to fix first: those with the most silent hazards in the highest severity
-    class; ties are broken by the next lower class, at last by hazards without contact, then by the shortest
+    class; ties are broken by the next lower classes, then by hazards without contact, then by the shortest
     time from activation to hazard. If the target has no alerts, all hazards are counted. `frame` must have at
     least one hazard."""
     hazards = frame[frame["outcome"] == "hazard"]

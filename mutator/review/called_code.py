@@ -18,7 +18,7 @@ from mutator.review.source_names import SUPER, Import, Module, Use, uses_in
 from mutator.targets.source_tree import SourceTree
 
 _Class = tuple[str, str]  # its file, its name
-_FURTHEST = 20  # most imports to follow for a name
+_FURTHEST = 20  # maximum number of imports to follow for a name
 
 
 @dataclass(frozen=True, slots=True, order=True)

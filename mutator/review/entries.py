@@ -41,8 +41,8 @@ class Bound:
 class Decision:
     """The decision of `by` about a group, and the group's state at that time.
 
-    `at` is the time (UTC, ISO 8601), `commit` the library's, `tool` the version of mutator. In decisions from
-    older files, `at`, `commit`, `tool`, `values` and `bound.calls` are None.
+    `at` is the time (UTC, ISO 8601), `commit` the commit of the library, `tool` the version of mutator. In
+    decisions from older files, `at`, `commit`, `tool`, `values` and `bound.calls` are None.
     """
 
     group: str

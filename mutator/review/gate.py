@@ -17,7 +17,7 @@ from mutator.workspace import Workspace
 
 SCHEMA = "reviewed/1"
 FILE = "reviewed.json"
-_MOST_IDS = 10  # most ids in one printed command
+_MOST_IDS = 10  # maximum number of ids in one printed command
 
 
 def approvals(workspace: Workspace, plan: Plan) -> dict[str, Any]:

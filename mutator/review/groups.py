@@ -20,7 +20,7 @@ from mutator.triggers.conditions import TIME, names_in
 
 Span = tuple[int, int, str]  # position of a value in a patch: begin, end, name (empty: not yet known)
 
-HOLE = "\0"  # never in Python source
+HOLE = "\0"  # never occurs in Python source
 _WORD = r"\w.\\\x80-\U0010ffff"  # next to one of these, a number is part of a longer number or of a name
 _NUMBER = (  # with its sign, and the operator of a sum: `- 3.0`
     rf"(?:[+-] ?){{0,2}}(?:(?<![{_WORD}])[0-9]+(?:\.[0-9]*)?(?:e[+-]?[0-9]+)?(?![{_WORD}])"

@@ -40,7 +40,7 @@ from mutator.workspace import Workspace
 
 MODEL = "image_effect"
 LEVELS = ("least", "middle", "most")
-MOST = 9  # most values of a group to draw; three are shown
+MOST = 9  # maximum number of a group's values to draw; three are shown
 CLEAR = 0.5  # minimum correlation of amount and change for ranking severity by amount
 QUALITY = 85
 LIMITS = Limits(cpu_s=60, wall_s=120)

@@ -179,7 +179,7 @@ def _json(value: Any) -> str:
 
 
 def _from_first(source: Source) -> Source:
-    """Convert the blocks of a `review/1` file; invalid parts stay as they are."""
+    """Convert the blocks of a `review/1` file; invalid parts are left unchanged."""
     blocks = source.data.get("decisions")
     if not isinstance(blocks, list):
         return source

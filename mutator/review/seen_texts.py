@@ -49,7 +49,7 @@ def _headed(diff: Iterable[str], new: Sequence[str]) -> Iterator[str]:
 
 
 def _section(lines: Iterable[str]) -> str:
-    """The section, and the part of it, in which these lines end."""
+    """The section at the end of these lines, and the part of that section."""
     section = part = ""
     for line in lines:
         if line.startswith("== "):

@@ -60,7 +60,7 @@ def of_group(run: RunFolder, group: Group) -> Typical | None:
 
 @lru_cache(maxsize=8)
 def _of_run(path: Path, written: int) -> dict[str, Typical]:
-    """The results of each group by label; `written`, the time of the table, only keys the cache."""
+    """The results of each group by label; `written`, the time of the table, is only a cache key."""
     import numpy as np
 
     texts = Results.of_run(path).texts()

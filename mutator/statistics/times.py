@@ -42,8 +42,8 @@ class Reaction:
     if the flat section reaches the end of the curve, `median` is the section's beginning. From `median_low`
     to `median_high`, the curve's log-log transformed interval contains one half (Brookmeyer and Crowley
     1982). A bound is infinite if the runs do not reach it. `survival` is the Kaplan-Meier share of alerts
-    without a hazard within the driver's reaction time; `in_time` is the share of the hazards after an alert
-    that came later than this.
+    without a hazard within the driver's reaction time; `in_time` is the share, among the hazards after an
+    alert, of those that came later than this reaction time.
     """
 
     at_risk: int

@@ -1,7 +1,7 @@
 """The hazard analysis as data: control structure, unsafe control actions, causal factors.
 
-Loading checks all references between the files. `mutator.stpa.checks` compares the analysis with fault specs
-and target.
+Loading checks all references between the files. `mutator.stpa.checks` compares the analysis with the fault
+specs and the target.
 """
 
 from collections.abc import Collection, Mapping
@@ -227,7 +227,7 @@ def _check_grid(structure: StructureModel, source: Source) -> None:
 def _tables(
     folder: Path, unsafe: UnsafeActionsModel, source: Source, structure: StructureModel
 ) -> dict[str, ContextTable]:
-    """Load the context tables of the unsafe actions. They may judge only control actions of the structure."""
+    """Load the context tables of the unsafe actions. They can judge only the structure's control actions."""
     known = sorted(path.stem for path in folder.glob("*.yaml"))
     tables = {}
     for i, name in enumerate(unsafe.tables):

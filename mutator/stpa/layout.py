@@ -38,7 +38,7 @@ class Box:
         return self.y + self.height
 
     def holds(self, x: float) -> bool:
-        """Whether an arrow at `x` meets the box, not too close to its edges."""
+        """Whether an arrow at `x` meets the box, away from its corners."""
         return self.x + 8 <= x <= self.x + self.width - 8
 
 

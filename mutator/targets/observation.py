@@ -22,7 +22,7 @@ _READING = (
 )
 _FUNCTIONS = ("abs", "min", "max", "hypot", "float", "len")
 _TAKEN = (*RESERVED, "math")
-_ARGUMENTS = {"abs": (1, 1), "float": (1, 1), "len": (1, 1), "hypot": (2, 2)}  # others: one or more
+_ARGUMENTS = {"abs": (1, 1), "float": (1, 1), "len": (1, 1), "hypot": (2, 2)}  # other functions: one or more
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

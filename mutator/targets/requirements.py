@@ -32,7 +32,7 @@ def read_requirements(texts: Sequence[str], source: Source) -> tuple[Requirement
 
 def shortcoming(wanted: Requirement) -> str:
     """What is wrong with a package: `not installed`, or the installed version. Empty if it is installed as
-    required, or not needed here."""
+    required, or is not needed here."""
     if wanted.marker and not wanted.marker.evaluate({"extra": ""}):
         return ""
     try:

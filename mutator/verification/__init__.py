@@ -1,4 +1,4 @@
 """Checks that results are valid: preflight, equivalence check, library check, doctor.
 
-This package changes no result.
+This package does not change results.
 """

@@ -43,7 +43,7 @@ def job(workspace: Workspace, manifest: TargetManifest, experiment: Experiment) 
 def judge(
     experiments: Iterable[Experiment], run: Callable[[Experiment], CheckRun], hazard: str
 ) -> tuple[str, str]:
-    """Run the experiments until one does harm; return the problem (empty: none) and the success message."""
+    """Run experiments until one causes `hazard`; return the problem ('': none) and the success message."""
     harmless: list[str] = []
     for experiment in experiments:
         value = fault_label("", experiment.fault.value, experiment.fault.unit).strip()

@@ -1,5 +1,4 @@
-"""Find draws that no parameter uses, so that their faults are all the same, and parameters that no template
-uses."""
+"""Find draws that no parameter uses (all their faults are the same), and parameters that no template uses."""
 
 from collections.abc import Iterator
 

@@ -217,8 +217,8 @@ class _Checks:
             yield _result(f"same {name}", judge_same(goldens), "one run for all")
 
     def _anchors(self) -> CheckResult:
-        """Check that each variant of the plan finds its statements. A mutant that does not compile is no
-        failure here."""
+        """Check that each variant of the plan finds its statements. A mutant that does not compile
+        passes this check."""
         problems: dict[str, list[str]] = {}
         for fault in self.variants.values():
             try:

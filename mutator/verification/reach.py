@@ -1,7 +1,7 @@
 """Find out which statements of fault specs, and which triggers, golden runs reach.
 
 One mutant has a counting probe call at each of these statements. A statement is counted exactly when a fault
-there would be active if its trigger always held.
+there would be active if the fault's trigger always held.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -29,9 +29,9 @@ from mutator.verification.audited_records import recorded
 from mutator.verification.repaired_series import repair_series
 from mutator.workspace import Workspace
 
-ASIDE = "damaged"  # folder for what is set aside
+ASIDE = "damaged"  # folder for damaged content
 SCHEMAS = {"records": SCHEMA, "proof": SCHEMA, "timings": TIMINGS_SCHEMA}
-_Change = tuple[str, bytes | None, str]  # a file, its new content (None: removed), and a sentence
+_Change = tuple[str, bytes | None, str]  # file, new content (None: removed), sentence about the change
 
 
 def repair(folder: RunFolder, workspace: Workspace | None = None) -> list[str]:

@@ -52,8 +52,8 @@ def holds(trigger: Arming, rows: Iterable[Sequence[float]]) -> bool:
 
 
 def _fits(trigger: Arming, observed: Observed) -> bool:
-    """Whether the condition has one argument for each observed column; in older templates it also has derived
-    values."""
+    """Whether the condition has one argument for each observed column; in older templates it also takes the
+    derived values."""
     return len(signature(trigger[1]).parameters) == len(observed.T)
 
 
