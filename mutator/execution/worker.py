@@ -181,7 +181,7 @@ def timing_of(finished: Finished, worker: str) -> dict[str, Any]:
 
 
 def dying_python(parent: int) -> list[str]:
-    """Return the beginning of a Python command line. Its process dies with `parent`, even while starting."""
+    """Return the beginning of a Python command line whose process dies with `parent`, even while starting."""
     return [sys.executable, "-I", "-S", guard.__file__, str(parent), sys.executable]
 
 

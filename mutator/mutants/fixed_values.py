@@ -2,7 +2,7 @@
 
 The program computes them once, when it loads the module and no fault is active. So the probe sets them while
 the fault is active, and restores them afterwards. A tagged line after the statement tells the probe where
-they are.
+the values are.
 """
 
 import ast

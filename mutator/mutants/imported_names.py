@@ -38,8 +38,8 @@ class _Imports:
 def importers(tree: SourceTree, path: str, name: str) -> tuple[str, ...]:
     """Return `module.NAME` for each place that imports the constant `name` of the module at `path`.
 
-    MutatorError with the places where it cannot be set: star imports, imports into a class, and modules that
-    also set the name in another way.
+    MutatorError with the places where the constant cannot be set: star imports, imports into a class, and
+    modules that also set the name in another way.
     """
     files = [tree.derived(file, _imports) for file in tree.files if file.endswith(".py")]
     exported = {file.module: file.exported for file in files}

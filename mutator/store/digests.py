@@ -168,7 +168,7 @@ def rewriting(
 ) -> Iterator[None]:
     """Announce that the `with` block changes files (None: deletes them); confirm the changes at its end.
 
-    If the process is killed within the block, the folder still opens, and the files can be rewritten.
+    If the process is killed within the block, the folder can still be opened, and the files rewritten.
     `finished` is as in `close_segments`, but applies from the start of the block.
     """
     before = settled(run)

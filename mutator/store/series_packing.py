@@ -1,6 +1,6 @@
 """Pack the series that workers appended into a run's chunks, the most valuable first, up to the budget.
 
-The files do not depend on the workers or their order.
+The packed files do not depend on the workers or their order.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -22,7 +22,7 @@ _MB = 1_000_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EncodedSeries:
-    """The bytes of an experiment's series, and of the golden run `key` to which it refers."""
+    """The bytes of an experiment's series, and of the series of its golden run `key`."""
 
     key: str
     golden: bytes
@@ -42,7 +42,7 @@ class SeriesWriter:
         self._writer().append(*series_block(experiment_id, one))
 
     def add_golden(self, key: str, golden: Callable[[], bytes]) -> None:
-        """Append the series of a golden run, which `golden` returns, unless it is there already."""
+        """Append the series that `golden` returns for a golden run, unless it was appended before."""
         if key not in self._known:
             self._writer().append(GOLDEN, key, golden())
             self._known.add(key)

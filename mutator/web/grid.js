@@ -56,7 +56,7 @@ class Grid {
     new ResizeObserver(() => this.#soon()).observe(place);
   }
 
-  /** The columns that are hidden by default. Metrics have unit and meaning. */
+  /** The columns that are hidden by default. Metrics have a unit and a meaning. */
   static #more(table, metrics) {
     const known = new Map(metrics.map(([name, unit, about]) => [name, { unit, about }]));
     const names = [...table.columns.keys()].filter((name) => !Grid.COLUMNS.some((column) => column.name === name));

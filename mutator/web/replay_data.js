@@ -49,8 +49,8 @@ const ReplayData = (() => {
     return Math.sqrt(sum / (count || 1));
   }
 
-  /** The axis of a channel, from its values up to the end of the drive. `cut`: the true range, if it is too large to show:
-   *  for example, a headway time near standstill would hide everything else. `isWhole`: all values are integers. */
+  /** The axis of a channel, from its values up to the end of the drive. `cut`: the true range, if it is too large to show.
+   *  For example, a headway time near standstill would hide everything else. `isWhole`: all values are integers. */
   function range(channel, end) {
     const values = [];
     for (let i = 0; i < channel.t.length && channel.t[i] <= end + TINY; i++) values.push(channel.golden[i], channel.faulty[i]);
@@ -63,7 +63,7 @@ const ReplayData = (() => {
       cut = [low, high];
       [low, high] = [Math.max(low, -2 * usual), Math.min(high, 2 * usual)];
     }
-    // because a narrower range would magnify rounding errors
+    // a narrower range would magnify rounding errors
     const margin = Math.max((high - low) * 0.06, 1e-6, Math.abs(high) * 1e-3);
     return { low: low - margin, high: high + margin, cut, isWhole };
   }

@@ -2,7 +2,7 @@
 
 Each process waits between two steps of a golden run; the first waits before any run. A process answers on its
 own socket with marshalled dicts, each preceded by its length. While it has only one thread, it forks on
-request: a mutant, or a process that waits at a later step. It ends when the other end closes its socket, or
+request, to run a mutant or to wait at a later step. It ends when the other end closes its socket, or
 when the first process ends (guard.py).
 """
 

@@ -44,9 +44,9 @@ def fork(
     """Fork. Return None in the child, which leads its own session and dies with its parent.
 
     The parent waits until the child ends, a limit stops it, or the other end of `caller` (a pipe or socket)
-    is closed. It then kills everything that the child left. If the caller closes its end, the child has
-    `patience_s` to end by itself. The parent returns `code` (negative for a signal), `cpu_s`, `wall_s`, and
-    `stopped`: WALL, DISK, ABANDONED or "".
+    is closed. The parent then kills everything that the child left. If the caller closes its end, the
+    child has `patience_s` to end by itself. The parent returns `code` (negative for a signal), `cpu_s`,
+    `wall_s`, and `stopped`: WALL, DISK, ABANDONED or "".
     """
     _prctl(_PR_SET_CHILD_SUBREAPER, 1)
     began, parent, pid = time.monotonic(), os.getpid(), os.fork()
@@ -82,7 +82,7 @@ def _mind_signals() -> None:
 
 
 def die_with_parent(parent: int) -> None:
-    """Make the kernel kill this process when `parent` dies. Exit now if it is no longer the parent."""
+    """Make the kernel kill this process when `parent` dies. Exit now if `parent` is no longer the parent."""
     _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
         os._exit(1)

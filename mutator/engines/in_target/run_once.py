@@ -1,8 +1,8 @@
 """Run a target once in a fresh interpreter: `python -P -s run_once.py job.json SOCKET`.
 
 Standard library only, because the harness must not change what the target does. The script forks. The parent
-guards the run (see guard.py) and reports over the socket how it ended. The child limits itself, puts the tree
-first on sys.path, runs the entry module as `__main__`, and writes report.json.
+guards the child (see guard.py) and reports over the socket how it ended. The child limits itself, puts the
+tree first on sys.path, runs the entry module as `__main__`, and writes report.json.
 """
 
 import errno
@@ -24,8 +24,8 @@ from pathlib import Path
 from typing import Any
 
 _NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
-_LONGEST = 2000  # characters stored of an exception
-_MOST_ERRORS = 50  # exceptions stored: the one raised, its causes and those that it groups
+_LONGEST = 2000  # the most characters stored of an exception
+_MOST_ERRORS = 50  # the most exceptions stored: the one raised, its causes and those that it groups
 
 
 def beside(name: str) -> Any:
@@ -142,7 +142,7 @@ def run_until(job: dict[str, Any]) -> bool:
 
 
 def note_activation(probe: Any, inactive: str) -> None:
-    """Let the first activation delete the file `inactive`, so that it is known even if the run crashes."""
+    """Delete the file `inactive` at the first activation, which is then known even if the run crashes."""
     active = probe.active
 
     def first_active(fi: str) -> Any:

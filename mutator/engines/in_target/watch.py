@@ -229,8 +229,8 @@ class Watcher:
 class _Watched:
     """A function with an action before each call.
 
-    Like the built-in functions that it replaces, it does not become a method as a class attribute, and
-    copying returns the same object.
+    Like the built-in functions that it replaces, it does not become a method when it is a class
+    attribute, and copying it returns the same object.
     """
 
     def __init__(self, original: Callable[..., Any], before: Callable[..., None]) -> None:

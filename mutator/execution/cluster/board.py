@@ -23,7 +23,7 @@ _SHARE = 4  # a piece is the remaining work divided by the number of workers and
 _FIRST = 4  # runs in a piece before the first measurement
 _GUESS_S = 0.5  # duration of a run before the first measurement
 _LATE = 3.0  # a piece that takes this many times as long as expected is repeated by another worker
-_LATE_S = 5.0  # but only after this many seconds
+_LATE_S = 5.0  # no piece is repeated before this many seconds
 _DEATHS = 2  # a piece that has killed this many workers is split
 _PROOF_S = 20.0  # a worker idle for this long (or longer, if runs are slow) proves its own runs
 

@@ -50,7 +50,7 @@ RESERVED = (
     "shutdown_on_close",
 )
 _NO_OPTIONS = {"self", "args", "kwargs", "base_class_kwargs", "job_kwargs", "scheduler", "name", *RESERVED}
-_RENEWED_EVERY = "5s"  # a job that reaches its time limit is replaced
+_RENEWED_EVERY = "5s"  # how often jobs that reached their time limit are replaced
 
 
 class ClusterModel(StrictModel, title="A cluster file"):
