@@ -1,4 +1,4 @@
 """When a fault is active: conditions over observed values, and the kinds of triggers.
 
-This package does not select triggers for a campaign or know what a fault does.
+This package neither selects triggers for a campaign nor knows what a fault does.
 """

@@ -32,7 +32,7 @@ def check_condition(
     *,
     over_time: bool = False,
 ) -> str:
-    """Check a condition and return its canonical text, constants replaced by their numbers.
+    """Check a condition and return its canonical text, with constants replaced by their numbers.
 
     Allowed: the variables (None: any name, checked once the target is known), numbers, `True`, comparisons,
     and/or/not, + - * /, abs/min/max/hypot, and, with `over_time`, `ever` of a condition and `rate` of a
