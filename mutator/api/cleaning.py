@@ -1,4 +1,4 @@
-"""Deletion of run folders, for `mutator clean`: completely, or not at all."""
+"""Delete run folders for `mutator clean`, each one completely or not at all."""
 
 from mutator.store.cleaning import check
 from mutator.store.cleaning import clean as delete

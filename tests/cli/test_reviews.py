@@ -40,7 +40,7 @@ def about(known: dict[str, str], words: str) -> str:
 
 
 def test_groups_without_approval_are_listed_first(cli: Cli, root: Path, known: dict[str, str]) -> None:
-    """Groups with a changed template come before approved ones."""
+    """An approved group is listed as changed once its template has changed."""
     first, *rest = known
     cli("review", "approve", first, *JANE)
     lines = cli("review").out.splitlines()

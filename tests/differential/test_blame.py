@@ -1,4 +1,4 @@
-"""Every engine gives the same reason why a run did not end well."""
+"""Every engine gives the same reason why a run did not end normally."""
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path

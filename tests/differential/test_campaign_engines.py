@@ -1,4 +1,4 @@
-"""A whole campaign gives the same results on each engine, also after kills."""
+"""A whole campaign gives the same results on each engine, even after kills."""
 
 import os
 import signal

@@ -147,7 +147,7 @@ def test_an_invalid_study_is_reported_at_its_line_in_the_campaign(
 def test_an_error_in_a_studys_check_is_reported_as_a_problem(
     strangers: None, toycar: Workspace, study: str
 ) -> None:
-    """It does not end `mutator check`."""
+    """The error does not end `mutator check`."""
     path = asking(toycar, study)
     line = len(path.read_text().splitlines())
     problems = [str(problem) for problem in check_library(toycar, "toycar")]

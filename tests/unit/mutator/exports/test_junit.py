@@ -25,7 +25,8 @@ BECAME: dict[str, dict[str, Any] | None] = {
 
 
 def became(e: Experiment) -> dict[str, Any] | None:
-    """Make lane faults hazards, silence a harness error, and distance masked, not activated or not run."""
+    """Make lane faults hazards, silence faults harness errors, and distance faults masked, not activated or
+    not run."""
     if e.fault.fault_type in BECAME:
         return BECAME[e.fault.fault_type]
     if e.method.value == "random":

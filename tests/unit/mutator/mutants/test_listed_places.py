@@ -131,7 +131,7 @@ def test_the_places_of_one_function_can_be_listed(shipped: Workspace) -> None:
 
 
 def test_models_that_repeat_or_move_a_yield_are_not_listed(shipped: Workspace) -> None:
-    """They would change what the generator yields."""
+    """Such models would change what the generator yields."""
     file = parse_file("m.py", b"def f(a):\n    b = yield a\n    c = b\n    return c\n", Path("x"))
     places = [one for one in places_of(file, shipped.fault_models()) if "before_assign" in one.at]
     models = {one.line: one.models for one in places}

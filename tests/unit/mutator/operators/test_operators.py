@@ -126,8 +126,8 @@ def test_mutations_to_equal_code_are_dropped(make: Make) -> None:
 
 
 def test_first_values_are_kept_in_functions_with_the_same_name(make: Make) -> None:
-    """A property and its setter share a name. In each, the assignment that gives a local name its first value
-    is not left out."""
+    """A property and its setter share a name. In each, no mutant omits the assignment that gives a local name
+    its first value."""
     setter = "@f.setter\n    def f(self, a):\n        c = a\n        self.a = c"
     made = make(
         f"@property\n    def f(self):\n        c = 1\n        return c\n    {setter}",

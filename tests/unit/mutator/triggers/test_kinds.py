@@ -13,7 +13,7 @@ FOLLOWING = {"t": 3.0, "d_rel": 40.0, "v_ego": 20.0, "v_lead": 18.0}
 
 
 def test_the_text_of_a_trigger_decides_its_kind() -> None:
-    """A condition waits until it is armed."""
+    """`always` and conditions are armed at the given time."""
     assert read_trigger("always", 1.5, ("t", "hwt")) == always(armed_after_s=1.5)
     assert read_trigger("12.5", 1.5, ("t", "hwt")) == at_time(12.5)
     typed = read_trigger("hwt<=2", 1.5, ("t", "hwt"))

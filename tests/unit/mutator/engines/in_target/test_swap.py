@@ -105,7 +105,7 @@ def functions(old: str, new: str) -> list[tuple[str, tuple[str, ...], types.Code
 def test_functions_of_every_form_run_the_new_code(
     loaded: types.ModuleType, word: str, call: Callable[[types.ModuleType], str]
 ) -> None:
-    """They run the new code even after many calls of the old code."""
+    """The new code runs even after many calls of the old code."""
     kept = call
     for _ in range(200):
         if word != "cached":
@@ -116,7 +116,7 @@ def test_functions_of_every_form_run_the_new_code(
 
 
 def test_imported_names_and_bound_methods_run_the_new_code(loaded: types.ModuleType) -> None:
-    """Their function object is kept and gets the new code."""
+    """The function object is kept and gets the new code."""
     plain, method = loaded.plain, loaded.Car().method
     swap_code(functions('"old plain"', '"new plain"'), PROBE)
     swap_code(functions('"old method"', '"new method"'), PROBE)

@@ -166,7 +166,7 @@ def test_a_known_deadly_experiment_is_given_up_after_its_second_worker(
 
 
 def test_a_worker_does_not_retry_the_piece_that_killed_it(folder: RunFolder, clock: Clock) -> None:
-    """If no other worker is left, it retries the piece."""
+    """The worker retries the piece only if no other worker is left."""
     there = board(folder, clock)
     deadly = taken(there, "alpha")
     there.died(deadly, "alpha")
