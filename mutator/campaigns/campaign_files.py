@@ -89,7 +89,7 @@ class Campaign:
         return ("setting", reading) if reading in self.setting else ("setting",)
 
     def error(self, keys: Keys, got: str, *, expected: str, remedy: str) -> MutatorError:
-        """Return, for the caller to raise, an error that points into the campaign file."""
+        """Return an error at `keys` of the campaign file; the caller raises it."""
         return self.yaml.error(keys, got, expected=expected, remedy=remedy)
 
 

@@ -25,7 +25,7 @@ def cut(groups: Sequence[Hashable], size: int) -> tuple[int, ...]:
 
 
 def cut_runs(runs: Sequence[Sequence[Experiment]], size: int) -> tuple[int, ...]:
-    """Return the number of experiments in each chunk of at most `size` runs. Shared runs stay whole."""
+    """Return the number of experiments in each chunk of at most `size` runs. No chunk splits a shared run."""
     lengths = iter([len(same) for same in runs])
     counts = cut([(same[0].scenario, same[0].changes) for same in runs], size)
     return tuple(sum(islice(lengths, count)) for count in counts)

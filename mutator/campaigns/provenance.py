@@ -73,7 +73,7 @@ def check_versions(folder: RunFolder, *, accept: bool = False) -> tuple[str, ...
 
 
 def other_versions(run: Path, what: str, found: Iterable[str]) -> MutatorError:
-    """Return, for the caller to raise, an error about different versions. Its text begins with `what`."""
+    """Return an error about different versions, which the caller raises. Its text begins with `what`."""
     return MutatorError(
         f"{what} other versions: {'; '.join(found)}",
         where=run,

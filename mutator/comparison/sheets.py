@@ -128,8 +128,8 @@ def whole_and_parts(
     whole: tuple[tuple[Cell, ...], ...],
     parts: Sequence[tuple[Cell, ...]],
 ) -> tuple[Sheet, Sheet]:
-    """A table of all pairs and one by fault type. `heads` has the heading of the first column, then the
-    others."""
+    """The table of all pairs and the table by fault type. `heads` has the heading of the first column, then
+    those of the others."""
     what, numbers = heads
     return (
         Sheet(name=name, title=title, note=f"{note}.", heads=(what, *numbers), lines=whole),

@@ -90,7 +90,10 @@ def brake_too_short(pair: Pair) -> Steps | None:
 
 
 def at_a_wrong_time(channel: str) -> Look:
-    """Return a function that finds steps in which only the faulty run applies `channel`, for long enough."""
+    """Return a function that finds the steps in which only the faulty run applies `channel`.
+
+    The function returns None if these steps last less than WRONG_S.
+    """
 
     def look(pair: Pair) -> Steps | None:
         golden, faulty = pair.applied(channel)

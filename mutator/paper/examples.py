@@ -26,7 +26,7 @@ def example_drawings(
     workspace: Workspace | None,
     wanted: Sequence[Wanted] = WANTED,
 ) -> tuple[Drawing, ...]:
-    """Return a drawing for each wanted figure. If a figure cannot be drawn, its drawing has the reason.
+    """Return a drawing for each wanted figure. If a figure cannot be drawn, its drawing gives the reason.
 
     `frame` comes from `statistics.frame.load`. Traces come from stored series, so nothing is rerun.
     """

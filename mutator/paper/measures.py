@@ -150,7 +150,7 @@ def median_time(runs: pd.DataFrame, *, of: str) -> Estimate:
     ends = {str(scenario): float(group["t_end"].iloc[0]) for scenario, group in chosen.groupby("scenario")}
     found = times.reaction(chosen, ends, 0.0)
     median, low, high = found.median, found.median_low, found.median_high
-    if found.at_risk and math.isnan(low):  # the curve stays above one half or skips it in one step
+    if found.at_risk and math.isnan(low):  # the curve stays above one half or jumps past it
         median = math.inf if math.isnan(median) else median
         if found.at_risk >= _BOUNDS_A_MEDIAN:
             low = high = median

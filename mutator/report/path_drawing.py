@@ -39,7 +39,7 @@ def draw_ways(structure: StructureModel, counts: PathCounts, links: Collection[s
 
 
 def share_text(through: int, came: int) -> str:
-    """For example `12 of 40, 30 %`; '' if no fault came to the link."""
+    """For example `12 of 40, 30 %`; '' if no fault reached the link."""
     return f"{through} of {came}, {100 * through / came:.0f} %" if came else ""
 
 

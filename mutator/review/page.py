@@ -78,8 +78,8 @@ def render_page(data: dict[str, Any]) -> str:
 
 
 def state_of(review: Review, group: Group) -> dict[str, Any]:
-    """The review of a group, as the page shows it. `digest` identifies the mutants, so that a page that shows
-    other mutants cannot decide about these."""
+    """The review of a group, as the page shows it. `digest` identifies the mutants, so that decisions from a
+    page that shows other mutants are refused."""
     decision, flag = review.decision(group.id), review.flag(group.id)
     return {
         "state": review.state(group).value,

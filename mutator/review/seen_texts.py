@@ -49,7 +49,7 @@ def _headed(diff: Iterable[str], new: Sequence[str]) -> Iterator[str]:
 
 
 def _section(lines: Iterable[str]) -> str:
-    """The section at the end of these lines, and the part of that section."""
+    """The names of the last section in these lines and of its last part."""
     section = part = ""
     for line in lines:
         if line.startswith("== "):

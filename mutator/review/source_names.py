@@ -96,7 +96,7 @@ def read_module(path: str, data: bytes, root: Path) -> Module:
 
 
 def uses_in(node: ast.AST, owner: str = "", wanted: _Wanted | None = None) -> Iterator[Use]:
-    """The external names that the parts of `node` accepted by `wanted` use. `owner` is the class of a
+    """The external names used in `node`, within the parts that `wanted` accepts. `owner` is the class of a
     method."""
     yield from _uses(node, _Scope(owner=owner), wanted or (lambda _: True))
 

@@ -21,12 +21,12 @@ def run_sheets(
     alerts: Alerts | None,
     ends: Mapping[str, float] | None,
 ) -> tuple[Sheet, ...]:
-    """The tables of a frame; none if it has one method and no published counts, because the tables would only
-    repeat counts.
+    """The tables of a frame; none for one method without published counts, because they would only repeat
+    counts.
 
     `alerts` are those of each run with a hazard (None: the target has no alerts); they decide which event
     came first. `ends` is the end of a run of each scenario in simulated seconds; censored times need it.
-    Tables without their inputs are left out.
+    Tables whose inputs are missing are left out.
     """
     frame = slim(frame)
     if not published and not {GUIDED, RANDOM} <= set(frame["method"]):

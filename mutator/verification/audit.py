@@ -59,8 +59,8 @@ class Check:
 def audit_checks(folder: RunFolder, workspace: Workspace | None) -> list[Check]:
     """Audit a complete run folder.
 
-    Trees and patches are compared only if `workspace` has the run's sources. If it is None or has other
-    sources, this is reported as a difference.
+    Trees and patches are compared only if `workspace` has the run's sources; otherwise, a difference is
+    reported.
     """
     head = folder.head
     here = Check.of("sources that match those of the run", len(head["sources"]), _sources(folder, workspace))

@@ -1,7 +1,8 @@
 """Find triggers that no golden run reaches.
 
 A faulty run equals the golden run until its fault is active, so a trigger that never holds in the golden run
-never fires. Null mutants equal their golden runs, and record what these observe.
+never fires. The run of a null mutant equals its golden run, and records the observed
+values.
 """
 
 from collections import Counter

@@ -1,5 +1,5 @@
-"""The panels of every report. To add one, add a module and a line in `PANELS`; its function returns None if
-there is nothing to show."""
+"""The panels of every report. To add a panel, write a module and list its function in `PANELS`. The function
+returns None if there is nothing to show."""
 
 from collections.abc import Callable
 
