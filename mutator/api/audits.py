@@ -78,10 +78,10 @@ def verify(
 ) -> Audit:
     """Audit the run folder at `run`, finished or not, even if it no longer opens.
 
-    `rerun` randomly drawn experiments are rerun on the reference engine. `expect` is the seal that the run
-    must have. With `repair`, damaged parts are set aside, and the next run of the campaign in this folder
-    redoes them; otherwise nothing is written. MutatorError if `run` is not a run folder or its run.json
-    cannot be read.
+    `rerun` is the number of randomly drawn experiments to rerun on the reference engine. `expect` is the seal
+    that the run must have. With `repair`, damaged parts are set aside, and the next run of the campaign in
+    this folder redoes them; otherwise nothing is written. MutatorError if `run` is not a run folder or its
+    run.json cannot be read.
     """
     check_whole("rerun", rerun)
     if expect is not None:

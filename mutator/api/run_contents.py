@@ -83,7 +83,7 @@ class RunContents:
         return Results.up_to_date(self.path).frame()
 
     def propagation(self) -> "pd.DataFrame":
-        """Return one row for each channel of an experiment that differs from golden: the columns of
+        """Return, for each experiment, one row for each channel that differs from golden, with the columns of
         propagation.parquet.
 
         MutatorError for a run of an older version that did not record these differences.

@@ -63,7 +63,8 @@ def newest_run(root: Path) -> Path:
 
 
 def merge_runs(shards: Sequence[str | Path], out: str | Path, *, accept_versions: bool = False) -> "Run":
-    """Merge the shards of a plan into the run folder `out`, with the same results as from a single machine.
+    """Merge the shards of a plan into the run folder `out`, with the same results as a run on a single
+    machine.
 
     MutatorError unless the shards are finished and make up one whole plan, and, without `accept_versions`, if
     their versions of Python or packages differ. CheckFailed if their golden runs differ.
@@ -177,8 +178,8 @@ class Run(RunContents):
 
     def take_stills(self, progress: Notify | None = None, *, workers: int = 1) -> str:
         """Rerun the worst camera experiments, and keep the frames at the activation, the first alert and the
-        first hazard for the report. One in 20 planned experiments is rerun, at most ten, `workers` at a time;
-        none is started after two minutes.
+        first hazard for the report. At most ten experiments are rerun, and at most one in 20 of those
+        planned, `workers` at a time; none is started after two minutes.
 
         Return the reason for the first experiment without stills; empty if all have stills.
         """

@@ -1,8 +1,8 @@
 """Check every request, and limit what a browser may do with a response.
 
 Other pages in the user's browser and other users of the machine can reach a local port. So each request needs
-the token, in a cookie that other sites cannot send. The request must name this server, because a page whose
-host name resolves to this machine could otherwise read responses, and must not come from another origin.
+the token, in a cookie that other sites cannot send. The request must not come from another origin. It must
+name this server, because a page whose host name resolves to this machine could otherwise read responses.
 """
 
 import base64

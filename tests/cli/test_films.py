@@ -84,7 +84,8 @@ def test_a_still_without_a_file_name_is_in_the_report(cli: Cli, name: str) -> No
 def test_a_run_takes_stills_of_its_worst_experiments(
     cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Stills show activation and hazard, if they are visible. Their number is in proportion to the plan."""
+    """Stills show activation and hazard, if they are visible. Their number is in proportion to the size of
+    the plan."""
     manifest = root / "fault_library/targets/toycar.yaml"
     manifest.write_text(manifest.read_text().replace("still: [", "pictures: [alone]\n  still: ["))
     monkeypatch.setattr(stills, "ONE_IN", 2)

@@ -23,8 +23,8 @@ class Killed(BaseException):
 
 
 class Death:
-    """Allow this many renames in a run folder and fail all later ones. Each file appears by a rename. Renames
-    of scratch files do not count."""
+    """Allow this many renames and deletions in a run folder and fail all later ones. A rename puts each file
+    in place. Scratch files are ignored."""
 
     def __init__(self, run: Path, after: int, patch: pytest.MonkeyPatch) -> None:
         self.left, self._run = after, run
