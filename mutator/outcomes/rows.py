@@ -39,7 +39,7 @@ class Row:
     detail: str
     severity: str = ""  # class of the contact that ended the drive
     delta_v: float | None = None  # delta-v of that contact in m/s
-    margins: tuple[tuple[str, float], ...] = ()  # to the hazards that occurred or, if none did, to all
+    margins: tuple[tuple[str, float], ...] = ()  # by hazard: those that occurred or, if none did, all
 
     @property
     def margin(self) -> float | None:

@@ -182,7 +182,7 @@ def _chosen(faults: Sequence[Fault]) -> tuple[Fault, ...]:
 def _drawn_anew(
     manifest: TargetManifest, models: FaultModels, scenario: Path, wanted: Mapping[str, _Wanted]
 ) -> dict[str, Pictures]:
-    """Draw and cache the images of groups, in one run of the target for all groups of a place."""
+    """Draw and cache the images of groups. All groups of a place share one run of the target."""
     check_requirements(manifest)
     places: dict[tuple[object, ...], list[str]] = {}
     for name, one in wanted.items():

@@ -1,7 +1,7 @@
 """Set aside damaged parts of a run folder, so that `mutator run` can fill the gaps.
 
-Intact lines of a segment stay. Files that only a copy of the folder can replace (run.json, campaign.yaml, the
-plan) are not touched.
+Intact lines of a segment are kept. Files that only a copy of the folder can replace (run.json, campaign.yaml,
+the plan) are not touched.
 """
 
 import os
@@ -94,7 +94,7 @@ def _files(folder: RunFolder, ledger: Ledger) -> Iterator[_Change]:
 
 
 def _lost_patches(folder: RunFolder) -> list[str]:
-    """Experiments whose stored patch does not match the record."""
+    """Experiments whose stored patch does not match their record."""
     lost = []
     for one in recorded(folder, "records"):
         try:
@@ -105,8 +105,8 @@ def _lost_patches(folder: RunFolder) -> list[str]:
 
 
 def _drop_patches(folder: RunFolder, lost: Collection[str]) -> list[str]:
-    """Set aside the files of these patches, and files with damaged blocks; return a sentence for each of the
-    latter. Other patches in these files stay."""
+    """Set aside the files of these patches, and files with damaged blocks; return a sentence for each
+    file with damaged blocks. Other patches in these files are kept."""
     run, patches, said = folder.path, folder.patches, []
     for one in lost:
         old = patches.old_file(one)
@@ -130,7 +130,7 @@ def _drop_patches(folder: RunFolder, lost: Collection[str]) -> list[str]:
 
 
 def _segments(folder: RunFolder, ledger: Ledger, lost: Collection[str]) -> Iterator[_Change]:
-    """Segments with invalid lines, and the content that stays."""
+    """Segments with invalid lines, and their remaining content."""
     run, planned = folder.path, folder.share()
     strangers = set(integrity.strangers(run, ledger)) if ledger.finished else set()
     for kind, schema in SCHEMAS.items():
