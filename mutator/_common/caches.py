@@ -102,7 +102,7 @@ def make_room(target: str) -> list[Entry]:
     """Delete the least recently used files of a target until at most TARGET_BYTES remain; return the deleted
     entries.
 
-    Called before each seed of a run, because each seed has its own images.
+    It is called before each seed of a run, because each seed has its own images.
     """
     return _pruned([_entry(f"target {target}", path) for path in _files(of_target(target))], TARGET_BYTES)
 

@@ -179,7 +179,7 @@ def write_atomic(path: Path, data: bytes) -> None:
 
 @contextmanager
 def half_written(path: Path) -> Iterator[Path]:
-    """Yield a temporary path to write to. It is renamed to `path` unless the block raises."""
+    """Yield a temporary path to write to. The file there is renamed to `path` unless the block raises."""
     if path.is_dir():
         raise MutatorError("a folder", where=path, expected="a file to write", remedy="name a file in it")
     temporary = path.with_name(f".{path.name}.{threading.get_native_id()}")

@@ -25,8 +25,8 @@ def processes_for(experiments: int) -> int:
 
 
 def shared(made: Callable[[T], R], items: Sequence[T], processes: int) -> Iterator[R]:
-    """Yield `made(item)` for each item, in order, computed by `processes` processes (fewer than two: by this
-    one).
+    """Yield `made(item)` for each item, in order, computed by `processes` processes (with fewer than two: by
+    this process).
 
     Each process is at most one result ahead, which saves memory. Exceptions of `made` are raised here;
     MutatorError if a process dies.

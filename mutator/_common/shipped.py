@@ -45,7 +45,7 @@ def refuse_shipped(path: Path) -> None:
 def write_library(folder: Path) -> None:
     """Write an editable library, templates and a README into a new or empty `folder`; MutatorError otherwise.
 
-    The library's manifest says `root: shipped:target`, so it works in any folder.
+    The library's manifest says `root: shipped:target`, so the library works in any folder.
     """
     shipped = shipped_folder()
     make_empty(folder)

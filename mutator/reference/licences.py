@@ -1,4 +1,4 @@
-"""Generate the page of licences that the installed packages of constraints.txt state.
+"""Generate the page of licences, as stated by the installed packages of constraints.txt.
 
 `python -m mutator.reference.licences` writes it. `python -m mutator.reference` does not, since it depends on
 the installed packages.
@@ -31,8 +31,8 @@ _ROW = re.compile(r"^\| ([\w.-]+) \| [^|]* \| ([^|]+) \|$", re.MULTILINE)
 
 
 def write_licences(clone: Path) -> None:
-    """Write the page. A package that is not installed keeps its listed licence; MutatorError if it has
-    none."""
+    """Write the page. A package that is not installed keeps its listed licence; MutatorError if none is
+    listed."""
     page = clone / PAGE
     known = table_of(page.read_text(encoding="utf-8")) if page.exists() else {}
     direct = _needed_by(clone)

@@ -25,7 +25,7 @@ Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, jso
 Reseal = Callable[..., None]  # recomputes every checksum and digest of a run folder
 
 TESTS = Path(__file__).parents[1]
-CHOSEN = ["--only", 'fault_type != "distance"']  # some of these always cause a hazard
+CHOSEN = ["--only", 'fault_type != "distance"']  # some of these faults always cause a hazard
 
 
 def mutator(root: Path, *words: object) -> subprocess.CompletedProcess[str]:

@@ -95,7 +95,7 @@ def test_a_manifest_that_cannot_be_loaded_is_not_rewritten(cli, path: Path, line
 
 
 def test_a_manifest_with_an_invalid_value_is_not_rewritten(cli, path: Path) -> None:
-    """Formulas and placeholders are checked as they will be used."""
+    """Formulas and placeholders are checked in the form in which they will be used."""
     path.write_text(path.read_text().replace('"{out}", --number', '"{oot}", --number'))
     before = path.read_bytes()
     assert "{oot}" in cli("upgrade", path).err

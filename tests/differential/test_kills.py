@@ -31,7 +31,7 @@ def contents(tree: Path) -> dict[str, bytes]:
 
 
 def struck(command: Command, kill: Kill, after_s: float) -> bool:
-    """Kill the command, or one of its workers, after that time. Return false if it ended before."""
+    """Kill the command, or one of its workers, after that time. Return false if the command ended earlier."""
     try:
         command.process.wait(after_s)
         return False
@@ -86,8 +86,8 @@ class Campaign:
             assert self.finish(self.folder / f"killed{next(number)}", left) == self.results
 
     def finish(self, out: Path, kills: list[Kill]) -> str:
-        """Repeat the command until it completes, with the remaining `kills`. Return the digest of the
-        results."""
+        """Repeat the command until it completes, and kill it while `kills` has entries. Return the digest of
+        the results."""
         done = False
         while not done:
             command = Command(

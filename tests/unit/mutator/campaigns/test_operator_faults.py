@@ -66,7 +66,7 @@ def test_each_mutant_is_planned_as_permanent_and_as_transient(toycar: Workspace,
 
 
 def test_the_frozen_plan_lists_left_out_mutants(toycar: Workspace, campaign: Path, tmp_path: Path) -> None:
-    """A plan without operators does not have this key."""
+    """A plan without operators has no such list."""
     plan = make_plan(toycar, campaign)
     folder = freeze(plan, tmp_path / "run", toycar)
     assert load_plan(folder).told == plan.told == tuple(folder.head["operators"])

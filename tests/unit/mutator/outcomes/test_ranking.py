@@ -32,7 +32,7 @@ WORST_FIRST = {
     # H2 and H3 alternate, although H3's numbers are larger; only margins of hazards that occurred are used
     "deep-2": HAZARD | {"margin_h2": "-0.3"},
     "deep-3": LEFT | {"margin_h3": "-500"},
-    "both": LEFT | {"t_h2": "3", "margin_h2": "-0.2", "margin_h3": "-2"},  # second of H2, third of H3
+    "both": LEFT | {"t_h2": "3", "margin_h2": "-0.2", "margin_h3": "-2"},  # second by H2, third by H3
     "second-3": LEFT | {"margin_h3": "-100"},
     "third-2": HAZARD | {"margin_h2": "-0.1", "margin_h3": "-9"},
     "fourth-3": LEFT | {"margin_h3": "-1"},

@@ -24,7 +24,7 @@ def run(tmp_path: Path) -> Path:
 
 
 def study_forms(run: Path) -> tuple[str, str]:
-    """The texts of the study's Markdown and page."""
+    """Return the study's Markdown and the text of its page."""
     building.write(run, HERE)
     report = run / "report"
     return (report / "STUDY.md").read_text(), " ".join(Page((report / "study.html").read_text()).texts)

@@ -125,7 +125,7 @@ def test_a_schema_accepts_a_users_fault_model() -> None:
 
 
 def test_pages_are_written_in_a_clone_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A wheel has no clone to write them into."""
+    """An installed wheel has no clone to write to."""
     monkeypatch.setattr(shipped, "ARCHIVE", tmp_path)
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
     library = tmp_path / "mutator" / "shipped" / "0" / "fault_library"
