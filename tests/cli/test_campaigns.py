@@ -94,7 +94,7 @@ def test_a_run_has_a_worker_for_each_usable_core(
 
 @pytest.mark.parametrize("engine", ["reference", "warm", "fork"])
 def test_a_fault_that_hides_a_name_is_refused_before_any_run(cli: Cli, root: Path, engine: str) -> None:
-    """Such a fault makes a module's name local."""
+    """The fault would make a module's name local to a function."""
     driver = root / "tree" / "toycar" / "driver.py"
     driver.write_text("HEADWAY_S = 1.5\n" + driver.read_text().replace("1.5 * speed", "HEADWAY_S * speed"))
     spec = root / "fault_library" / "faults" / "sensor" / "lane.yaml"

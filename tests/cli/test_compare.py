@@ -39,7 +39,7 @@ def test_compare_prints_and_writes_the_changes(cli: Cli, runs: tuple[Path, Path]
 
 
 def test_a_different_selection_is_reported_before_any_table(cli: Cli, root: Path, write_run: Write) -> None:
-    """The page has the remark, too."""
+    """The Markdown and the JSON output have the remark, too."""
     workspace = Workspace.find(root)
     runs = write_run(workspace, Path("whole")), write_run(workspace, Path("part"), limit=6)
     said = "The runs are different parts of a campaign: whole has everything, part has --limit 6."

@@ -44,7 +44,6 @@ def terminal(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_inserted_lines_of_a_diff_are_green(cli: Cli, root: Path, terminal: None) -> None:
-    """Without colours, the diff equals the piped one."""
     answer = cli("diff", "sensor/silence")
     assert re.search(r"\x1b\[32m\+ +if not _fi.active", answer.out)
     assert "+        if not _fi.active" in ANSI.sub("", answer.out)

@@ -80,8 +80,8 @@ def test_order_and_interruptions_change_no_byte(
 def test_lost_records_run_again(
     toy: Workspace, tmp_path: Path, whole: Path, undisturbed: Bytes, closed: bool
 ) -> None:
-    """If a session has closed the file of records, a kill does not explain the loss. Such a file is refused
-    until it is repaired."""
+    """A kill does not explain a loss from a file that a session has closed, so that file is refused until it
+    is repaired."""
     out = shutil.copytree(whole, tmp_path / "run")
     [path] = (out / "records").iterdir()
     lines = path.read_bytes().splitlines(keepends=True)

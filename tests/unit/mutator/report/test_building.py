@@ -168,7 +168,7 @@ def test_an_up_to_date_report_is_not_written_again(run: Path) -> None:
 
 @pytest.mark.parametrize("name", ["REPORT.md", "index.html", "figures/a.svg", "tables/a.csv"])
 def test_a_report_that_was_edited_is_written_again(run: Path, name: str) -> None:
-    """A comparison in the same folder is not a file of the report."""
+    """A comparison in the same folder is not part of the report."""
     out = run / "report"
     for folder in ("figures", "tables", "compare-other"):
         (out / folder).mkdir(parents=True)

@@ -111,7 +111,7 @@ def test_a_link_to_a_file_is_not_followed(client: Client, linked: Path, name: st
 
 @pytest.mark.parametrize("name", ["plots", "report", "series"])
 def test_linked_folders_are_not_followed(client: Client, linked: Path, name: str) -> None:
-    """A report or a job would write into the linked folder."""
+    """Otherwise, a report or a job could write into a linked folder."""
     outside = client.place / "outside"
     outside.mkdir(exist_ok=True)
     for kind in ("a.svg", "a.html", "index.js"):
@@ -130,7 +130,7 @@ def test_linked_folders_are_not_followed(client: Client, linked: Path, name: str
 
 @pytest.mark.parametrize("name", ["report/figures/a.svg", "records/a.jsonl", "series/kept/.a.js.1"])
 def test_no_command_is_started_on_a_run_folder_with_a_link(client: Client, linked: Path, name: str) -> None:
-    """The command's output would follow the link."""
+    """Otherwise, the command's output would follow the link."""
     end = client.place / "secret.csv"
     (linked / name).parent.mkdir(parents=True, exist_ok=True)
     (linked / name).symlink_to(end)
