@@ -302,7 +302,7 @@ def test_the_api_finds_a_plain_forgery(
 
 
 def test_the_genuine_run_passes(genuine: tuple[Workspace, Path], run: Path, cli: Cli, tmp_path: Path) -> None:
-    """The run is also tried as a read-only copy elsewhere."""
+    """The run is verified as a read-only copy in another folder."""
     known = seal_of(RunFolder.open(genuine[1]))
     for path in [run, *run.rglob("*")]:
         path.chmod(0o555 if path.is_dir() else 0o444)

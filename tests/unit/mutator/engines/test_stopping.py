@@ -178,7 +178,7 @@ def test_any_terminal_condition_ends_a_run(stopping: Fork, gap: float, speed: fl
 
 @pytest.mark.parametrize("terminal", ["max(d_rel, speed) <= 90", "min(speed, d_rel, t) > 40"])
 def test_stopping_agrees_with_the_verdict_on_the_trace(stopping: Fork, edit: Edit, terminal: str) -> None:
-    """This includes NaN values."""
+    """The values can be NaN."""
     edit(MANIFEST, "terminal: speed > 90", f"terminal: '{terminal}'")
     manifest = stopping.toy.manifest("toycar")
     over = compiled(stop_source(manifest))

@@ -122,8 +122,7 @@ def test_a_clock_read_by_a_package_is_reported_at_the_targets_line(tmp_path: Pat
 
 
 def test_pandas_imports_normally_while_watched(tmp_path: Path) -> None:
-    """pandas cannot use a replaced `datetime`. The target's own reading of the date is recorded
-    nevertheless."""
+    """pandas cannot use a replaced `datetime`. The target's own reading of the date is still recorded."""
     (tmp_path / "controller.py").write_text(
         "import datetime\nimport pandas\n\ndef drive():\n    assert pandas.Timestamp(2020, 1, 1)\n"
         "    datetime.date.today()\n"

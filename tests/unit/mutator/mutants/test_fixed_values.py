@@ -216,8 +216,8 @@ def test_modules_that_import_a_constant_are_found(tmp_path: Path) -> None:
 
 
 def test_importers_that_cannot_be_set_are_listed(tmp_path: Path) -> None:
-    """The error lists, each with its line, a star import, an import into a class, and an imported name that
-    the module sets again."""
+    """The error lists a star import, an import into a class, and an imported name that the module sets again,
+    each with its line."""
     texts = {
         "limits": "LIMIT = 5\n",
         "a": "from limits import *\n",

@@ -27,7 +27,8 @@ def path(*states: State, stopped_at: tuple[str, ...] = ()) -> Path:
 
 
 def test_paths_become_shapes_and_columns_of_the_page(record: Callable[..., Record]) -> None:
-    """Equal paths share a shape. An experiment without divergences has empty columns of channels."""
+    """Equal paths share a shape. An experiment without divergences has no values in the columns of
+    channels."""
     far, held = path(*[State.REACHED] * 3), path(State.REACHED, State.HELD, State.HELD)
     records = {
         "a": record("a", left=(("seen", 1.23456, 0.123456), ("gap", 2.0, inf))),

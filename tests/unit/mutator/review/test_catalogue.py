@@ -77,7 +77,7 @@ def test_the_diff_has_only_the_lines_of_the_fault(groups: Groups) -> None:
 def test_a_decision_depends_on_template_function_and_diff(
     toycar: Workspace, groups: Groups, file: str, old: str, new: str, changed: list[str], untouched: str
 ) -> None:
-    """Other changes, even in the same file, do not affect it."""
+    """Other changes, even in the same file, do not affect the decision."""
     before = groups
     path = toycar.library.parent / file
     assert old in path.read_text()

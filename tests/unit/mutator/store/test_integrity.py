@@ -161,7 +161,7 @@ def test_a_record_outside_the_plan_is_reported(run: Path) -> None:
 
 
 def test_a_second_record_is_reported(run: Path) -> None:
-    """Harness errors are not final, so a second record is allowed."""
+    """Records of harness errors are exempt, because they are not final."""
     lines = (run / "records" / "0001-a.jsonl").read_text().splitlines()
     one = {k: v for k, v in json.loads(lines[1]).items() if k != "sum"}
     path = unsealed(run, one | {"status": Status.HARNESS_ERROR.value}, one)
