@@ -97,7 +97,7 @@ def test_a_guard_indents_the_statement_it_wraps() -> None:
 
 
 def test_a_guard_does_not_indent_the_inside_of_a_string() -> None:
-    """Indenting these lines would change the string."""
+    """Indenting its lines would change the string."""
     text = 'def f(x):\n    g("""a\n    b""", f"""{x}\n""")\n'
     assert spliced(text, AnchorKind.BEFORE_CALL, "g", guard=True).decode() == (
         'def f(x):\n    if not _fi.active("ab12"):  # fi:ab12 guard:1\n'
@@ -186,7 +186,7 @@ def test_the_import_of_the_probe_is_tagged() -> None:
 
 
 def test_a_byte_order_mark_stays_first() -> None:
-    """The probe's import is inserted below the docstring. Without a docstring, it is refused."""
+    """The probe's import is inserted below the docstring. A file without a docstring is refused."""
     file = parsed(b"\xef\xbb\xbf'Doc.'\nx = 1\n")
     result = splicing.joined(splicing.apply_edits(file, [splicing.probe_import(file, "pack")]))
     compile(result, "m.py", "exec")

@@ -234,7 +234,7 @@ def test_the_first_changed_input_decides_between_fault_and_feedback(
 
 def test_a_component_with_a_single_input_is_reached_even_after_the_car() -> None:
     """Only the speed control feeds the pedals, so the fault reached them, although the car moved differently
-    before."""
+    before that."""
     found = path("eyes", "wheel", seen=1.0, wanted=1.0, torque=1.0, place=1.1, gas=3.0)
     assert states(found)["pedals"] is State.REACHED
 
