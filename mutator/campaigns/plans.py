@@ -237,7 +237,7 @@ class Planning:
             raise MutatorError(
                 self.choices.shard,
                 argument="shard",
-                expected=f"at most {chunks} shards, one for each chunk of the plan",
+                expected=f"at most {chunks}, because the plan has that many chunks",
                 remedy="use fewer shards, or a smaller chunk in the campaign",
             )
 

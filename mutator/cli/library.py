@@ -197,7 +197,8 @@ def check(
     )
     warned = sum(finding.level == "warning" for finding in findings)
     well = f"no problem, {counted(warned, 'warning')}" if warned else "all well"
-    terminal.say(f"{well}: {len(workspace.spec_files())} specs, {faults} faults{readings}", style="green")
+    specs = counted(len(workspace.spec_files()), "spec")
+    terminal.say(f"{well}: {specs}, {counted(faults, 'fault')}{readings}", style="green")
 
 
 def _say_finding(terminal: Terminal, finding: "Finding") -> None:

@@ -139,7 +139,7 @@ def _check_numbers(folders: Sequence[RunFolder]) -> None:
         held[shard.number] = folder
     missing = [f"{k}/{of}" for k in range(1, (of or 0) + 1) if k not in held]
     if missing:
-        raise MutatorError(f"no folder of shard {', '.join(missing)}", expected="all shards", remedy=_REMEDY)
+        raise MutatorError(f"no folder for shard {', '.join(missing)}", expected="all shards", remedy=_REMEDY)
 
 
 def _check_complete(folder: RunFolder) -> None:
@@ -183,7 +183,7 @@ def _stretches(folders: Sequence[RunFolder], *, accept: bool) -> Iterator[Stretc
         ends = zip(first.stretches[-1:], folder.stretches[-1:], strict=False)
         found = [text for one, other in ends for text in differences(one, other.python, other.packages)]
         if found and not accept:
-            raise other_versions(folder.path, f"not run like {first.path}, but with", found)
+            raise other_versions(folder.path, f"unlike {first.path}, this shard used", found)
         assert folder.shard is not None
         for i, stretch in enumerate(folder.stretches):
             yield replace(

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from mutator._common.interrupts import held
-from mutator._common.text import suggestion
+from mutator._common.text import counted, suggestion
 from mutator.errors import MutatorError
 from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS, Anchor, AnchorKind, FaultLocation
 from mutator.mutants.expression_choice import as_written, choose_expression
@@ -255,7 +255,8 @@ def _no_single_hit(
     if hits:
         lines = ", ".join(str(s.first + 1) for _, s in hits)
         take = f"from 1 to {len(hits)}" if len(hits) > 1 else "1, or leave it out"
-        got = f"{what} matches {len(hits)} statements {place}: lines {lines}"
+        found = counted(len(hits), "statement")
+        got = f"{what} matches {found} {place}: {'lines' if len(hits) > 1 else 'line'} {lines}"
         remedy = f"give `nth`, {take}" if anchor.nth is None else f"`nth` is {anchor.nth}: give {take}"
         line, expected = hits[0][1].first, "exactly one"
     elif pairs:

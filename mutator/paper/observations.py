@@ -262,7 +262,7 @@ def _answer(
         raise source.error(
             keys,
             f"a query that fails: {err}",
-            expected=f"arguments of {measure}, with columns of the results",
+            expected=f"arguments that {measure} accepts, with names of columns of the results",
             remedy="see mutator/paper/measures.py",
         ) from err
     return Answer(group=group, query=query, found=found, verdict=rule.verdict(found))

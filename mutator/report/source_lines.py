@@ -47,7 +47,7 @@ Marks = Mapping[int, Mapping[str, Mark]]  # line (from 1) -> permanent or transi
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MarkedFile:
-    """A file with faults. `shown` are the line ranges to show (from 1): functions with faults."""
+    """A file with faults. `shown` has the ranges of lines to show, numbered from 1."""
 
     path: str
     data: bytes
@@ -63,9 +63,9 @@ class MarkedFile:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SourceLines:
-    """The files of a run, worst first. `places` has the line of each fault, such as `pkg/plan.py:42`;
-    `changes` the change of each operator's fault, such as `a + b -> a - b`. `why` is the reason if there are
-    no files."""
+    """The files of a run, worst first. `places` maps each fault to its line, such as `pkg/plan.py:42`;
+    `changes` maps each fault of an operator to its change, such as `a + b -> a - b`. `why` is the reason if
+    there are no files."""
 
     files: tuple[MarkedFile, ...] = ()
     places: Mapping[str, str] = field(default_factory=dict)

@@ -36,7 +36,7 @@ def made_from(folder: RunFolder, workspace: Workspace | None) -> str:
 
 
 def is_current(out: Path, made_from: str) -> bool:
-    """Whether the report in `out` was made from these inputs and is unchanged since."""
+    """Whether the report in `out` was made from these inputs and has not changed since."""
     try:
         stamp = read_json(out / FILE, SCHEMA)
     except MutatorError:  # unreadable, so the report is written again

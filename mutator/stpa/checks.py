@@ -128,7 +128,7 @@ def _contradictions(analysis: Analysis) -> Iterator[MutatorError]:
                         f"{name} ({action.action} {action.category}) leads to {hazard} in {context}",
                         expected=f"what {table.path.name} says there: "
                         f"{', '.join(sorted(_judged(row, action))) or 'no hazard'}",
-                        remedy="correct one of the two",
+                        remedy="correct the unsafe control action or the table",
                     )
 
 

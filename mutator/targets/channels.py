@@ -71,9 +71,9 @@ class ChannelModel(StrictModel, title="A channel"):
         None,
         ge=0.0,
         allow_inf_nan=False,
-        description="The largest difference from the golden run that is ignored. If an actuator differs by "
+        description="Differences from the golden run up to this value are ignored. If an actuator differs by "
         "more, the fault has manifested; if a channel of a component does, the fault has reached it. "
-        f"Default: 0 for actuators, {ROUNDING:g} in the unit for others, to ignore rounding.",
+        f"Default: 0 for actuators; for other channels {ROUNDING:g} of the unit, to ignore rounding.",
     )
     about: str = Field("", description="What the channel contains.")
     time: str = Field(

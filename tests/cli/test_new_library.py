@@ -91,7 +91,7 @@ def test_a_first_library_runs_once_its_todo_marks_are_deleted(
     for path in (nowhere / "faults").rglob("*.*"):
         path.write_text(MARK.sub("", path.read_text()))
     monkeypatch.chdir(nowhere / "faults")
-    assert cli("check").out.startswith("all well: 1 specs, 18 faults")
+    assert cli("check").out.startswith("all well: 1 spec, 18 faults")
     tried = cli("try", "controller/value", "--variant", "added", "--value", 10, "-s", "first", "--trigger", 1)
     assert tried.code == 0, tried.err
     assert f"+++ b/{place}" in tried.out

@@ -14,7 +14,7 @@ def test_a_shard_is_run_and_merged(cli: Cli, root: Path) -> None:
     assert "2 of 2 experiments done" in ran.err + ran.out
     missing = cli("merge", "part", "--out", "whole")
     assert missing.code == 2
-    assert "no folder of shard 2/2" in missing.err
+    assert "no folder for shard 2/2" in missing.err
     assert cli("run", "small", "--out", "rest", "-n", "0", "--shard", "2/2", "--limit", 4).code == 0
     merged = cli("merge", "part", "rest", "--out", "whole", "--json")
     assert merged.code == 0, merged.err

@@ -136,7 +136,7 @@ def test_nothing_is_left_to_run_in_a_merged_folder(runs: Runs, toy: Workspace, t
 @pytest.mark.parametrize(
     ("given", "told"),
     [
-        (("1/2",), "no folder of shard 2/2"),
+        (("1/2",), "no folder for shard 2/2"),
         (("1/2", "1/2"), "shard 1/2 is given twice"),
         (("1/2", "whole"), "a whole run, not a shard"),
     ],

@@ -161,7 +161,7 @@ def test_faults_are_active_once_their_trigger_fires(toy: Workspace, tmp_path: Pa
         ({"path": "../toycar/sensor.py"}, "leads out of the target"),
         ({"path": "toycar/judge.py"}, "is forbidden to faults"),
         ({"function": "Sensor.mesure"}, "did you mean 'Sensor.measure'?"),
-        ({"anchor": Anchor(kind=AnchorKind.AFTER_ASSIGN, name="rate", nth=2)}, "matches 1 statements"),
+        ({"anchor": Anchor(kind=AnchorKind.AFTER_ASSIGN, name="rate", nth=2)}, "matches 1 statement "),
         (
             {"function": "Sensor.send", "anchor": Anchor(kind=AnchorKind.ENTRY)},
             "'gap' is not known in Sensor.send",
