@@ -1,4 +1,4 @@
-"""Measure the geometric and the as-coded detector's time for a frame, as medians over a run.
+"""Measure the median time per frame of the geometric and the as-coded detectors.
 
 `python benchmarks/detect_drive.py [--repeat N] [--plain]`. It runs on one core, in clear and in bad weather,
 with compiled code unless given `--plain`; the last column says whether the code was compiled. Times are CPU
@@ -46,7 +46,7 @@ class Moment(NamedTuple):
 
 
 def drive(marks: str, weather: str | None, amount: float) -> list[np.ndarray]:
-    """Return the frames of two seconds."""
+    """Return two seconds of frames."""
     camera = CameraModel()
     road = RoadRenderer(camera, marks, 0)
     pictures = [road.grey(STEP * k) for k in range(DIFFERENT)]

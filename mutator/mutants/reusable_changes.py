@@ -1,6 +1,7 @@
-"""Reusable changes: a changed file without its inserted lines, which other mutants fill with their lines.
+"""Reusable changes: changed files without their inserted lines. Other mutants insert their own lines.
 
-Many mutants insert the same lines except for numbers and ids. Only the first is spliced and compiled.
+Many mutants insert the same lines except for numbers and ids. Only the first mutant of such a group is
+spliced and compiled.
 """
 
 from collections.abc import Sequence
@@ -71,7 +72,7 @@ def inserted_lines(edits: Sequence[Edit]) -> list[bytes]:
 
 
 def always_compiles(file: ParsedFile, change: ReusableChange, key: ReuseKey) -> bool:
-    """Return whether the change compiles with all lines that have this key, i.e. with normalized ones.
+    """Return whether the change compiles with any lines that have this key: the normalized lines are tried.
 
     The change then also un-splices, because that depends only on the tags, which are part of the key.
     """

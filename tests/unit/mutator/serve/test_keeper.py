@@ -87,7 +87,7 @@ def test_a_command_dies_with_its_keeper(tmp_path: Path) -> None:
     keeper.wait()
     assert eventually(lambda: is_gone(int(command)))
     os.close(hold)
-    os.kill(child, signal.SIGKILL)  # the child's process: the script does not end it
+    os.kill(child, signal.SIGKILL)  # the command died without ending its child
 
 
 @pytest.mark.parametrize("code", [0, 1, 3])
