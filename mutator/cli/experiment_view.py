@@ -95,9 +95,9 @@ def print_verdict(terminal: Terminal, result: "ExperimentResult") -> None:
             for t, what in sorted(events, key=lambda e: e[0])
         ]
         terminal.table(["time [s]", "from activation [s]", "what"], rows, right=(0, 1))
-    if manifest and (note := _no_alert(record, manifest)):
-        terminal.say(note)
     told = result.verdict
+    if manifest and (note := _no_alert(record, manifest, told["reaction_time_s"])):
+        terminal.say(note)
     if told["severity"]:
         terminal.say(f"severity: {told['severity']}, delta-v {told['metrics']['delta_v']:.2f} m/s")
     for name, what in _TIMES.items():
@@ -129,14 +129,13 @@ def _values(values: Iterable[tuple[str, float]], units: Mapping[str, str]) -> st
     return ", ".join(text.replace(" ", NO_BREAK) for text in texts)
 
 
-def _no_alert(record: "Record", manifest: "TargetManifest") -> str:
+def _no_alert(record: "Record", manifest: "TargetManifest", reaction_s: float | None) -> str:
     """Return a note if there was no alert, or none before the first hazard; empty otherwise."""
     if not (manifest.alerts and record.outcome and record.activation):
         return ""
-    if not record.hazards:
-        return "" if record.alerts else "no alert"
-    first = min(t for _, t in record.hazards)
-    return "" if any(t <= first for _, t in record.alerts) else "no alert before the hazard"
+    if record.hazards:
+        return "no alert before the hazard" if reaction_s is None else ""
+    return "" if record.alerts else "no alert"
 
 
 def print_path(terminal: Terminal, found: "RunExperiment") -> None:

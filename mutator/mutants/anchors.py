@@ -23,7 +23,7 @@ from mutator.targets.source_tree import SourceTree
 class Site:
     """A resolved anchor. The statement is on lines `first` to `last` (exclusive, from 0).
 
-    For `entry` there is no statement, and `first == last`.
+    An `entry` has no statement: `first` equals `last`.
     """
 
     first: int

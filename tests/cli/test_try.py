@@ -2,10 +2,16 @@
 
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from mutator.cli import experiment_view
+from mutator.model import Record
+from mutator.outcomes.verdicts import reaction_time
+from mutator.workspace import Workspace
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
 
@@ -26,6 +32,29 @@ def test_try_says_whether_an_alert_came_before_the_hazard(cli: Cli, root: Path) 
     lane = cli("try", "sensor/lane", "-s", "A", "--value", "2.4", "--trigger", "1").out
     assert "hazard H3" in lane
     assert "no alert before the hazard" in lane.splitlines()
+
+
+@pytest.mark.parametrize(
+    ("alert", "hazard", "note"),
+    [
+        (2.0, 3.0, ""),
+        (3.0, 3.0, "no alert before the hazard"),
+        (4.0, 3.0, "no alert before the hazard"),
+        (None, 3.0, "no alert before the hazard"),
+        (2.0, None, ""),
+        (None, None, "no alert"),
+    ],
+)
+def test_the_note_on_alerts_agrees_with_the_reaction_time(
+    toycar: Workspace, record: Callable[..., Record], alert: float | None, hazard: float | None, note: str
+) -> None:
+    made = replace(
+        record(),
+        alerts=() if alert is None else (("chime", alert),),
+        hazards=() if hazard is None else (("H3", hazard),),
+    )
+    reaction = reaction_time(made.hazards, made.alerts)
+    assert experiment_view._no_alert(made, toycar.manifest("toycar"), reaction) == note
 
 
 def test_try_reports_hazards_of_the_fault_free_run(cli: Cli, root: Path) -> None:
