@@ -121,7 +121,8 @@ class Reviews:
         return page_html(review, review.in_turn(groups), chosen.options, served)
 
     def told(self, chosen: Selection) -> dict[str, Any]:
-        review, groups = load_review(self.workspace, chosen.target), self.groups(chosen)
+        groups = self.groups(chosen)  # first, as it may take seconds, in which others decide
+        review = load_review(self.workspace, chosen.target)
         return {"target": chosen.target, "by": self.reviewer, "groups": _states(review, groups)}
 
     def decide(self, chosen: Selection, wanted: Decisions) -> dict[str, Any]:

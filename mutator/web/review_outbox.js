@@ -15,6 +15,7 @@ class Outbox {
     this.key = `mutator-review ${this.address}`;
     this.queue = Outbox.#stored(this.key).filter((item) => groups.has(item.group));
     this.sending = null; // promise of the pending request
+    this.sends = 0;
     this.isSingle = false; // one change per request, because a batch was refused
     setInterval(() => this.poll(), Outbox.EVERY_MS);
     document.addEventListener("visibilitychange", () => document.hidden || this.poll());
@@ -59,13 +60,14 @@ class Outbox {
   async poll() {
     if (document.hidden && !this.queue.length) return;
     if (this.sending) return;
+    const { sends } = this;
     const answer = await this.#ask(this.address);
     if (!answer.data?.groups) {
       this.events.offline(this.#gone(answer));
       return;
     }
     this.events.offline("");
-    if (!this.sending) this.#receive(answer.data.groups); // else the pending answer is newer
+    if (sends === this.sends) this.#receive(answer.data.groups); // else it may lack the marks sent since
     this.#flush();
   }
 
@@ -86,7 +88,9 @@ class Outbox {
   }
 
   #flush() {
-    this.sending ??= this.#send().finally(() => {
+    if (this.sending || !this.queue.length) return;
+    this.sends += 1;
+    this.sending = this.#send().finally(() => {
       this.sending = null;
     });
   }

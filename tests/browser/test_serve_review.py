@@ -214,6 +214,35 @@ def test_a_pending_approval_is_not_applied_to_later_code(
     assert not load_review(library, "toycar").entries
 
 
+def test_a_late_answer_does_not_hide_a_mark(review: Callable[..., Any], library: Workspace) -> None:
+    """An answer from before the mark arrives after it. The next mark must not be refused as unseen."""
+    page = review("Jane")
+    late: list[Any] = []
+
+    def hold(route: Any) -> None:
+        if route.request.method == "GET":
+            late.append((route, route.fetch()))
+        else:
+            route.continue_()
+
+    page.route("**/api/review/**", hold)
+    page.evaluate("document.dispatchEvent(new Event('visibilitychange'))")
+    while not late:
+        page.wait_for_timeout(20)
+    page.keyboard.press("j")
+    page.keyboard.press("r")
+    group = current(page)
+    saved(page, group)
+    for route, answer in late:
+        route.fulfill(response=answer)
+    page.wait_for_timeout(100)
+    assert page.inner_text(f"#group-{group} .state") == "rejected"
+    page.keyboard.press("f")
+    page.wait_for_selector(f"#group-{group} .flagged:visible")
+    saved(page, group)
+    assert load_review(library, "toycar").flag(group)
+
+
 @pytest.mark.slow
 def test_marks_survive_a_stopped_server(library: Workspace, serve: Callable[..., Any], visit: Visit) -> None:
     """Marks stay in the tab and are sent to the next server."""
