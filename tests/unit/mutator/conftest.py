@@ -1,4 +1,4 @@
-"""Workspaces and a fork engine for unit tests. Targets are copied, so that tests can change them."""
+"""Fixtures for unit tests: workspaces and a fork engine."""
 
 import shutil
 from collections.abc import Iterator
@@ -16,7 +16,6 @@ CLONE = HERE.parents[2]
 
 @pytest.fixture
 def toy(tmp_path: Path) -> Workspace:
-    """A workspace on a copy of the toy target and its library, with the real templates."""
     root = tmp_path / "toy"
     shutil.copytree(HERE / "toy", root, ignore=shutil.ignore_patterns("__pycache__"))
     return Workspace.find(root=root, templates=CLONE / "templates")
@@ -24,13 +23,11 @@ def toy(tmp_path: Path) -> Workspace:
 
 @pytest.fixture(scope="session")
 def clone() -> Workspace:
-    """The shipped workspace of this clone."""
     return Workspace.find(root=CLONE)
 
 
 @pytest.fixture
 def fork(toycar: Workspace, tmp_path: Path) -> Iterator[Fork]:
-    """A fork engine on the toy."""
     made = Fork(toycar, tmp_path)
     yield made
     made.close()

@@ -19,7 +19,7 @@ LIMITS = Limits(cpu_s=20, wall_s=60, memory_mb=1024, steps=500)
 
 
 class Fork:
-    """A fork engine that is created on first use, so that files of the toy can be edited before that."""
+    """A fork engine that is created on first use, so that a test can edit the toy's files before."""
 
     def __init__(self, toy: Workspace, folder: Path) -> None:
         self.toy = toy

@@ -49,9 +49,7 @@ def driven(arguments: list[str]) -> tuple[dict[str, list[float]], dict[str, obje
         return {name: trace[name].tolist() for name in trace}, json.loads((out / "record.json").read_text())
 
 
-def test_a_run_writes_a_row_for_each_step(arguments: list[str]) -> None:
-    """The record has the time at which each hazard first occurred, or null, and the times at which each alert
-    began."""
+def test_a_run_writes_a_trace_and_a_record(arguments: list[str]) -> None:
     trace, record = driven(arguments)
     assert list(trace) == ["t", "height", "lies"]
     assert trace["t"] == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
@@ -61,14 +59,12 @@ def test_a_run_writes_a_row_for_each_step(arguments: list[str]) -> None:
     assert record["alerts"] == [{"name": "low", "t": 0.1}, {"name": "low", "t": pytest.approx(0.4)}]
 
 
-def test_the_step_that_calls_end_is_the_last(arguments: list[str]) -> None:
-    """The last step is recorded."""
+def test_the_step_that_calls_end_is_recorded_as_the_last(arguments: list[str]) -> None:
     trace, _ = driven([*arguments, "--caught"])
     assert trace["height"][-1] == 0.0
 
 
 def test_equal_runs_write_equal_bytes(arguments: list[str]) -> None:
-    """A second run replaces the files and leaves no others."""
     out = Path(arguments[5])
     files = []
     for _ in range(2):
@@ -111,14 +107,13 @@ def test_flags_replace_keys_of_the_scenario(arguments: list[str], flags: list[st
         (["--duration_s", "long"], "duration_s is 'long'; expected a number"),
     ],
 )
-def test_a_wrong_argument_is_named(arguments: list[str], flags: list[str], words: str) -> None:
+def test_the_error_names_the_wrong_argument(arguments: list[str], flags: list[str], words: str) -> None:
     with pytest.raises(GlueError) as told:
         Ball.main([*arguments, *flags])
     assert words in str(told.value)
 
 
 def test_values_are_read_as_json_or_as_text(tmp_path: Path) -> None:
-    """Text can contain colons."""
     path = tmp_path / "a.yaml"
     path.write_text('a: 1\nb: 2.5\nc: true\nd: null\ne: [1, 2]\nf: {"x": 1}\ng: a: b\nh: "1"\ni: a#b\n')
     expected = {
@@ -197,9 +192,6 @@ LENGTHS = [0.1, 0.25, 0.05, 0.1, 0.1, 0.4, 0.1]
 
 @pytest.mark.parametrize("first", [0.1, 0.7])
 def test_steps_can_differ_in_length(first: float, arguments: list[str]) -> None:
-    """If a step sets `step_s` before it records, it has that length, and the next step begins after it. The
-    run keeps its duration, to the nearest step."""
-
     class Uneven(Run):
         def __init__(self, scenario, seed):
             super().__init__(step_s=first, duration_s=1.0)
@@ -228,7 +220,7 @@ def test_times_of_equal_steps_are_exact_multiples() -> None:
     assert times == [number * 0.1 for number in range(1000)]
 
 
-def test_a_channel_named_time_is_refused() -> None:
+def test_a_channel_named_t_is_refused() -> None:
     """The time would overwrite the channel."""
     with pytest.raises(GlueError, match="without t"):
         Run(step_s=0.5, duration_s=1.0).record(t=1.0)

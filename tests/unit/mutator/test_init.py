@@ -18,7 +18,6 @@ def test_every_public_name_can_be_imported() -> None:
 
 
 def test_importing_mutator_loads_no_slow_packages() -> None:
-    """Such packages are loaded when a name that needs them is first used."""
     code = "import mutator, sys; dir(mutator); print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = {name.partition(".")[0] for name in done.stdout.split()}

@@ -46,6 +46,6 @@ def test_the_label_of_an_experiment_names_its_fault_scenario_and_trigger(
     assert experiment(method=Method.RANDOM, trigger="random/C2").drive_label == "S1, random C2"
 
 
-def test_only_one_module_combines_value_and_unit() -> None:
-    """Otherwise, labels of the same fault could differ between tables."""
+def test_no_module_strips_a_placeholder_unit() -> None:
+    """Only `fault_label` makes labels; otherwise, labels of the same fault could differ between tables."""
     assert [path for path in SOURCES.rglob("*.py") if '(" -")' in path.read_text()] == []

@@ -35,7 +35,6 @@ def test_the_nearest_library_above_the_current_folder_is_found(
 def test_options_override_the_environment(
     toy: Workspace, elsewhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A folder for one part overrides the root."""
     root = toy.library.parent
     (root / "templates").mkdir()
     other = elsewhere / "library"
@@ -59,7 +58,6 @@ def test_outside_a_clone_the_shipped_library_is_used(elsewhere: Path) -> None:
 
 
 def test_a_library_without_templates_uses_the_shipped_ones(elsewhere: Path) -> None:
-    """A root folder that is given explicitly must contain both."""
     (elsewhere / "fault_library").mkdir()
     found = Workspace.find()
     assert (found.library, found.templates) == (elsewhere / "fault_library", CLONE / "templates")
@@ -68,7 +66,6 @@ def test_a_library_without_templates_uses_the_shipped_ones(elsewhere: Path) -> N
 
 
 def test_a_named_folder_must_exist(elsewhere: Path) -> None:
-    """The shipped folder is not used instead."""
     with pytest.raises(MutatorError, match=r"no folder .*none; expected the fault_library folder.*`library`"):
         Workspace.find(library=elsewhere / "none", templates=elsewhere)
 
@@ -104,16 +101,14 @@ def test_the_path_of_a_spec_file_must_match_its_module_and_fault_type(toy: Works
         toy.specs()
 
 
-def test_a_workspace_prints_as_a_line_and_as_a_table(toycar: Workspace) -> None:
+def test_a_workspace_is_displayed_as_a_line_or_as_a_table(toycar: Workspace) -> None:
     assert repr(toycar).endswith("9 fault specs, 2 scenarios, 1 context table, 3 campaigns, 1 target>")
     shown = toycar._repr_html_()
     for name in ("sensor/lane", "near_far", "small", "toycar", str(toycar.templates)):
         assert name in shown
 
 
-def test_faults_can_be_selected_with_patterns(toycar: Workspace) -> None:
-    """A pattern selects specs or variants, and the values depend on the seed. A file can be given instead of
-    a name."""
+def test_faults_can_be_selected_by_pattern_or_file(toycar: Workspace) -> None:
     names = {fault.spec for fault in toycar.faults("sensor/*")}
     assert names == {
         *("sensor/distance/longer", "sensor/distance/nearer"),

@@ -19,10 +19,9 @@ from mutator._common import cores
         (None, 8),
     ],
 )
-def test_a_quota_limits_the_cores(
+def test_a_containers_quota_limits_the_cores(
     quota: str | None, usable: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A container's quota can lower the number that the process's affinity gives, but not below one."""
     monkeypatch.setattr(os, "sched_getaffinity", lambda pid: set(range(8)))
     monkeypatch.setattr(cores, "_QUOTA", tmp_path / "cpu.max")
     if quota is not None:

@@ -52,9 +52,7 @@ def test_a_newer_schema_is_refused() -> None:
         check_schema("run/3", "run/2", Path("run.json"))
 
 
-def test_any_folder_can_be_removed(tmp_path: Path) -> None:
-    """Deep, locked and unusual folders are deleted. The targets of links stay, and so does a link that is
-    passed as the folder."""
+def test_deep_and_locked_folders_are_removed_but_not_the_targets_of_links(tmp_path: Path) -> None:
     kept, folder = tmp_path / "kept", tmp_path / "folder"
     kept.mkdir()
     (kept / "x").touch()
@@ -76,8 +74,9 @@ def test_any_folder_can_be_removed(tmp_path: Path) -> None:
     assert (kept / "x").exists() and kept.stat().st_mode == before
 
 
-def test_a_scratch_folder_is_deleted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The folder is deleted at the end of its `with` block, or together with its object."""
+def test_a_scratch_folder_is_deleted_after_its_block_or_with_its_object(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     with ScratchFolder("x-") as folder:
         (folder / "y").mkdir()

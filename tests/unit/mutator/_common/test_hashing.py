@@ -16,36 +16,28 @@ PARAMS = (("by", 40.0), ("target", "d_rel"))
 CONDITION = "hwt <= 2.0"
 
 
+# The records of a later version, each with one more field.
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Injection(model.Injection):
-    """`Injection` of a later version, with one more field."""
-
     every: int = added(1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trigger(model.Trigger):
-    """`Trigger` of a later version, with one more field."""
-
     fade: Hold | None = added(None)
 
 
 @dataclass(frozen=True)
 class Fault(model.Fault):
-    """`Fault` of a later version, with one more field."""
-
     tags: tuple[str, ...] = added(())
 
 
 @dataclass(frozen=True)
 class Experiment(model.Experiment):
-    """`Experiment` of a later version, with one more field."""
-
     repeat: int = added(0)
 
 
 def fault(kind: type[model.Fault], injection: type[model.Injection], **more: object) -> model.Fault:
-    """A chaff fault of 40 m, built from the given classes."""
     injections = (injection(location=LOCATION, model="offset", params=PARAMS),)
     return kind("radar/chaff/d", "radar", "chaff", "as_described", 40.0, "m", "H1", injections, **more)
 
@@ -53,7 +45,6 @@ def fault(kind: type[model.Fault], injection: type[model.Injection], **more: obj
 def experiment(
     kind: type[model.Experiment], trigger: type[model.Trigger], of: model.Fault, **more: object
 ) -> model.Experiment:
-    """The chaff fault in scenario S1 with trigger C1, built from the given classes."""
     return kind(of, "S1", "d" * 64, Method.GUIDED, trigger(name="C1", condition=CONDITION), 7, **more)
 
 
@@ -102,8 +93,7 @@ def test_values_of_different_types_have_different_digests() -> None:
     ["[1.5, -0.0, 1e-7]", "NaN", "[Infinity, -1e999]", "18446744073709551615", '"\\ud800"', "-0"],
 )
 def test_json_is_read_as_the_standard_library_reads_it(text: str) -> None:
-    """The faster JSON reader refuses NaN, infinities and lone surrogates, but the harness must read them,
-    too."""
+    """The faster JSON reader refuses NaN, infinities and lone surrogates."""
     assert repr(from_json(text.encode())) == repr(json.loads(text))
 
 

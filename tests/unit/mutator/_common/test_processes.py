@@ -22,8 +22,6 @@ def test_other_processes_do_the_work() -> None:
 
 
 def test_errors_of_other_processes_are_raised() -> None:
-    """An error is raised unchanged after all results before it. A killed process is reported."""
-
     def fails(n: int) -> int:
         if n == 3:
             raise MutatorError("three", where="here", line=3)

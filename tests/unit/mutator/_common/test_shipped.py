@@ -1,5 +1,4 @@
-"""The files that ship with the harness: the folders of a clone, or an archive that is unpacked and kept
-unchanged."""
+"""The files that ship with the harness: folders of a clone, or an archive that is unpacked."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -35,13 +34,11 @@ def as_in_a_new_process() -> Path:
     return shipped_folder()
 
 
-def test_a_clone_ships_its_own_folders() -> None:
-    """Without an archive, as in a clone or an editable install, the folders next to the package are used."""
+def test_without_an_archive_the_folders_of_the_clone_are_used() -> None:
     assert shipped_folder() == CLONE
 
 
 def test_the_archive_is_unpacked_once(archive: Path, tmp_path: Path) -> None:
-    """The user's data folder then has exactly the archive's files."""
     folder = shipped_folder()
     assert folder.is_relative_to(tmp_path / "data" / "mutator")
     found = {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
@@ -110,7 +107,7 @@ def test_a_folder_unpacked_by_another_process_is_used(archive: Path, monkeypatch
 
 
 def _first(seen: set[Path], path: Path) -> bool:
-    """Return whether this is the first check of a path; if so, the folder seems not to exist yet."""
+    """Return whether a path is checked for the first time."""
     new = path not in seen
     seen.add(path)
     return new
@@ -122,11 +119,9 @@ def test_writing_to_the_shipped_library_is_refused(archive: Path, tmp_path: Path
         refuse_shipped(shipped_folder() / "fault_library" / "reviews" / "openpilot.yaml")
 
 
-def test_a_new_library_is_a_copy_that_finds_the_controller(
+def test_a_moved_copy_of_the_library_still_finds_the_controller(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The copy differs from the shipped library only in the manifest's `root`, and its folder can be
-    moved."""
     write_library(tmp_path / "new")
     (tmp_path / "deep").mkdir()
     moved = (tmp_path / "new").rename(tmp_path / "deep" / "moved")
@@ -144,7 +139,6 @@ def test_a_new_library_is_a_copy_that_finds_the_controller(
 
 
 def test_edits_in_a_new_library_take_effect(tmp_path: Path) -> None:
-    """The mutant's diff shows edits to a template and a spec."""
     write_library(tmp_path / "new")
     template = tmp_path / "new/templates/offset.py.j2"
     template.write_text(template.read_text().replace("{{ by | signed }}", "{{ by | signed }} * 1.0", 1))

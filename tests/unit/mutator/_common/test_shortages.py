@@ -22,7 +22,6 @@ from mutator.errors import EXIT_HARNESS_ERRORS
     ],
 )
 def test_each_shortage_has_a_remedy(error: Exception, said: str) -> None:
-    """A shortage is also recognized as the cause of another error."""
     found = shortage(error)
     assert found is not None
     assert said in str(found)

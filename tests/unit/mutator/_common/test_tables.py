@@ -6,7 +6,6 @@ from mutator._common.tables import Table
 
 
 def test_text_pads_columns_and_aligns_numbers_to_the_right() -> None:
-    """No line ends with spaces."""
     table = Table(heads=("fault", "runs"), rows=[("radar/chaff", "7"), ("fog", "12")], right=(1,))
     assert table.as_text().splitlines() == ["fault        runs", "radar/chaff     7", "fog            12"]
 
@@ -30,14 +29,12 @@ def test_markdown_cells_stay_on_one_line_and_are_escaped() -> None:
 
 
 def test_a_vertical_bar_in_a_cell_is_escaped() -> None:
-    """Cells that are already Markdown are left unchanged."""
     table = Table(heads=["x"], rows=[["a|b *c*"]])
     assert table.as_markdown().endswith(r"| a\|b \*c\* |")
     assert table.as_markdown(escape=False).endswith("| a|b *c* |")
 
 
 def test_html_escapes_texts_and_marks_continued_rows() -> None:
-    """A row with an empty first cell gets the class `group`."""
     html = Table(heads=["<b>"], rows=[["<i> & {0}"], [""]]).as_html("plain")
     assert '<table class="plain">' in html
     assert '<th scope="col">&lt;b&gt;</th>' in html

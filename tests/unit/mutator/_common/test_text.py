@@ -19,12 +19,11 @@ from mutator.triggers.conditions import check_condition
     ],
 )
 def test_operators_of_other_languages_get_a_hint(text: str, hint: str) -> None:
-    """Valid or quoted operators get no hint."""
     assert operator_hint(text) == hint
 
 
 @pytest.mark.parametrize("text", ["t > 2 && v > 3", "t > 2 || v > 3", "!(t > 2)", "t = 2"])
-def test_conditions_and_filters_give_the_hint(text: str) -> None:
+def test_errors_in_conditions_and_filters_contain_the_hint(text: str) -> None:
     for refused in (check_condition, lambda text: compile_filter(text, ("t", "v"))):
         with pytest.raises(MutatorError) as caught:
             refused(text)

@@ -15,8 +15,7 @@ from mutator.workspace import Workspace
 TWO = mutator.Choices(only='fault_type == "lane"', limit=2)
 
 
-def test_a_plan_prints_and_converts_to_a_frame(toycar: Workspace, tmp_path: Path) -> None:
-    """The frame has experiment ids as its index. Planning writes no files."""
+def test_a_plan_has_a_repr_and_a_frame(toycar: Workspace, tmp_path: Path) -> None:
     plan = mutator.plan("toy", workspace=toycar)
     assert repr(plan) == "<Plan of toy, as_described: 24 experiments, seed 7>"
     assert "sensor/lane" in plan._repr_html_()
@@ -28,7 +27,7 @@ def test_a_plan_prints_and_converts_to_a_frame(toycar: Workspace, tmp_path: Path
     assert frozen.digest == plan.digest == mutator.load_run(tmp_path / "p").plan.digest
 
 
-def test_a_campaign_runs_resumes_and_is_compared(toycar: Workspace, tmp_path: Path) -> None:
+def test_a_campaign_can_be_run_resumed_and_compared(toycar: Workspace, tmp_path: Path) -> None:
     seen: list[mutator.Progress] = []
     first = mutator.run("small", tmp_path / "a", choices=TWO, workspace=toycar, progress=seen.append)
     assert first.summary is not None

@@ -40,7 +40,6 @@ def test_names_and_records_give_the_same_mutant(toycar: Workspace) -> None:
 
 
 def test_mutants_of_a_campaign_are_written(toycar: Workspace, tmp_path: Path) -> None:
-    """The index names each patch. `step` is called once for each mutant."""
     steps: list[int] = []
     bench, pairs = pairs_of_campaign(toycar, "small", Choices(limit=4))
     index = write_mutants(bench, pairs, tmp_path / "m", step=lambda: steps.append(1))
@@ -51,7 +50,6 @@ def test_mutants_of_a_campaign_are_written(toycar: Workspace, tmp_path: Path) ->
 
 
 def test_specs_are_paired_with_every_context(toycar: Workspace) -> None:
-    """A glob that matches nothing is an error."""
     bench = Bench.of(toycar)
     pairs = pairs_of_specs(bench, ["sensor/lane"])
     assert {trigger.name for _, trigger in pairs} == {"near", "far"}

@@ -1,4 +1,4 @@
-"""Runs as shown in notebooks."""
+"""Finished runs in the Python API."""
 
 import dataclasses
 import os
@@ -36,7 +36,6 @@ PAGE = Path(__file__).parents[4] / "docs" / "how-to" / "use-in-a-notebook.md"
 
 
 def became(e: Experiment) -> dict[str, Any]:
-    """Lane faults are hazardous, silence crashes the controller, and all other faults are masked."""
     if e.fault.fault_type == "silence":
         return {"status": Status.CRASHED, "outcome": None}
     hazard = {"outcome": Outcome.HAZARD, "hazards": (("H3", 4.0), ("H1", 4.5))}
@@ -55,8 +54,6 @@ def run(
 
 
 def test_propagation_is_available_as_frames(run: Run) -> None:
-    """A run's frame has a row for each channel that left golden. An experiment's frame sorts its channels by
-    the time at which they left golden. For older runs, which lack the data, there is an error."""
     frame = run.propagation()
     lanes = run.results.index[run.results["fault_type"] == "lane"]
     assert list(frame["experiment_id"].unique()) == sorted(lanes)
@@ -71,7 +68,6 @@ def test_propagation_is_available_as_frames(run: Run) -> None:
 
 
 def test_the_columns_of_the_frame_have_types(run: Run) -> None:
-    """Names are categories, flags are nullable, and times are floats with a unit."""
     frame = run.results
     assert len(frame) == 24
     assert frame.index.name == "experiment_id"
@@ -86,8 +82,7 @@ def test_the_columns_of_the_frame_have_types(run: Run) -> None:
     assert set(numbers) <= set(frame.attrs["units"])
 
 
-def test_the_frame_has_hazards(run: Run) -> None:
-    """`hazard` is unknown for a crash."""
+def test_the_hazard_of_a_crash_is_unknown(run: Run) -> None:
     frame = run.results
     lane, silence = (frame[frame["fault_type"] == name] for name in ("lane", "silence"))
     assert lane["hazard"].all()
@@ -96,8 +91,7 @@ def test_the_frame_has_hazards(run: Run) -> None:
     assert not frame[frame["fault_type"] == "distance"]["hazard"].any()
 
 
-def test_a_run_prints_as_one_line(run: Run) -> None:
-    """The run gives access to its faults and provenance."""
+def test_a_run_has_a_one_line_repr_faults_and_provenance(run: Run) -> None:
     assert repr(run) == "<Run first: 24 of 24 experiments of toy, as_described>"
     assert run.provenance["campaign"] == "toy"
     assert {"sources", "seed", "stretches", "choices"} <= set(run.provenance)
@@ -135,14 +129,12 @@ def driven_once(
 
 @pytest.fixture
 def driven(driven_once: Path, toycar: Workspace, tmp_path: Path) -> Run:
-    """A copy of the run `driven_once` in runs/first."""
     run = shutil.copytree(driven_once, tmp_path / "runs" / "first")
     return mutator.load_run(run, workspace=toycar)
 
 
 def test_traces_are_frames_and_exact_traces_need_a_rerun(driven: Run) -> None:
-    """Without a stored series, the experiment is rerun once. For exact traces, which have all channels in
-    double precision, it is rerun each time."""
+    """Exact traces have all channels in double precision, and each request for them reruns the experiment."""
     [name] = driven.results.index
     golden = driven.golden("A")
     assert (golden.index.name, len(golden)) == ("time", 120)
@@ -167,7 +159,6 @@ def test_traces_are_frames_and_exact_traces_need_a_rerun(driven: Run) -> None:
 
 
 def test_an_experiment_has_a_diff_a_record_and_a_plot(driven: Run) -> None:
-    """A notebook shows an experiment as a table and a figure."""
     [name] = driven.results.index
     experiment = driven.experiment(name)
     assert "# fi:" in experiment.diff
@@ -180,9 +171,7 @@ def test_an_experiment_has_a_diff_a_record_and_a_plot(driven: Run) -> None:
     assert repr(experiment) in unescape(experiment._repr_html_())
 
 
-def test_a_rerun_is_compared_with_the_campaigns_record(driven: Run) -> None:
-    """A rerun leaves no files unless the caller requests them. The series of a rerun that differs from the
-    record is not kept."""
+def test_only_a_rerun_that_equals_the_record_is_kept(driven: Run) -> None:
     experiment = driven.experiment(driven.results.index[0])
     trial = experiment.rerun()
     assert trial.same_as_record is True
@@ -224,7 +213,6 @@ def test_two_processes_can_request_the_same_series(driven: Run) -> None:
 def test_the_code_of_the_notebook_page_runs(
     driven: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The page's code blocks run unchanged, on a run in runs/first."""
     library = driven.workspace.library
     monkeypatch.setenv("MUTATOR_ROOT", str(library.parent))
     small = (library / "campaigns" / "small.yaml").read_text()
@@ -242,7 +230,7 @@ def test_the_code_of_the_notebook_page_runs(
     assert names["trial"].outcome == "hazard"
 
 
-def test_missing_data_are_an_error(run: Run, tmp_path: Path) -> None:
+def test_missing_data_is_an_error(run: Run, tmp_path: Path) -> None:
     with pytest.raises(MutatorError, match="no golden run Z"):
         run.golden("Z")
     with pytest.raises(MutatorError, match="no experiment 'zz'"):
@@ -254,7 +242,6 @@ def test_missing_data_are_an_error(run: Run, tmp_path: Path) -> None:
 def test_a_planned_experiment_has_a_diff_but_no_traces(
     toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path]
 ) -> None:
-    """The mutant is built on request. The error for the missing traces has a remedy."""
     run = mutator.load_run(write_run(toycar, tmp_path / "r", lambda e: None), workspace=toycar)
     experiment = run.experiment(next(iter(run.experiments)))
     assert "# fi:" in experiment.diff

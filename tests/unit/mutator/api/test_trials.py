@@ -1,4 +1,4 @@
-"""Try one fault."""
+"""Trials of single faults."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from mutator.model import Outcome, Status
 from mutator.workspace import Workspace
 
 
-def test_a_fault_is_tried_by_name(toycar: Workspace) -> None:
+def test_a_fault_can_be_tried_by_name(toycar: Workspace) -> None:
     trial = mutator.try_fault("sensor/lane/shifted", "A", 1.0, workspace=toycar)
     assert (trial.outcome, trial.status) == (Outcome.HAZARD, Status.OK)
     assert "H3" in trial.verdict["hazards_s"]
@@ -28,7 +28,6 @@ def test_a_fault_is_tried_by_name(toycar: Workspace) -> None:
 
 
 def test_a_given_value_replaces_the_drawn_values(toycar: Workspace, tmp_path: Path) -> None:
-    """All files are kept in the folder `out`."""
     trial = mutator.try_fault(
         "sensor/distance/longer", "A", "near", value=12.5, workspace=toycar, out=tmp_path / "o"
     )
@@ -41,7 +40,6 @@ def test_a_given_value_replaces_the_drawn_values(toycar: Workspace, tmp_path: Pa
 
 
 def test_any_fault_record_can_be_tried(toycar: Workspace) -> None:
-    """A crash of the controller is a result, with the data recorded before it."""
     [fault] = toycar.faults("hostile/crash")
     trial = mutator.try_fault(fault, "A", workspace=toycar)
     assert trial.fault is fault

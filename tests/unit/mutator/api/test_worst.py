@@ -18,7 +18,6 @@ from mutator.workspace import Workspace
 def test_filtered_results_are_sorted_by_severity(
     toycar: Workspace, tmp_path: Path, record: Callable[..., Record], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Hazards come first for any batch size. A limit shortens the list and leaves the count unchanged."""
     plan = make_plan(toycar, "toy")
     run = freeze(plan, tmp_path / "run", toycar).path
     hazard = {"outcome": Outcome.HAZARD, "hazards": (("H3", 5.0),)}

@@ -92,7 +92,6 @@ KNOWN = "reading 'as_built'; expected one of as_described, as_coded"
 
 
 def in_library(toycar: Workspace, old: str, new: str) -> Path:
-    """Write a campaign of the toy car's library with one change; return its path."""
     path = toycar.library / "campaigns" / "mine.yaml"
     text = TEXT.replace(old, new)
     assert new in text
@@ -108,8 +107,6 @@ def test_a_single_arming_time_applies_to_every_reading(toycar: Workspace) -> Non
 
 
 def test_a_setting_can_differ_by_reading(toycar: Workspace) -> None:
-    """A setting that is a list applies to every reading; the default is an empty list. An entry that is
-    listed twice is refused."""
     for text, expected in (
         ("", {"as_described": (), "as_coded": ()}),
         ("setting: [alone]\n", {"as_described": ("alone",), "as_coded": ("alone",)}),

@@ -33,14 +33,15 @@ def folder(toycar: Workspace, tmp_path: Path) -> RunFolder:
     return freeze(make_plan(toycar, "toy"), tmp_path / "run", toycar)
 
 
-def test_everything_is_pending_at_first(folder: RunFolder) -> None:
+def test_all_experiments_are_pending_at_first(folder: RunFolder) -> None:
     left = pending(folder, {})
     assert [item.chunk for item in left] == list(range(8))
     assert sum(len(item.places) for item in left) == 24
 
 
-def test_an_experiment_with_a_record_is_not_pending(folder: RunFolder, record: Callable[..., Record]) -> None:
-    """An experiment with a harness error stays pending. Complete chunks are left out."""
+def test_experiments_without_a_valid_record_are_pending(
+    folder: RunFolder, record: Callable[..., Record]
+) -> None:
     faults = read_faults(folder.path)
     chunks = [read_chunk(folder.path, chunk, faults) for chunk in folder.head["chunks"]]
     records = {e.id: record(e.id) for e in (*chunks[0], chunks[1][1], chunks[2][0])}
@@ -52,7 +53,7 @@ def test_an_experiment_with_a_record_is_not_pending(folder: RunFolder, record: C
     assert len(left) == 7
 
 
-def test_all_chunks_together_hold_the_plan(folder: RunFolder) -> None:
+def test_the_chunks_together_contain_the_whole_plan(folder: RunFolder) -> None:
     faults = read_faults(folder.path)
     found = [e.id for chunk in folder.head["chunks"] for e in read_chunk(folder.path, chunk, faults)]
     assert len(found) == len(set(found)) == 24

@@ -12,7 +12,6 @@ from mutator.workspace import Workspace
 
 
 def test_a_frozen_plan_is_read_back_equal(toycar: Workspace, tmp_path: Path) -> None:
-    """The plan is also written as plan.csv."""
     plan = make_plan(toycar, "toy", Choices(limit=9))
     folder = freeze(plan, tmp_path / "run", toycar)
     back = load_plan(folder)

@@ -18,14 +18,12 @@ def git(folder: Path, *words: str) -> None:
 
 
 def test_required_packages_include_indirect_requirements() -> None:
-    """The names are canonical. mutator and its extras are left out."""
     found = machine.required()
     assert {"numpy", "jinja2", "markupsafe", "pydantic-core", "execnet", "pytest-xdist"} <= found
     assert not {"hypothesis", "mypy", "tox", "import-linter", "mutator"} & found
 
 
 def test_requirements_that_do_not_apply_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Examples are packages for Windows, or for an unused extra."""
     told = {
         "mutator": ("1", ["a[fast]>=1", "w; sys_platform == 'win32'", "t; extra == 'test'"]),
         "a": ("1", ["b", "c; extra == 'fast'", "d; extra == 'slow'", "gone"]),
@@ -46,12 +44,10 @@ def test_versions_come_from_package_metadata() -> None:
 
 
 def test_modules_are_reported_by_package() -> None:
-    """A module's name can differ from its package's name. Modules without a package are left out."""
     assert machine.packages_of(["yaml", "_yaml", "cv2", "nosuch"]) == ("opencv-python-headless", "pyyaml")
 
 
 def test_blas_uses_one_thread_in_any_environment(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The target's process gets a fixed environment."""
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "2")
     machine.blas.cache_clear()
     (library,) = machine.blas()

@@ -22,7 +22,7 @@ ENTRY = "  - {operators: [arithmetic, branch], in: ['toycar/driver.py::Driver.*'
 
 @pytest.fixture(autouse=True)
 def lines(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Replace the executed lines of a golden run by lines 1 to 16 of the driver, so that nothing is run."""
+    """Pretend that golden runs execute lines 1 to 16 of the driver, so that nothing is run."""
 
     def known(manifest: TargetManifest, drives: Sequence[GoldenDrive], limits: Limits) -> list[Executed]:
         return [{"toycar/driver.py": frozenset(range(1, 17))} for _ in drives]
@@ -32,8 +32,7 @@ def lines(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def campaign(toycar: Workspace, tmp_path: Path) -> Path:
-    """A campaign with only operator mutants. Transient faults start at random times and last half a
-    second."""
+    """A campaign with only operator mutants."""
     text = toycar.campaign("small").read_text()
     begin, end = text.index("faults:"), text.index("methods:")
     text = f"{text[:begin]}faults:\n{ENTRY}\n{text[end:]}".replace("[guided, random]", "[random]")
@@ -51,8 +50,6 @@ def _edited(campaign: Path, old: str, new: str) -> Path:
 
 
 def test_each_mutant_is_planned_as_permanent_and_as_transient(toycar: Workspace, campaign: Path) -> None:
-    """The permanent fault has the trigger `always`, the transient one a random time. The plan's digest is
-    reproducible, and the plan reports how many mutants it left out."""
     plan = make_plan(toycar, campaign)
     assert len({one.fault.id for one in plan.experiments}) == 12 == len(plan.experiments) / 2
     found = Counter((one.method, one.trigger.hold) for one in plan.experiments)
@@ -66,7 +63,6 @@ def test_each_mutant_is_planned_as_permanent_and_as_transient(toycar: Workspace,
 
 
 def test_the_frozen_plan_lists_left_out_mutants(toycar: Workspace, campaign: Path, tmp_path: Path) -> None:
-    """A plan without operators has no such list."""
     plan = make_plan(toycar, campaign)
     folder = freeze(plan, tmp_path / "run", toycar)
     assert load_plan(folder).told == plan.told == tuple(folder.head["operators"])
@@ -74,7 +70,6 @@ def test_the_frozen_plan_lists_left_out_mutants(toycar: Workspace, campaign: Pat
 
 
 def test_the_key_when_selects_permanent_or_transient_mutants(toycar: Workspace, campaign: Path) -> None:
-    """The campaign can also contain specs and context rows."""
     _edited(campaign, "sample: 12}", "sample: 2, when: [permanent]}\n  - spec: sensor/silence/no_data")
     kinds = Counter((one.fault.module, one.trigger.name) for one in make_plan(toycar, campaign).experiments)
     assert kinds == {("operators", "always"): 2, ("sensor", "random/always"): 1}
@@ -101,8 +96,6 @@ def test_another_seed_draws_other_mutants(toycar: Workspace, campaign: Path) -> 
 
 
 def test_review_groups_do_not_depend_on_the_draw(toycar: Workspace, campaign: Path) -> None:
-    """There is one group for each operator and function."""
-
     def groups(plan: Plan) -> dict[str, object]:
         return {one.what: one.bound for one in of_plan(toycar, plan) if ": operator" in one.what}
 
@@ -144,7 +137,6 @@ def test_a_wrong_selection_is_refused_with_its_line(campaign: Path, old: str, ne
 def test_a_place_without_mutants_is_refused_with_its_line(
     toycar: Workspace, campaign: Path, place: str, said: str
 ) -> None:
-    """Either the place does not exist, or no golden run executes it."""
     _edited(campaign, "toycar/driver.py::Driver.*", place)
     with pytest.raises(MutatorError, match=r"operators\.yaml:7: ") as caught:
         make_plan(toycar, campaign)

@@ -16,7 +16,6 @@ from mutator.workspace import Workspace
 
 @pytest.fixture
 def whole(toycar: Workspace) -> Workspace:
-    """The toy workspace, whose campaign `toy` is planned in full instead of as a sample."""
     path = toycar.campaign("toy")
     path.write_text(path.read_text().replace("sample: 24\n", ""))
     return toycar
@@ -26,8 +25,7 @@ def pair_key(experiment: Experiment) -> tuple[str, str, str]:
     return experiment.scenario, experiment.fault.id, experiment.trigger.name.removeprefix("random/")
 
 
-def test_guided_and_random_are_matched_pairs(whole: Workspace) -> None:
-    """The two partners have the same scenario, fault and context row."""
+def test_each_guided_experiment_has_a_random_partner(whole: Workspace) -> None:
     experiments = make_plan(whole, "toy").experiments
     guided = Counter(pair_key(e) for e in experiments if e.method is Method.GUIDED)
     random = Counter(pair_key(e) for e in experiments if e.method is Method.RANDOM)
@@ -37,7 +35,6 @@ def test_guided_and_random_are_matched_pairs(whole: Workspace) -> None:
 
 
 def test_the_reading_determines_when_triggers_are_armed(whole: Workspace) -> None:
-    """Random times are starts of steps, from the arming time to the last step."""
     for reading, armed in (("as_described", 1.0), ("as_coded", 0.0)):
         times = set()
         for experiment in make_plan(whole, "toy", Choices(reading=reading)).experiments:
@@ -58,8 +55,7 @@ def test_random_times_differ_between_rows_and_scenarios(whole: Workspace) -> Non
     assert len({e.trigger.condition for e in silent}) == len(silent) == 4
 
 
-def test_the_same_seed_gives_the_same_plan(toycar: Workspace, copy_toycar, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
-    """Ids, order, chunks and digest do not depend on the location."""
+def test_a_seed_gives_the_same_plan_in_any_folder(toycar: Workspace, copy_toycar, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
     plan = make_plan(toycar, "toy")
     elsewhere = make_plan(copy_toycar(tmp_path / "elsewhere"), "toy")
     assert (plan.experiments, plan.chunks, plan.digest) == (
@@ -93,8 +89,7 @@ def test_experiments_with_the_same_golden_run_are_adjacent(whole: Workspace) -> 
     assert first == len(keys)
 
 
-def test_a_setting_applies_to_all_runs(whole: Workspace) -> None:
-    """The setting also applies to the canary and the golden runs, and it changes the ids."""
+def test_a_setting_applies_to_all_runs_and_changes_the_ids(whole: Workspace) -> None:
     before = make_plan(whole, "toy")
     path = whole.campaign("toy")
     path.write_text(path.read_text().replace("faults:", "setting: [alone]\nfaults:", 1))
@@ -109,7 +104,6 @@ def test_a_setting_applies_to_all_runs(whole: Workspace) -> None:
 
 
 def test_a_plan_can_be_filtered_and_limited(whole: Workspace) -> None:
-    """The limit takes an even sample of the experiments that the filters keep."""
     plan = make_plan(
         whole, "toy", Choices(only='scenario == "A"', exclude='method == "random" or value > 60', limit=5)
     )
@@ -200,7 +194,6 @@ def test_a_campaign_can_limit_the_values_of_each_variant(whole: Workspace) -> No
 
 
 def test_the_expected_time_depends_on_workers_and_rate(toycar: Workspace) -> None:
-    """A measured rate replaces the default rate."""
     plan = make_plan(toycar, "toy")
     one, two = plan.cost(1), plan.cost(2)
     assert one.cpu_s == two.cpu_s > 0
@@ -216,7 +209,6 @@ BEYOND = ("software", "vision_weather")  # modules of unpublished faults
 
 
 def test_quickstart_plans_every_published_variant(clone: Workspace) -> None:
-    """The plan has 60 experiments: guided and random, in every scenario and context."""
     plan = make_plan(clone, "quickstart")
     experiments = plan.experiments
     variants = {f"{spec.name}/{v.name}" for spec in clone.specs() if spec.module not in BEYOND for v in spec}
@@ -234,10 +226,9 @@ def plan_of(clone: Workspace, tmp_path: Path, **choices: str) -> Plan:
     return make_plan(clone, path, Choices(**choices))
 
 
-def test_the_published_experiments_expand_in_both_readings(clone: Workspace, tmp_path: Path) -> None:
-    """Without sampling, the plan has the 11,280 published experiments: each value in each scenario and
-    context."""
+def test_both_readings_expand_to_all_published_experiments(clone: Workspace, tmp_path: Path) -> None:
     described, coded = (plan_of(clone, tmp_path, reading=r) for r in ("as_described", "as_coded"))
+    # values, scenarios, contexts, methods
     assert len(described.experiments) == len(coded.experiments) == 282 * 5 * 4 * 2
     assert len({e.id for e in described.experiments}) == len(described.experiments)
     values = [

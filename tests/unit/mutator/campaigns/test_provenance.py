@@ -47,7 +47,7 @@ def test_a_session_records_everything_that_affects_results(folder: RunFolder, to
 
 
 def _clone() -> dict[str, object] | None:
-    """Return the state of the harness's clone, if there is one. The toy is a copy outside any clone."""
+    """Return the git state of the harness; the toy is outside any clone."""
     state = machine.clone_state(Path(machine.__file__).parents[1])
     return {"mutator": state} if state else None
 
@@ -84,7 +84,6 @@ def test_different_versions_are_refused_unless_accepted(
     other: dict[str, str | None],
     told: str,
 ) -> None:
-    """The error lists the differences. If the user accepts them, run.json records them."""
     begin_stretch(folder, toycar, records="0001-*", accept=False)
     use(monkeypatch, **other)
     with pytest.raises(MutatorError) as caught:

@@ -14,7 +14,6 @@ SPECS = ("radar/chaff/distance", "radar/jamming/no_data", "car/speed/slower")
 
 @pytest.fixture
 def many(experiment: Callable[..., Experiment]) -> list[Experiment]:
-    """Three variants with 10, 1 and 3 values, in two scenarios, with two methods and two triggers."""
     made = []
     for spec, values in zip(SPECS, (10, 1, 3), strict=True):
         for scenario in ("S1", "S2"):
@@ -27,8 +26,6 @@ def many(experiment: Callable[..., Experiment]) -> list[Experiment]:
 
 @pytest.mark.parametrize("count", [6, 12, 24])
 def test_a_sample_is_balanced(many: list[Experiment], count: int) -> None:
-    """Each variant, method, scenario and trigger appears equally often, regardless of the number of
-    values."""
     picked = pick(many, count, seed=1)
     assert len(picked) == count
     assert set(Counter(e.fault.spec for e in picked).values()) == {count // 3}
@@ -45,7 +42,6 @@ def test_if_a_variant_has_too_few_experiments_others_fill_its_share(many: list[E
 
 
 def test_a_seed_always_picks_the_same_experiments(many: list[Experiment]) -> None:
-    """The experiments keep their order. Another seed picks different ones."""
     picked = pick(many, 10, seed=1)
     assert [many.index(e) for e in picked] == sorted(many.index(e) for e in picked)
     assert pick(list(reversed(many)), 10, seed=1) == tuple(reversed(picked))
@@ -85,8 +81,6 @@ def test_a_proportional_sample_keeps_pairs_and_the_share_of_each_variant(many: l
 
 @pytest.mark.parametrize("count", [2, 12, 24, 40, 54])
 def test_sampled_pairs_stay_together(many: list[Experiment], count: int) -> None:
-    """Variants, scenarios and context rows are evenly spread, and a seed picks the same experiments for any
-    input order."""
     picked = pick_pairs(many, count, seed=1)
     assert len(picked) == count
     keys = {m: {key(e) for e in picked if e.method is m} for m in Method}
@@ -106,8 +100,7 @@ def test_a_sample_of_odd_size_splits_one_pair(many: list[Experiment], count: int
     assert len(picked) == count and len(guided - random) == 1 and random <= guided
 
 
-def test_without_partners_single_experiments_are_sampled(many: list[Experiment]) -> None:
-    """The sample equals the result of `pick`."""
+def test_unpaired_experiments_are_sampled_one_by_one(many: list[Experiment]) -> None:
     guided = [e for e in many if e.method is Method.GUIDED]
     assert pick_pairs(guided, 9, seed=1) == pick(guided, 9, seed=1)
 

@@ -18,8 +18,6 @@ SEEDS = "seeds: {from: 3, to: 5}"
 
 @pytest.fixture
 def campaign(toycar: Workspace, tmp_path: Path) -> Callable[..., Path]:
-    """Write the campaign `small` with the given lines instead of its seed."""
-
     def write(lines: str = SEEDS, **more: str) -> Path:
         text = toycar.campaign("small").read_text()
         assert "\nseed: 3\n" in text
@@ -39,7 +37,6 @@ def alone(workspace: Workspace, path: Path, seed: int, **chosen: int) -> Plan:
 def test_a_plan_for_several_seeds_joins_the_plans_for_each_seed(
     toycar: Workspace, campaign: Callable[..., Path], more: dict[str, str]
 ) -> None:
-    """`Choices(seed=...)` selects one of the campaign's seeds."""
     path = campaign(**more)
     plan, parts = make_plan(toycar, path), [alone(toycar, path, seed) for seed in (3, 4, 5)]
     assert plan.experiments == tuple(e for part in parts for e in part.experiments)

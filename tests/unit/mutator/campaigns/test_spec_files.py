@@ -28,8 +28,6 @@ def mine(toycar: Workspace, tmp_path: Path) -> Path:
 def test_a_spec_file_is_found_relative_to_the_campaign(
     toycar: Workspace, mine: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """The spec file's faults are added to the library's, from any current folder. The canary can come from a
-    spec file, too. A campaign without random times needs no `random_until_s`."""
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
     plan = make_plan(toycar, mine)
@@ -48,7 +46,7 @@ def test_a_missing_spec_file_is_reported(toycar: Workspace, mine: Path) -> None:
 
 
 def test_two_specs_with_the_same_name_are_refused(toycar: Workspace, mine: Path) -> None:
-    """Tables could not distinguish them. A campaign can name a spec file of the library, however."""
+    """Tables could not distinguish their faults."""
     file = mine.parent / "specs" / "drifting.yaml"
     file.write_text(file.read_text().replace("fault_type: drifting", "fault_type: lane"))
     with pytest.raises(MutatorError, match="has the name of a spec in the library, sensor/lane"):

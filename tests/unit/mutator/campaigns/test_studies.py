@@ -25,7 +25,7 @@ PAGE = CLONE / "docs" / "how-to" / "add-a-study.md"
 
 @pytest.fixture
 def installed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """The study of the how-to page, and a study with a broken entry point."""
+    """Install the study of the how-to page and a study with a broken entry point."""
     package = tmp_path / "site" / "crash_tests"
     package.mkdir(parents=True)
     [code] = re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.S)
@@ -40,13 +40,11 @@ def installed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
 
 def test_the_shipped_study_is_installed() -> None:
-    """The test fails if the installation is outdated."""
     assert "driving_agent_resilience" in study_names(), "install again: pip install -e . --no-deps"
     assert list(find_study("driving_agent_resilience").check(Workspace.find(root=CLONE))) == []
 
 
 def test_the_report_contains_a_study_from_another_package(installed: None, tmp_path: Path) -> None:
-    """The example on the how-to page works unchanged."""
     run = tmp_path / "run"
     run.mkdir()
     written = building.write(make_run(run, study="crash_tests"), Workspace.find(root=CLONE))
@@ -62,7 +60,6 @@ def test_the_report_contains_a_study_from_another_package(installed: None, tmp_p
 
 
 def test_an_unknown_or_broken_study_is_refused(installed: None) -> None:
-    """The error lists the known studies or gives the reason."""
     with pytest.raises(MutatorError, match="'moon_landing' is not installed; expected one of broken, crash"):
         find_study("moon_landing")
     with pytest.raises(MutatorError, match=r"'broken' cannot be loaded: .*MISSING"):
@@ -103,7 +100,7 @@ BAD_CHECKS = {
 
 @pytest.fixture
 def strangers(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """The entry points of an installed package, each of which has a different error."""
+    """Install a package in which every entry point has a different error."""
     package = tmp_path / "site" / "strange_studies"
     package.mkdir(parents=True)
     (package / "raising.py").write_text("STUDY = 1 / 0")
@@ -127,7 +124,6 @@ def asking(toycar: Workspace, study: str) -> Path:
 def test_an_invalid_study_is_reported_at_its_line_in_the_campaign(
     strangers: None, toycar: Workspace, study: str
 ) -> None:
-    """Planning refuses the study, and `mutator check` lists it."""
     before = [str(problem) for problem in check_library(toycar, "toycar")]
     path = asking(toycar, study)
     line = len(path.read_text().splitlines())
@@ -147,7 +143,6 @@ def test_an_invalid_study_is_reported_at_its_line_in_the_campaign(
 def test_an_error_in_a_studys_check_is_reported_as_a_problem(
     strangers: None, toycar: Workspace, study: str
 ) -> None:
-    """The error does not end `mutator check`."""
     path = asking(toycar, study)
     line = len(path.read_text().splitlines())
     problems = [str(problem) for problem in check_library(toycar, "toycar")]

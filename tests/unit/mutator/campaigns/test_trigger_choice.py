@@ -35,7 +35,6 @@ def listed(pole: Workspace, triggers: str, methods: str = "[guided]") -> Path:
 
 
 def test_each_listed_trigger_is_planned(pole: Workspace) -> None:
-    """The file sets how times, conditions and `always` are armed and held. Each has a random partner."""
     plan = make_plan(pole, "upright")
     assert len(plan.experiments) == 3 * 3 * 2
     found = {e.trigger.name: e.trigger for e in plan.experiments if e.method is Method.GUIDED}
@@ -52,7 +51,6 @@ def test_each_listed_trigger_is_planned(pole: Workspace) -> None:
 
 
 def test_triggers_can_be_a_plain_list(pole: Workspace) -> None:
-    """A plain list needs no methods, and its arming time comes from the manifest."""
     path = listed(pole, "triggers: [always, {when: angle > 0.1}]\n")
     path.write_text(path.read_text().replace("methods: [guided]\n", ""))
     manifest = pole.library / "targets" / "pole.yaml"
@@ -86,7 +84,6 @@ def test_triggers_can_be_a_plain_list(pole: Workspace) -> None:
 def test_a_mistake_in_the_list_is_reported_at_its_line(
     pole: Workspace, triggers: str, methods: str, said: str
 ) -> None:
-    """A condition that uses a value that is not observed is a mistake."""
     path = listed(pole, triggers, methods)
     with pytest.raises(MutatorError, match=said) as caught:
         make_plan(pole, "upright")
@@ -94,7 +91,6 @@ def test_a_mistake_in_the_list_is_reported_at_its_line(
 
 
 def test_the_library_check_reports_invalid_conditions(pole: Workspace) -> None:
-    """A library without a hazard analysis is valid."""
     assert check_library(pole, "pole") == []
     listed(pole, "triggers: [{when: speed > 1}]\n")
     (problem,) = check_library(pole, "pole")
@@ -102,7 +98,6 @@ def test_the_library_check_reports_invalid_conditions(pole: Workspace) -> None:
 
 
 def test_without_a_context_table_mutants_have_the_trigger_always(pole: Workspace) -> None:
-    """The error for an unknown trigger lists no context rows."""
     triggers = {trigger.name for _, trigger in MutantSet.of_specs(["sensor/angle"], workspace=pole).pairs}
     assert triggers == {"always"}
     with pytest.raises(MutatorError, match=r"expected a time in s, `always`, or a condition"):

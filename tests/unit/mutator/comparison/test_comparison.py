@@ -26,7 +26,6 @@ HAZARD = {"outcome": Outcome.HAZARD, "t_manifest": 2.5, "hazards": (("H3", 4.0),
 
 
 def lane_is_left(e: Experiment) -> dict[str, Any]:
-    """Make lane faults hazardous, except one, which crashes. Its message contains HTML."""
     if e.fault.fault_type != "lane":
         return {}
     if e.fault.value == 0.8:
@@ -38,8 +37,7 @@ def lane_is_left(e: Experiment) -> dict[str, Any]:
 def runs(
     tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace], write_run: Write
 ) -> tuple[Path, Path]:
-    """Two runs of the toy. In `before`, every fault is masked. `after` has a changed target and worse
-    results."""
+    """Two runs. In `before`, every fault is masked. `after` has a changed target and worse results."""
     place = tmp_path_factory.mktemp("runs")
     toycar = copy_toycar(place)
     before = write_run(toycar, place / "before")
@@ -73,7 +71,6 @@ def test_pairs_in_which_one_run_stops_get_a_remark(found: Comparison) -> None:
 def test_runs_without_a_list_of_files_can_be_compared(
     runs: tuple[Path, Path], tmp_path: Path, reseal: Callable[[Path], None]
 ) -> None:
-    """The comparison states that the changed files are not known."""
     old = shutil.copytree(runs[0], tmp_path / "old")
     head = old / HEAD
     told = json.loads(head.read_text())
@@ -120,8 +117,7 @@ def test_a_run_compared_with_itself_has_no_changes(runs: tuple[Path, Path]) -> N
 
 
 def test_differing_versions_are_reported(runs: tuple[Path, Path]) -> None:
-    """Python, processor and package versions of all stretches are compared. If one folder lists every
-    installed package, only packages that both folders list are compared."""
+    """If one folder lists every installed package, only packages that both folders list are compared."""
     sides = [read_side(runs[0]) for _ in "ab"]
     old = Stretch(python="CPython 3.11.7", packages={"numpy": "2.0"}, platform="Linux", cpu="Cray 1")
     new = replace(old, python="CPython 3.12.1", packages={"numpy": "2.1", "cv": "5"})
@@ -160,7 +156,6 @@ def test_a_run_with_a_failed_proof_is_not_compared(
 
 
 def test_missing_results_do_not_affect_rates(toycar: Workspace, tmp_path: Path, write_run: Write) -> None:
-    """Harness errors and experiments that did not run are reported."""
     broken = {"status": Status.HARNESS_ERROR, "outcome": None, "activation": None, "detail": "no disk"}
     a = write_run(toycar, tmp_path / "a", lambda e: HAZARD)
     b = write_run(
@@ -190,7 +185,6 @@ class Page(HTMLParser):
 
 
 def test_the_page_the_markdown_and_the_csv_file_list_every_change(found: Comparison, tmp_path: Path) -> None:
-    """The page is self-contained and escapes text."""
     written = pages.write(found, tmp_path / "out")
     pairs = list(csv.DictReader(written.pairs.open()))
     assert len(pairs) == 24
@@ -218,7 +212,6 @@ def test_comparing_again_gives_the_same_bytes(
 def test_a_long_page_shows_the_first_changes_without_scripts(
     found: Comparison, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The page contains all rows, however."""
     monkeypatch.setattr(pages, "SHOWN", 3)
     text = pages.write(found, tmp_path / "out").page.read_text()
     rows = [line for line in text.splitlines() if '<span class="change' in line]

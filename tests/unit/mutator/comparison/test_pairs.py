@@ -17,7 +17,6 @@ Make = Callable[..., Experiment]
 
 
 def row(experiment_id: str = "e", **given: Any) -> Row:
-    """The row of a successful run with a masked fault."""
     fields: dict[str, Any] = {
         "experiment_id": experiment_id,
         **dict.fromkeys(("module", "fault_type", "variant", "value", "unit", "scenario"), "x"),
@@ -37,13 +36,12 @@ def row(experiment_id: str = "e", **given: Any) -> Row:
 
 
 def side(*experiments: Experiment, without: tuple[Experiment, ...] = ()) -> Side:
-    """A run of these experiments, except those in `without`, which have not run."""
+    """Return a run of these experiments, in which those in `without` have not run."""
     rows = {e.id: row(e.id) for e in experiments if e not in without}
     return Side(folder=RunFolder(Path("run")), experiments=experiments, rows=rows)
 
 
 def test_experiments_are_matched_by_fault_scenario_and_trigger(experiment: Make) -> None:
-    """Matching experiments can differ in reading, setting, trigger time and seed."""
     one = experiment(method=Method.RANDOM, trigger="random/C1")
     other = dataclasses.replace(
         one,
@@ -82,8 +80,7 @@ def test_an_experiment_that_did_not_run_forms_no_pair(experiment: Make) -> None:
 
 
 def test_ambiguous_experiments_are_not_matched(experiment: Make) -> None:
-    """Identical experiments are matched first. Others with the same fault, scenario and trigger are matched
-    only if one is left on each side."""
+    """Identical experiments are matched first, and others only if one is left on each side."""
     a = experiment()
     twin = dataclasses.replace(a, seed=8)
     third = dataclasses.replace(a, seed=9)

@@ -43,13 +43,10 @@ def contact(delta_v: float, **more: float) -> dict[str, Any]:
 
 
 def before(e: Experiment) -> dict[str, Any]:
-    """In the run `before`, lane faults end in light contacts, and the other faults have no effect."""
     return contact(2.0) if e.fault.fault_type == "lane" else {"metrics": (("way", 20.0),)}
 
 
 def after(e: Experiment) -> dict[str, Any]:
-    """In the run `after`, guided lane faults end in harder contacts, and random ones in none. With distance
-    faults, the car has a contact and covers less distance."""
     if e.fault.fault_type == "lane":
         return contact(12.0) if e.method is Method.GUIDED else {"metrics": (("way", 30.0),)}
     return contact(5.0, way=16.0) if e.fault.fault_type == "distance" else {"metrics": (("way", 20.0),)}
@@ -61,8 +58,8 @@ def runs(
     copy_toycar: Callable[[Path], Workspace],
     write_run: Callable[..., Path],
 ) -> tuple[Path, ...]:
-    """Three runs of the toy with severity (before, after, and before with another scale), and one run of a
-    target without severity."""
+    """The runs `before`, `after`, `strict` (`before` with another severity scale) and `without` (no
+    severity)."""
     place = tmp_path_factory.mktemp("runs")
     toycar = copy_toycar(place)
     without = write_run(toycar, place / "without")
@@ -87,7 +84,6 @@ def kinds(found: Comparison, change: Change) -> set[tuple[str, str]]:
 
 
 def test_each_change_of_severity_is_listed(found: Comparison) -> None:
-    """A higher class or a new contact is worse."""
     assert kinds(found, Change.HIGHER_SEVERITY) == {("lane", "S1>S3"), ("distance", ">S2")}
     assert kinds(found, Change.LOWER_SEVERITY) == {("lane", "S1>")}
     assert "higher-severity" in summary(found)
@@ -106,7 +102,6 @@ def test_a_gate_finds_contacts_that_were_milder_before(found: Comparison) -> Non
 
 
 def test_the_medians_of_metrics_are_compared(found: Comparison) -> None:
-    """Only pairs with a value in both runs are used."""
     sheets = {sheet.name: sheet for sheet in found.sheets}
     lines = [dict(zip(sheets["metrics"].heads, line, strict=True)) for line in sheets["metrics"].lines]
     way = next(line for line in lines if line["metric"] == "way")

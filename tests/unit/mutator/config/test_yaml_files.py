@@ -10,15 +10,11 @@ from mutator.errors import MutatorError
 
 
 class Wheel(yaml_files.StrictModel):
-    """A section of the file."""
-
     radius: float
     spokes: int = 5
 
 
 class Car(yaml_files.StrictModel):
-    """The model of a whole file."""
-
     name: str
     wheels: dict[str, Wheel] = Field(default_factory=dict)
     spare: Wheel | None = None
