@@ -1,4 +1,4 @@
-"""The step at which a mutant's fault becomes active, as its probe determines it."""
+"""Predictions of the step at which a mutant's fault becomes active."""
 
 import math
 import random
@@ -15,7 +15,6 @@ from mutator.workspace import Workspace
 
 @pytest.fixture
 def probe(toycar: Workspace):
-    """The source of the null mutant's probe, with a trigger."""
     manifest, models = toycar.manifest("toycar"), toycar.fault_models()
 
     def make(trigger: Trigger) -> str:
@@ -74,7 +73,6 @@ def test_a_fork_starts_at_the_first_active_step(probe, trigger: Trigger, step: i
 def test_the_predicted_activation_step_agrees_with_the_probe(
     probe, condition: str, armed_after_s: float, hold: Hold
 ) -> None:
-    """Observations can contain zeros, infinities and NaN."""
     draw = random.Random(condition)
     code = probe(Trigger(name="x", condition=condition, armed_after_s=armed_after_s, hold=hold))
     for _ in range(10):
@@ -99,9 +97,7 @@ def test_the_probes_template_determines_the_precision_of_the_arming_time(probe) 
     assert [start_of(one, SEEN).step for one in (close, far)] == [4, 3]
 
 
-def test_a_probe_in_two_parts_equals_the_whole(probe) -> None:
-    """The part that all probes share and the part that depends on the trigger, run one after the other, equal
-    the whole probe, including line numbers."""
+def test_the_two_parts_of_a_probe_equal_the_whole_probe(probe) -> None:
     trigger = Trigger(name="x", condition="hwt < 2.0", hold=Hold.FOR, hold_s=0.1)
     whole, parts = {}, {}
     exec(compile(probe(trigger), "_fi", "exec"), whole)
@@ -125,7 +121,7 @@ def test_a_step_can_have_several_observations_or_none(probe) -> None:
 
 
 @pytest.mark.parametrize("trigger", [at_time(0.2), Trigger(name="x", condition="d_rel <= 20.0")])
-def test_a_probe_whose_state_is_set_equals_one_that_observed(probe, trigger: Trigger) -> None:
+def test_a_probe_with_restored_state_equals_one_that_observed_the_steps(probe, trigger: Trigger) -> None:
     start = start_of(probe(trigger), SEEN)
     saw: dict = {}
     given: dict = {}

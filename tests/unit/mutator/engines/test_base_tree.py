@@ -1,4 +1,4 @@
-"""The pristine tree, which runs share through links. Writes through a link are undone."""
+"""The pristine tree, which runs share through links."""
 
 from pathlib import Path
 
@@ -26,7 +26,7 @@ def test_writes_to_a_tree_without_links_stay_in_it(folder: Path, tmp_path: Path)
 
 @pytest.mark.parametrize("name", ["car/go.py", "car/__pycache__/go.pyc"])
 def test_writes_through_a_link_are_undone(folder: Path, tmp_path: Path, name: str) -> None:
-    """A changed or locked file is restored. `was_changed` reports a change once to each user of the tree."""
+    """`was_changed` reports a change once to each user of the tree."""
     base, other = BaseTree(folder), BaseTree(folder)
     genuine = (folder / name).read_bytes()
     base.lay_out(tmp_path / "tree", linked=True)

@@ -58,7 +58,6 @@ GUARDED = 'if _fi.active("abc"):\n    y = y + 1.0'
 
 
 def test_changed_functions_are_found(changes: Changes) -> None:
-    """Each function is listed by module and path, with its old and new code."""
     found = changes(
         ("return [value", GUARDED), ("self.speed = speed", 'if not _fi.active("abc"):\n    speed = 0.0')
     )
@@ -89,9 +88,9 @@ def test_imports_of_injected_lines_are_listed(changes: Changes) -> None:
         ("limit = 3.0", 'if _fi.active("abc"):\n    limit = 0.0', None),
     ],
 )
-def test_some_changes_cannot_be_swapped(changes: Changes, before: str, lines: str, why: str | None) -> None:
-    """A change that acts without its trigger, or in a generator or inner function, is refused with the
-    reason. Code outside functions needs no swap."""
+def test_changes_that_cannot_be_swapped_are_refused_with_a_reason(
+    changes: Changes, before: str, lines: str, why: str | None
+) -> None:
     if why is None:
         assert changes((before, lines)).functions == ()
         return
@@ -117,7 +116,7 @@ def test_a_guard_must_keep_the_original_statement_in_its_else_branch(kept: int, 
         plan_swap(manifest, files, "/tree")  # type: ignore[arg-type]
 
 
-def test_a_file_that_the_run_digests_must_be_written_to_disk(changes: Changes) -> None:
+def test_a_file_that_the_run_reads_itself_is_not_swapped(changes: Changes) -> None:
     with pytest.raises(NotSwappable, match="read by the run itself"):
         changes(reads_itself=("car/*.py",))
 

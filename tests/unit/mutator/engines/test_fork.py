@@ -37,7 +37,7 @@ def test_forking_processes_have_one_thread_and_end_with_the_engine(fork: Fork) -
     for time_s in (2.0, 4.0, 3.0):
         assert fork.run(fork.job(at_time(time_s))).mode is RunMode.FORK
     pids = fork.processes()
-    assert len(pids) >= 4, "the guard, the server, a golden run at its start, and some further on"
+    assert len(pids) >= 4, "expected the guard, the server, and golden runs that wait at several steps"
     for pid in pids:
         status = Path(f"/proc/{pid}/status").read_text()
         assert "\nThreads:\t1\n" in status
@@ -46,8 +46,7 @@ def test_forking_processes_have_one_thread_and_end_with_the_engine(fork: Fork) -
     assert [path.name for path in (fork.folder / "work").iterdir() if "server" in path.name] == []
 
 
-def test_a_fork_starts_just_before_its_fault(fork: Fork) -> None:
-    """The golden run simulates the earlier steps, and only a few processes wait."""
+def test_a_fork_starts_just_before_its_fault_and_few_processes_wait(fork: Fork) -> None:
     starts = [fork.run(fork.job(at_time(0.05 * step))).start for step in (40, 41, 90, 10, 100, 0)]
     assert starts == [40, 41, 90, 10, 100, 0]
     for step in range(3, 100, 9):
@@ -65,14 +64,12 @@ def test_libraries_that_the_golden_run_imports_late_are_loaded_before_the_fork(f
 
 
 def test_an_experiment_that_never_triggers_gets_the_files_of_the_golden_run(fork: Fork) -> None:
-    """The experiment needs no run."""
     execution = fork.run(fork.job(at_time(100.0)))
     assert (execution.mode, execution.status, execution.cpu_s) == (RunMode.GOLDEN, Status.OK, 0.0)
     assert execution.out == fork.golden
 
 
 def test_a_killed_process_causes_a_harness_error_for_one_job_only(fork: Fork) -> None:
-    """The next job gets new processes, no matter whether the server or a waiting process was killed."""
     job = fork.job(at_time(2.0))
     for place in (0, -1):  # the first process, then a waiting one
         assert fork.run(job).status is Status.OK
@@ -81,13 +78,13 @@ def test_a_killed_process_causes_a_harness_error_for_one_job_only(fork: Fork) ->
         assert gone(victims[place])
         time.sleep(0.1)
         execution = fork.run(job)
-        if execution.status is Status.OK:  # a waiting process was not affected
+        if execution.status is Status.OK:  # a waiting process could still run the job
             assert place == 0
             execution = fork.run(fork.job(Trigger(name="x", condition="t >= 0.01")))
         assert execution.status is Status.HARNESS_ERROR
         assert "fork server" in execution.detail
         assert fork.run(job).status is Status.OK
-        assert all(map(gone, victims)), "nothing is left of the server that was killed"
+        assert all(map(gone, victims)), "a process of the killed server is still running"
 
 
 def test_waiting_processes_end_with_the_server(fork: Fork) -> None:

@@ -1,4 +1,4 @@
-"""The targets and runs that the fork engine leaves to the reference engine, with its reasons."""
+"""Targets and runs that the fork engine leaves to the reference engine, and why."""
 
 from dataclasses import replace
 
@@ -12,8 +12,6 @@ from ..fork_on_toy import LIMITS, Edit, Fork
 
 
 def test_a_target_with_threads_is_not_forked(fork: Fork, edit: Edit) -> None:
-    """The target starts a thread when it is loaded. The reference engine runs it, and the result gives the
-    reason."""
     edit(
         "tree/toycar/go.py",
         "class Drive:",
@@ -65,7 +63,6 @@ def test_the_stored_reason_is_printable(fork: Fork, edit: Edit) -> None:
 
 @pytest.mark.slow
 def test_a_target_that_behaves_differently_step_by_step_is_not_forked(fork: Fork, edit: Edit) -> None:
-    """The stepwise golden run differs from the command's golden run."""
     edit(
         "tree/toycar/go.py",
         "    drive = begin(arguments)\n",
@@ -77,8 +74,7 @@ def test_a_target_that_behaves_differently_step_by_step_is_not_forked(fork: Fork
 
 
 @pytest.mark.slow
-def test_a_run_that_leaves_a_thread_is_repeated(fork: Fork, edit: Edit) -> None:
-    """The run does not end by itself. The reference engine repeats it and reports the timeout."""
+def test_a_run_that_leaves_a_thread_is_repeated_by_the_reference_engine(fork: Fork, edit: Edit) -> None:
     fork.limits = replace(LIMITS, wall_s=3)
     edit(
         "tree/toycar/sensing.py",
@@ -105,7 +101,6 @@ def test_a_run_that_writes_into_its_tree_is_repeated_by_the_reference_engine(for
 
 
 def test_a_fault_in_a_generator_is_not_forked(fork: Fork, edit: Edit) -> None:
-    """A generator can be suspended between two steps, so the reference engine runs the experiment."""
     edit(
         "tree/toycar/sensing.py",
         "    def publish(self",
@@ -140,8 +135,7 @@ EARLY = """
 
 
 def test_a_target_that_observes_before_its_first_step_is_not_forked(fork: Fork, edit: Edit) -> None:
-    """A fork would miss such observations. The reference engine runs all experiments of the target, even if
-    the fault becomes active later."""
+    """A fork would miss such observations."""
     edit("fault_library/targets/toycar.yaml", "function: Drive.step,", "function: Drive.look,")
     edit("tree/toycar/go.py", '\n        self.steps = int(case["steps"])\n', EARLY)
     for trigger in (always(armed_after_s=-2.0), at_time(2.0)):

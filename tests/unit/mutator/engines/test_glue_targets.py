@@ -45,7 +45,6 @@ if __name__ == "__main__":
 
 @pytest.fixture
 def glued(fork: Fork, edit: Edit) -> Fork:
-    """The toy with an entry that uses the glue."""
     (fork.toy.library.parent / "tree" / "toycar" / "go.py").write_text(ENTRY)
     edit(
         MANIFEST,
@@ -70,8 +69,7 @@ def test_both_engines_give_the_same_bytes(glued: Fork) -> None:
 
 
 def test_a_run_imports_the_glue_of_the_harness_that_started_it(glued: Fork) -> None:
-    """Another version of mutator can be installed. The run's report does not list the glue as a package of
-    the target."""
+    """Another version of mutator can be installed."""
     plain = glued.engine.reference.execute(glued.job(at_time(2.0)), glued.folder / "plain")
     assert Path(plain.log.strip()) == Path(mutator.__file__)
     assert "mutator" not in plain.modules

@@ -34,7 +34,6 @@ def manifest(toycar: Workspace) -> TargetManifest:
 
 @pytest.fixture
 def run(toycar: Workspace, manifest: TargetManifest, tmp_path: Path) -> Run:
-    """Run scenario A on a tree with changed files and the given limits."""
     work = tmp_path / "work"
     work.mkdir()
     base = prepare_base(manifest, tmp_path / "base")
@@ -56,7 +55,6 @@ def entry(body: str) -> dict[str, str]:
 def test_a_mutant_of_a_file_that_runs_read_uses_no_shared_caches(
     toycar: Workspace, manifest: TargetManifest, tmp_path: Path
 ) -> None:
-    """The manifest lists such files in `reads_itself`."""
     said = 'import json, sys\nfrom pathlib import Path\nPath("words.json").write_text(json.dumps(sys.argv))\n'
     changed = replace(manifest, independent=("--forget",), reads_itself=("toycar/sens*.py",))
     engine = ReferenceEngine(changed, prepare_base(manifest, tmp_path / "base"), tmp_path, LIMITS)
@@ -126,14 +124,12 @@ def test_sleeping_hits_the_wall_limit(run: Run) -> None:
 
 
 def test_a_run_kept_alive_by_a_thread_times_out(run: Run) -> None:
-    """The run has otherwise finished its work."""
     body = "import threading, time; threading.Thread(target=time.sleep, args=(100,)).start()"
     execution = run(entry(body), replace(LIMITS, wall_s=2))
     assert (execution.status, execution.detail) == (Status.TIMEOUT, "wall time limit of 2 s")
 
 
 def test_a_run_with_too_many_steps_times_out(run: Run) -> None:
-    """The run ends at the same step on every machine."""
     probe = (
         "MUTANT = 'm'\nclass StepLimit(RuntimeError): pass\n"
         "def limit(n): global most; most = n\n"
@@ -176,7 +172,7 @@ def test_changing_the_tree_during_a_run_is_a_harness_error(run: Run) -> None:
     execution = run(entry(body))
     assert execution.status is Status.HARNESS_ERROR
     assert "toycar/world.py" in execution.detail
-    assert run().status is Status.OK, "the next run has its own tree again"
+    assert run().status is Status.OK, "the next run must have an intact tree"
 
 
 def test_truncated_bytecode_does_not_affect_later_runs(toycar: Workspace, run: Run, tmp_path: Path) -> None:
@@ -188,8 +184,6 @@ def test_truncated_bytecode_does_not_affect_later_runs(toycar: Workspace, run: R
 
 
 def test_a_replaced_log_or_report_is_treated_as_missing(run: Run) -> None:
-    """A run can remove the file, or replace it with a folder or a pipe, for which the engine must not
-    wait."""
     head = "import os\nos.unlink('../log')\n"
     for body in ("", "os.mkdir('../log')", "os.mkfifo('../log')"):
         execution = run(entry(head + body))
@@ -240,8 +234,7 @@ def test_a_run_receives_signals_that_its_parent_ignored(run: Run) -> None:
         signal.signal(signal.SIGINT, before)
 
 
-def test_a_source_file_from_outside_the_tree_is_a_harness_error(run: Run) -> None:
-    """A data file is allowed."""
+def test_a_source_file_that_a_run_adds_to_its_tree_is_a_harness_error(run: Run) -> None:
     body = "import toycar, pathlib\npathlib.Path(toycar.__file__).with_name('left.py').touch()"
     execution = run(entry(body))
     assert execution.status is Status.HARNESS_ERROR
@@ -262,7 +255,6 @@ def test_stale_bytecode_cannot_run(run: Run, manifest: TargetManifest, tmp_path:
 
 
 def test_the_users_environment_does_not_reach_a_run(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The user's variables are removed, the job sets the hash seed, and libraries use one thread."""
     monkeypatch.setenv("PYTHONPATH", "/nowhere")
     monkeypatch.setenv("MUTATOR_SECRET", "x")
     body = (
@@ -392,9 +384,7 @@ def test_two_threads_can_use_one_engine(
     assert found == [Status.OK, Status.OK]
 
 
-def test_the_report_lists_imported_packages(run: Run) -> None:
-    """The target's own packages, the standard library, and modules that were loaded before the run are
-    excluded."""
+def test_the_report_lists_only_packages_that_the_run_imports(run: Run) -> None:
     assert run().modules == ("numpy",)
     assert run(entry("import json, iniconfig.exceptions, toycar.world")).modules == ("iniconfig",)
 

@@ -17,8 +17,6 @@ def test_each_engine_in_the_list_can_be_created() -> None:
 
 
 def test_the_default_engine_depends_on_the_size_of_the_campaign(toycar: Workspace) -> None:
-    """A small campaign uses the reference engine, and a large one uses the fork engine. An unknown name is
-    refused."""
     manifest = toycar.manifest("toycar")
     assert choose_engine(None, manifest, 3) == REFERENCE
     assert choose_engine(None, manifest, 1000) == FORK

@@ -27,7 +27,6 @@ def several(fork: Fork, edit: Edit) -> Fork:
 
 
 def test_both_engines_give_the_same_bytes(several: Fork) -> None:
-    """The mutant imports the probe by its bare name."""
     job = several.job(at_time(2.0))
     assert {path for path in job.files if path.endswith("_fi.py")} == {"_fi.py"}
     assert b"\nimport _fi  # fi:probe\n" in b"\n" + job.files["toycar/sensing.py"]

@@ -114,7 +114,6 @@ def test_engines_agree_on_a_run_that_stops_before_its_fault(
 def test_engines_agree_on_a_run_that_stops_after_its_fault(
     stopping: Fork, edit: Edit, terminal: str, outcome: Outcome
 ) -> None:
-    """The fault was active before the terminal hazard or caused it."""
     edit(MANIFEST, "terminal: speed > 90", f"terminal: {terminal}")
     reference, forked = (
         drive(stopping, one, AfterHazard.STOP) for one in (stopping.engine.reference, stopping.engine)
@@ -143,17 +142,15 @@ def test_engines_agree_on_a_run_that_stops_after_its_fault(
         ("  stepwise: begin\n", "", "no `stepwise`"),
     ],
 )
-def test_a_hazard_over_several_steps_cannot_stop_a_run(
+def test_a_hazard_that_cannot_be_judged_in_each_step_is_refused(
     stopping: Fork, edit: Edit, old: str, new: str, message: str
 ) -> None:
-    """The error names the hazard or channel that cannot be judged from the values of a single step."""
     edit(MANIFEST, old, new)
     with pytest.raises(MutatorError, match=re.escape(f"cannot stop at a terminal hazard: {message}")):
         stop_source(stopping.toy.manifest("toycar"))
 
 
 def test_a_target_without_a_terminal_hazard_is_refused(stopping: Fork, edit: Edit) -> None:
-    """Runs of such a target would never stop."""
     edit(MANIFEST, ", terminal: true", "")
     edit(MANIFEST, ", terminal: speed > 90", "")
     with pytest.raises(MutatorError, match="no terminal hazard"):
@@ -171,14 +168,12 @@ def test_a_target_without_a_terminal_hazard_is_refused(stopping: Fork, edit: Edi
     ],
 )
 def test_any_terminal_condition_ends_a_run(stopping: Fork, gap: float, speed: float, over: bool) -> None:
-    """The condition can use the trace's channels and values derived from them."""
     source = stop_source(stopping.toy.manifest("toycar"))
     assert compiled(source)({"time": 1.0, "gap": gap, "speed": speed}) is over
 
 
 @pytest.mark.parametrize("terminal", ["max(d_rel, speed) <= 90", "min(speed, d_rel, t) > 40"])
 def test_stopping_agrees_with_the_verdict_on_the_trace(stopping: Fork, edit: Edit, terminal: str) -> None:
-    """The values can be NaN."""
     edit(MANIFEST, "terminal: speed > 90", f"terminal: '{terminal}'")
     manifest = stopping.toy.manifest("toycar")
     over = compiled(stop_source(manifest))
@@ -192,15 +187,14 @@ def test_stopping_agrees_with_the_verdict_on_the_trace(stopping: Fork, edit: Edi
 
 
 def test_missing_recorded_values_are_a_harness_error(stopping: Fork, edit: Edit) -> None:
-    """The values are already missing before the fault is active, so it did not cause the error."""
+    """The values are missing before the fault is active, so the fault is not the cause."""
     edit("tree/toycar/go.py", "def recorded(", "def something_else(")
     record = drive(stopping, stopping.engine.reference, AfterHazard.STOP)
     assert record.status is Status.HARNESS_ERROR
     assert "recorded" in record.detail
 
 
-def test_after_hazard_applies_to_the_whole_campaign(stopping: Fork, edit: Edit) -> None:
-    """`after_hazard: stop` changes every experiment's id. A target that cannot stop is not planned."""
+def test_after_hazard_changes_the_ids_of_all_experiments(stopping: Fork, edit: Edit) -> None:
     edit("fault_library/campaigns/small.yaml", "chunk: 2", "chunk: 2\nafter_hazard: stop")
     stopped = make_plan(stopping.toy, "small")
     assert {e.after_hazard for e in (*stopped.experiments, stopped.canary)} == {AfterHazard.STOP}
@@ -218,7 +212,6 @@ def test_after_hazard_applies_to_the_whole_campaign(stopping: Fork, edit: Edit) 
 
 
 def test_a_trace_can_be_cut_at_a_time() -> None:
-    """A channel with separate times is cut at the same time."""
     trace = {"t": np.arange(4.0), "a": np.arange(4.0), "b": np.array([7.0, 8.0]), "b@": np.array([0.5, 2.5])}
     cut = until(trace, 2.0, "t")
     assert {name: values.tolist() for name, values in cut.items()} == {

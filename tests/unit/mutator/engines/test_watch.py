@@ -1,5 +1,5 @@
-"""What the watcher of a run records about the target's code. The watcher replaces the functions that it
-watches, so it runs in a separate process."""
+"""What the watcher records about a target's code. Because the watcher replaces functions, it runs in a
+separate process."""
 
 import json
 import subprocess
@@ -88,7 +88,6 @@ def noted(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[dict[str, 
 
 @pytest.mark.parametrize("line", NOTED)
 def test_sources_of_nondeterminism_are_reported(line: str, noted: dict[str, list[dict[str, str]]]) -> None:
-    """Clock readings, unseeded draws, salted hashes and threads are reported with file, line and function."""
     (one,) = noted[line]
     assert one["what"].startswith(NOTED[line])
     assert (one["file"], one["function"], one["via"]) == ("controller.py", "drive", "")
@@ -96,7 +95,6 @@ def test_sources_of_nondeterminism_are_reported(line: str, noted: dict[str, list
 
 @pytest.mark.parametrize("line", SOUND)
 def test_reproducible_values_are_not_reported(line: str, noted: dict[str, list[dict[str, str]]]) -> None:
-    """Examples are seeded draws and fixed dates."""
     assert noted[line] == []
 
 
@@ -122,7 +120,7 @@ def test_a_clock_read_by_a_package_is_reported_at_the_targets_line(tmp_path: Pat
 
 
 def test_pandas_imports_normally_while_watched(tmp_path: Path) -> None:
-    """pandas cannot use a replaced `datetime`. The target's own reading of the date is still recorded."""
+    """pandas cannot use a replaced `datetime`."""
     (tmp_path / "controller.py").write_text(
         "import datetime\nimport pandas\n\ndef drive():\n    assert pandas.Timestamp(2020, 1, 1)\n"
         "    datetime.date.today()\n"

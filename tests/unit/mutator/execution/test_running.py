@@ -31,8 +31,7 @@ class Idle:
 
 
 @pytest.mark.usefixtures("kept_checks")
-def test_another_distributor_gives_the_same_results(toycar: Workspace, tmp_path: Path) -> None:
-    """A distributor can resume a run that a different one began."""
+def test_a_run_resumed_by_another_distributor_has_the_same_results(toycar: Workspace, tmp_path: Path) -> None:
     assert run_campaign(toycar, "small", tmp_path / "local").exit_code == 0
     summary = run_campaign(toycar, "small", tmp_path / "idle", distributor=Idle())
     assert (summary.exit_code, summary.done, summary.problem) == (3, 0, "no machine answered")

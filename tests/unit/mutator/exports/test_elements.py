@@ -1,5 +1,4 @@
-"""Runs exported as mutation testing reports: the structure that the schema requires, and the meaning of
-statuses."""
+"""Runs exported as mutation testing reports."""
 
 import json
 import re
@@ -81,8 +80,6 @@ def test_each_run_is_listed_once_as_a_test(report: dict[str, Any]) -> None:
 
 
 def test_a_mutant_replaces_whole_statements(report: dict[str, Any]) -> None:
-    """The location in the source is that of the statement. The replacement is the statement with the injected
-    lines."""
     for source, mutant in mutants(report):
         start, end = mutant["location"]["start"], mutant["location"]["end"]
         lines = source.splitlines()[start["line"] - 1 : end["line"]]
@@ -97,8 +94,6 @@ def test_a_mutant_replaces_whole_statements(report: dict[str, Any]) -> None:
 def test_a_mutant_of_an_operator_replaces_its_expression(
     toycar: Workspace, tmp_path: Path, write_run: Write, of_operators: Callable[..., Any]
 ) -> None:
-    """The location gives the exact columns. A deleted statement is replaced by `pass`."""
-
     def changed(plan: Plan) -> Plan:
         mutants = of_operators(toycar, "toycar/driver.py", drives=1)(plan)
         first = mutants.experiments[0]
@@ -172,7 +167,6 @@ def test_the_status_of_a_mutant_follows_from_its_experiments(
     experiment: Callable[..., Experiment],
     record: Callable[..., Record],
 ) -> None:
-    """A hazard takes precedence over all other results."""
     drives = [experiment(scenario=f"S{i}") for i in range(len(became))]
     records = {
         e.id: record(e.id, **fields) for e, fields in zip(drives, became, strict=True) if fields is not None

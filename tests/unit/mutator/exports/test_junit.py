@@ -25,8 +25,6 @@ BECAME: dict[str, dict[str, Any] | None] = {
 
 
 def became(e: Experiment) -> dict[str, Any] | None:
-    """Make lane faults hazards, silence faults harness errors, and distance faults masked, not activated or
-    not run."""
     if e.fault.fault_type in BECAME:
         return BECAME[e.fault.fault_type]
     if e.method.value == "random":
@@ -54,9 +52,7 @@ def cases(file: Path) -> dict[str, list[ET.Element]]:
     return {suite.get("name", "").split("/")[1]: suite.findall("testcase") for suite in suites}
 
 
-def test_hazards_pass_by_default(run: Path) -> None:
-    """Harness errors are errors. Experiments that did not run and faults that were not activated are
-    skipped."""
+def test_hazards_pass_by_default_and_harness_errors_are_errors(run: Path) -> None:
     file = export(run, Format.JUNIT)
     found = cases(file)
     assert set(found) == {"lane", "silence", "distance"}

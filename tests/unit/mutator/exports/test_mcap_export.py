@@ -56,7 +56,6 @@ FAULTY = Series(  # the run ended after 0.5 s; gas was 1 for one step in between
 
 
 def became(e: Experiment) -> dict[str, Any]:
-    """Make lane faults hazards with every kind of event, and mask all others."""
     if e.fault.fault_type != "lane":
         return {}
     return {
@@ -91,8 +90,6 @@ def hazardous(run: Path) -> list[str]:
 
 
 def test_golden_run_faulty_run_and_events_are_read_back(run: Path, tmp_path: Path) -> None:
-    """Each channel of a run is a topic with a schema and a unit. Each value and each event is a message, and
-    values that are not finite are null."""
     only = 'outcome == "hazard" and fault_type == "lane"'
     out = export(run, Format.MCAP, tmp_path / "out", parts=Parts(only=only))
     assert sorted(path.stem for path in out.iterdir()) == sorted(hazardous(run))
@@ -131,7 +128,7 @@ def test_golden_run_faulty_run_and_events_are_read_back(run: Path, tmp_path: Pat
 
 
 def test_negative_times_are_shifted(run: Path, tmp_path: Path) -> None:
-    """Log times cannot be negative. All times are shifted by the same amount, which the metadata give."""
+    """Log times cannot be negative."""
     copy, name = tmp_path / "run", hazardous(run)[0]
     shutil.copytree(run, copy)
     early = replace(GOLDEN, t=GOLDEN.t - 0.5)
@@ -174,7 +171,6 @@ def test_the_same_run_gives_the_same_bytes(run: Path, tmp_path: Path) -> None:
 
 
 def test_experiments_without_a_series_are_reported(run: Path, tmp_path: Path) -> None:
-    """The message gives the command that reruns them. An empty export is an error."""
     left = 8 - len(hazardous(run))
     with pytest.warns(
         MutatorWarning, match=f"{left} of 8 experiments have no series.*mutator rerun .* --trace"

@@ -43,7 +43,6 @@ RAISING = ["exception", "reordering", "repetition", "slow_call", "swapped_argume
 
 @pytest.fixture
 def folder(tmp_path: Path, clone: Workspace) -> Path:
-    """A copy of the templates, which tests can break."""
     return Path(shutil.copytree(clone.templates, tmp_path / "templates"))
 
 
@@ -56,8 +55,7 @@ def broken(folder: Path, name: str, old: str, new: str) -> str:
     return str(caught.value).replace(f"{path}:", "")
 
 
-def test_the_expected_models_ship(clone: Workspace) -> None:
-    """Two of the models wrap statements, and some belong to operator mutants."""
+def test_the_expected_models_are_shipped(clone: Workspace) -> None:
     models = clone.fault_models()
     assert list(models.models) == sorted(NAMES + OF_OPERATORS)
     assert [m.name for m in models if m.kind is SnippetKind.GUARD] == ["omission", "reordering"]

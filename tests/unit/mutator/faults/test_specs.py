@@ -29,7 +29,6 @@ def of(found: tuple[Fault, ...], variant: str) -> list[Fault]:
 
 
 def test_a_spec_keeps_the_order_of_its_variants(toy: Workspace) -> None:
-    """The number of faults is known before any fault is built."""
     spec = toy.spec(NAME)
     assert [v.name for v in spec] == ["longer", "silent", "both"]
     assert [v.count for v in spec] == [3, 1, 2]
@@ -38,7 +37,6 @@ def test_a_spec_keeps_the_order_of_its_variants(toy: Workspace) -> None:
 
 
 def test_expansion_draws_one_value_from_each_range(toy: Workspace) -> None:
-    """An integer range gives integers. Values are in the key's unit."""
     found = of(faults(toy), "longer")
     assert [f.value // 10 for f in found] == [1, 2, 3]
     assert all(isinstance(f.value, int) and f.unit == "m" and f.aim == "H1" for f in found)
@@ -48,7 +46,6 @@ def test_expansion_draws_one_value_from_each_range(toy: Workspace) -> None:
 
 
 def test_values_are_converted_to_the_variables_unit(toy: Workspace) -> None:
-    """The sign comes from the spec. The fault's value remains in km/h."""
     for fault in of(faults(toy), "both"):
         by = dict(fault.injections[1].params)["by"]
         assert by == pytest.approx(-float(fault.value) / 3.6)
@@ -57,8 +54,6 @@ def test_values_are_converted_to_the_variables_unit(toy: Workspace) -> None:
 
 
 def test_both_readings_share_their_draws(toy: Workspace) -> None:
-    """In the reading `as_coded`, the same number is used in another unit. A variant that does not mention the
-    reading is the same in both."""
     described, coded = faults(toy), faults(toy, reading="as_coded")
     assert [f.value for f in described] == [f.value for f in coded]
     assert all(f.reading == "as_coded" for f in coded)
@@ -75,7 +70,6 @@ def test_hold_and_changes_belong_to_the_fault(toy: Workspace) -> None:
 
 
 def test_a_reading_can_override_the_hold(toy: Workspace) -> None:
-    """If a variant does not mention the reading, its own hold applies."""
     path = toy.spec(NAME).path
     text = path.read_text()
     both = text.index("as_coded:", text.index("both:"))
@@ -94,8 +88,7 @@ def test_ids_depend_on_the_seed_and_are_unique(toy: Workspace) -> None:
     assert other != again and other[3] == again[3], "only the fault without a value stays the same"
 
 
-def test_the_cap_limits_the_number_of_values() -> None:
-    """The same key and ranges give the same values, and another key gives different values."""
+def test_drawn_values_depend_on_the_key_and_do_not_exceed_the_cap() -> None:
     ranges = tuple((float(i), float(i + 9)) for i in range(10, 70, 10))
     draw = Draw(key="k", name="speed", unit="mph", kind="integers", ranges=ranges, cap=60)
     same = Draw(key="k", name="fast", unit="mph", kind="integers", ranges=ranges, cap=60)
@@ -113,7 +106,6 @@ def test_the_cap_limits_the_number_of_values() -> None:
 def test_a_variable_can_be_stuck_at_a_value_without_a_unit(
     toy: Workspace, unit: str, written: str, value: object
 ) -> None:
-    """The value can be a boolean, None or a text."""
     path = toy.library / "faults" / "sensor" / "distance.yaml"
     old = "model: offset\n          unit: m\n          params: {by_m: error}"
     assert old in path.read_text()
@@ -124,7 +116,6 @@ def test_a_variable_can_be_stuck_at_a_value_without_a_unit(
 
 
 def test_a_parameter_can_name_the_drawn_value(toy: Workspace) -> None:
-    """A minus sign before the name negates the value."""
     path = toy.library / "faults" / "sensor" / "distance.yaml"
     text = path.read_text().replace("model: offset", "model: stuck", 1)
     path.write_text(text.replace("by_m: error", "value_m: -error", 1))
@@ -315,7 +306,6 @@ def edited(workspace: Workspace, old: str, new: str) -> str:
     ],
 )
 def test_a_mistake_is_reported_with_a_remedy(toy: Workspace, old: str, new: str, said: str) -> None:
-    """The message gives file and line, the invalid value, and the expected one."""
     assert said.replace("{KNOWN}", KNOWN) in edited(toy, old, new)
 
 

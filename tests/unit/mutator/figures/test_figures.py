@@ -18,8 +18,6 @@ BLUR = {"module": "vision_input", "fault_type": "blur"}
 
 @pytest.fixture
 def frame() -> pd.DataFrame:
-    """Runs of two faults. Chaff: H1; H1 and H2; no hazard; not activated. Blur in S2: not activated (guided);
-    H2 (random)."""
     return results(
         RUN | H1,
         RUN | H1 | H2,
@@ -39,8 +37,6 @@ def test_each_run_with_a_hazard_is_in_exactly_one_part_of_a_bar(frame: pd.DataFr
 
 
 def test_hazard_bars_show_counts(frame: pd.DataFrame) -> None:
-    """The label gives the numbers of hazards and of injected faults. A fault type that was never activated
-    has no rate."""
     figure = hazards.draw(frame)
     guided, _, rates = figure.axes
     widths = {c.get_label(): [bar.get_width() for bar in c] for c in guided.containers}
@@ -51,7 +47,6 @@ def test_hazard_bars_show_counts(frame: pd.DataFrame) -> None:
 
 
 def test_the_heat_map_shows_hazards_per_activated_fault(frame: pd.DataFrame) -> None:
-    """A cell without activated faults has no colour."""
     guided = heat_map.draw(frame).axes[0]
     assert sorted(text.get_text() for text in guided.texts) == ["0/0", "2/3"]
     cells = guided.images[0].get_array()
@@ -59,9 +54,7 @@ def test_the_heat_map_shows_hazards_per_activated_fault(frame: pd.DataFrame) -> 
     assert cells.mask.tolist() == [[False, True], [True, True]]
 
 
-def test_time_panels_need_a_run_with_both_events(frame: pd.DataFrame) -> None:
-    """A panel has a bar only if a run has both events. The bar is labelled with the number of such runs, and
-    their mean is marked."""
+def test_a_time_panel_has_a_bar_only_for_runs_with_both_events(frame: pd.DataFrame) -> None:
     panels = {axis.get_title(loc="left"): axis for axis in propagation.draw(frame).axes}
     assert [t.get_text() for t in panels["activation to manifest"].texts] == ["3", "1"]
     assert [t.get_text() for t in panels["alert to hazard"].texts] == ["2", "1"]
@@ -71,7 +64,6 @@ def test_time_panels_need_a_run_with_both_events(frame: pd.DataFrame) -> None:
 
 
 def test_a_figure_drawn_again_has_the_same_bytes(frame: pd.DataFrame, tmp_path: Path) -> None:
-    """Each figure is written as SVG and PNG. The SVG contains names as text."""
     contents = []
     for _ in range(2):
         write_drawings(drawings(frame)[:1], tmp_path)
@@ -82,7 +74,6 @@ def test_a_figure_drawn_again_has_the_same_bytes(frame: pd.DataFrame, tmp_path: 
 
 
 def test_a_single_fault_type_or_scenario_is_not_compared(frame: pd.DataFrame) -> None:
-    """Empty results have no figures."""
     chaff, blur = frame[frame["kind"] == "radar/chaff"], frame[frame["scenario"] == "S2"]
     assert drawings(chaff) == drawings(blur) == drawings(frame[:0]) == ()
     one_scenario = frame.assign(scenario="S1")

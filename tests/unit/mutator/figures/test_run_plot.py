@@ -59,7 +59,6 @@ def test_an_svg_contains_channels_units_and_marks(tmp_path: Path, manifest: Simp
 
 
 def test_everything_after_the_end_of_the_drive_is_grey(manifest: SimpleNamespace) -> None:
-    """The axes ignore that part. Without an end, nothing is grey."""
     faulty = trace()
     faulty["gas"] = np.where(TIME > 2.0, -500.0, faulty["gas"])
     marks = [Mark(kind=MarkKind.HAZARD, t=t, label="H") for t in (2.0, 2.5)]
@@ -81,19 +80,17 @@ def test_a_plot_drawn_again_has_the_same_bytes(tmp_path: Path, manifest: SimpleN
     assert (tmp_path / "a.svg").read_bytes() == (tmp_path / "b.svg").read_bytes()
 
 
-def test_the_files_suffix_decides_the_format(tmp_path: Path, manifest: SimpleNamespace) -> None:
+def test_the_suffix_of_a_file_determines_its_format(tmp_path: Path, manifest: SimpleNamespace) -> None:
     save(draw_run(trace(), trace(), manifest, title="x"), [tmp_path / "p.png"])
     assert (tmp_path / "p.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_runs_without_a_common_channel_are_refused(tmp_path: Path, manifest: SimpleNamespace) -> None:
-    """The error names the manifest."""
     with pytest.raises(MutatorError, match=re.escape("m.yaml")):
         draw_run(trace(), {"t": TIME}, manifest, title="x")
 
 
 def test_marks_of_a_record_are_sorted_by_time() -> None:
-    """Marks are the activation, the manifestation, alerts and hazards."""
     record = Record(
         experiment_id="0" * 16,
         status=Status.OK,

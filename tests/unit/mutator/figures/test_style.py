@@ -8,7 +8,6 @@ from mutator.figures.style import themed
 
 
 def test_a_figure_in_a_page_follows_the_theme(tmp_path) -> None:
-    """The figure has no white background and no black ink. Text on bright cells stays dark."""
     line = {"kind": "a/b", "scenario": "S1", "method": "guided", "is_activated": True, "is_hazard": True}
     times = dict.fromkeys(("t_activation", "t_manifest", "t_hazard"), 1.0)
     flags = {"is_manifested": True, "is_alert": False}

@@ -66,7 +66,6 @@ class StepLimit(RuntimeError):
 
 
 def test_modules_imported_after_a_given_module_are_listed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A module that is imported again later is listed, too."""
     for name in ("early", "_fi", "late"):
         monkeypatch.setitem(sys.modules, name, types.ModuleType(name))
     assert imported_since("_fi") == ["late", "_fi"]
@@ -147,7 +146,6 @@ FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
     ],
 )
 def test_a_full_disk_is_recognized_in_errors_and_their_causes(error: Exception, is_told: bool) -> None:
-    """The chain of causes can be cyclic."""
     assert describe(error, TREE, None)["disk_full"] is is_told
     later = ValueError("later")
     later.__cause__ = KeyError("x")
@@ -163,7 +161,6 @@ def test_a_full_disk_in_an_exception_group_is_recognized(described: Callable[...
 
 
 def test_the_first_activation_deletes_a_file(tmp_path: Path) -> None:
-    """The probe's own function is restored at the same time."""
     inactive = tmp_path / "inactive"
     inactive.touch()
     answers = [False, False, True, False]
@@ -177,8 +174,6 @@ def test_the_first_activation_deletes_a_file(tmp_path: Path) -> None:
 
 
 def test_the_probes_report_is_passed_on() -> None:
-    """An exception in the probe ends the run with an error. A value that is not a dictionary is not a
-    report."""
     probe = types.SimpleNamespace(report=lambda: {"mutant": "m"})
     assert asked(probe, TREE, "car._fi") == {"probe": {"mutant": "m"}}
     probe.report = lambda: object()

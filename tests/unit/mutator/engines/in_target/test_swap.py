@@ -116,7 +116,6 @@ def test_functions_of_every_form_run_the_new_code(
 
 
 def test_imported_names_and_bound_methods_run_the_new_code(loaded: types.ModuleType) -> None:
-    """The function object is kept and gets the new code."""
     plain, method = loaded.plain, loaded.Car().method
     swap_code(functions('"old plain"', '"new plain"'), PROBE)
     swap_code(functions('"old method"', '"new method"'), PROBE)

@@ -1,4 +1,4 @@
-"""Which worker gets which piece of work next."""
+"""How the board distributes pieces of work to workers."""
 
 import random
 from collections import Counter
@@ -72,8 +72,7 @@ def drained(board: Board, workers: tuple[str, ...] = ("alpha", "beta")) -> list[
     return done
 
 
-def test_each_experiment_is_done_once(folder: RunFolder, clock: Clock, ids: list[str]) -> None:
-    """All experiments of a piece have the same golden run."""
+def test_each_experiment_is_run_exactly_once(folder: RunFolder, clock: Clock, ids: list[str]) -> None:
     done = [piece for _, piece in drained(board(folder, clock))]
     assert sorted(name for piece in done for name in piece.lines) == sorted(ids)
     for piece in done:
@@ -133,10 +132,9 @@ def test_a_late_piece_is_repeated_but_counted_once(folder: RunFolder, clock: Clo
     assert there.is_empty
 
 
-def test_an_experiment_that_kills_workers_is_identified(
+def test_only_an_experiment_that_kills_workers_is_given_up(
     folder: RunFolder, clock: Clock, ids: list[str]
 ) -> None:
-    """The board gives up this experiment. All others are completed."""
     there, deadly, done = board(folder, clock), ids[17], Counter[str]()
     given_up: list[str] = []
     while not there.is_empty:
@@ -152,10 +150,9 @@ def test_an_experiment_that_kills_workers_is_identified(
     assert sorted([*done.elements(), deadly]) == sorted(ids)
 
 
-def test_a_known_deadly_experiment_is_given_up_after_its_second_worker(
+def test_an_experiment_is_given_up_after_it_kills_two_workers(
     folder: RunFolder, clock: Clock, ids: list[str]
 ) -> None:
-    """After the first death, the experiment gets a piece of its own."""
     there = board(folder, clock)
     piece = taken(there, "alpha")
     deadly = piece.ids[-1]
@@ -165,8 +162,7 @@ def test_a_known_deadly_experiment_is_given_up_after_its_second_worker(
     assert there.died(apart, "beta", deadly) is not None
 
 
-def test_a_worker_does_not_retry_the_piece_that_killed_it(folder: RunFolder, clock: Clock) -> None:
-    """The worker retries the piece only if no other worker is left."""
+def test_only_the_last_worker_retries_a_piece_that_killed_it(folder: RunFolder, clock: Clock) -> None:
     there = board(folder, clock)
     deadly = taken(there, "alpha")
     there.died(deadly, "alpha")
@@ -209,8 +205,9 @@ def test_an_idle_worker_leaves_the_proof_to_a_busy_worker(folder: RunFolder, clo
     assert taken(there, "beta").kind is Kind.PROVE
 
 
-def test_each_experiment_is_counted_exactly_once(folder: RunFolder, clock: Clock, ids: list[str]) -> None:
-    """Results, returned pieces and deaths of workers come in random order."""
+def test_each_experiment_is_counted_once_for_any_order_of_events(
+    folder: RunFolder, clock: Clock, ids: list[str]
+) -> None:
     draw, there, done = random.Random(5), board(folder, clock), Counter[str]()
     out: list[tuple[str, Piece]] = []
     while not there.is_empty:

@@ -64,7 +64,6 @@ def with_slurm(folder: Path, monkeypatch: pytest.MonkeyPatch, sbatch: str) -> No
 def test_an_invalid_file_is_refused_with_its_line(
     before: str, after: str, error: str, tmp_path: Path
 ) -> None:
-    """The mistake is an unknown kind, key or option, or a value that the cluster's class rejects."""
     with pytest.raises(MutatorError, match=error):
         run(opened(tmp_path, SLURM.replace(before, after)))
 
@@ -79,7 +78,6 @@ def test_an_invalid_file_is_refused_with_its_line(
     ],
 )
 def test_a_scheduler_on_an_unprotected_network_is_not_started(text: str, tmp_path: Path) -> None:
-    """The error names the file and the line of the options. Nothing is sent to the queueing system."""
     with pytest.raises(
         MutatorError, match=r"some.yaml:4: the network .* neither encrypted nor on the loopback"
     ):
@@ -123,7 +121,6 @@ def test_jobs_are_submitted_and_cancelled(tmp_path: Path, monkeypatch: pytest.Mo
 def test_security_true_creates_certificates_for_the_cluster(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """With certificates, the option `--insecure-network` is not needed."""
     with_slurm(tmp_path, monkeypatch, "cp $1 job; echo Submitted batch job 7")
     options = f"  security: true\n  shared_temp_directory: {tmp_path}\n  interface: lo"
     run(opened(tmp_path, SLURM.replace("  scheduler_options: {host: 127.0.0.1}", options)))

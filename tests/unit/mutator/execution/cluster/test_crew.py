@@ -30,7 +30,6 @@ STRETCH = Stretch(python="CPython 3.11.7", packages={"numpy": "2.4.6"}, platform
     ],
 )
 def test_a_worker_with_other_versions_is_refused(change: dict[str, object], objection: str) -> None:
-    """The same rules apply to resuming a run on another machine."""
     assert Crew(STRETCH, accept=False).objection(FACTS | change) == objection
 
 

@@ -1,4 +1,4 @@
-"""Work is distributed to workers that fail in many ways. Each failure is attributed to its cause."""
+"""The distribution of work to workers that fail in various ways."""
 
 import asyncio
 import json
@@ -158,7 +158,6 @@ def errors(records: dict[str, Record]) -> list[str]:
 
 @pytest.mark.parametrize("ending", [Ending.DIED, Ending.FAILED, Ending.UNFIT, Ending.UNLIKE])
 def test_no_experiment_is_blamed_for_a_failing_worker(session: Any, ending: Ending) -> None:
-    """The other worker completes the pieces. A remark names the failing worker and gives the reason."""
     workers = Workers(odd=sick(ending), alpha=healthy)
     workers.seconds["alpha"] = (
         0.2  # otherwise, it finishes everything before the other has failed often enough
@@ -170,7 +169,6 @@ def test_no_experiment_is_blamed_for_a_failing_worker(session: Any, ending: Endi
 
 @pytest.mark.parametrize("ending", [Ending.DIED, Ending.FAILED])
 def test_an_experiment_that_fails_everywhere_is_a_harness_error(session: Any, ending: Ending) -> None:
-    """Both workers continue with the other experiments."""
     deadly = list(plan_file.ids(session.folder.path))[5]
     records, remarks = dealt(session, Workers(alpha=sick(ending, deadly), beta=sick(ending, deadly)))
     assert (len(records), errors(records), session.problem, remarks) == (12, [deadly], "", [])
@@ -186,7 +184,6 @@ def test_work_is_submitted_again_after_a_lost_connection(session: Any) -> None:
 
 
 def test_work_waits_for_a_queued_worker_after_a_refusal(session: Any) -> None:
-    """The cluster file requests two workers, and the first one is refused."""
     workers = Workers(odd=sick(Ending.UNLIKE))
 
     async def late() -> None:

@@ -38,7 +38,6 @@ def children(host: Host) -> list[int]:
 
 @contextmanager
 def attended(host: Host) -> Iterator[threading.Event]:
-    """Attend the host in a thread until the event is set."""
     unwanted = threading.Event()
     thread = threading.Thread(target=host.attend, args=(lambda: not unwanted.is_set(),))
     thread.start()
@@ -68,8 +67,9 @@ def host(sent: tuple[Bundle, Piece], tmp_path: Path) -> Host:
     return Host.lay_out(sent[0].data, str(tmp_path / "place"), "alpha")
 
 
-def test_the_process_and_its_folder_are_removed_with_the_host(host: Host, sent: tuple[Bundle, Piece]) -> None:
-    """All pieces run in the same process."""
+def test_all_pieces_run_in_one_process_that_ends_with_the_host(
+    host: Host, sent: tuple[Bundle, Piece]
+) -> None:
     piece = sent[1]
     with attended(host):
         first = host.run(piece.packed(), lambda: True)
@@ -100,7 +100,6 @@ def _first(host: Host) -> int:
 
 
 def test_if_the_process_does_not_start_no_piece_is_blamed(host: Host, sent: tuple[Bundle, Piece]) -> None:
-    """The result gives the reason, here a missing file."""
     (host.folder / "meta.json").unlink()
     with attended(host):
         result = host.run(sent[1].packed(), lambda: True)
@@ -121,8 +120,7 @@ def test_a_cancelled_piece_ends_within_a_second(host: Host, sent: tuple[Bundle, 
         assert children(host) == []
 
 
-def test_damaged_data_are_refused(sent: tuple[Bundle, Piece], host: Host, tmp_path: Path) -> None:
-    """A damaged bundle is not unpacked, and a damaged piece is not started."""
+def test_damaged_data_is_refused(sent: tuple[Bundle, Piece], host: Host, tmp_path: Path) -> None:
     with pytest.raises(MutatorError, match="damaged parcel"):
         Host.lay_out(sent[0].data[:-1] + b"?", str(tmp_path / "other"), "alpha")
     assert not [*(tmp_path / "other").iterdir()]
@@ -149,7 +147,6 @@ def written(entry: Path) -> int:
 def test_hosts_of_a_machine_share_golden_runs(
     sent: tuple[Bundle, Piece], cache: Path, tmp_path: Path
 ) -> None:
-    """A damaged golden run is rerun and replaced. The records are the same each time."""
     first = run_once(sent, tmp_path / "a")
     (entry,) = cache.iterdir()
     before = written(entry)
@@ -163,7 +160,6 @@ def test_hosts_of_a_machine_share_golden_runs(
 def test_a_cached_golden_run_must_match_the_campaign(
     sent: tuple[Bundle, Piece], cache: Path, tmp_path: Path
 ) -> None:
-    """Its digest must equal the one in the campaign, and the sources must be unchanged."""
     run_once(sent, tmp_path / "a")
     bundle.lay_out(sent[0].data, tmp_path / "site")
     site = Site(tmp_path / "site")

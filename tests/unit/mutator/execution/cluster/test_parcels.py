@@ -1,4 +1,4 @@
-"""Data sent between the command and workers arrive unchanged or are refused."""
+"""Data sent between the command and its workers arrives unchanged or is refused."""
 
 import random
 
@@ -10,7 +10,6 @@ from mutator.execution.cluster.pieces import Ending, Result
 
 
 def test_parts_are_read_back_in_order() -> None:
-    """Parts can be empty or binary."""
     parts = {"a": b"", "b/c": bytes(range(256)), "line": b"x\ny"}
     assert unpack(pack(parts)) == parts
     assert list(unpack(pack(parts))) == list(parts)

@@ -42,7 +42,6 @@ def test_local_is_followed_by_the_number_of_workers() -> None:
     ],
 )
 def test_an_invalid_where_is_refused(text: str) -> None:
-    """The error names the argument, the value found, and the valid values."""
     with pytest.raises(MutatorError) as caught:
         parse(text)
     assert caught.value.argument == "cluster"
@@ -51,7 +50,6 @@ def test_an_invalid_where_is_refused(text: str) -> None:
 
 
 def test_parsing_needs_no_dask() -> None:
-    """The `cluster` extra need not be installed."""
     code = (
         "import sys; from mutator.execution.cluster.where import parse; parse('local:2'); print(*sys.modules)"
     )
@@ -101,7 +99,6 @@ def test_only_loopback_and_tls_addresses_are_private(address: str, closed: bool)
 
 
 def test_an_open_network_is_refused_before_connecting(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The remedy names TLS and the argument that allows open networks."""
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(
         MutatorError, match=r"neither encrypted nor on the loopback.*tls://.*`insecure_network`"
@@ -154,9 +151,6 @@ def test_missing_certificates_are_an_error_with_a_remedy() -> None:
 
 
 def test_local_workers_run_and_end() -> None:
-    """The cluster has one single-threaded worker process, in a separate folder. The process and the folder
-    are removed when the cluster is closed."""
-
     async def used() -> tuple[str, dict[str, int], int, str]:
         async with parse("local:1").open(insecure=False) as client:
             await client.wait_for_workers(1)
