@@ -249,7 +249,7 @@ def test_a_run_without_a_step_method_is_an_error(arguments: list[str]) -> None:
         Run(step_s=1.0, duration_s=1.0).step()
 
 
-def test_only_seed_globals_seeds_global_generators(arguments: list[str]) -> None:
+def test_only_seed_globals_seeds_the_global_random_generators(arguments: list[str]) -> None:
     before = random.getstate()
     driven(arguments)
     assert random.getstate() == before

@@ -44,8 +44,8 @@ RUNS = [
 
 @pytest.fixture
 def run(tmp_path: Path) -> ReportedRun:
-    """The rows of `RUNS`. The experiments cost 1, 2, 4, ... s of CPU time, except the last one, which has
-    none."""
+    """The experiments of `RUNS`, which took 1, 2, 4, ... s of CPU time. The time of the last one is
+    unknown."""
     make_run(tmp_path, metrics=METRICS)
     columns = [c.name for c in result_columns(("H1",), ("gas",), METRICS)]
     with (tmp_path / "results.csv").open("w", newline="") as file:
@@ -77,7 +77,6 @@ def said(run: ReportedRun) -> dict[str, Answer]:
 
 
 def test_the_worst_experiment_is_first(said: dict[str, Answer]) -> None:
-    """Harder contacts come first, then smaller margins."""
     answer = said["dangerous"]
     assert (
         answer.says
@@ -117,7 +116,6 @@ def test_an_alert_after_the_hazard_is_not_a_warning(said: dict[str, Answer]) -> 
 
 
 def test_without_severity_the_number_of_silent_hazards_decides(said: dict[str, Answer]) -> None:
-    """The shortest time to a hazard decides ties."""
     answer = said["first"]
     assert answer.says.startswith("Start with car/speed: 2 of 3 silent hazards (67 %). The rule: ")
     silent = "warning=no%20alert%20at%20all,alert%20only%20after%20the%20hazard"
@@ -147,7 +145,6 @@ def hazards(*rows: tuple[str, str, float]) -> pd.DataFrame:
 
 
 def test_severity_and_then_time_decide_what_to_fix_first() -> None:
-    """One hazard of class S3 ranks before many of S1."""
     many = [("a/many", "S1", 1.0)] * 5
     some = [("b/slow", "S3", 9.0), ("c/fast", "S3", 8.0), ("d/both", "S3", 9.5), ("d/both", "", 9.0)]
     answer = first_to_fix(hazards(*some, *many), None, has_alerts=True)
@@ -169,7 +166,6 @@ def course(by: str = "", stopped_at: tuple[str, ...] = ()) -> Course:
 
 
 def test_the_component_that_let_most_faults_through_is_named() -> None:
-    """Faults without a path are not counted."""
     courses = (course("feet"), course("hands"), course(stopped_at=("eyes",)))
     structure = {"label": {"feet": "Feet", "eyes": "Eyes"}.__getitem__, "courses": courses}
     frame = hazards(*[("a/b", "S1", 1.0)] * 4).assign(course=[0, 0, 1, -1])
@@ -195,8 +191,7 @@ def test_six_contacts_and_four_other_hazards_are_listed() -> None:
     assert len(dangerous(frame[:12], [], has_alerts=True).listings[0].lines) == 10
 
 
-def test_tolerated_faults_are_counted_among_activated_ones(said: dict[str, Answer]) -> None:
-    """The weakest fault type comes first."""
+def test_tolerated_faults_are_a_share_of_the_activated_ones(said: dict[str, Answer]) -> None:
     answer = said["survived"]
     assert answer.says == (
         "3 of 7 activated faults (43 %) led to no hazard: 2 changed no actuator (masked), 1 did (sdc). "
@@ -257,7 +252,7 @@ def test_a_crash_is_not_tolerated(run: ReportedRun) -> None:
     )
 
 
-def test_a_single_hazard_is_in_the_singular(run: ReportedRun) -> None:
+def test_counts_of_one_use_the_singular(run: ReportedRun) -> None:
     found = {answer.name: answer for answer in answers_of(part_of(run, {"0" * 16, "1" * 16}))}
     assert found["unwarned"].says.startswith("1 of 2 hazards (50 %) was silent")
     found = {answer.name: answer for answer in answers_of(part_of(run, {"0" * 16}))}

@@ -62,12 +62,10 @@ def row(name: str) -> Row:
     ],
 )
 def test_columns_are_numbers_dictionaries_or_texts(name: str, values: list[str], made: object) -> None:
-    """Columns of names have a dictionary for the filters, even if no names are equal, and are not read as
-    numbers."""
     assert column(name, values) == made
 
 
-def test_a_target_without_alerts_has_no_columns_of_alerts() -> None:
+def test_a_target_without_alerts_has_no_alert_columns() -> None:
     line = {"experiment_id": "a", "alerts": "", "t_alert": "", "reaction_time": "", "detail": ""}
     names = [
         {made["name"] for made in table([row("a")], [line], alerts=has)["columns"]} for has in (True, False)
@@ -76,8 +74,7 @@ def test_a_target_without_alerts_has_no_columns_of_alerts() -> None:
     assert "detail" in names[1]
 
 
-def test_diffs_are_put_together_from_shape_and_values(experiment: Callable[..., Experiment]) -> None:
-    """A row without a patch or a plan has no shape."""
+def test_diffs_are_stored_as_shapes_and_values(experiment: Callable[..., Experiment]) -> None:
     one, two = experiment(3.0), experiment(4.0)
     rows = [row(two.id), row("none"), row(one.id)]
     patches = [(two.id, "", PATCH.format(4)), (one.id, "", PATCH.format(3))]
@@ -95,7 +92,6 @@ def test_diffs_are_put_together_from_shape_and_values(experiment: Callable[..., 
 
 
 def test_pictures_beyond_the_budget_are_links(tmp_path: Path) -> None:
-    """Films and plots of exact traces are always links."""
     write_json(tmp_path / "run.json", {"schema": "run/1"})
     plots = tmp_path / "plots"
     plots.mkdir()

@@ -30,7 +30,7 @@ def run(tmp_path: Path) -> Path:
     return make_run(tmp_path)
 
 
-def test_a_harness_error_is_a_class_of_its_own(run: Path) -> None:
+def test_harness_errors_are_counted_separately(run: Path) -> None:
     text = building.write(run, None).markdown.read_text()
     assert "3 experiments: 1 hazard, 1 crashed, 1 harness_error." in text
     failed = text.split("## Runs that did not finish normally")[1]
@@ -41,7 +41,7 @@ def test_a_harness_error_is_a_class_of_its_own(run: Path) -> None:
     assert line == "| radar/chaff | 2 | 2 | 2 | 1 | 0 | 0 | 1 | 0 | 1 | 1 | 1 |"
 
 
-def test_the_page_is_well_formed_and_escapes_what_it_shows(run: Path) -> None:
+def test_the_page_is_well_formed_and_escaped(run: Path) -> None:
     page = Page(building.write(run, None).page.read_text())
     assert page.open == []
     assert "night_<b>drive</b>" in page.texts
@@ -101,7 +101,7 @@ def test_the_report_names_the_reviewers(run: Path) -> None:
         assert "all of 2 groups approved, by Jane (1), Joe (1)" in text
 
 
-def test_the_report_is_written_byte_for_byte_again(run: Path) -> None:
+def test_the_report_is_reproducible(run: Path) -> None:
     written = building.write(run, None)
     before = written.page.read_bytes(), written.markdown.read_bytes()
     again = building.write(run, None)
@@ -145,7 +145,6 @@ def test_the_report_says_what_stopped_runs_might_have_missed(run: Path) -> None:
 
 
 def drawn_again(run: Path, workspace: Workspace | None) -> bool:
-    """Whether `ensure` writes the report again."""
     page = run / "report" / "index.html"
     before = page.stat().st_mtime_ns if page.exists() else None
     building.ensure(run, workspace)
@@ -168,7 +167,6 @@ def test_an_up_to_date_report_is_not_written_again(run: Path) -> None:
 
 @pytest.mark.parametrize("name", ["REPORT.md", "index.html", "figures/a.svg", "tables/a.csv"])
 def test_a_report_that_was_edited_is_written_again(run: Path, name: str) -> None:
-    """A comparison in the same folder is not part of the report."""
     out = run / "report"
     for folder in ("figures", "tables", "compare-other"):
         (out / folder).mkdir(parents=True)
@@ -182,7 +180,7 @@ def test_a_report_that_was_edited_is_written_again(run: Path, name: str) -> None
 
 
 @pytest.mark.parametrize("text", ["{", "[1]", '{"schema": "report/1"}', '{"schema": "report/1", "files": 1}'])
-def test_a_damaged_note_of_inputs_causes_a_new_report(run: Path, text: str) -> None:
+def test_a_damaged_list_of_inputs_causes_a_new_report(run: Path, text: str) -> None:
     building.write(run, None)
     (run / "report" / "made_from.json").write_text(text)
     assert drawn_again(run, None)

@@ -15,7 +15,6 @@ from .made_run import COLUMNS, NONE, OK, Page, make_run
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """Two runs of one plan with different hazards, and a damaged run folder."""
     calm = OK | NONE | {"outcome": "masked"}
     for hour, (name, lines) in enumerate((("before", (OK, calm, calm)), ("after", (calm, OK, calm))), 1):
         (tmp_path / name).mkdir()
@@ -32,7 +31,6 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_changes_between_runs_are_counted(folder: Path) -> None:
-    """A new hazard and one that disappeared count as two changes."""
     written = write_history(folder)
     text = written.markdown.read_text()
     assert written.runs == 2
@@ -68,6 +66,6 @@ def test_the_page_links_to_existing_reports_and_comparisons(folder: Path) -> Non
     assert sorted(links) == ["after/report/compare-before/index.html", "after/report/index.html", "data:,"]
 
 
-def test_no_run_is_an_error(folder: Path) -> None:
+def test_a_folder_without_runs_is_an_error(folder: Path) -> None:
     with pytest.raises(MutatorError, match="there is no run folder here"):
         write_history(folder / "before" / "plots")

@@ -15,7 +15,6 @@ CHANNELS = [
 
 
 def path(*states: State, stopped_at: tuple[str, ...] = ()) -> Path:
-    """The path through eyes, pedals and car."""
     names = ("eyes", "pedals", "car")
     stages = tuple(Stage(component=n, state=s, channels=()) for n, s in zip(names, states, strict=True))
     through = {State.REACHED: Passage.THROUGH, State.HELD: Passage.STOPPED, State.UNSEEN: Passage.UNKNOWN}
@@ -27,8 +26,6 @@ def path(*states: State, stopped_at: tuple[str, ...] = ()) -> Path:
 
 
 def test_paths_become_shapes_and_columns_of_the_page(record: Callable[..., Record]) -> None:
-    """Equal paths share a shape. An experiment without divergences has no values in the columns of
-    channels."""
     far, held = path(*[State.REACHED] * 3), path(State.REACHED, State.HELD, State.HELD)
     records = {
         "a": record("a", left=(("seen", 1.23456, 0.123456), ("gap", 2.0, inf))),

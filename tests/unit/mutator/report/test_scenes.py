@@ -16,7 +16,6 @@ def names(tree: Tree) -> Iterator[str]:
 
 
 def test_the_shipped_scene_uses_channels_of_the_target() -> None:
-    """The scene follows an actor that is always visible."""
     manifest = Workspace.find().manifest("openpilot")
     scene = scene_facts(manifest)
     assert scene is not None

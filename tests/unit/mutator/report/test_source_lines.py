@@ -46,7 +46,6 @@ def became(experiment: Experiment) -> dict[str, Any]:
 def run(
     toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path], of_operators: Callable[..., Any]
 ) -> Path:
-    """A run folder with mutants of the toy's driver."""
     out = write_run(toycar, tmp_path / "run", became, changed=of_operators(toycar, DRIVER))
     results.build(out)
     (out / "report").mkdir()

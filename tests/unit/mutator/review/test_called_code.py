@@ -122,7 +122,6 @@ def called(line: str, tag: str = TAG, **changed: str) -> dict[str, str]:
     ],
 )
 def test_called_code_is_found_by_its_name(line: str, found: set[str]) -> None:
-    """Imports, modules, bases and `self` are followed, and variables and annotations are not."""
     assert set(called(line)) == found
 
 
@@ -137,15 +136,13 @@ def test_only_the_new_value_of_a_changed_line_is_searched_for_calls() -> None:
     assert set(called(line, was)) == {"car/eye.py helper", "car/eye.py LEVEL"}
 
 
-def test_the_source_has_all_statements_that_set_a_name() -> None:
-    """A file that is not Python is included as a whole."""
+def test_called_source_has_all_statements_that_bind_the_name() -> None:
     assert called("kit.never()")["car/tools.py never"] == "@cached\ndef never():\n    return clip\n"
     assert called("numbers.one()")["car/numbers.py one"] == TREE["car/numbers.py"]
     assert called("Mist()")["car/drops.npz"] == "\0"
 
 
-def test_a_module_that_cannot_be_parsed_calls_nothing() -> None:
-    """A module that imports itself does not make the search endless."""
+def test_unparsable_modules_and_import_cycles_call_nothing() -> None:
     assert called("picture = weather.Rain(3)", **{"car/weather.py": "class Rain(:\n"}) == {}
     assert called("picture = four()") == {}
 
@@ -212,7 +209,6 @@ class Eye(Effect[int]):
     ],
 )
 def test_names_are_followed_through_packages_and_bases(line: str, found: set[str]) -> None:
-    """A variable of a comprehension does not hide an outer name."""
     pristine = PACKAGE["car/eye.py"].format(line="pass")
     files = {**TREE, **PACKAGE, "car/eye.py": pristine}
     tree = SourceTree(Path(), {path: text.encode() for path, text in files.items()}, "", {})
@@ -229,8 +225,7 @@ def test_names_are_followed_through_packages_and_bases(line: str, found: set[str
         (["left out"], set()),
     ],
 )
-def test_names_in_expressions_have_their_meaning_in_the_function(texts: list[str], found: set[str]) -> None:
-    """Text that is not an expression calls nothing."""
+def test_names_in_expressions_are_resolved_in_their_function(texts: list[str], found: set[str]) -> None:
     files = {**TREE, "car/eye.py": EYE.format(line="pass")}
     tree = SourceTree(Path(), {path: text.encode() for path, text in files.items()}, "", {})
     assert set(CalledCode(tree).of_expressions("car/eye.py", "Eye.look", texts)) == found

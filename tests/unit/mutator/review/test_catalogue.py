@@ -27,7 +27,6 @@ def groups(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path
 
 
 def test_variants_are_grouped_by_place_model_and_arguments(groups: Groups) -> None:
-    """Triggers make no difference."""
     sense = "toycar/sensing.py Sensor.sense"
     assert {group.what: (group.trigger, group.hold) for group in groups.values()} == {
         f"{sense} after_assign gap: offset(by, low, target=gap)": ("state or time", "to_end or while"),
@@ -56,7 +55,6 @@ def test_the_canary_is_reviewed_too(toycar: Workspace) -> None:
 
 
 def test_the_diff_has_only_the_lines_of_the_fault(groups: Groups) -> None:
-    """The probe and the import form a separate group."""
     for group in groups.values():
         is_probe = group.what.startswith("the probe")
         assert ("_fi.observe" in group.diff) is ("+from toycar import _fi" in group.diff) is is_probe
@@ -77,7 +75,6 @@ def test_the_diff_has_only_the_lines_of_the_fault(groups: Groups) -> None:
 def test_a_decision_depends_on_template_function_and_diff(
     toycar: Workspace, groups: Groups, file: str, old: str, new: str, changed: list[str], untouched: str
 ) -> None:
-    """Other changes, even in the same file, do not affect the decision."""
     before = groups
     path = toycar.library.parent / file
     assert old in path.read_text()
@@ -104,7 +101,6 @@ def test_a_decision_does_not_depend_on_drawn_values(toycar: Workspace, groups: G
 
 
 def test_a_drawn_choice_has_a_diff_for_each_choice(toycar: Workspace) -> None:
-    """A decision covers all of these diffs."""
     template = toycar.templates / "offset.py.j2"
     text = template.read_text()
     template.write_text(text + "{% if by > 30 %}\n    {{ target }} = {{ target }}\n{% endif %}\n")

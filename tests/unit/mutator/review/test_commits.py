@@ -58,7 +58,6 @@ def say(toy: Workspace, by: str, kind: Kind = Kind.APPROVE) -> Review:
 
 
 def test_the_last_author_cannot_approve(toycar: Workspace, root: Path) -> None:
-    """The author is refused under the name, the e-mail address or both."""
     for author in ("Git Smith", "smith@example.org", "git smith <other@example.org>"):
         with pytest.raises(MutatorError, match=r"changed group \w{12} last \(commit .*Git Smith") as caught:
             say(toycar, author)
@@ -91,7 +90,6 @@ def test_a_co_author_cannot_approve(toycar: Workspace, root: Path) -> None:
 
 
 def test_merging_does_not_make_a_person_an_author(toycar: Workspace, root: Path) -> None:
-    """The later of two authors still cannot approve their own change."""
     git(root, "checkout", "-qb", "side")
     commit(root, "templates/offset.yaml", "Joe <joe@example.org>")
     git(root, "checkout", "-q", "-")
@@ -102,8 +100,7 @@ def test_merging_does_not_make_a_person_an_author(toycar: Workspace, root: Path)
     assert say(toycar, "Git Smith").decision(lane(toycar).id)
 
 
-def test_changes_that_git_does_not_know_are_refused(toycar: Workspace, root: Path) -> None:
-    """The cases are an uncommitted change, an untracked file, and a library without git."""
+def test_changes_that_are_not_in_git_are_refused(toycar: Workspace, root: Path) -> None:
     with (root / LANE).open("a") as file:
         file.write("# more\n")
     with pytest.raises(
@@ -121,7 +118,6 @@ def test_changes_that_git_does_not_know_are_refused(toycar: Workspace, root: Pat
 
 
 def test_a_decision_stores_the_librarys_commit(toycar: Workspace, root: Path) -> None:
-    """The commit ends in `-dirty` if anything except reviews is uncommitted."""
     sha = git(root, "rev-parse", "HEAD")
     for _ in range(2):  # in the second round, the first decision is uncommitted
         decision = say(toycar, "Jane Doe").decision(lane(toycar).id)
@@ -130,9 +126,7 @@ def test_a_decision_stores_the_librarys_commit(toycar: Workspace, root: Path) ->
     assert library_commit(toycar) == f"{sha}-dirty"
 
 
-def test_the_reviewer_is_gits_user_name(
-    toycar: Workspace, root: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_user_name_comes_from_git(toycar: Workspace, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("HOME", str(root))
     monkeypatch.delenv("XDG_CONFIG_HOME", raising=False)
     assert user_name(toycar) is None

@@ -103,7 +103,6 @@ def test_values_must_lie_within_the_approved_ones(
 
 
 def test_a_new_decision_replaces_the_old_one(toycar: Workspace) -> None:
-    """The group keeps its earlier remarks."""
     say(toycar, Kind.APPROVE, "a", text="fine")
     found = say(toycar, Kind.REJECT, "a", by="Joe", text="no")
     assert found.describe(group("a")).startswith("rejected by Joe")
@@ -112,7 +111,6 @@ def test_a_new_decision_replaces_the_old_one(toycar: Workspace) -> None:
 
 
 def test_a_cleared_decision_is_deleted(toycar: Workspace) -> None:
-    """Remarks stay. A block without content is deleted."""
     say(toycar, Kind.APPROVE, "a", "b", text="fine")
     say(toycar, Kind.FLAG, "c")
     found = say(toycar, Kind.CLEAR, "a")
@@ -188,7 +186,6 @@ def test_each_hunk_names_its_section_and_function(tmp_path: Path) -> None:
 
 
 def test_a_changed_group_shows_the_diff_since_its_approval(toycar: Workspace) -> None:
-    """If the approved text is not stored, there is no diff."""
     found = say(toycar, Kind.APPROVE, "a")
     now = group("a", replace(BOUND, diff="e" * 16), "+x = 2\n")
     assert found.changes(group("a")) == ""

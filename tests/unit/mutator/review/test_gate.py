@@ -21,14 +21,14 @@ def plan(toycar: Workspace) -> Plan:
 
 
 def decide(toy: Workspace, plan: Plan, kind: Kind = Kind.APPROVE, count: int | None = None) -> None:
-    """Approve or reject the plan's groups, or only the first `count`."""
     changes = [Change(group=one, kind=kind, by=f"Reviewer {count}") for one in of_plan(toy, plan)[:count]]
     review = load_review(toy, "toycar")
     record(toy, "toycar", changes, {change.group.id: review.revision(change.group.id) for change in changes})
 
 
-def test_an_approved_plan_runs(toycar: Workspace, plan: Plan, tmp_path: Path) -> None:
-    """The run folder stores for the report who approved which group."""
+def test_the_run_folder_of_an_approved_plan_names_its_reviewers(
+    toycar: Workspace, plan: Plan, tmp_path: Path
+) -> None:
     run = freeze(plan, tmp_path / "run", toycar).path
     assert gate.approval_summary(run) == ""
     decide(toycar, plan)
@@ -65,7 +65,7 @@ def test_groups_without_approval_are_named(toycar: Workspace, plan: Plan) -> Non
     assert caught.value.exit_code == 1
 
 
-def test_a_group_of_the_canary_alone_has_no_count(toycar: Workspace, plan: Plan) -> None:
+def test_groups_used_only_by_the_canary_have_no_count(toycar: Workspace, plan: Plan) -> None:
     alone = [group for group in of_plan(toycar, plan) if not group.runs]
     with pytest.raises(CheckFailed) as caught:
         gate.approvals(toycar, plan)
@@ -88,7 +88,6 @@ def test_a_refused_run_leaves_no_plan(toycar: Workspace, tmp_path: Path) -> None
 
 
 def test_a_resumed_run_does_not_need_the_campaigns_spec_file(toycar: Workspace, tmp_path: Path) -> None:
-    """The faults that the campaign drew are still approved."""
     mine = tmp_path / "mine"
     mine.mkdir()
     spec = (toycar.library / "faults/sensor/lane.yaml").read_text()

@@ -39,7 +39,6 @@ def test_a_shape_with_a_faults_values_is_its_patch(toycar: Workspace) -> None:
 
 
 def test_holes_have_names(toycar: Workspace) -> None:
-    """Parts that all faults share stay text."""
     pairs = [(fault, NEAR) for fault in faults(toycar, "nearer")]
     (shape,) = grouped(toycar, pairs)
     named = shape.with_named_holes(parameter_values(fault) for fault, _ in pairs)

@@ -58,7 +58,6 @@ def grey(jpeg: bytes) -> float:
 
 
 def test_an_effect_is_shown_at_three_levels(lit: Lit) -> None:
-    """The levels are the least, a middle and the largest value."""
     workspace, group = lit()
     found = drawn(workspace, group)
     assert grey(found.before) == pytest.approx(90, abs=1)
@@ -71,7 +70,6 @@ def test_an_effect_is_shown_at_three_levels(lit: Lit) -> None:
 
 
 def test_each_level_has_a_pair_of_images(lit: Lit) -> None:
-    """The result is None for a missing level and for a group without images."""
     workspace, group = lit(values="[10, 50]")
     manifest = workspace.manifest("toycar")
     pairs = [pictures.of_group(workspace, manifest, group, level) for level in (*LEVELS, "utmost")]
@@ -82,7 +80,6 @@ def test_each_level_has_a_pair_of_images(lit: Lit) -> None:
 
 
 def test_images_are_cached_until_an_effect_changes(lit: Lit, runs: list[str]) -> None:
-    """A damaged entry is drawn again."""
     workspace, group = lit()
     first = drawn(workspace, group)
     runs.clear()
@@ -138,7 +135,6 @@ def test_more_blobs_are_more_severe() -> None:
     ],
 )
 def test_an_image_that_cannot_be_drawn_is_reported(lit: Lit, picture: str, said: str) -> None:
-    """An array of bytes is an image. An error of the target keeps its text."""
     with pytest.raises(MutatorError, match=said):
         drawn(*lit(picture=picture))
 

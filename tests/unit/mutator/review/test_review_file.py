@@ -137,7 +137,6 @@ def test_old_approvals_of_different_diffs_are_invalid(old: Path) -> None:
 
 
 def test_old_remarks_are_kept(old: Path) -> None:
-    """The reviewers under all kinds of triggers are named together."""
     edited(old, "4f924f1dc5e6", 'remark: ""', 'remark: "once"')
     edited(old, "6ee7b871b4c7", 'remark: ""', 'remark: "twice"')
     entry = edited(old, "6ee7b871b4c7", "Jane Doe", "Joe")[SILENCE]

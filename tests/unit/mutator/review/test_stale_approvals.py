@@ -1,4 +1,4 @@
-"""A changed line makes exactly those approvals stale that depend on it."""
+"""A changed line invalidates exactly the approvals that depend on it."""
 
 import shutil
 from collections.abc import Callable

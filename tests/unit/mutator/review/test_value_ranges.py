@@ -26,7 +26,7 @@ def test_a_range_covers_all_ranges_of_the_specs(toycar: Workspace) -> None:
         assert ranges_of(faults(toycar, "sensor/lane", seed)[:1], specs, models) == {"by": (0.0, 2.5)}
 
 
-def test_without_its_spec_a_fault_has_only_its_own_values(toycar: Workspace) -> None:
+def test_without_a_spec_the_range_is_the_faults_value(toycar: Workspace) -> None:
     fault = faults(toycar, "sensor/distance")[0]
     assert ranges_of([fault], {}, toycar.fault_models()) == {"by": (fault.value, fault.value)}
 
@@ -37,7 +37,7 @@ def test_without_its_spec_a_fault_has_only_its_own_values(toycar: Workspace) -> 
         ([3.0, -1.0], (-1.0, 3.0)),
         ([float("nan"), 3.0], (3.0, 3.0, "nan")),
         ([float("inf"), float("-inf")], ("-inf", "inf")),
-        ([True, "word", None], None),  # the group's name has these
+        ([True, "word", None], None),  # these are part of the group's name
     ],
 )
 def test_values_without_an_order_are_listed_next_to_the_range(
@@ -50,7 +50,6 @@ def test_values_without_an_order_are_listed_next_to_the_range(
 
 
 def test_the_selected_execution_and_instance_are_values(toycar: Workspace) -> None:
-    """A drawn seed is not a value."""
     fault = faults(toycar, "sensor/distance")[0]
     (injection,) = fault.injections
     made = replace(fault, injections=(injection, replace(injection, call=3, where="index == 2")))

@@ -28,8 +28,6 @@ SECRET = "what others must not read"
 
 @dataclass(frozen=True)
 class Answer:
-    """The server's response."""
-
     status: int
     headers: Mapping[str, str]
     data: bytes
@@ -104,7 +102,7 @@ class Client:
             if found["ended"]:
                 return dict(found)
             time.sleep(0.1)
-        raise AssertionError(f"job {job} goes on: {found}")
+        raise AssertionError(f"job {job} is still running: {found}")
 
 
 @pytest.fixture(scope="session")

@@ -55,7 +55,7 @@ def test_an_address_outside_the_reports_is_not_found(client: Client, address: st
 
 
 @pytest.mark.parametrize("spec", ["../../secret.csv", "toy/fault_library/targets/toycar.yaml", "/etc/passwd"])
-def test_a_spec_is_not_named_by_its_path(client: Client, spec: str) -> None:
+def test_a_spec_cannot_be_given_as_a_path(client: Client, spec: str) -> None:
     """Only the command line accepts a file."""
     for given in (spec, quote(spec, safe="")):
         answer = client.get(f"/api/review/toycar?spec={given}")
@@ -78,7 +78,6 @@ def test_only_files_that_a_report_shows_are_served(client: Client, name: str) ->
 
 
 def test_files_of_a_report_are_served(client: Client) -> None:
-    """A part of a film is served if the request asks for a range."""
     assert client.get("/runs/night/results.csv").headers["content-type"].startswith("text/csv")
     picture = client.get(f"/runs/night/plots/{'0' * 16}-14.50s.jpg")
     assert (picture.headers["content-type"], picture.data) == ("image/jpeg", b"picture")
@@ -174,7 +173,7 @@ def test_a_hostile_series_script_is_not_served(client: Client, name: str, text: 
     path.unlink()
 
 
-def test_series_are_served_as_they_are(client: Client) -> None:
+def test_series_are_served_unchanged(client: Client) -> None:
     """The page relies on the length in bytes, so the response is not encoded."""
     path = client.place / "runs/night/series/kept/0123456789abcdef.js"
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -186,7 +185,6 @@ def test_series_are_served_as_they_are(client: Client) -> None:
 
 
 def test_a_report_with_a_forged_stamp_gets_a_strict_policy(client: Client, linked: Path) -> None:
-    """The policy allows none of the report's scripts."""
     assert client.get("/runs/linked/report/index.html").status == 200
     page = linked / "report" / "index.html"
     page.write_text(

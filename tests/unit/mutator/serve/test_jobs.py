@@ -26,7 +26,6 @@ def busy(
     copy_toycar: Callable[[Path], Workspace],
     served_at: Callable[[Workspace, Path], Any],
 ) -> Iterator[Client]:
-    """A server that has run a campaign."""
     place = tmp_path_factory.mktemp("busy")
     workspace = copy_toycar(place)
     shutil.rmtree(workspace.library / "faults" / "hostile")
@@ -117,7 +116,6 @@ def job(**given: Any) -> Job:
 
 
 def test_the_output_of_a_job_is_plain_text() -> None:
-    """If the output is too long, its beginning is cut off."""
     made = job()
     made.hear(f"\x1b[31m/srv/data/{HOSTILE}\x07\u202e\n".encode())
     made.hear(b"\xff\xfe\n")

@@ -62,7 +62,6 @@ def child_of(folder: Path) -> int:
 
 
 def test_a_command_is_asked_to_end_when_its_server_ends(tmp_path: Path) -> None:
-    """When the pipe is closed, the command is asked to end, and so are its children."""
     keeper, hold = kept(tmp_path, COMMAND.format(IN_ORDER))
     child = child_of(tmp_path)
     os.close(hold)

@@ -56,7 +56,7 @@ def test_a_decision_is_in_the_file_and_on_the_reloaded_page(
     assert client.get("/review/toycar?spec=sensor/*").status == 200
 
 
-def test_another_reviewers_decision_is_not_overwritten_unseen(
+def test_a_decision_that_the_reviewer_has_not_seen_is_not_overwritten(
     reviewed: tuple[Client, list[str]], toycar: Workspace
 ) -> None:
     client, (first, second, *_) = reviewed

@@ -39,7 +39,6 @@ def test_another_origin_is_refused_whatever_its_headers(client: Client, method: 
 
 
 def test_a_post_needs_an_origin(client: Client) -> None:
-    """A POST is also refused if the browser marks it as cross-site."""
     assert client.ask("POST", "/api/jobs", {"Origin": None}, b"{}").status == 403
     for site in ("cross-site", "same-site", "anything"):
         assert client.get("/api/jobs", Sec_Fetch_Site=site).status == 403
@@ -51,14 +50,12 @@ def test_a_post_needs_an_origin(client: Client) -> None:
 )
 @pytest.mark.parametrize("path", ASKED)
 def test_a_request_without_the_token_is_refused(client: Client, path: str, cookie: str | None) -> None:
-    """The cookie of another server is not accepted."""
     answer = client.get(path, Cookie=cookie and cookie.format(port=client.port))
     assert answer.status == 403
     assert "the server printed" in answer.text
 
 
 def test_the_token_becomes_a_cookie(client: Client) -> None:
-    """Scripts cannot read the cookie, and other sites do not send it. The next address has no token."""
     answer = client.get(f"/?token={TOKEN}", Cookie=None)
     assert (answer.status, answer.headers["location"]) == (303, "/")
     cookie = answer.headers["set-cookie"].lower()
@@ -77,7 +74,6 @@ def test_a_wrong_token_is_refused_despite_a_valid_cookie(client: Client, query: 
 
 @pytest.mark.parametrize("method", ["PUT", "DELETE", "PATCH", "OPTIONS", "TRACE", "PROPFIND"])
 def test_other_methods_are_refused(client: Client, method: str) -> None:
-    """A preflight from another origin gets no permission."""
     answer = client.ask(method, "/api/jobs")
     assert answer.status == 405
     assert not [name for name in answer.headers if name.startswith("access-control")]
@@ -103,7 +99,6 @@ def test_a_body_within_the_limit_is_read(client: Client) -> None:
 
 @pytest.mark.parametrize("path", [*ASKED, "/runs/night/results.csv", "/?token=wrong"])
 def test_every_response_has_the_policy(client: Client, path: str) -> None:
-    """The policy allows only our scripts, no framing, and no guessing of types."""
     headers = client.get(path).headers
     policy = headers["content-security-policy"]
     assert policy.startswith("default-src 'none'; script-src 'self' 'sha256-")
@@ -124,7 +119,6 @@ def blocks(page: str, tag: str) -> list[str]:
 
 
 def check_policy(answer: Answer) -> None:
-    """Fail if the page has a script or a style sheet that the policy does not allow."""
     carried = blocks(answer.text, "script") + blocks(answer.text, "style")
     assert carried
     for text in carried:

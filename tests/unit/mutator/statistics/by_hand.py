@@ -212,7 +212,6 @@ def bootstrap(
 
 
 def rate_difference(rows: Sequence[Row]) -> float:
-    """The share of guided runs with a hazard, minus that of random runs."""
     hits, runs = {"guided": 0, "random": 0}, {"guided": 0, "random": 0}
     for row in rows:
         runs[row["method"]] += 1

@@ -53,7 +53,6 @@ def test_the_pooled_odds_ratio_follows_the_textbook() -> None:
 
 
 def test_strata_without_hazards_do_not_affect_the_odds_ratio() -> None:
-    """If no type has hazards, the result is unknown."""
     one = stratum((10, 20), (5, 20))
     pooled = contrasts.mantel_haenszel([one, stratum((0, 9), (0, 9))])
     assert pooled.odds_ratio == pytest.approx(contrasts.mantel_haenszel([one]).odds_ratio)
@@ -67,7 +66,6 @@ def test_holm_adjusts_as_in_the_textbook() -> None:
 
 @pytest.mark.slow
 def test_holm_adjusts_as_statsmodels_does() -> None:
-    """The p-values include ties, 0, 1, and tests without a result."""
     from statsmodels.stats.multitest import multipletests  # slow to import
 
     draw = random.Random(1)
@@ -80,7 +78,6 @@ def test_holm_adjusts_as_statsmodels_does() -> None:
 
 
 def test_pairs_have_the_same_fault_scenario_and_row(frame: pd.DataFrame) -> None:
-    """Runs without a partner are left out."""
     found = contrasts.pairs(frame)
     assert list(found["fault_id"]) == ["a", "b", "c", "d", "e"]
     assert contrasts.mcnemar(found) == Matched(both=1, first_only=1, second_only=2, neither=1, p=1.0)

@@ -30,8 +30,6 @@ FRAME = pd.DataFrame(
 
 
 def test_each_metric_has_its_spread_by_fault_type() -> None:
-    """Median, worse quartile and worst value, as computed by hand. Experiments without activation or value
-    are left out."""
     sheet = metrics_sheet(FRAME, METRICS)
     told = [(*line[:6], *line[8:]) for line in sheet.lines]
     assert told == [
@@ -52,7 +50,6 @@ def test_without_values_there_is_no_table() -> None:
 
 
 def test_severity_classes_are_counted_by_fault_type() -> None:
-    """The first column counts contacts of any class."""
     rows = severity_sheet(FRAME).table().rows
     counts = [[row[0], *(cell.partition("(")[2].partition(";")[0] for cell in row[1:])] for row in rows]
     assert counts == [
@@ -63,7 +60,7 @@ def test_severity_classes_are_counted_by_fault_type() -> None:
     assert rows[0][1] == "60.0 % (3/5; 23.1 to 88.2)"
 
 
-def test_only_an_event_before_the_hazard_has_a_time_to_it() -> None:
+def test_times_to_a_hazard_need_an_earlier_event() -> None:
     told = [line[:6] for line in tolerant_times_sheet(FRAME).lines]
     assert told == [
         ("a/x", "activation to hazard", 5, 1.0, 2.0, 3.0),
@@ -99,7 +96,6 @@ def test_the_interval_of_a_median_resamples_whole_faults(
 
 
 def test_a_median_of_one_fault_or_of_equal_runs_has_no_interval() -> None:
-    """Without pairs, there is no difference."""
     ones, faults = pd.Series([1.0, 1.0, 1.0]), pd.Series(["a", "b", "c"])
     assert all(map(math.isnan, median_interval(ones, faults)))
     assert all(map(math.isnan, median_interval(pd.Series([1.0, 2.0]), pd.Series(["a", "a"]))))

@@ -37,7 +37,6 @@ def faults(experiment: Callable[..., Experiment]) -> dict[str, Fault]:
 
 
 def lines(sheet: Any) -> dict[tuple[str, str, str], dict[str, Any]]:
-    """The lines by subject, unit of the count, and duration of the faults."""
     assert sheet.heads[: len(HEADS)] == HEADS
     return {line[:3]: dict(zip(sheet.heads, line, strict=True)) for line in sheet.lines}
 
@@ -56,8 +55,7 @@ def test_a_mutant_is_counted_once_for_all_its_runs(faults: dict[str, Fault]) -> 
     assert found["pkg/radar.py::g", "mutants", "permanent"]["hazard"] == share(0, 0)
 
 
-def test_permanent_and_transient_mutants_have_their_own_lines(faults: dict[str, Fault]) -> None:
-    """The total counts a mutant once."""
+def test_permanent_and_transient_mutants_have_separate_lines(faults: dict[str, Fault]) -> None:
     frame = results(drive("a", HIT), drive("a", ACTIVE, trigger="C1"), drive("b", ACTIVE, trigger="C1"))
     found = lines(score_sheet(frame, faults, GOLDEN))
     assert found["all", "mutants", "permanent"]["hazard"] == share(1, 1)
@@ -67,7 +65,6 @@ def test_permanent_and_transient_mutants_have_their_own_lines(faults: dict[str, 
 
 
 def test_alerts_of_the_fault_free_run_are_not_attributed_to_a_mutant(faults: dict[str, Fault]) -> None:
-    """If these alerts are unknown, there is no share."""
     frame = results(
         drive("a", ACTIVE, alerts="own", t_alert="2.0"), drive("b", ACTIVE, alerts="own;brake", t_alert="2.0")
     )
@@ -81,8 +78,7 @@ def test_alerts_of_the_fault_free_run_are_not_attributed_to_a_mutant(faults: dic
     assert not drives_of(frame, faults, of_a_seed)["new alert"].any()
 
 
-def test_harness_errors_are_in_no_denominator(faults: dict[str, Fault]) -> None:
-    """A crash counts as active and not as a hazard."""
+def test_harness_errors_are_excluded_from_all_shares(faults: dict[str, Fault]) -> None:
     frame = results(
         drive("a", CHANGED),
         drive("b", {}, status="crashed"),

@@ -15,7 +15,6 @@ def flags(text: str) -> pd.Series:
 
 
 def test_mcnemar_uses_the_pairs_that_differ() -> None:
-    """The p-value is the exact binomial one."""
     found = mcnemar(flags("1111111100"), flags("1000000010"))
     assert (found.both, found.first_only, found.second_only, found.neither, found.pairs) == (1, 7, 1, 1, 10)
     assert found.p == pytest.approx(2 * (1 + 8) / 2**8)

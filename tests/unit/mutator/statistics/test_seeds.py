@@ -30,7 +30,6 @@ def test_one_seed_has_no_spread() -> None:
 
 
 def test_the_lowest_and_the_highest_seed_are_shown() -> None:
-    """In a tie, the seed with the lower number is shown. Seeds sort as numbers."""
     frame = results(*seed(10, 1), *seed(9, 6, runs=20), *seed(2, 5), *seed(30, 1))
     assert seeds_of(frame) == ["2", "9", "10", "30"]
     found = cells(seeds_sheet(frame), "all", "hazards", "activated")
@@ -40,9 +39,8 @@ def test_the_lowest_and_the_highest_seed_are_shown() -> None:
 
 
 def test_the_interval_is_made_of_percentiles_of_resampled_seeds() -> None:
-    """For two seeds of equal size with 0.2 and 0.6, a draw of two is 0.2, 0.4 or 0.6, in 1, 2 and 1 of 4
-    cases. So the middle 95 % go from 0.2 to 0.6. The interval of twenty seeds equals that of numpy's
-    draws."""
+    """Two draws from the shares 0.2 and 0.6 have the mean 0.2, 0.4, 0.4 or 0.6, so the interval is 0.2 to
+    0.6."""
     found = cells(seeds_sheet(results(*seed(1, 2), *seed(2, 6))), "all", "hazards", "activated")
     assert (found["low"], found["high"]) == pytest.approx((0.2, 0.6))
     hazards = [(7 * k) % 10 for k in range(20)]
@@ -55,7 +53,6 @@ def test_the_interval_is_made_of_percentiles_of_resampled_seeds() -> None:
 
 
 def test_seeds_that_agree_have_no_interval() -> None:
-    """A seed without runs to count is left out of a share."""
     frame = results(*seed(1, 4), *seed(2, 4), *seed(3, 0, t_activation=""))
     found = cells(seeds_sheet(frame), "all", "hazards", "activated")
     assert math.isnan(found["low"]) and math.isnan(found["high"])
@@ -65,7 +62,6 @@ def test_seeds_that_agree_have_no_interval() -> None:
 
 
 def test_each_method_and_each_fault_type_has_its_own_lines() -> None:
-    """Without alerts, there are no lines about alerts."""
     frame = results(
         *seed(1, 2), *seed(2, 3), *seed(1, 8, method="random"), *seed(2, 9, method="random", fault_type="fog")
     )

@@ -13,7 +13,6 @@ ALERTS = {"0": (("fcw", 8.0),), "1": ()}
 
 
 def test_a_run_of_both_methods_has_all_tables() -> None:
-    """The table of alerts needs records of alerts."""
     expected = [
         *("summary_guided", "summary_random", "coverage_guided", "coverage_random"),
         *("guided_against_random", "guided_against_random_by_fault_type", "matched_pairs"),
@@ -32,7 +31,6 @@ def test_one_method_without_published_numbers_has_only_counts() -> None:
 
 
 def test_numbers_are_written_plainly() -> None:
-    """Unknown values are empty or a dash. A tiny p-value is not shown as zero."""
     sheet = Sheet(name="n", title="T", note="N.", heads=("a", "b", "c"), lines=((math.nan, P(1e-20), None),))
     assert sheet.table().rows == [["-", "< 0.0001", "-"]]
     assert sheet.csv() == "a,b,c\n,1e-20,\n"

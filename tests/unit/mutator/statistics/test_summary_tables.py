@@ -31,7 +31,6 @@ def test_a_table_without_published_counts_has_only_ours() -> None:
 
 
 def test_crashes_count_as_injected_and_harness_errors_do_not() -> None:
-    """A crash alone does not count as activated."""
     frame = results(HIT, {"status": "harness_error"}, {"status": "invalid_mutant"}, {"status": "crashed"})
     assert by_scenario(frame)["guided", "S1"] == Tally(
         injected=2,

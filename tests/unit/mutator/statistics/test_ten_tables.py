@@ -24,8 +24,6 @@ WHOLES = ("activated", "injected")
 
 @dataclass(frozen=True)
 class Campaign:
-    """A made-up campaign: its usable rows, and the tables of its report."""
-
     rows: list[Row]
     sheets: dict[str, Sheet]
 
@@ -102,7 +100,6 @@ def test_coverage_by_fault_type(made: Campaign, method: str) -> None:
 
 
 def test_guided_against_random(made: Campaign) -> None:
-    """The table has Mantel-Haenszel odds ratios and the tests by Cochran and by Breslow and Day."""
     for line, whole in zip(made.lines("guided_against_random"), WHOLES, strict=True):
         tables = by_hand.fourfolds(made.rows, whole)
         odds = by_hand.pooled_odds(tables.values())
@@ -140,8 +137,6 @@ def test_fisher_and_holm_by_fault_type(made: Campaign) -> None:
 
 
 def test_matched_pairs(made: Campaign) -> None:
-    """The table has the pairs with a hazard in both, one or neither run, and McNemar's exact p-values with
-    Holm's adjustment."""
     pairs = by_hand.matched(made.rows)
     expected: list[list[Any]] = []
     for which, some in (
@@ -185,7 +180,6 @@ def test_propagation_times(made: Campaign) -> None:
 
 
 def test_from_alert_to_hazard(made: Campaign) -> None:
-    """The table has the Kaplan-Meier median, its interval, and the share after the driver's time."""
     lines = iter(made.lines("alert_to_hazard"))
     for method, scenario, rows in _groups(made):
         alerted = [row for row in rows if "t_alert" in row and row["status"] == "ok"]

@@ -52,7 +52,7 @@ def test_kaplan_meier_of_a_textbook_sample() -> None:
 
 
 def test_censored_times_raise_the_median() -> None:
-    """Here the curve never reaches one half, so there is no median."""
+    """A curve that never reaches one half has no median."""
     few = [run(10.0, 11.0 + i) for i in range(3)]
     assert times.reaction(results(*few), ENDS, DRIVER_S).median == pytest.approx(2.0)
     many = times.reaction(results(*few, *[run(10.0, "")] * 7), ENDS, DRIVER_S)
@@ -77,11 +77,10 @@ def test_a_reaction_time_equal_to_the_drivers_is_not_longer() -> None:
 
 
 def test_alerts_are_counted_before_each_hazard() -> None:
-    """An alert between two hazards came before the second one only."""
     frame = results(run(8.0, 9.0), run(9.0, 10.0, t_h3=8.0), run("", "", t_h3=8.0), run("", 9.0))
     alerts = {
         "0": (("steer_saturated", 8.0), ("fcw", 8.5)),
-        "1": (("fcw", 9.0), ("steer_saturated", 10.0)),  # the latter came with the hazard, not before it
+        "1": (("fcw", 9.0), ("steer_saturated", 10.0)),  # the second alert came with the hazard
         "2": (),
         "3": (),
     }

@@ -41,7 +41,7 @@ def test_a_truncated_last_block_is_unfinished_and_not_damaged(file: Path) -> Non
         assert not read_blocks(file).damaged
 
 
-def test_a_changed_byte_loses_only_its_block(file: Path) -> None:
+def test_a_changed_byte_damages_only_its_block(file: Path) -> None:
     whole = file.read_bytes()
     second = len(as_block(0, "one", CONTENT["one"]))
     for place in range(second, second + len(as_block(1, "two", CONTENT["two"]))):

@@ -21,7 +21,6 @@ class Killed(BaseException):
 
 @pytest.fixture
 def run(tmp_path: Path) -> Path:
-    """A folder with a ledger that lists two files."""
     for name in ("a", "b"):
         (tmp_path / name).write_text(f"old {name}")
     known = {name: Digest.of((tmp_path / name).read_bytes()) for name in ("a", "b")}
@@ -50,7 +49,6 @@ def test_a_ledger_is_read_as_written(run: Path) -> None:
 
 
 def test_every_changed_byte_is_found(run: Path) -> None:
-    """The checksum does not match, or the file is not JSON."""
     path = run / digests.FILE
     data = path.read_bytes()
     for place in range(len(data)):
@@ -61,7 +59,6 @@ def test_every_changed_byte_is_found(run: Path) -> None:
 
 @pytest.mark.parametrize("content", ["{}", '{"schema": "digests/1"}', "[]", "", '{"schema": "digests/9"}'])
 def test_a_file_that_is_not_a_ledger_is_refused(run: Path, content: str) -> None:
-    """The file is truncated, or is of another kind or a newer schema."""
     (run / digests.FILE).write_text(content)
     with pytest.raises(MutatorError, match=r"digests\.json"):
         digests.read(run)
@@ -99,7 +96,7 @@ def kills(run: Path, work: Callable[[], Any], monkeypatch: pytest.MonkeyPatch) -
                 return survived
             except Killed:
                 assert accepted(run)
-    raise AssertionError("no end")
+    raise AssertionError("the work never completes")
 
 
 def test_a_kill_during_a_rewrite_leaves_a_valid_folder(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -118,7 +115,6 @@ def test_after_a_kill_a_file_is_old_or_new(run: Path, monkeypatch: pytest.Monkey
 
 
 def test_a_file_announced_for_deletion_can_be_missing(run: Path) -> None:
-    """Afterwards, the ledger no longer lists the file."""
     with digests.rewriting(run, {"a": None}):
         assert accepted(run)
         (run / "a").unlink()
@@ -127,7 +123,6 @@ def test_a_file_announced_for_deletion_can_be_missing(run: Path) -> None:
 
 
 def test_segments_are_entered_when_they_are_closed(run: Path) -> None:
-    """An incomplete last line is cut off."""
     path = segment(run, "records/0001-gw0.jsonl", 1, 2)
     whole = path.read_bytes()
     path.write_bytes(whole + b'{"sum":"0123')

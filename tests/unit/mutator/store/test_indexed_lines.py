@@ -13,7 +13,6 @@ SCHEMA = "things/1"
 
 
 def things(folder: Path, **files: list[dict[str, Any]]) -> IndexedLines[dict[str, Any]]:
-    """An index of each experiment's newest line in these files."""
     for name, lines in files.items():
         path = folder / f"{name}.jsonl"
         path.write_bytes(written(path, {"schema": SCHEMA}, lines))
@@ -26,7 +25,6 @@ def opened(folder: Path) -> IndexedLines[dict[str, Any]]:
 
 
 def test_the_newest_line_replaces_the_first(tmp_path: Path) -> None:
-    """Experiments keep the order of their first lines."""
     told = {"note": '"experiment_id":"zz"', "within": ['{"experiment_id":"yy"}']}
     many = {f"f{i:02}": [{"experiment_id": f"e{i}", "n": i}] for i in range(30)}
     found = things(tmp_path, a=[{"experiment_id": "aa", "n": 0, **told}], b=[{"experiment_id": "bb"}], **many)
@@ -38,7 +36,6 @@ def test_the_newest_line_replaces_the_first(tmp_path: Path) -> None:
 
 
 def test_a_damaged_line_is_reported_before_any_is_read(tmp_path: Path) -> None:
-    """An incomplete last line, which a kill can leave, is not an error."""
     things(tmp_path, a=[{"experiment_id": "aa", "n": 10}, {"experiment_id": "bb", "n": 20}])
     path = tmp_path / "a.jsonl"
     data = path.read_bytes()
@@ -50,7 +47,6 @@ def test_a_damaged_line_is_reported_before_any_is_read(tmp_path: Path) -> None:
 
 
 def test_an_invalid_line_is_reported_with_file_and_line(tmp_path: Path) -> None:
-    """A line without an experiment is reported immediately, and one with invalid content when it is read."""
     path = tmp_path / "a.jsonl"
     lines = LineWriter(path, {"schema": SCHEMA})
     lines.append({"experiment_id": "aa"})

@@ -141,7 +141,6 @@ def unsealed(run: Path, *lines: dict[str, object], plan: str | None = None) -> P
 
 
 def test_an_unclosed_segment_is_read(run: Path) -> None:
-    """An incomplete last line is ignored, and a damaged line is reported."""
     again = {"experiment_id": next(plan_file.ids(run)), "status": "harness_error"}
     path = unsealed(run, again, again)
     path.write_bytes(path.read_bytes() + b'{"sum"')
@@ -201,7 +200,6 @@ def test_a_folder_disguised_as_an_older_version_is_refused(run: Path) -> None:
 
 
 def test_a_folder_that_is_being_written_is_not_damaged(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The owner rewrites a file while the folder is opened."""
     real, seen = integrity.problems, []
 
     def look(*arguments: object, **more: object) -> list[MutatorError]:

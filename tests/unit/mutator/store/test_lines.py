@@ -26,7 +26,6 @@ def write(path: Path, *values: object) -> Path:
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
-    """A file with a head and six lines."""
     return write(tmp_path / "records" / "0001-gw0.jsonl", *range(6))
 
 
@@ -35,7 +34,6 @@ def values(segment: Segment) -> list[object]:
 
 
 def test_lines_are_read_as_appended(tmp_path: Path) -> None:
-    """A line can be any JSON value."""
     given = [1.5, float("inf"), None, 'ü\n"sum"', {"sum": "0" * 16}, [[], {}]]
     segment = read_segment(write(tmp_path / "records" / "a.jsonl", *given))
     assert values(segment) == given

@@ -9,7 +9,6 @@ from mutator.store.patches import Patches, PatchWriter
 
 @pytest.fixture
 def run(tmp_path: Path) -> Path:
-    """A run folder with a patch from each of two workers."""
     for worker, name in (("0001-gw0", "a" * 16), ("0001-gw1", "b" * 16)):
         writer = PatchWriter(tmp_path, worker)
         writer.append(name, f"patch of {name}\n".encode())
@@ -32,7 +31,6 @@ def test_the_error_for_a_lost_patch_names_its_file(run: Path) -> None:
 
 
 def test_the_error_for_a_lost_file_takes_its_name_from_the_record(run: Path) -> None:
-    """Without a record, the folder is named."""
     path = run / "patches" / "0001-gw1.blocks"
     path.unlink()
     assert Patches(run).file("b" * 16, "0001-gw1") == path

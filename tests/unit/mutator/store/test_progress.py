@@ -7,7 +7,6 @@ from mutator.store.progress import Pace
 
 
 def test_earlier_steps_do_not_count_towards_a_stages_rate(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Steps finished before a stage count only as progress."""
     now = 100.0
     monkeypatch.setattr(progress.time, "monotonic", lambda: now)
     pace = Pace("proof", 23, done=3)

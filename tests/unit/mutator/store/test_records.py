@@ -27,7 +27,6 @@ def write(run: Path, name: str, *records: Record) -> Path:
 
 
 def test_records_are_read_as_written(tmp_path: Path, record: MakeRecord) -> None:
-    """Deviations can be infinite, and activations can be missing."""
     first = record(
         "a" * 16, max_dev=(("gas", float("inf")),), hazards=(("H1", 3.25),), alerts=(("fcw", 3.0),)
     )
@@ -46,7 +45,7 @@ def test_a_line_equals_asdict(record: MakeRecord) -> None:
 
 
 def test_a_record_without_an_error_has_no_such_key(tmp_path: Path, record: MakeRecord) -> None:
-    """Such a line equals that of older versions."""
+    """Older versions wrote no such key."""
     writer = LineWriter(tmp_path / "records" / "0001-gw0.jsonl", HEAD)
     writer.append(record())
     writer.close()
@@ -109,7 +108,6 @@ def test_a_second_record_is_refused(tmp_path: Path, record: MakeRecord) -> None:
 
 
 def test_records_of_the_earlier_schema_are_read(tmp_path: Path, record: MakeRecord) -> None:
-    """The earlier schema has no checksums. Neither schema accepts the lines of the other."""
     path = write(tmp_path, "0001-gw0.jsonl", record())
     old = [{"schema": "records/1"}, {k: v for k, v in asdict(record()).items() if k != "patch"}]
     path.write_text("".join(f"{json.dumps(line)}\n" for line in old))

@@ -45,7 +45,7 @@ def holder(folder: RunFolder, *words: str) -> "subprocess.Popen[str]":
     return process
 
 
-def test_provenance_says_what_a_run_depends_on(folder: RunFolder, toycar: Workspace) -> None:
+def test_provenance_lists_what_a_run_depends_on(folder: RunFolder, toycar: Workspace) -> None:
     found = folder.provenance
     assert found["mutator"]
     assert found["stretches"] == []
@@ -66,7 +66,7 @@ def test_a_folder_that_is_not_a_run_is_refused(tmp_path: Path) -> None:
         RunFolder.open(tmp_path)
 
 
-def test_a_unique_start_of_an_id_finds_the_experiment(folder: RunFolder) -> None:
+def test_a_unique_prefix_of_an_id_finds_the_experiment(folder: RunFolder) -> None:
     with pytest.raises(MutatorError, match="no experiment 'zz'"):
         folder.find("zz")
     with pytest.raises(MutatorError, match="24 experiments start with ''"):
@@ -74,7 +74,6 @@ def test_a_unique_start_of_an_id_finds_the_experiment(folder: RunFolder) -> None
 
 
 def test_a_run_folder_has_one_owner(folder: RunFolder) -> None:
-    """The lock of a dead owner is released."""
     process = holder(folder, "owner")
     try:
         for attempt in (lambda: locks.owned(folder.path).__enter__(), lambda: clean(folder.path)):
@@ -99,7 +98,6 @@ def test_a_new_owner_waits_for_workers_of_a_dead_command(folder: RunFolder) -> N
 
 @pytest.mark.parametrize("name", ["owner.lock", "workers/1"])
 def test_a_lock_that_is_not_a_file_is_refused(folder: RunFolder, name: str) -> None:
-    """Nothing is written to a link's target."""
     place = folder.path / name
     place.unlink(missing_ok=True)
     place.parent.mkdir(exist_ok=True)

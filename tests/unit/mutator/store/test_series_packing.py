@@ -69,7 +69,6 @@ def test_each_series_is_found_in_its_chunk(packed: Path) -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_packed_bytes_do_not_depend_on_the_order_of_arrival(tmp_path: Path, packed: Path, seed: int) -> None:
-    """Series are packed once or several times, by one or two workers, and one experiment ran twice."""
     draw = random.Random(seed)
     order = draw.sample(IDS, len(IDS))
     cuts = sorted(draw.sample(range(1, len(IDS)), 2))
@@ -106,7 +105,6 @@ def test_merged_series_of_shards_equal_those_of_one_run(tmp_path: Path, packed: 
 
 
 def test_equal_golden_runs_stay_separate(tmp_path: Path) -> None:
-    """After packing again, each experiment keeps its series."""
     append(tmp_path, "0001-main", IDS[:2])
     for worker, names in (("0002-main", IDS[2:3]), ("0003-main", IDS[3:4])):
         pack(tmp_path, "p", WORTH, 500)
@@ -129,7 +127,6 @@ def test_a_truncated_segment_loses_only_its_last_series(tmp_path: Path) -> None:
 
 
 def test_experiments_of_a_damaged_chunk_can_be_rerun(tmp_path: Path) -> None:
-    """The rerun stores a series in a separate file."""
     append(tmp_path, "0001-main", IDS[:3])
     pack(tmp_path, "p", WORTH, 500)
     index = SeriesFolder(tmp_path).index

@@ -47,7 +47,6 @@ def test_every_difference_is_named() -> None:
 
 
 def test_several_stretches_are_printed_together() -> None:
-    """Each value is listed once, oldest first. Differences that the user accepted are marked."""
     after = Stretch(
         python="CPython 3.12.1",
         packages={"numpy": "2.1.0"},

@@ -22,7 +22,6 @@ from mutator.workspace import Workspace
 def made(
     tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]
 ) -> tuple[Workspace, Path]:
-    """A finished campaign of two seeds."""
     place = tmp_path_factory.mktemp("seeds")
     workspace = copy_toycar(place)
     path = workspace.campaign("small")
@@ -62,13 +61,13 @@ def test_a_verified_run_is_only_compared_byte_for_byte(
     assert ended_before(RunFolder.open(run)) is not None
 
     def look(*arguments: object) -> None:
-        raise AssertionError("looked into")
+        raise AssertionError("verified again")
 
     monkeypatch.setattr(integrity, "id_problems", look)
     again = run_campaign(workspace, "small", run)
     for name in ("planned", "done", "ran", "outcomes", "proof", "seal", "results", "harness_errors"):
         assert getattr(again, name) == getattr(first, name), name
-    with pytest.raises(AssertionError, match="looked into"):
+    with pytest.raises(AssertionError, match="verified again"):
         RunFolder.open(run).problems(anew=True)
 
 

@@ -31,7 +31,6 @@ def manifest(clone: Workspace) -> TargetManifest:
 
 @pytest.fixture
 def folder(clone: Workspace, tmp_path: Path) -> Path:
-    """A copy of the analysis, which a test can break."""
     return Path(shutil.copytree(clone.library / "stpa", tmp_path / "stpa"))
 
 
@@ -118,7 +117,6 @@ def test_a_spec_with_two_locations_is_listed_at_both(clone: Workspace) -> None:
     ],
 )
 def test_an_inconsistent_analysis_is_refused(folder: Path, file: str, old: str, new: str, said: str) -> None:
-    """Gaps, overlaps, unknown names and dangling names are reported with file and line."""
     spoil(folder, file, old, new)
     with pytest.raises(MutatorError) as caught:
         load_analysis(folder)

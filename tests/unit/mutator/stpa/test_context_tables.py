@@ -44,7 +44,6 @@ def test_a_mistake_in_a_table_is_reported(toy: Workspace, old: str, new: str, sa
 
 
 def test_an_unknown_name_in_a_row_is_reported(toy: Workspace) -> None:
-    """The error lists the constants and the observed values."""
     path = toy.library / "stpa" / "contexts" / "pedals.yaml"
     path.write_text(path.read_text().replace("when: hwt <= safe_hwt_s", "when: hwt <= safe", 1))
     table, variables = load_context_table(path), toy.manifest("toy").observation.variables
@@ -63,7 +62,6 @@ def test_hazards_lead_to_known_accidents(toy: Workspace) -> None:
 
 
 def test_the_shipped_table_covers_every_situation_exactly_once(clone: Workspace) -> None:
-    """The table's four contexts include the paper's hazardous cells."""
     table = clone.context_table("accelerate_decelerate")
     triggers = table.triggers()
     assert [t.name for t in triggers] == ["C1", "C2", "C3", "C4"]
@@ -96,7 +94,7 @@ def test_the_safe_headway_is_read_from_the_table(clone: Workspace, tmp_path: Pat
     assert load_context_table(path).rows[1].condition == "hwt <= 3.0 and rs > 0.0"
 
 
-def test_the_table_in_the_docs_loads_and_is_proved(clone: Workspace, tmp_path: Path) -> None:
+def test_the_table_in_the_docs_is_valid_and_complete(clone: Workspace, tmp_path: Path) -> None:
     page = clone.library.parent / "docs" / "how-to" / "change-the-hazard-analysis.md"
     (text, *_) = re.findall(r"```yaml\n(.*?)```", page.read_text(), re.DOTALL)
     (tmp_path / "closing.yaml").write_text(text)

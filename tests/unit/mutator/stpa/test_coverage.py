@@ -21,8 +21,7 @@ def prove(*conditions: str):
         ("v_ego < 0.3", "v_ego >= 0.3 and hwt <= 2", "v_ego >= 0.3 and hwt > 2"),
     ],
 )
-def test_a_table_that_covers_everything_once_is_proved(conditions: tuple[str, ...]) -> None:
-    """Comparisons are written in several forms."""
+def test_a_table_that_covers_everything_once_is_accepted(conditions: tuple[str, ...]) -> None:
     found = prove(*conditions)
     assert (found.beyond, found.place) == (None, None)
     assert found.cells > 0

@@ -92,6 +92,6 @@ def test_the_diagram_in_the_docs_is_current(analysis: Analysis) -> None:
     assert (CLONE / "docs" / "explanation" / "hazard-analysis.svg").read_text() == draw(analysis)
 
 
-def test_a_common_beginning_of_names_is_written_once() -> None:
+def test_a_common_prefix_is_written_once() -> None:
     assert short(["CF9"]) == "CF9"
     assert short(["CF9", "CF10"]) == "CF9, 10"

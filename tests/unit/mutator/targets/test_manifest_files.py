@@ -36,7 +36,6 @@ def test_actuators_have_no_default_tolerance(toy: Workspace) -> None:
 
 
 def test_ground_truth_can_be_computed(toy: Workspace) -> None:
-    """Formulas use names, attributes and items that the target has."""
     path = toy.library / "targets" / "toy.yaml"
     text = path.read_text().replace("is: now.gap", "is: 'now[\"lead\"].x[-1] - (now.x + 4.5)'")
     path.write_text(text.replace("is: now.lead_speed", "is: 'hypot(now.v[0], now.v[1]) > 3'"))
@@ -78,7 +77,6 @@ def test_arguments_have_placeholders_and_changes(toy: Workspace) -> None:
 
 
 def test_placeholders_can_be_anywhere_in_an_argument(toy: Workspace) -> None:
-    """Each placeholder is replaced once. Other braces stay."""
     path = toy.library / "targets" / "toy.yaml"
     text = path.read_text().replace("alone: [--alone, --quiet]", 'alone: ["--in={out}/x", \'{"a": {}}\']')
     text = text.replace("  changes:", '  independent: ["--log={out}:{seed}"]\n  changes:')
@@ -90,7 +88,6 @@ def test_placeholders_can_be_anywhere_in_an_argument(toy: Workspace) -> None:
 
 
 def test_without_arguments_the_entry_gets_options(toy: Workspace) -> None:
-    """The options are the scenario, the seed and the output folder."""
     path = toy.library / "targets" / "toy.yaml"
     lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join(line for line in lines if not line.startswith("  args:")))
@@ -99,7 +96,6 @@ def test_without_arguments_the_entry_gets_options(toy: Workspace) -> None:
 
 
 def test_every_run_has_the_same_cache_folder(toy: Workspace) -> None:
-    """`{cache}` is the target's folder in the user's cache."""
     path = toy.library / "targets" / "toy.yaml"
     path.write_text(path.read_text().replace('"{out}"', '"{out}", --cache, "{cache}"'))
     manifest = toy.manifest("toy")
@@ -109,7 +105,6 @@ def test_every_run_has_the_same_cache_folder(toy: Workspace) -> None:
 
 
 def test_a_film_adds_arguments(toy: Workspace) -> None:
-    """The module of the film command is checked like other modules."""
     with pytest.raises(MutatorError, match=r"target toy cannot be filmed; expected `film` in its manifest"):
         toy.manifest("toy").filming()
     path = toy.library / "targets" / "toy.yaml"
@@ -139,7 +134,6 @@ def test_the_root_can_be_given(toy: Workspace, tmp_path: Path) -> None:
 
 
 def test_the_root_can_be_the_shipped_controller(toy: Workspace) -> None:
-    """The root `shipped:target` can be named in any manifest."""
     path = toy.library / "targets" / "toy.yaml"
     text = path.read_text()
     line = next(line for line in text.splitlines() if line.startswith("root:"))
@@ -153,7 +147,6 @@ def test_the_root_can_be_the_shipped_controller(toy: Workspace) -> None:
 
 
 def test_a_manifest_is_a_snapshot(toy: Workspace) -> None:
-    """Only a manifest that is loaded later includes an edit of the tree. Bytecode is not part of a tree."""
     manifest = toy.manifest("toy")
     before = manifest.tree
     (manifest.root / "toycar" / "__pycache__").mkdir()
@@ -271,7 +264,6 @@ def test_without_files_the_tree_has_all_files_of_the_packages(toy: Workspace) ->
     ],
 )
 def test_invalid_packages_are_refused(toy: Workspace, packages: str, said: str) -> None:
-    """Names must be unique, and must be import names or module files at the root."""
     path = toy.library / "targets" / "toy.yaml"
     path.write_text(path.read_text().replace("package: toycar", packages))
     with pytest.raises(MutatorError) as caught:
@@ -299,13 +291,11 @@ def test_a_package_without_files_is_refused(toy: Workspace) -> None:
     ],
 )
 def test_globs_match_the_whole_path(glob: str, hits: set[str]) -> None:
-    """`*` matches within a folder, `**` across folders."""
     paths = ["a/x.py", "a/b/y.py", "a/b/c/z.py", "a/b/d.dbc", "w.py", "a/xXpy"]
     assert {p for p in paths if matches(p, [glob])} == hits
 
 
 def test_linked_files_are_part_of_the_tree(toy: Workspace, tmp_path: Path) -> None:
-    """A linked file can have faults. The mutant has a copy of it."""
     outside = tmp_path / "outside"
     outside.mkdir()
     root = toy.manifest("toy").root / "toycar"

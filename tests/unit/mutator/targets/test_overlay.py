@@ -49,8 +49,7 @@ def test_an_overlay_is_also_looked_up_in_the_library(pole: Workspace) -> None:
         pole.manifest("pole")
 
 
-def test_a_tree_with_an_overlay_is_run(pole: Workspace) -> None:
-    """Faults in the foreign modules take effect."""
+def test_faults_in_a_tree_with_an_overlay_take_effect(pole: Workspace) -> None:
     trial = try_fault("sensor/angle", "tilted", 1.0, value=60, workspace=pole)
     assert trial.record.outcome is Outcome.HAZARD
     assert trial.record.activation is not None and trial.record.activation.first == 1.0
@@ -73,7 +72,6 @@ def test_no_fault_can_be_injected_into_an_overlay(pole: Workspace) -> None:
 
 @pytest.mark.parametrize("name", ["regulator.py", "filters/low_pass.py", "notes.txt"])
 def test_a_file_of_both_overlay_and_root_is_refused(pole: Workspace, name: str) -> None:
-    """The root's file need not be part of the tree."""
     (pole.manifest("pole").root / "notes.txt").write_text("mine")
     path = pole.library / "overlays" / "pole" / name
     path.parent.mkdir(exist_ok=True)
@@ -103,7 +101,6 @@ def test_a_linked_overlay_works_like_the_original(pole: Workspace, tmp_path: Pat
 
 
 def test_errors_name_the_file_of_the_overlay(pole: Workspace) -> None:
-    """`doctor` names root and overlay."""
     overlay = (pole.library / "overlays" / "pole").resolve()
     edit(pole.library / MANIFEST, "after_assign: now", "after_assign: then")
     with pytest.raises(MutatorError) as caught:

@@ -34,7 +34,6 @@ def installed(pole: Workspace, **keys: str) -> Workspace:
 
 
 def test_the_tree_has_only_the_installed_package_and_the_overlay(pole: Workspace, site: Path) -> None:
-    """The package is not imported."""
     manifest = installed(pole, root="installed:filters_of_poles", packages="[filters_of_poles]").manifest(
         "pole"
     )
@@ -79,10 +78,9 @@ def test_the_root_can_be_an_installed_module(pole: Workspace, site: Path) -> Non
         ),
     ],
 )
-def test_an_installed_package_must_have_a_source_of_its_own(
+def test_an_invalid_installed_root_is_refused(
     pole: Workspace, site: Path, keys: dict[str, str], said: str
 ) -> None:
-    """A missing package, and a tree that would include other packages, are refused as well."""
     with pytest.raises(MutatorError, match=f"pole.yaml:{said}"):
         installed(pole, **keys).manifest("pole")
 
@@ -96,7 +94,6 @@ def test_check_reports_a_missing_package_once(pole: Workspace) -> None:
 def test_a_mutant_of_an_installed_package_runs_from_its_own_tree(
     pole: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The installed package stays unchanged."""
     root, site = pole.manifest("pole").root, tmp_path / "site"
     shutil.move(root / "filters", site / "filters")
     for name in ("pole.py", "regulator.py"):  # modules that the glue imports

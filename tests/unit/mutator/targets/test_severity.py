@@ -54,7 +54,6 @@ def test_the_shipped_contact_is_with_an_equal_car() -> None:
     ],
 )
 def test_mistakes_in_a_scale_are_reported(tmp_path: Path, old: str, new: str, message: str) -> None:
-    """A scale needs all four classes with increasing delta-v."""
     (tmp_path / "hard.yaml").write_text(SCALE)
     assert load_scale(tmp_path / "hard.yaml").classes[2] == ("S2", 20 * KPH, "c")
     (tmp_path / "hard.yaml").write_text(SCALE.replace(old, new))

@@ -13,7 +13,6 @@ FOLLOWING = {"t": 3.0, "d_rel": 40.0, "v_ego": 20.0, "v_lead": 18.0}
 
 
 def test_the_text_of_a_trigger_decides_its_kind() -> None:
-    """`always` and conditions are armed at the given time."""
     assert read_trigger("always", 1.5, ("t", "hwt")) == always(armed_after_s=1.5)
     assert read_trigger("12.5", 1.5, ("t", "hwt")) == at_time(12.5)
     typed = read_trigger("hwt<=2", 1.5, ("t", "hwt"))
@@ -21,7 +20,7 @@ def test_the_text_of_a_trigger_decides_its_kind() -> None:
 
 
 @pytest.mark.parametrize("text", ["", "soon", "nan", "hwt", "1 +"])
-def test_any_other_text_is_refused(text: str) -> None:
+def test_invalid_text_is_refused(text: str) -> None:
     with pytest.raises(MutatorError):
         read_trigger(text, 0.0, ("t", "hwt"))
 
@@ -38,7 +37,6 @@ def test_always_and_a_time_last_to_the_end_of_the_run() -> None:
 
 
 def test_random_times_are_starts_of_steps() -> None:
-    """A drawn time depends only on the seed and the key."""
     times = [draw_time(7, f"key {i}", first_s=1.5, last_s=29.5, step_s=0.01) for i in range(300)]
     assert times == [draw_time(7, f"key {i}", first_s=1.5, last_s=29.5, step_s=0.01) for i in range(300)]
     assert all(1.5 <= t <= 29.5 and t == round(t * 100) / 100 for t in times)

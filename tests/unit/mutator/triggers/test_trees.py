@@ -21,7 +21,6 @@ DERIVED = {"hwt": "(gap / speed)", "risk": "(1.0 / hwt)"}
     ],
 )
 def test_a_formula_becomes_a_tree_of_operators(text: str, made: object) -> None:
-    """Operators come first, numbers are floats, and a derived value is replaced by its formula."""
     assert tree(check_formula(text, KNOWN, over_time=True), DERIVED) == made
 
 

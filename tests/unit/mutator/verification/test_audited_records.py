@@ -39,7 +39,6 @@ def flaws(record: Record) -> list[str]:
 def test_deviations_must_fit_the_target_and_the_drive(
     record: MakeRecord, fields: dict[str, Any], told: str
 ) -> None:
-    """Runs without recorded channels are exempt."""
     head = HEAD | {"channels": [[name, "-", "internal", "", ""] for name in ("gas", "brake", "seen")]}
     one = Recorded(Path("r.jsonl"), 7, record(**FINE | fields))
     found = [str(flaw) for flaw in verdicts(head, [one], MANIFEST)]

@@ -216,7 +216,6 @@ def test_the_wording_fits_the_number_of_places_reached(toy: Workspace, count: in
 
 
 def test_a_trigger_that_no_scenario_reaches_is_reported(toy: Workspace) -> None:
-    """Either its context never occurs, or its random time comes after the end of every run."""
     change(toy, "fault_library/stpa/contexts/near_far.yaml", "near_s: 2.0", "near_s: 0.01")
     change(toy, "fault_library/campaigns/small.yaml", "random_until_s: 5.5", "random_until_s: 9.0")
     found = driven(toy)["triggers"]

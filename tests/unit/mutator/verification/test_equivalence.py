@@ -24,7 +24,6 @@ Reseal = Callable[..., None]
 
 
 def test_the_sample_has_every_fault_type_and_scenario(experiment: Callable[..., Experiment]) -> None:
-    """The sample has one experiment in a hundred and at least 20."""
     many = [experiment(value, f"S{value % 5:.0f}") for value in range(3000)]
     rare = experiment(1.0, "S9", spec="vision/rain/rate")
     sample = equivalence.sample([*many, rare], 1)
@@ -59,7 +58,6 @@ def test_a_record_that_differs_fails_the_campaign(toycar: Workspace, proven: Pat
 
 @pytest.mark.slow
 def test_an_incomplete_check_is_resumed(toycar: Workspace, proven: Path, reseal: Reseal) -> None:
-    """Any engine can complete the check."""
     (path,) = (proven / "proof").iterdir()
     path.write_text(path.read_text().splitlines()[0] + "\n")
     reseal(proven, finished=False)
@@ -89,8 +87,7 @@ _BELIEVE = """
 
 @pytest.fixture
 def sharing(toycar: Workspace, tmp_path: Path) -> Workspace:
-    """A toy whose runs read a drift of the car and its start from a shared file, unless `--forget` is
-    given."""
+    """A toy whose runs read the car's drift and start from a shared file, unless `--forget` is given."""
     go, world = (tmp_path / "toy/tree/toycar" / name for name in ("go.py", "world.py"))
     believe = _BELIEVE.replace("{kept}", str(tmp_path / "kept"))
     go.write_text(go.read_text().replace("\n    return Drive(case)\n", believe))
@@ -128,8 +125,7 @@ def test_an_error_that_runs_share_fails_the_campaign(
         assert (code, found) == (0, "")
 
 
-def test_forking_is_the_default_where_it_is_worthwhile(toycar: Workspace) -> None:
-    """A requested engine is used or refused."""
+def test_only_large_campaigns_fork_by_default(toycar: Workspace) -> None:
     manifest = toycar.manifest("toycar")
     assert choose_engine(None, manifest, 1000) == "fork"
     assert choose_engine(None, manifest, 10) == "reference"
@@ -152,7 +148,6 @@ def threaded(toycar: Workspace, tmp_path: Path) -> Workspace:
 
 
 def test_without_forks_there_is_no_equivalence_check(threaded: Workspace, tmp_path: Path) -> None:
-    """The folder has the seal of a run on the reference engine, and an audit finds nothing."""
     summary = run_campaign(threaded, "small", tmp_path / "run", engine="fork", choices=Choices(limit=1))
     assert (summary.proof, summary.exit_code) == (None, 0)
     assert summary.not_forked.endswith("only one can be forked: besides the main one, 'poll'")

@@ -57,7 +57,6 @@ def faults(everything: dict[str, tuple[Fault, ...]]) -> dict[str, tuple[Fault, .
 
 
 def test_the_shipped_library_has_no_problem(clone: Workspace) -> None:
-    """Every spec expands, every anchor is found once, and every shape compiles and can be undone."""
     assert check_library(clone, "openpilot") == []
 
 
@@ -71,7 +70,6 @@ def test_published_fault_types_have_the_published_number_of_values(
 
 
 def test_values_have_the_expected_ranges_and_signs(faults: dict[str, tuple[Fault, ...]]) -> None:
-    """An invisible vehicle's speed is too high, and ghosts are too close."""
     by_spec: dict[str, list[Fault]] = {}
     for fault in faults["as_described"]:
         by_spec.setdefault(fault.spec, []).append(fault)
@@ -169,8 +167,6 @@ def test_levels_of_image_effects_are_the_published_ones(faults: dict[str, tuple[
 
 
 def test_each_effect_has_its_own_seed(everything: dict[str, tuple[Fault, ...]]) -> None:
-    """Each level has a different seed, and so does each of two effects in one frame. The readings share
-    seeds."""
     seeds = {
         reading: [dict(i.params)["seed"] for f in found for i in f.injections if i.model == "image_effect"]
         for reading, found in everything.items()
@@ -182,7 +178,6 @@ def test_each_effect_has_its_own_seed(everything: dict[str, tuple[Fault, ...]]) 
 def test_two_effects_act_in_the_order_of_the_spec(
     clone: Workspace, everything: dict[str, tuple[Fault, ...]]
 ) -> None:
-    """Rain falls in front of a foggy road."""
     manifest, models = clone.manifest("openpilot"), clone.fault_models()
     fault = next(f for f in everything["as_described"] if f.fault_type == "rain_and_fog")
     made = build(manifest, models, fault, always())

@@ -31,8 +31,9 @@ def change(toycar: Workspace, old: str, new: str, name: str = "go") -> None:
     path.write_text(path.read_text().replace(old, new))
 
 
-def test_a_sound_target_passes(toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """For the same sources, the checks are not run again."""
+def test_a_sound_target_passes_and_is_not_checked_again(
+    toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     folder = frozen(toycar, tmp_path)
     told: list[Progress] = []
     results = run_checks(toycar, folder, workers=2, notify=told.append)
@@ -84,7 +85,6 @@ def test_a_damaged_golden_run_is_replaced(toycar: Workspace, tmp_path: Path) -> 
 def test_an_unsound_target_is_refused(
     toycar: Workspace, tmp_path: Path, old: str, new: str, told: str
 ) -> None:
-    """The target is non-deterministic, reaches a hazard without a fault, or differs from its manifest."""
     change(toycar, old, new)
     folder = frozen(toycar, tmp_path)
     with pytest.raises(CheckFailed, match=re.escape(told)):

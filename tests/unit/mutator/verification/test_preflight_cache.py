@@ -67,7 +67,6 @@ def test_another_folder_uses_the_cached_results(checked: tuple[Workspace, RunFol
 def test_a_damaged_entry_is_ignored(
     checked: tuple[Workspace, RunFolder], tmp_path: Path, cache: Path, damaged: str, content: bytes | None
 ) -> None:
-    """A file of the entry is empty, changed or missing."""
     if not damaged:
         shutil.rmtree(cache)
     elif content is None:

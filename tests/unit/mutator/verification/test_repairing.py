@@ -29,7 +29,6 @@ def made(
 
 @pytest.fixture
 def run(made: Path, tmp_path: Path) -> Path:
-    """A finished run of 24 experiments, which a test can damage."""
     return Path(shutil.copytree(made, tmp_path / "run"))
 
 
@@ -58,7 +57,6 @@ LOSSES: dict[str, tuple[Callable[[list[bytes]], list[bytes]], int]] = {
 
 @pytest.mark.parametrize("loss", LOSSES)
 def test_only_damaged_lines_of_a_segment_are_lost(run: Path, made: Path, loss: str) -> None:
-    """The damaged file is kept in another folder."""
     change, lost = LOSSES[loss]
     edit(run / RECORDS, change)
     damaged = (run / RECORDS).read_bytes()
@@ -94,7 +92,6 @@ def test_a_missing_segment_loses_its_records(run: Path) -> None:
 
 
 def test_a_lost_patch_removes_its_record(run: Path, put_patches: Callable[..., None]) -> None:
-    """Running the experiment again restores patch and record."""
     one, other = list(plan_file.ids(run))[:2]
     [file] = Patches(run).files()
     put_patches(run, {one: b"other", other: None})
@@ -118,7 +115,6 @@ def test_a_damaged_first_block_removes_all_records_of_its_file(run: Path) -> Non
 
 @pytest.mark.parametrize("name", ["checks.json", "golden/A/log.npz"])
 def test_files_that_run_can_rebuild_are_moved_aside(run: Path, name: str) -> None:
-    """The run is then unfinished, so that `run` rebuilds the file."""
     (run / name).write_bytes(b"other")
     said, folder = repaired(run)
     assert said == [f"{name} set aside: `mutator run` rebuilds it"]
@@ -154,7 +150,6 @@ def test_damaged_timings_are_removed(run: Path) -> None:
 
 @pytest.mark.parametrize("content", [None, b"{", b"{}"])
 def test_a_damaged_ledger_is_rebuilt_from_the_files(run: Path, content: bytes | None) -> None:
-    """Only an earlier seal can confirm the rebuilt ledger."""
     path = run / digests.FILE
     path.unlink() if content is None else path.write_bytes(content)
     said, folder = repaired(run)
@@ -179,7 +174,6 @@ def test_an_intact_run_is_not_changed(run: Path) -> None:
 
 
 def test_a_run_resumes_after_a_killed_repair(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The kill comes at any point after something was moved aside."""
     edit(run / RECORDS, lambda x: [*x[:3], x[3].replace(b"ok", b"no"), *x[4:]])
     with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
         patched.setattr(digests, "close_segments", kill)

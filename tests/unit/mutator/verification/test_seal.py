@@ -38,7 +38,6 @@ def sealed(run: Path) -> str | None:
 
 
 def test_the_seal_does_not_depend_on_workers_or_order(made: Path, run: Path, reseal: Reseal) -> None:
-    """Sessions, lost timings and the processor make no difference either."""
     path = run / "records" / "0001-a.jsonl"
     head, *lines = path.read_text().splitlines()
     path.write_text("\n".join([head, *lines[12:], ""]))
@@ -99,14 +98,12 @@ CHANGES: dict[str, Callable[[Path], None]] = {
 def test_any_change_of_the_result_changes_the_seal(
     made: Path, run: Path, reseal: Reseal, change: str
 ) -> None:
-    """The cases are records, patches, golden runs, checks, sources, choices and versions."""
     CHANGES[change](run)
     reseal(run)
     assert sealed(run) not in (None, sealed(made))
 
 
 def test_an_unfinished_run_has_no_seal(run: Path) -> None:
-    """An old run without digests has none either."""
     digests.close_segments(run, finished=False)
     folder = RunFolder.open(run)
     assert (seal_of(folder), seal_or_why_not(folder)) == (None, "none: the run is not finished")

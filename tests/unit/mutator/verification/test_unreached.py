@@ -46,7 +46,7 @@ def test_triggers_that_never_hold_are_reported(
         assert part in told[0]
 
 
-def test_observations_are_read_by_their_golden_runs(tmp_path: Path) -> None:
+def test_observations_are_read_for_each_golden_run(tmp_path: Path) -> None:
     assert read_observed(tmp_path) == {}
     write_observed(tmp_path, "town/A+alone", SEEN)
     assert {key: rows.tolist() for key, rows in read_observed(tmp_path).items()} == {
@@ -55,7 +55,6 @@ def test_observations_are_read_by_their_golden_runs(tmp_path: Path) -> None:
 
 
 def test_triggers_are_checked_with_cached_golden_runs(toycar: Workspace, tmp_path: Path) -> None:
-    """A resumed run does not repeat the warning about unreached triggers."""
     campaign = toycar.library / "campaigns" / "small.yaml"
     text = campaign.read_text().replace("methods: [guided, random]", "methods: [guided]")
     campaign.write_text(text.replace("table: near_far", "list: [{when: v_ego > 99}, {at_s: 50}]"))

@@ -22,7 +22,6 @@ HEADER = (
 
 @pytest.fixture
 def run(tmp_path: Path) -> RunFolder:
-    """A run folder with a guided chaff run, its random partner, and a golden run of 30 s."""
     head = {"schema": "run/1", "target": "openpilot", "goldens": [["S1", []]]}
     (tmp_path / "run.json").write_text(json.dumps(head))
     plan_file.write(tmp_path, [], [])
@@ -51,7 +50,7 @@ def test_without_a_library_no_time_is_censored(run: RunFolder) -> None:
     assert "alert_to_hazard" not in names(run, "csv")
 
 
-def test_tables_are_written_byte_for_byte_again(run: RunFolder) -> None:
+def test_tables_are_reproducible(run: RunFolder) -> None:
     contents = []
     for _ in range(2):
         tables_panel(ReportedRun.open(run, HERE))
@@ -60,7 +59,7 @@ def test_tables_are_written_byte_for_byte_again(run: RunFolder) -> None:
     assert contents[0] == contents[1]
 
 
-def test_a_table_of_alerts_notes_those_of_fault_free_runs(run: RunFolder) -> None:
+def test_tables_of_alerts_mention_the_alerts_of_fault_free_runs(run: RunFolder) -> None:
     golden = run.path / "golden" / "S1"
     drive = {name: np.ones(3000) for name in ("d_rel", "v_ego", "v_lead", "a_ego", "hwt")}
     drive |= {"t": np.arange(3000) / 100, "lateral_offset": np.linspace(-0.25, 0.5, 3000)}
@@ -76,7 +75,7 @@ def test_a_table_of_alerts_notes_those_of_fault_free_runs(run: RunFolder) -> Non
 
 
 @pytest.mark.parametrize("alerts", [["fcw"], []])
-def test_a_target_without_alerts_has_no_tables_of_alerts(run: RunFolder, alerts: list[str]) -> None:
+def test_a_target_without_alerts_has_no_alert_tables(run: RunFolder, alerts: list[str]) -> None:
     head = json.loads((run.path / "run.json").read_text()) | {"alerts": alerts}
     (run.path / "run.json").write_text(json.dumps(head))
     markdown = tables_panel(ReportedRun.open(RunFolder.unverified(run.path), HERE)).markdown
