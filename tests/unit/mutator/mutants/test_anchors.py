@@ -82,7 +82,6 @@ def lines(kind: AnchorKind, name: str, function: str = "A.run", nth: int | None 
 def test_anchors_find_statements_of_every_form(
     kind: AnchorKind, name: str, nth: int | None, line: int
 ) -> None:
-    """The forms are assignments, calls, and returns."""
     assert lines(kind, name, nth=nth) == (line, line)
 
 
@@ -107,7 +106,7 @@ def test_an_item_whose_index_the_statement_changes_has_no_name(targets: str, nam
 
 
 def test_the_head_of_a_block_is_the_last_candidate() -> None:
-    """Older anchors, from before heads were candidates, therefore keep their statements."""
+    """Anchors written before heads were candidates therefore keep their statements."""
     source = "def f(xs):\n    for x in xs:\n        pass\n    x = 1\n"
     source += "    with xs as y:\n        y = 2\n        y = 3\n"
 
@@ -120,7 +119,6 @@ def test_the_head_of_a_block_is_the_last_candidate() -> None:
 
 
 def test_a_function_is_found_by_its_qualified_name() -> None:
-    """The qualified name of a nested function can be written with or without `<locals>`."""
     assert lines(AnchorKind.AFTER_ASSIGN, "a", "A.run.inner") == (28, 28)
     assert lines(AnchorKind.AFTER_ASSIGN, "a", "A.run.<locals>.inner") == (28, 28)
     assert lines(AnchorKind.AFTER_ASSIGN, "self._width", "A.width") == (11, 11)
@@ -159,7 +157,6 @@ def test_a_function_is_found_by_its_qualified_name() -> None:
 def test_an_anchor_with_no_match_or_several_is_an_error(
     kind: AnchorKind, name: str, function: str, nth: int | None, pieces: list[str]
 ) -> None:
-    """The error names the place, the candidates or the reason, and a remedy."""
     with pytest.raises(MutatorError) as caught:
         lines(kind, name, function, nth)
     for piece in pieces:
@@ -186,7 +183,6 @@ def test_the_entry_of_a_function_is_below_its_docstring() -> None:
     ],
 )
 def test_the_probe_is_imported_below_the_head_of_the_file(source: str, line: int) -> None:
-    """The head consists of the docstring, comments and `from __future__` imports."""
     assert parsed(source).import_line + 1 == line
 
 

@@ -69,7 +69,6 @@ def test_diffs_equal_the_stored_diffs(toy: Workspace, variant: str) -> None:
 
 @pytest.mark.parametrize("variant", ["longer", "silent", "both", "null"])
 def test_only_tagged_lines_differ(toy: Workspace, variant: str) -> None:
-    """The probe is the only new file, and every file compiles."""
     manifest = toy.manifest("toy")
     made = build(toy, None if variant == "null" else toy_faults(toy)[variant])
     assert set(made.files) - set(manifest.tree.files) == {"toycar/_fi.py"}
@@ -140,7 +139,6 @@ def run(toy: Workspace, made: Mutant, place: Path, steps: int = 100) -> dict[str
 
 
 def test_faults_are_active_once_their_trigger_fires(toy: Workspace, tmp_path: Path) -> None:
-    """The null mutant changes nothing, but its probe evaluates the trigger."""
     null = run(toy, build(toy, None), tmp_path / "null")
     assert null["report"]["injections"] == {}
     assert null["report"]["triggered"]["first"] == 0.5

@@ -1,4 +1,4 @@
-"""Expressions: which ones anchors can name, how anchors name them, and how a mutant changes their values."""
+"""Expressions that anchors can name, and how a mutant changes their values."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -109,7 +109,6 @@ def test_every_value_has_a_name_for_each_role() -> None:
     ],
 )
 def test_an_anchor_matches_regardless_of_spaces_and_quotes(place: FaultLocation, line: int) -> None:
-    """An empty name matches any expression."""
     assert parsed().span(place)[0] + 1 == line
 
 
@@ -127,15 +126,12 @@ def test_an_anchor_matches_regardless_of_spaces_and_quotes(place: FaultLocation,
     ],
 )
 def test_an_anchor_with_no_match_or_several_is_an_error(place: FaultLocation, pieces: Iterable[str]) -> None:
-    """The error names the line, the candidates, and a remedy."""
     with pytest.raises(MutatorError) as caught:
         parsed().resolve_value(place)
     assert all(piece in str(caught.value) for piece in pieces), str(caught.value)
 
 
 def test_a_changed_expression_stays_in_its_place() -> None:
-    """If an expression spans several lines, its first and last lines change. Two expressions in one line
-    share the line's tag."""
     source = "def f(a, b):  # go\r\n    c = a, b\r\n    return g(a,  # first\r\n        b) + c  # sum\r\n"
     at = {"function": "f"}
     assert changed(source, (location("assigned_value", "c", **at), "None")) == source.replace(
@@ -166,7 +162,6 @@ def test_a_changed_expression_stays_in_its_place() -> None:
     ],
 )
 def test_a_tuple_is_changed_as_a_whole(value: str, kept: str) -> None:
-    """A tuple can be an index, span several lines, and have or lack parentheses."""
     place = location("return_value", "", function="f")
     line = changed(f"def f(a, b):\n    return {value}\n", (place, "0")).splitlines()[1]
     assert line == f'    return (0 if _fi.active("a0") else {kept})  # fi:a0 was:    return {value}'
@@ -179,7 +174,7 @@ def test_a_tuple_is_changed_as_a_whole(value: str, kept: str) -> None:
 
 
 def test_a_huge_number_has_no_anchor() -> None:
-    """Python cannot write a number with thousands of digits. Other expressions in its file can be changed."""
+    """Python cannot write a number with thousands of digits."""
     source = f"def f(a):\n    b = g(0x{'f' * 5000})\n    return a\n"
     assert 'return (0 if _fi.active("a0") else a)' in changed(
         source, (location("return_value", "a", function="f"), "0")
@@ -194,7 +189,6 @@ def test_two_injections_into_one_expression_are_refused() -> None:
 
 
 def test_functions_with_the_same_name_have_separate_variables() -> None:
-    """The getter and setter of a property have the same name."""
     source = "class A:\n    def x(self): return self.a\n    def x(self, value): return value + 1\n"
     file = parse_file("m.py", source.encode(), Path())
     first, second = (location("return_value", "", nth=nth, function="A.x") for nth in (1, 2))
@@ -214,14 +208,12 @@ def test_files_in_other_encodings_are_changed_at_the_right_column() -> None:
 
 
 def test_an_f_string_is_changed_as_a_whole() -> None:
-    """The values inside an f-string have no anchors."""
     source = b'def f(x):\n    return g(f"{x:.2f} m", f"{x}" "b")\n'
     found = parse_file("m.py", source, Path()).expressions["f"]
     assert [one.text for one in found if one.text.startswith("f")] == ["f'{x:.2f} m'", "f'{x}b'"]
 
 
 def test_a_named_expression_as_a_condition_has_an_anchor() -> None:
-    """While no fault is active, `:=` still sets its name."""
     source = "def f(a):\n    while n := a.pop():\n        if (m := n + 1): return g(k := m)\n"
     places = [
         location("condition", "(n := a.pop())", function="f"),

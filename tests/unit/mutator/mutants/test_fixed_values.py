@@ -1,5 +1,4 @@
-"""Constants and defaults: which of them faults can change, which are refused, and how the probe changes them
-during a run."""
+"""Constants and defaults that faults change during a run."""
 
 import sys
 import types
@@ -136,8 +135,6 @@ def load(clone: Workspace) -> Iterator[Callable[..., tuple[Any, Any]]]:
 def test_a_fixed_value_changes_while_the_fault_is_active(
     load: Callable[..., tuple[Any, Any]], place: str
 ) -> None:
-    """The value is restored at the next inactive step and when a run starts again. Each active step is
-    counted once."""
     location, value = PLACES[place]
     module, fi = load(location)
     original, seen = value(module), []
@@ -180,8 +177,6 @@ def test_tagged_lines_follow_the_statement_that_sets_the_value(clone: Workspace)
     ],
 )
 def test_an_unsuitable_value_is_refused(clone: Workspace, location: FaultLocation, words: str) -> None:
-    """The error for an unknown name lists the existing ones. A value that cannot be changed reliably is
-    refused with the reason."""
     with pytest.raises(MutatorError, match=words):
         mutant(clone, location)
 
@@ -196,7 +191,6 @@ def test_a_model_that_changes_no_value_is_refused(clone: Workspace) -> None:
 
 
 def test_modules_that_import_a_constant_are_found(tmp_path: Path) -> None:
-    """A module can import a constant through another module. Imports inside functions are ignored."""
     files = {
         "pkg/__init__.py": "from .limits import LIMIT\n",
         "pkg/limits.py": "LIMIT = 5\n",
@@ -216,8 +210,6 @@ def test_modules_that_import_a_constant_are_found(tmp_path: Path) -> None:
 
 
 def test_importers_that_cannot_be_set_are_listed(tmp_path: Path) -> None:
-    """The error lists a star import, an import into a class, and an imported name that the module sets again,
-    each with its line."""
     texts = {
         "limits": "LIMIT = 5\n",
         "a": "from limits import *\n",

@@ -46,7 +46,6 @@ def test_a_similar_comment_is_not_a_tag(clone: Workspace) -> None:
 
 
 def test_pages_use_the_tags_defined_in_python() -> None:
-    """The script that shows diffs contains no tags of its own."""
     words = injected_lines.tag_words()
     for tag in words["probe"]:
         assert injected_lines.tagged("x", tag) == f"x  {words['mark']}{tag}"

@@ -110,8 +110,7 @@ def models(tmp_path: Path) -> FaultModels:
     return Workspace(library=workspace.library, templates=templates).fault_models()
 
 
-def test_a_template_can_set_its_own_names(models: FaultModels) -> None:
-    """The template is refused if the function uses the same names."""
+def test_a_template_cannot_set_names_that_the_function_uses(models: FaultModels) -> None:
     assert "for y in [1]:" in injected(models, "outer", target="x")
     with pytest.raises(
         MutatorError, match=r"root/m.py:6: .* set 'y', a name that the function uses"
@@ -133,7 +132,6 @@ def test_an_expression_that_sets_a_name_is_refused(tmp_path: Path) -> None:
 
 
 def test_an_imported_name_that_the_function_uses_is_refused() -> None:
-    """An image effect imports its class."""
     params = {"amount": 1.0, "camera": None, "scene": None, "seed": 1, "target": "x"}
     params |= {"camera": "x", "scene": "x"}
     with pytest.raises(MutatorError, match="set 'Rain', a name that the function uses"):

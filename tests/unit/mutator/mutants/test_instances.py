@@ -1,4 +1,4 @@
-"""Faults limited to one instance among several, to one execution, or to every n-th."""
+"""Faults limited to some instances or executions."""
 
 import types
 from pathlib import Path
@@ -79,14 +79,13 @@ def drive(clone: Workspace, data: bytes, times: tuple[float, ...]) -> tuple[list
 def test_a_fault_can_be_limited_to_instances_and_executions(
     clone: Workspace, anchor: Anchor, given: dict[str, Any], active: list[list[int]], count: int
 ) -> None:
-    """Executions are numbered from the activation, and only for instances that meet the condition. Only
-    executions with a change are counted as activations."""
+    """Only executions that meet the condition are numbered, beginning with the activation."""
     seen, told = drive(clone, mutant(clone, anchor, **given), (0.0, 1.0, 2.0, 3.0))
     assert seen == [[1, 2, 3], *active, [1, 2, 3]]
     assert told["count"] == count
 
 
-def test_executions_are_counted_from_zero_in_each_active_period(clone: Workspace) -> None:
+def test_executions_are_counted_anew_in_each_active_period(clone: Workspace) -> None:
     seen, told = drive(clone, mutant(clone, AFTER, call=2), (0.0, 1.0, 3.0, 0.0, 1.0, 2.0))
     assert [step[1] for step in seen] == [2, 12, 2, 2, 12, 2]
     assert told["count"] == 1, "only the last run is counted"
@@ -98,8 +97,6 @@ def test_a_guard_omits_one_instance(clone: Workspace) -> None:
 
 
 def test_the_injected_line_checks_the_fault_first(clone: Workspace) -> None:
-    """The condition is evaluated only while the fault is active. The probe counts an execution after all
-    other checks."""
     lines = {
         AFTER: b'if _fi.on() and (index == 2) and _fi.every("a", 5) and _fi.active("a"):  # fi:a',
         VALUE: b'gap = (lane["gap"] + 10 if _fi.on() and (index == 2) and _fi.every("a", 5) and '
@@ -113,7 +110,6 @@ def test_the_injected_line_checks_the_fault_first(clone: Workspace) -> None:
 
 
 def test_lines_with_a_selection_are_recognized_as_checking_the_probe(clone: Workspace) -> None:
-    """The selection is part of the line's injected text."""
     for anchor, model in ((AFTER, "offset"), (SENT, "omission")):
         data = mutant(clone, anchor, model, where="lane['gap'] == 2 or (index == 1)", call=2)
         tags = [tag for line in data.splitlines() if (tag := injected_lines.tag_of(line)) and tag.id == "a"]
@@ -142,15 +138,13 @@ def test_lines_with_a_selection_are_recognized_as_checking_the_probe(clone: Work
         "",
     ],
 )
-def test_a_condition_with_side_effects_is_refused(text: str) -> None:
-    """A condition must not call a function, calculate, assign a name, or use the probe."""
+def test_a_condition_that_calls_calculates_or_assigns_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match=r".*"):
         instance_condition(text)
 
 
 def test_unknown_names_and_models_with_lasting_effects_are_refused(clone: Workspace) -> None:
-    """The error for an unknown name lists the known ones. A lasting effect would outlive the active time of
-    the fault."""
+    """A lasting effect would outlive the active time of the fault."""
     with pytest.raises(MutatorError, match=r"m.py:3: 'side' in `where` is not known in drive; .*index"):
         mutant(clone, AFTER, where="side == 'left'")
     params = (("per_step", 1.0), ("stays", True), ("target", "gap"))
@@ -183,6 +177,5 @@ def test_a_condition_is_stored_in_canonical_form() -> None:
     ],
 )
 def test_invalid_selections_in_yaml_are_refused(given: dict[str, Any], words: str) -> None:
-    """Invalid conditions, contradictions, and selections at constants and defaults are refused."""
     with pytest.raises(MutatorError, match=words):
         read(**given)

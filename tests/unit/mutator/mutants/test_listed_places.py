@@ -91,7 +91,6 @@ def test_an_ambiguous_place_is_listed_with_nth(listed: list[ListedPlace]) -> Non
 
 
 def test_each_listed_anchor_finds_its_own_line(listed: list[ListedPlace]) -> None:
-    """Each anchor is valid in a spec and is listed once."""
     source = Source(path=Path("spec.yaml"), data={}, lines={})
     assert [AtModel(**one.at).location(source, ()) for one in listed] == [one.location for one in listed]
     file = parse_file("m.py", SOURCE, Path("x"))
@@ -100,7 +99,9 @@ def test_each_listed_anchor_finds_its_own_line(listed: list[ListedPlace]) -> Non
     assert max(Counter(one.location for one in listed).values()) == 1
 
 
-def test_models_work_at_the_places_that_list_them(shipped: Workspace, listed: list[ListedPlace]) -> None:
+def test_models_can_be_injected_only_at_the_places_that_list_them(
+    shipped: Workspace, listed: list[ListedPlace]
+) -> None:
     file, models, tried = parse_file("m.py", SOURCE, Path("x")), shipped.fault_models(), Counter[bool]()
     for one in listed:
         if one.location.function == "other":

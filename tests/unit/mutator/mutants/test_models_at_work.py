@@ -83,7 +83,6 @@ def test_a_stale_value_is_two_steps_old(toy: Make, kind: AnchorKind, name: str) 
 
 
 def test_staleness_is_counted_in_steps_and_not_in_executions(toy: Make) -> None:
-    """The last value of the earlier step is used."""
     made = toy("def f(x):\n    return x\n", AnchorKind.RETURN_VALUE, "x", "stale", steps=1)
     count, f = counting(), made.names["f"]
     made.names["f"] = lambda x: (f(x), f(count()))
@@ -91,7 +90,6 @@ def test_staleness_is_counted_in_steps_and_not_in_executions(toy: Make) -> None:
 
 
 def test_a_slow_call_returns_its_result_after_its_duration(toy: Make) -> None:
-    """During that time, no other call is made."""
     made = toy("def f(get):\n    return get()\n", AnchorKind.RESULT, "get", "slow_call", duration=2 * STEP_S)
     count = counting()
     assert made.run("..xxxxxx..xxx", lambda: count) == [1, 2, 3, 3, 3, 3, 4, 4, 6, 7, 8, 8, 8]
@@ -155,8 +153,7 @@ def test_the_anchored_statement_and_the_next_are_exchanged(toy: Make) -> None:
     )
 
 
-def test_exchanged_statements_raise_the_usual_error(toy: Make) -> None:
-    """A name is read before it is set."""
+def test_exchanged_statements_can_raise_an_unbound_local_error(toy: Make) -> None:
     source = "def f(x):\n    y = x\n    z = y\n    return z\n"
     made = toy(source, AnchorKind.BEFORE_ASSIGN, "y", "reordering")
     assert made.run(".", lambda: 1) == [1]
@@ -191,7 +188,6 @@ def test_a_return_statement_cannot_be_repeated(toy: Make) -> None:
 
 
 def test_two_arguments_are_swapped(toy: Make) -> None:
-    """Arguments can have keywords. The other arguments keep their order."""
     source = "def f(x):\n    return dict(a=x, b=x + 1, c=(x == 1))\n"
     made = toy(source, AnchorKind.RESULT, "dict", "swapped_arguments", first=1, second=3)
     assert made.run(".x", lambda: 1) == [{"a": 1, "b": 2, "c": True}, {"a": True, "b": 2, "c": 1}]
@@ -228,8 +224,9 @@ def test_a_model_of_a_call_needs_a_call_anchor(toy: Make, model: str, kind: Anch
 @pytest.mark.parametrize(
     ("holds", "taken"), [("inverted", [1, 2, 2]), ("always", [1, 1, 1]), ("never", [2, 2, 2])]
 )
-def test_a_branch_condition_is_negated_or_fixed(toy: Make, holds: str, taken: list[int]) -> None:
-    """The condition is still evaluated."""
+def test_a_branch_condition_is_evaluated_then_negated_or_fixed(
+    toy: Make, holds: str, taken: list[int]
+) -> None:
     asked: list[int] = []
     source = "def f(x):\n    if ask(x):\n        return 1\n    return 2\n"
     made = toy(source, AnchorKind.CONDITION, "ask(x)", "wrong_branch", holds=holds)
@@ -249,7 +246,6 @@ def test_a_branch_condition_is_negated_or_fixed(toy: Make, holds: str, taken: li
     ],
 )
 def test_an_exception_is_raised_while_the_fault_is_active(toy: Make, kind: AnchorKind, name: str) -> None:
-    """The anchor can be a statement or an expression."""
     made = toy("def f(x):\n    return x\n", kind, name, "exception", error="TimeoutError")
     assert made.run(".", lambda: 1) == [1]
     with pytest.raises(TimeoutError, match="injected fault"):
@@ -263,7 +259,6 @@ def test_a_call_returns_none_while_the_fault_is_active(toy: Make) -> None:
 
 
 def test_the_drift_of_an_expression_grows_with_each_active_step(toy: Make) -> None:
-    """A drift that remains after the fault needs a statement as its anchor."""
     source = "def f(x):\n    return x\n"
     made = toy(source, AnchorKind.RETURN_VALUE, "", "drift", per_step=0.5)
     assert made.run(".xx.x", lambda: 1) == [1, 1.5, 2.0, 1, 2.5]

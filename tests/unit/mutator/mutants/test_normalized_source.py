@@ -30,7 +30,6 @@ IDS = st.text("0123456789abcdef", min_size=8, max_size=8)
     ],
 )
 def test_plain_decimal_numbers_become_zero(text: str, kept: str) -> None:
-    """An integer becomes 0 and a float becomes 0.0. All other text is unchanged."""
     assert normalized(text, ()) == kept
 
 

@@ -32,7 +32,6 @@ BODY = "def f(x):\n    x = 1\n    return x\n"
     ],
 )
 def test_unreadable_files_are_refused(source: str, line: int | None, said: str) -> None:
-    """The error names the file, the first invalid line, the reason and the remedy."""
     with pytest.raises(MutatorError) as caught:
         parse_file("m.py", source.encode("latin-1" if "latin" in source else "utf-8"), Path("root"))
     error = caught.value

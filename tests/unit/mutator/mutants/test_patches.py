@@ -15,7 +15,6 @@ BODY = "".join(f"    y{i} = {i}\n" for i in range(10))
 
 
 def make(data: bytes, names: list[str], guard: bool) -> tuple[str, bytes]:
-    """Return the patch and the new bytes."""
     file = parse_file("pack/m.py", data, Path("root"))
     edits = [splicing.probe_import(file, "pack")]
     for name in names:
@@ -75,6 +74,5 @@ def test_a_tab_follows_a_file_name_with_a_space() -> None:
 
 @pytest.mark.parametrize(("end", "told"), [("\n", ""), ("", "\\ No newline at end of file\n")])
 def test_every_line_of_a_new_file_is_added(end: str, told: str) -> None:
-    """A missing newline at the end of the file is marked."""
     head = "diff --git a/m.py b/m.py\nnew file mode 100644\n--- /dev/null\n+++ b/m.py\n@@ -0,0 +1,3 @@\n"
     assert patches.new_file("m.py", f"a = 1\n\nb = 2{end}") == f"{head}+a = 1\n+\n+b = 2\n{told}"

@@ -30,7 +30,6 @@ def parsed(source: str = SOURCE) -> ParsedFile:
 
 
 def test_both_parsers_agree_on_places() -> None:
-    """Other statements can precede a statement on its line."""
     file = parsed()
     told = [f.place for functions in file.functions.values() for f in functions]
     told += [
@@ -58,7 +57,7 @@ def test_a_statement_that_the_parsers_place_on_different_lines_is_refused(
     assert caught.value.line == {"after_assign": 2, "before_return": 3, "entry": 1}[kind]
 
 
-def test_a_line_that_libcst_loses_is_detected_by_the_places(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_comparing_places_detects_a_line_that_libcst_loses(monkeypatch: pytest.MonkeyPatch) -> None:
     """The test turns off the check that LibCST reproduces the file's bytes."""
 
     def unchecked(data: bytes, where: Path) -> object:
@@ -84,7 +83,6 @@ def test_a_line_that_libcst_loses_is_detected_by_the_places(monkeypatch: pytest.
     ],
 )
 def test_backslashes_extend_the_last_statement(line: str, after: int) -> None:
-    """A backslash in a comment adds no line."""
     module = cst.parse_module(line + "\n")
     positions = MetadataWrapper(module, unsafe_skip_copy=True).resolve(PositionProvider)
     first = module.body[0]

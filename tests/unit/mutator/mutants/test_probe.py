@@ -56,13 +56,11 @@ def drive(fi: Any, lead_speeds: str, start: float = 0.0) -> str:
 def test_a_fault_is_held_as_requested(
     clone: Workspace, hold: Hold, seconds: float, armed: float, expected: str
 ) -> None:
-    """Once armed, a fault is active while its condition holds, for a fixed time, or to the end of the run."""
     fi = probe(clone, hold=hold.value, hold_s=seconds, armed_after_s=armed)
     assert drive(fi, "..xxx..xx.") == expected
 
 
 def test_the_report_has_times_and_counts(clone: Workspace) -> None:
-    """An injection that never ran is in the report, too."""
     fi = probe(clone)
     drive(fi, "..xx.x")
     assert fi.report() == {
@@ -116,7 +114,6 @@ def test_time_that_does_not_advance_is_an_error(
 
 
 def test_an_observed_value_that_is_not_a_number_is_an_error(clone: Workspace) -> None:
-    """The error is raised again when the report is requested."""
     fi = probe(clone)
     with pytest.raises(TypeError, match="NoneType"):
         fi.observe(t=0.0, d_rel=None, v_ego=20.0, v_lead=15.0)
@@ -125,7 +122,6 @@ def test_an_observed_value_that_is_not_a_number_is_an_error(clone: Workspace) ->
 
 
 def test_a_run_stops_in_the_step_after_its_limit(clone: Workspace) -> None:
-    """The full limit applies to the next run."""
     fi = probe(clone)
     fi.limit(3)
     drive(fi, "...")
@@ -146,8 +142,6 @@ def test_observed_values_can_be_named_like_variables_of_the_probe(clone: Workspa
 
 
 def test_derived_variables_are_computed(clone: Workspace) -> None:
-    """Headway is infinite at standstill, relative speed is the car's speed minus the lead's, and division
-    never raises."""
     fi = probe(clone, condition="hwt > 1e6 and rs == -3 and 1 / v_ego > 5")
     fi.observe(t=0.0, d_rel=10.0, v_ego=0.0, v_lead=3.0)
     assert fi.active("a")
@@ -188,7 +182,6 @@ def test_stored_values_are_reset_at_each_activation(clone: Workspace) -> None:
 
 
 def test_delayed_values_are_as_old_as_the_delay(clone: Workspace) -> None:
-    """The first value is returned until another value is old enough."""
     fi = probe(clone, condition="t >= 0.2")
     seen = []
     for i in range(8):
@@ -199,7 +192,6 @@ def test_delayed_values_are_as_old_as_the_delay(clone: Workspace) -> None:
 
 
 def test_values_stored_for_a_run_outlast_an_activation(clone: Workspace) -> None:
-    """Each injection has its own values. All of them are discarded at the end of the run."""
     fi = probe(clone)
     made = iter(range(10))
     seen = []
@@ -212,7 +204,6 @@ def test_values_stored_for_a_run_outlast_an_activation(clone: Workspace) -> None
 
 
 def test_noise_depends_only_on_its_seed(clone: Workspace) -> None:
-    """The shared generator of `random` is unchanged."""
     fi = probe(clone, condition="True")
     state = random.getstate()
     runs = []
@@ -254,8 +245,6 @@ FLIPS = [
 
 @pytest.mark.parametrize(("value", "bit", "result"), FLIPS, ids=lambda one: str(getattr(one, "dtype", one)))
 def test_a_bit_flip_keeps_the_type(clone: Workspace, value: Any, bit: int, result: Any) -> None:
-    """A flip changes a number, or each number of an array. The original value is not modified, and a second
-    flip restores it."""
     fi, before = probe(clone), copy.deepcopy(value)
     flipped = fi.flip_bit(value, bit)
     assert np.array_equal(flipped, result)
@@ -277,7 +266,6 @@ def test_a_bit_flip_keeps_the_type(clone: Workspace, value: Any, bit: int, resul
     ],
 )
 def test_a_bit_outside_the_type_is_an_error(clone: Workspace, value: Any, bit: int) -> None:
-    """Types whose bits cannot be flipped cause the same error."""
     with pytest.raises(ValueError, match=f"{value.dtype.name} has no bit {bit} to flip"):
         probe(clone).flip_bit(value, bit)
 

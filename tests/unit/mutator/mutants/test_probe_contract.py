@@ -38,7 +38,7 @@ def see(fi: Any, *, near: bool) -> None:
     assert fi.active(IDS[0]) is near
 
 
-def test_the_evaluated_decision_agrees_with_observe(clone: Workspace) -> None:
+def test_the_decision_of_the_harness_agrees_with_the_probe(clone: Workspace) -> None:
     code = compile(source(clone), "_fi", "exec")
     armed_t, holds = contract.decision(code)
     module: dict[str, Any] = {}
@@ -96,7 +96,6 @@ def test_a_report_without_an_active_injection_has_no_activation(report: dict[str
 
 
 def test_activations_of_all_injections_are_added(clone: Workspace) -> None:
-    """The harness's own report for a mutant that never triggers is read in the same way."""
     early = {"first": 0.25, "last": 0.75, "count": 1}
     report = {"injections": {"a": RAN, "b": early, "c": NEVER}}
     assert contract.activation_of(report) == Activation(first=0.25, last=2.0, count=4)
@@ -153,6 +152,5 @@ def test_valid_reports_have_no_findings(clone: Workspace) -> None:
     ],
 )
 def test_damaged_reports_are_detected(change: Any, said: str) -> None:
-    """Keys, types and numbers can be wrong, or contradict each other."""
     report = SOUND | change if isinstance(change, dict) else change
     assert said in contract.report_problem(report, "m", ("a", "b"))

@@ -1,5 +1,4 @@
-"""Rendering templates: values become literals, names are checked, and templates have no access to anything
-else."""
+"""The rendering of templates into Python code."""
 
 import copy
 import math
@@ -60,8 +59,7 @@ def rendered(template: str, kind: SnippetKind = SnippetKind.INSERT, **params: Va
     ],
 )
 def test_numbers_become_exact_literals(value: float, plain: str, added: str) -> None:
-    """Non-finite numbers have a form that Python reads. A whole number has no decimal point, so that an
-    integer variable stays an integer."""
+    """Added whole numbers have no decimal point, so that an integer variable stays an integer."""
     assert rendered("{{ target }} = {{ by }}\n", by=value) == (f"x = {plain}",)
     assert rendered("{{ target }} = y {{ by | signed }}\n", by=value) == (f"x = y {added}",)
 
@@ -142,7 +140,6 @@ def test_a_guard_opens_a_block() -> None:
     ],
 )
 def test_an_expression_stays_one_operand(template: str, text: str) -> None:
-    """Parentheses are added if needed."""
     made = replace(model(template, SnippetKind.VALUE), expression=template)
     assert changed_value(made, {"by": 1.0}, "ab12", "y") == text
 
@@ -179,7 +176,6 @@ CONSTANT = ParamSchema(name="value", type="constant", about="", optional=True)
     ],
 )
 def test_constants_are_written_with_repr(given: dict[str, Value], line: str) -> None:
-    """None is distinguished from a missing constant."""
     template = "x = {% if value is none %}0{% else %}{{ value }}{% endif %}\n"
     assert snippet(replace(model(template), params=(CONSTANT,)), given, "ab12") == (line,)
 
@@ -253,7 +249,6 @@ def test_constants_are_written_with_repr(given: dict[str, Value], line: str) -> 
 def test_a_models_result_has_the_expected_value_and_type(
     clone: Workspace, name: str, params: dict[str, Value], value: Any, result: Any
 ) -> None:
-    """Integers stay integers if the parameters are whole numbers."""
     models = clone.fault_models()
     given = {"target": "x", **{key: int(v) if key == "bit" else v for key, v in params.items()}}
     given = {key: v for key, v in given.items() if v is not None or key == "value"}

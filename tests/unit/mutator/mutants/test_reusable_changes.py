@@ -51,7 +51,6 @@ def change(text: str, code: str, name: str, guard: bool) -> tuple[ReusableChange
 @pytest.mark.parametrize("guard", [False, True])
 @pytest.mark.parametrize("text", TEXTS)
 def test_a_reusable_change_equals_the_spliced_one(text: str, guard: bool) -> None:
-    """The reusable change of one mutant is filled with the lines of another of the same kind."""
     code = "if _fi.active('{}', {}):" if guard else "x = _fi.held('{}', {})"
     reusable, _, _, compiles = change(text, code.format("00000001", 3.25), "00000001", guard)
     other, made, lines, _ = change(text, code.format("abcdefab", 1e-300), "abcdefab", guard)

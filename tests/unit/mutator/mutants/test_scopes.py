@@ -18,7 +18,6 @@ def genexpr(x=(i for i in 'ab')): return (µ for µ in x)
 
 
 def test_a_function_knows_its_own_and_outer_names() -> None:
-    """Names that only inner functions use are unknown."""
     names = function_names(SOURCE.encode())
     go = names[4, "go"]
     assert {"self", "x", "__own", "limit", "inner", "max"} <= go
@@ -28,7 +27,6 @@ def test_a_function_knows_its_own_and_outer_names() -> None:
 
 
 def test_the_files_encoding_is_used() -> None:
-    """A byte order mark can declare the encoding."""
     latin = "# coding: latin-1\ndef f(\xe9): return \xe9\n".encode("latin-1")
     assert function_names(latin) == {(2, "f"): {"\xe9"}}
     assert function_names("\ufeffdef f(\xe9): pass\r\n".encode()) == {(1, "f"): {"\xe9"}}
@@ -73,8 +71,6 @@ CLASS = "class C:\n    def f(self):\n        #\n        return __x\n"
 def test_an_inserted_binding_can_change_the_scope_of_a_name(
     source: str, inserted: str, moved: tuple[str, str, str, str] | None
 ) -> None:
-    """A binding of a name that was already local or declared changes nothing. Attributes, keyword arguments
-    and comprehension variables do not bind names of the function."""
     place = next(i for i, line in enumerate(source.splitlines(), 1) if line.strip() == "#")
     made = source.replace("#", inserted)
     found = next(moved_names(source.replace("#", "pass").encode(), made.encode(), {place}), None)

@@ -88,7 +88,6 @@ def test_inserting_changes_no_other_line(text: str | bytes) -> None:
 
 
 def test_a_guard_indents_the_statement_it_wraps() -> None:
-    """Blank lines stay blank."""
     text = "def f(x):\n    g(\n        1,\n\n  2)  # why\n    return x\n"
     assert spliced(text, AnchorKind.BEFORE_CALL, "g", guard=True).decode() == (
         'def f(x):\n    if not _fi.active("ab12"):  # fi:ab12 guard:4\n'
@@ -97,7 +96,7 @@ def test_a_guard_indents_the_statement_it_wraps() -> None:
 
 
 def test_a_guard_does_not_indent_the_inside_of_a_string() -> None:
-    """Indenting its lines would change the string."""
+    """Indenting the lines of a string would change the string."""
     text = 'def f(x):\n    g("""a\n    b""", f"""{x}\n""")\n'
     assert spliced(text, AnchorKind.BEFORE_CALL, "g", guard=True).decode() == (
         'def f(x):\n    if not _fi.active("ab12"):  # fi:ab12 guard:1\n'
@@ -117,7 +116,6 @@ def test_a_guard_does_not_indent_the_inside_of_a_string() -> None:
     ],
 )
 def test_guards_can_be_undone_in_files_of_every_form(text: str) -> None:
-    """Examples are tabs, mixed indentation, CRLF and missing final newlines."""
     assert b"guard:" in spliced(text, AnchorKind.BEFORE_CALL, "g", guard=True)
 
 
@@ -177,7 +175,6 @@ def test_a_snippet_that_the_files_encoding_cannot_represent_is_refused() -> None
 
 
 def test_the_import_of_the_probe_is_tagged() -> None:
-    """The import is inserted below the docstring and `__future__` imports."""
     file = parsed('"""Doc."""\nfrom __future__ import annotations\n\nimport os\n')
     result = splicing.joined(splicing.apply_edits(file, [splicing.probe_import(file, "pack")]))
     assert result.decode() == (
@@ -186,7 +183,6 @@ def test_the_import_of_the_probe_is_tagged() -> None:
 
 
 def test_a_byte_order_mark_stays_first() -> None:
-    """The probe's import is inserted below the docstring. A file without a docstring is refused."""
     file = parsed(b"\xef\xbb\xbf'Doc.'\nx = 1\n")
     result = splicing.joined(splicing.apply_edits(file, [splicing.probe_import(file, "pack")]))
     compile(result, "m.py", "exec")

@@ -60,23 +60,18 @@ def candidates(**sources: str) -> tuple[LoopCandidate, ...]:
 
 
 def test_the_controllers_step_ranks_first() -> None:
-    """A method with a step's name, in a class with state and called in a loop, ranks before methods of the
-    world and helpers."""
     first, *others = candidates(car=CAR)
     assert (first.name, first.path, first.line) == ("SpeedController.update", "car.py", 14)
     assert {one.name for one in others} == {"World.advance", "clip", "run"}
 
 
 def test_required_arguments_are_listed() -> None:
-    """Arguments of the step and of the constructor are listed, including keyword-only arguments."""
     first, *_ = candidates(car=CAR)
     assert first.needs == ("speed", "wanted", "dt")
     assert first.builds == ("gain", "limit")
 
 
 def test_only_numbers_with_a_name_are_listed_as_values() -> None:
-    """Texts, items and unpacked tuples are not listed. Names that are assigned once come first. The
-    assignments of other names are numbered."""
     first, *_ = candidates(car=CAR)
     assert [(value.name, value.line, value.nth) for value in first.values] == [
         ("error", 16, None),

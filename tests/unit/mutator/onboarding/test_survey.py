@@ -27,7 +27,6 @@ def tree(tmp_path: Path) -> Tree:
 
 
 def test_packages_and_flat_modules_are_distinguished(tree: Tree) -> None:
-    """Tests, setup scripts and folders without Python are ignored."""
     folder = tree(
         pkg__a_py="",
         loose_py="",
@@ -62,7 +61,6 @@ def test_an_empty_folder_has_no_packages(tree: Tree) -> None:
 
 
 def test_an_unreadable_file_is_listed_with_its_position(tree: Tree) -> None:
-    """The file has a syntax error or is not text."""
     folder = tree(bad_py="x = 1\ndef (:\n", good_py="")
     (folder / "binary.py").write_bytes(b"\0\xff")
     found = look_at(str(folder))
@@ -78,7 +76,6 @@ def test_nothing_is_imported(tree: Tree) -> None:
 
 
 def test_files_that_cannot_be_imported_are_left_out(tree: Tree) -> None:
-    """Pipes, dangling links and files whose names are not module names cannot be imported."""
     folder = tree(pkg__a_py="")
     for name in ("b-c.py", "class.py"):
         (folder / "pkg" / name).touch()
@@ -105,7 +102,6 @@ def test_environments_and_hidden_folders_are_left_out(tree: Tree) -> None:
 
 
 def test_an_installed_package_is_found_without_importing_it() -> None:
-    """The survey also gives the requirement for the package."""
     found = look_at("installed:typer")
     assert found.packages == ("typer",)
     assert found.requires and found.requires.startswith("typer>=")

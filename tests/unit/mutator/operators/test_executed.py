@@ -1,4 +1,4 @@
-"""The lines that a golden run executes. Recording them does not change the run."""
+"""The lines that a golden run executes."""
 
 from pathlib import Path
 
@@ -20,8 +20,7 @@ def _number(path: Path, text: str) -> int:
     return next(i for i, line in enumerate(path.read_text().splitlines(), 1) if text in line)
 
 
-def test_lines_are_recorded_from_the_first_observation_on(toycar: Workspace, tmp_path: Path) -> None:
-    """Lines of constructors are therefore left out. The trace is the same as without recording."""
+def test_lines_are_recorded_from_the_first_observation(toycar: Workspace, tmp_path: Path) -> None:
     manifest = toycar.manifest("toycar")
     base = prepare_base(manifest, tmp_path / "base")
     engine = ReferenceEngine(manifest, base, tmp_path, LIMITS)
@@ -44,7 +43,6 @@ def test_lines_are_recorded_from_the_first_observation_on(toycar: Workspace, tmp
 def test_executed_lines_are_cached(
     toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A damaged entry is measured again, and a failed run is an error."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     manifest = toycar.manifest("toycar")
     drive = GoldenDrive(scenario=toycar.scenario("A"), changes=(), seed=7)

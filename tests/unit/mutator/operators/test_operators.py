@@ -126,8 +126,7 @@ def test_mutations_to_equal_code_are_dropped(make: Make) -> None:
 
 
 def test_first_values_are_kept_in_functions_with_the_same_name(make: Make) -> None:
-    """A property and its setter share a name. In each, no mutant omits the assignment that gives a local name
-    its first value."""
+    """A property and its setter have the same name."""
     setter = "@f.setter\n    def f(self, a):\n        c = a\n        self.a = c"
     made = make(
         f"@property\n    def f(self):\n        c = 1\n        return c\n    {setter}",
@@ -151,7 +150,6 @@ def test_a_long_change_is_shortened_to_the_part_that_differs(make: Make) -> None
 
 
 def test_places_can_be_files_functions_and_globs(toycar: Workspace) -> None:
-    """Lines that are not executed are left out and counted."""
     manifest, models = toycar.manifest("toycar"), toycar.fault_models()
 
     def found(place: str, executed: dict[str, list[int]] | None = None) -> Found:
@@ -175,7 +173,6 @@ def test_places_can_be_files_functions_and_globs(toycar: Workspace) -> None:
 
 
 def test_samples_are_stratified_and_reproducible(toycar: Workspace) -> None:
-    """In each function, each operator is sampled in proportion to its mutants."""
     manifest, models = toycar.manifest("toycar"), toycar.fault_models()
     found = find_mutations(manifest, models, list(Operator), ["toycar/**"])
     drawn = sampled(found, len(found.mutations) // 3, 4)
@@ -187,7 +184,6 @@ def test_samples_are_stratified_and_reproducible(toycar: Workspace) -> None:
 
 
 def test_every_mutant_of_the_toy_can_be_built(toycar: Workspace) -> None:
-    """A direct build gives the same bytes. All ids differ."""
     manifest, models = toycar.manifest("toycar"), toycar.fault_models()
     found = find_mutations(manifest, models, list(Operator), ["toycar/sensing.py", "toycar/driver.py"])
     faults = [one.fault("as_described") for one in found.mutations]

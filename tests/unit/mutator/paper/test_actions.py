@@ -63,7 +63,6 @@ def test_braking_is_not_too_short_if_golden_does_not_brake() -> None:
 def test_gas_that_the_golden_run_does_not_give_is_at_a_wrong_time(
     begin: float, end: float, shown: tuple[float, float] | None
 ) -> None:
-    """Only gas of at least half a second, between the activation and the hazard, is reported."""
     given = pair({"gas": during(3, 4)}, {"gas": during(begin, end)})
     assert stretch(at_a_wrong_time("gas"), given) == shown
     assert at_a_wrong_time("brake")(given) is None
@@ -83,14 +82,12 @@ BOTH = {"gas": during(5, 7), "brake": during(1, 6)}
 def test_gas_and_brake_are_unavailable_if_they_end_soon_after_the_alert(
     golden: dict[str, np.ndarray], last: float, shown: tuple[float, float] | None
 ) -> None:
-    """The actuators are unavailable from the last gas or brake to the end of the run."""
     given = pair(golden, {"brake": during(1, last)})
     assert stretch(both_unavailable, given) == shown
     assert both_unavailable(replace(given, alert=None)) is None
 
 
 def test_runs_are_compared_up_to_the_end_of_the_shorter_one(record: Callable[..., Record]) -> None:
-    """The activation, the hazard and the first alert are taken from the record."""
     found = record(hazards=(("H3", 4.0), ("H1", 5.0)), alerts=(("a", 3.5), ("b", 3.0)))
     long, short = {"t": T, "gas": NONE}, {"t": T[:70], "gas": NONE[:70]}
     for golden, faulty in ((long, short), (short, long)):

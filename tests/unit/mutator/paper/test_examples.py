@@ -90,7 +90,6 @@ def test_rewriting_a_report_starts_no_process(place: Path, monkeypatch: pytest.M
 
 
 def test_a_figure_needs_only_the_stored_series(place: Path, tmp_path: Path) -> None:
-    """After an edit of the target, the figure is drawn again as the same file."""
     contents = []
     for _ in range(2):
         write_drawings([drawn(place, BRAKE)], tmp_path)
@@ -133,12 +132,11 @@ def test_matching_experiments_are_tried_until_one_shows_the_action(place: Path) 
 
 
 def test_a_query_without_a_match_is_reported(place: Path) -> None:
-    """A query also has no match if the run lacks the action's channel."""
     assert "no experiment of this run matches" in drawn(place, replace(BRAKE, query='module == "radar"')).note
     assert "records no sail" in drawn(place, replace(BRAKE, actions=("sail",))).note
 
 
-def test_candidates_come_largest_first_then_by_id() -> None:
+def test_candidates_are_sorted_by_size_and_then_by_id() -> None:
     h1 = {"t_activation": 2, "t_h1": 5, "max_dev_gas": 0}
     frame: pd.DataFrame = results(
         h1 | {"max_dev_brake": 9.0},

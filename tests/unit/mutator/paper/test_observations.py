@@ -31,7 +31,7 @@ EVENTS = {  # the events of a run, by the count that includes it
 
 
 def runs_of(tally: Tally, **group: str) -> pd.DataFrame:
-    """As many runs as the counts say, with their events."""
+    """Runs with the given counts of events."""
     warned = tally.hazards - (tally.hazards_no_alerts or 0)
     kinds = [
         (warned, ("manifested", "alerts", "hazards")),
@@ -162,7 +162,6 @@ def test_a_claim_is_undecided_if_a_group_is_missing() -> None:
 
 
 def test_the_median_time_to_a_hazard_includes_runs_without_one() -> None:
-    """If no run has a hazard, the lower end of the interval is infinite."""
     alerted = ACTIVATED | {"alerts": "fcw", "t_alert": 2.0}
     safe, late = of_rows(*[alerted] * 20), of_rows(*[alerted | {"t_h1": 6.0}] * 20)
     assert median_time(safe, of="").low == math.inf

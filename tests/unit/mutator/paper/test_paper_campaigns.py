@@ -73,7 +73,6 @@ def test_the_paper_campaigns_have_the_counts_of_table_three(paper: Plan) -> None
 
 
 def test_each_value_is_injected_in_each_scenario_and_context(paper: Plan) -> None:
-    """There are 282 values, five scenarios and four contexts. Each guided experiment has a random partner."""
     guided = of_method(paper, Method.GUIDED, pair)
     assert guided == of_method(paper, Method.RANDOM, pair)
     faults = {e.fault.id for e in paper.experiments}
@@ -92,7 +91,6 @@ def test_each_method_alone_has_its_half_of_the_experiments(
 
 
 def test_the_as_coded_campaign_has_the_same_counts(library: Workspace) -> None:
-    """Its triggers are armed from the start."""
     coded = make_plan(library, "paper_guided", Choices(reading="as_coded"))
     assert kinds(coded, Method.GUIDED) == INJECTED
     assert {e.trigger.armed_after_s for e in coded.experiments} == {0.0}
@@ -126,7 +124,6 @@ def test_the_reference_campaign_is_the_paper_as_coded(library: Workspace) -> Non
 
 
 def test_the_plan_is_the_same_in_another_process(sample: Plan) -> None:
-    """The other process has another hash seed and locale."""
     code = (
         "from pathlib import Path; from mutator.campaigns.plans import Choices, make_plan;"
         "from mutator.workspace import Workspace;"

@@ -60,8 +60,7 @@ def test_the_guided_advantage_reverses_per_injected_fault(paper: Paper) -> None:
     assert rates == [35.8, 29.0, 23.3, 29.0]
 
 
-def test_our_counts_are_below_the_papers(paper: Paper) -> None:
-    """Cells without a published count are empty."""
+def test_our_counts_are_in_the_row_below_the_papers(paper: Paper) -> None:
     frame = results(HIT, HIT | {"alerts": "fcw", "t_alert": 9}, {}, {"scenario": "S9", "t_activation": 2})
     lines = summary_sheet("guided", by_scenario(frame), paper.published()).table().rows
     hazards = [line[2:] for line in lines if line[:2] == ["hazards", "activated"]]
@@ -76,8 +75,7 @@ def test_our_counts_are_below_the_papers(paper: Paper) -> None:
     assert unwarned[3].startswith("50.0 % (1/2;")
 
 
-def test_coverage_has_both_denominators(paper: Paper) -> None:
-    """Hazards are given per activated and per injected fault."""
+def test_hazards_are_given_per_activated_and_per_injected_fault(paper: Paper) -> None:
     frame = results({"fault_type": "zeta"}, HIT, {}, {"fault_type": "jamming", "t_activation": 3})
     sheet = coverage_sheet("guided", by_kind(frame), paper.published())
     kinds = [line[0] for line in sheet.lines]
@@ -104,7 +102,7 @@ def test_contradictory_counts_are_reported_with_their_line(tmp_path: Path) -> No
         load_paper(tmp_path)
 
 
-def test_the_papers_advantage_within_fault_types(paper: Paper) -> None:
+def test_within_fault_types_guided_is_ahead_only_per_activated_fault(paper: Paper) -> None:
     activated, injected = (
         contrasts.mantel_haenszel(contrasts.strata(paper.coverage, whole)) for whole in contrasts.WHOLES
     )
@@ -114,7 +112,7 @@ def test_the_papers_advantage_within_fault_types(paper: Paper) -> None:
     assert activated.low > 1
 
 
-def test_the_papers_counts_go_through_the_same_tests_as_ours(paper: Paper) -> None:
+def test_the_papers_counts_and_ours_get_the_same_statistical_tests(paper: Paper) -> None:
     frame = results(HIT, HIT | {"method": "random", "trigger": "random/C2"})
     overall, kinds = overall_sheet(frame, paper.published()), kinds_sheet(frame, paper.published())
     assert [line[:2] for line in overall.lines] == [

@@ -1,4 +1,4 @@
-"""The number of seeds that show each observation, for results made by hand."""
+"""The number of seeds that show each observation, for made-up results."""
 
 from pathlib import Path
 from typing import Any
@@ -59,7 +59,6 @@ def test_seeds_that_show_each_observation_are_counted(tmp_path: Path) -> None:
 
 
 def test_a_seed_without_some_fault_types_is_judged_by_its_own_runs(tmp_path: Path) -> None:
-    """With a single seed, there is no comparison."""
     file = tmp_path / "observations.yaml"
     file.write_text(OBSERVATIONS)
     found = judge_by_seed(file, frame(), lambda runs: ["a type"] if set(runs["seed"]) == {"3"} else [])

@@ -57,7 +57,6 @@ def test_without_a_library_there_are_no_observations(run: Path) -> None:
 
 
 def test_the_report_links_to_the_page_of_the_study(run: Path) -> None:
-    """The page of the study is deleted if the results can no longer be compared with the study."""
     written = building.write(run, HERE)
     assert "[STUDY.md](STUDY.md)" in written.markdown.read_text()
     assert "study.html" in Page(written.page.read_text()).links
@@ -71,7 +70,6 @@ def test_the_report_links_to_the_page_of_the_study(run: Path) -> None:
 
 
 def test_an_experiment_outside_the_plan_has_no_figure(run: Path) -> None:
-    """The Markdown and the page show the query instead."""
     forms = study_forms(run)
     for text in forms:
         assert "No figure: the traces are not available" in text

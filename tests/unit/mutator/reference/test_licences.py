@@ -44,7 +44,6 @@ def clone(folder: Path, *packages: str) -> Path:
 
 
 def test_a_package_that_is_not_installed_keeps_its_licence(tmp_path: Path) -> None:
-    """A new package that is not installed is an error."""
     page = clone(tmp_path, "pytest", "no_such") / PAGE
     page.write_text("| gone | others | MIT |\n| no_such | others | BSD |\n")
     write_licences(tmp_path)

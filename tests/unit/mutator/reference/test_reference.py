@@ -71,8 +71,6 @@ def test_every_model_and_key_is_described(kind: Format) -> None:
 
 
 def test_models_are_in_reading_order() -> None:
-    """The file's model comes first, and then those of its keys, in the order in which they are first
-    needed."""
     names = reading_order(definitions(spec_model(Workspace.find(CLONE).readings())))
     assert names == ["Spec", "Variant", "Draw", "Sweep", "Reading", "Injection", "At"]
 
