@@ -60,9 +60,6 @@ def execution(
     ],
 )
 def test_the_lines_on_the_stack_determine_the_blame(stack: Stack, status: Status) -> None:
-    """An exception in the target's own code is a crash. If the exception is in an injected line, in a probe
-    helper that it calls, or in target code that it calls, the mutant is invalid. An exception in a line that
-    only observes or checks the probe is a harness error."""
     assert assign_blame(execution(stack), FILES, ())[0] is status
 
 
@@ -88,8 +85,6 @@ CHANGED = {
     ],
 )
 def test_the_mutant_is_blamed_only_for_the_injected_part_of_a_line(stack: Stack, status: Status) -> None:
-    """An exception in the rest of the line is blamed on the target, and one raised by checking the probe on
-    the harness."""
     assert assign_blame(execution(stack), CHANGED, ())[0] is status
 
 
@@ -111,8 +106,6 @@ TWO = b"""def say(x):
     [(IN_A_STRING, "None.x"), (LATIN, "1 / 0"), (TWO, "no()"), (TWO, "1 / 0")],
 )
 def test_columns_of_the_injected_part_are_counted_in_utf_8_bytes(data: bytes, of_fault: str) -> None:
-    """The line begins inside a string, has non-ASCII letters, or has two injections. Code before or after the
-    injected part belongs to the target."""
     encoding = "latin-1" if b"latin" in data else "utf-8"
     number = 1 + next(n for n, line in enumerate(data.splitlines()) if b"# fi:" in line)
     line = data.splitlines()[number - 1].decode(encoding)
@@ -150,7 +143,6 @@ def test_the_message_names_the_line_or_the_reason() -> None:
 
 
 def test_an_intended_exception_is_a_crash() -> None:
-    """The exception of any other injection makes the mutant invalid."""
     assert assign_blame(execution((INJECTED,)), FILES, ("0a1b2c3d",))[0] is Status.CRASHED
     assert assign_blame(execution((INJECTED,)), FILES, ("ffffffff",))[0] is Status.INVALID_MUTANT
     assert assign_blame(execution((PROBE, GUARD)), FILES, ("0a1b2c3d",))[0] is Status.HARNESS_ERROR
@@ -165,7 +157,6 @@ def test_a_fault_is_not_blamed_before_its_activation(status: Status, stacks: tup
 
 
 def test_a_run_without_an_exception_keeps_its_status() -> None:
-    """A run can time out or end silently after the activation, or be a harness error at any time."""
     for status in (Status.CRASHED, Status.TIMEOUT):
         assert assign_blame(execution(status=status, probe=False), FILES, ()) == (status, "why")
     told = assign_blame(execution(status=Status.HARNESS_ERROR, active=False), FILES, ())
@@ -173,16 +164,13 @@ def test_a_run_without_an_exception_keeps_its_status() -> None:
 
 
 def test_the_first_of_chained_exceptions_is_blamed() -> None:
-    """The target catches an exception of an injected line or of the probe and raises a different one. An
-    exception of the probe takes precedence."""
     assert assign_blame(execution((TARGET,), (ELSEWHERE,)), FILES, ())[0] is Status.CRASHED
     assert assign_blame(execution((TARGET,), (INJECTED,)), FILES, ())[0] is Status.INVALID_MUTANT
     assert assign_blame(execution((INJECTED,), (OBSERVES,)), FILES, ())[0] is Status.HARNESS_ERROR
 
 
-def test_endless_recursion_is_blamed_on_the_target() -> None:
-    """This holds even if an injected line made the last call, but not if an injected line called the code
-    that failed."""
+def test_endless_recursion_in_the_targets_code_is_blamed_on_the_target() -> None:
+    """The last call before the recursion limit can be in an injected line."""
     for top in ((INJECTED,), (PROBE, INJECTED), (GUARD,), (PROBE, GUARD)):
         deep = execution((*top, TARGET, ELSEWHERE), kind="RecursionError")
         assert assign_blame(deep, FILES, ())[0] is Status.CRASHED
@@ -195,7 +183,6 @@ def test_a_missing_report_is_a_harness_error() -> None:
 
 
 def test_the_reported_position_is_the_targets_innermost_line() -> None:
-    """The position is never a line of the probe."""
     error = error_of(execution((PROBE, INJECTED, ELSEWHERE)).raised)
     assert error == RunError(kind="ValueError", message="no", place="car/radar.py:5")
     assert error_of(None) is None

@@ -27,7 +27,6 @@ def test_the_shipped_target_has_the_expected_columns_in_order(clone: Workspace) 
 
 
 def test_another_target_has_its_own_columns() -> None:
-    """Hazards come before alerts, and channels after the reaction time. No column is specific to a car."""
     made = names(["CRUSHED"], ["gripper_force"])
     at = made.index("t_manifest")
     assert made[at + 1 : at + 4] == ["crushed", "t_crushed", "alerts"]
@@ -36,7 +35,6 @@ def test_another_target_has_its_own_columns() -> None:
 
 
 def test_a_target_can_have_no_hazards() -> None:
-    """No fixed column is mistaken for a hazard."""
     made = names([], [])
     assert hazards_in(made) == ()
     assert not [name for name in made if name.startswith("max_dev_")]
@@ -54,7 +52,6 @@ def test_hazard_columns_keep_the_order_of_the_manifest() -> None:
     ],
 )
 def test_deviation_columns_use_the_first_word_of_a_channel(channels: list[str], columns: list[str]) -> None:
-    """If that word is not unique, the whole name is used."""
     assert list(deviation_columns(channels).values()) == columns
 
 
@@ -70,7 +67,7 @@ def test_deviation_columns_use_the_first_word_of_a_channel(channels: list[str], 
     ],
 )
 def test_names_are_read_as_text(column: str, text: bool) -> None:
-    """Names can look like numbers. The columns that a target adds contain numbers."""
+    """Names can look like numbers."""
     assert is_text(column) is text
 
 
@@ -102,7 +99,6 @@ def test_a_hazard_with_an_existing_column_is_refused(toy: Workspace, hazards: st
     ],
 )
 def test_a_metric_with_an_existing_column_is_refused(toy: Workspace, metrics: list[str], at: str) -> None:
-    """A metric must not make another column look like a hazard, either."""
     path = toy.library / "targets" / "toy.yaml"
     lines = [f"  {name}: {{max: speed, unit: m/s, worse: higher, about: x}}" for name in metrics]
     path.write_text("\n".join([path.read_text().rstrip(), "metrics:", *lines, ""]))

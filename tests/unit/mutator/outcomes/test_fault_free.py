@@ -43,7 +43,6 @@ def folder(path: Path, runs: dict[tuple[str, str], dict]) -> RunFolder:
 
 
 def test_the_table_has_first_times_of_events_and_ranges_of_channels(tmp_path: Path) -> None:
-    """Channels and alerts that are not declared or recorded are left out."""
     raised = [{"name": "fcw", "t": 3.5}, {"name": "fcw", "t": 9.0}, {"name": "chime", "t": 1.0}]
     runs = fault_free_runs(
         folder(

@@ -84,13 +84,12 @@ def test_the_first_and_the_largest_difference_are_found() -> None:
 
 
 @pytest.mark.parametrize(("step", "first"), [(1e-12, T[3]), (0.5, T[3])])
-def test_without_a_tolerance_any_difference_counts(step: float, first: float) -> None:
+def test_without_a_tolerance_any_difference_is_a_manifestation(step: float, first: float) -> None:
     difference = compare(trace(gas=[1, 1, 1, 1, 1]), trace(gas=[1, 1, 1, 1 + step, 1]), [GAS], "t")
     assert difference.t_first == first
 
 
 def test_a_difference_within_its_tolerance_is_not_a_manifestation() -> None:
-    """The size of the difference is stored nevertheless."""
     channel = Channel(name="gas", unit="-", tolerance=0.1)
     difference = compare(trace(gas=[1, 1, 1]), trace(gas=[1, 1.05, 1]), [channel], "t")
     assert difference.t_first is None
@@ -99,7 +98,6 @@ def test_a_difference_within_its_tolerance_is_not_a_manifestation() -> None:
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_a_non_finite_value_is_an_infinite_difference(value: float) -> None:
-    """This holds for any tolerance."""
     channel = Channel(name="gas", unit="-", tolerance=100.0)
     difference = compare(trace(gas=[1, 1, 1]), trace(gas=[1, value, 1]), [channel], "t")
     assert difference.t_first == T[1]
@@ -132,7 +130,6 @@ def test_a_trace_is_read(tmp_path: Path) -> None:
 
 
 def test_an_invalid_trace_is_a_bad_output(tmp_path: Path) -> None:
-    """A trace is invalid if it is missing, incomplete, without a channel, or of unequal lengths."""
     path = tmp_path / "trace.npz"
     with pytest.raises(BadOutput):
         load_trace(MANIFEST, tmp_path)
@@ -153,7 +150,6 @@ def test_an_invalid_trace_is_a_bad_output(tmp_path: Path) -> None:
 
 
 def test_an_unusual_file_is_a_bad_output(tmp_path: Path) -> None:
-    """A file of a single array, a member with an invalid header, and a pipe are bad outputs."""
     path = tmp_path / "trace.npz"
     with path.open("wb") as file:
         np.save(file, T)
@@ -171,8 +167,7 @@ def test_an_unusual_file_is_a_bad_output(tmp_path: Path) -> None:
             load(MANIFEST, tmp_path)
 
 
-def test_a_record_is_read(tmp_path: Path) -> None:
-    """`alerts_of` returns each time at which one of the given alerts was raised."""
+def test_a_record_is_read_with_its_alerts(tmp_path: Path) -> None:
     said = {
         "hazards": {"H1": None, "H2": 3.5},
         "alerts": [{"name": "fcw", "t": 1.0}],

@@ -105,8 +105,9 @@ def test_a_hazard_occurs_when_its_condition_has_held_long_enough(
         ("max: gap / (speed - speed)", None),  # NaN and infinities are left out
     ],
 )
-def test_metrics_end_with_the_first_terminal_hazard(write: Write, metric: str, value: float | None) -> None:
-    """The step of the hazard is included."""
+def test_metrics_end_with_the_step_of_the_first_terminal_hazard(
+    write: Write, metric: str, value: float | None
+) -> None:
     what = metric.strip("{}")
     found = judged(
         write(
@@ -119,7 +120,6 @@ def test_metrics_end_with_the_first_terminal_hazard(write: Write, metric: str, v
 
 
 def test_without_a_terminal_hazard_metrics_cover_the_whole_run(write: Write) -> None:
-    """Metrics of the end of the drive have no value."""
     found = judged(
         write(
             "hazards: {}\nmetrics:\n"
@@ -152,8 +152,6 @@ CONTACT = (
     ],
 )
 def test_the_delta_v_of_a_contact_is_a_metric(write: Write, speed: float, delta_v: float | None) -> None:
-    """Delta-v is the change of the car's speed in an inelastic collision, computed from the closing speed and
-    the masses."""
     manifest = write(CONTACT.replace("OUT_ENDS", "false"))
     found = judged(manifest, speed=np.array([1.0, 2.0, -1.0, speed, 9.0, 9.0]))
     assert found.t_end == 3.0
@@ -180,12 +178,10 @@ def test_only_the_contact_that_ends_the_drive_has_a_delta_v(write: Write) -> Non
     ],
 )
 def test_the_smallest_margin_is_a_metric(write: Write, rule: str, margin: float | None) -> None:
-    """A hazard with a single comparison needs no declared margin."""
     assert dict(judged(write(f"hazards: {{HIT: {rule}}}\n")).metrics).get("margin_hit") == margin
 
 
 def test_a_hazard_without_a_condition_is_read_from_the_record(write: Write) -> None:
-    """The record's other hazards are ignored."""
     manifest = write('record: record.json\nhazards: {HIT: {terminal: true}, NEAR: {when: "gap < 0.5"}}\n')
     trace = {"time": T, "gap": GAP, "speed": SPEED}
     found = judge_run(manifest, trace, {"hazards": {"HIT": 2.5, "OTHER": 1.0}})
@@ -195,7 +191,6 @@ def test_a_hazard_without_a_condition_is_read_from_the_record(write: Write) -> N
 
 
 def test_a_slow_channel_keeps_its_newest_value(write: Write) -> None:
-    """Before its first value, the channel has no value."""
     manifest = write(
         'hazards: {SEEN: {when: "seen < 2"}}\n',
         observation="  seen: {unit: m, role: internal, time: t_seen}\nobservation:",
@@ -204,8 +199,7 @@ def test_a_slow_channel_keeps_its_newest_value(write: Write) -> None:
     assert judge_run(manifest, trace, {}).hazards == (("SEEN", 4.0),)
 
 
-def test_steps_can_differ_in_length(write: Write) -> None:
-    """The trace's times determine how long a condition has held and how much a step adds to an integral."""
+def test_durations_and_integrals_use_the_times_of_the_trace(write: Write) -> None:
     manifest = write(
         'hazards: {HIT: {when: "gap < 2", for_s: 0.5}}\n'
         "metrics: {way: {integral: speed, unit: m, worse: lower, about: x}}\n"
@@ -217,7 +211,6 @@ def test_steps_can_differ_in_length(write: Write) -> None:
 
 
 def test_a_temporal_formula_is_judged_after_its_horizon(write: Write) -> None:
-    """The hazard's margin is the robustness of the formula."""
     pytest.importorskip("rtamt")
     rule = "(gap < 2) implies eventually[0:2](gap > 3)"
     found = judged(write(f'hazards: {{LATE: {{stl: "{rule}", unit: m}}}}\n'))
@@ -238,7 +231,6 @@ def test_temporal_logic_needs_even_steps(write: Write) -> None:
 
 @pytest.mark.parametrize("kind", ["npz", "csv", "parquet", "mcap"])
 def test_every_trace_format_gives_the_same_result(tmp_path: Path, kind: str) -> None:
-    """One of the channels has its own rate."""
     import pandas as pd
 
     places = ("/cart:force", "/cart:state.gap", "/cam:d") if kind == "mcap" else ("force", "gap", "seen")
@@ -293,7 +285,6 @@ def test_a_channel_can_be_faster_than_the_steps(write: Write, tmp_path: Path) ->
 
 @pytest.mark.parametrize("times", [[0, 2, 1], [0, 1, np.nan], [0, np.inf, np.inf]])
 def test_times_must_increase(write: Write, tmp_path: Path, times: list[float]) -> None:
-    """Hazards depend on the order of the values."""
     np.savez(tmp_path / "trace.npz", time=times, gap=GAP[:3], speed=GAP[:3], force=GAP[:3])
     manifest = write("hazards: {}\n")
     with pytest.raises(MutatorError, match="times of time that decrease or are missing"):

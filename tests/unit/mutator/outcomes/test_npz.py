@@ -44,7 +44,6 @@ def test_the_fast_reader_returns_the_same_arrays_as_numpy() -> None:
     ],
 )
 def test_unusual_files_are_left_to_numpy(data: bytes) -> None:
-    """Examples are compressed members, arrays in Fortran order, arrays of text, and other kinds of files."""
     assert npz.members(data) is None
 
 
@@ -73,7 +72,6 @@ def test_any_header_is_read_as_numpy_reads_it(shape: str) -> None:
 
 
 def test_a_flipped_bit_never_changes_the_arrays() -> None:
-    """The reader returns the original arrays or None."""
     data = written(t=np.arange(3.0), x=np.arange(3, dtype=np.int32))
     for place in range(len(data)):
         found = npz.members(data[:place] + bytes([data[place] ^ 4]) + data[place + 1 :])

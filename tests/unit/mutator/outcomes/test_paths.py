@@ -125,7 +125,6 @@ def passages(found: Path) -> dict[str, Passage]:
 
 
 def test_an_estimator_that_did_not_change_stopped_the_fault() -> None:
-    """The fault is injected in a component without recorded channels."""
     found = path("eyes", outcome=Outcome.MASKED)
     assert [*states(found).items()] == [
         ("eyes", State.INJECTED),
@@ -151,7 +150,6 @@ def test_a_controller_that_did_not_change_stopped_the_fault() -> None:
 
 
 def test_a_fault_that_changed_the_car_reached_it() -> None:
-    """The time of each component is that of its first channel that differs."""
     found = path("eyes", seen=1.2, wanted=1.3, gas=1.3, place=1.4)
     assert [(s.component, s.t_first) for s in found.stages[1:]] == [
         ("finder", 1.2),
@@ -179,8 +177,7 @@ def test_links_that_the_study_ignores_are_not_part_of_the_path() -> None:
 
 
 def test_a_component_that_changed_after_the_car_only_received_feedback() -> None:
-    """The speed control changed after the car, and has an input that is not on the path. Therefore it and the
-    pedals, which only it feeds, are taken to have received feedback."""
+    """The speed control changed after the car and has an input that is not on the path."""
     found = path("finder", "wheel", angle=1.0, torque=1.0, place=1.1, wanted=1.5, gas=1.6)
     assert states(found) == {
         "finder": State.INJECTED,
@@ -195,17 +192,15 @@ def test_a_component_that_changed_after_the_car_only_received_feedback() -> None
 
 
 def test_the_only_input_of_a_reached_component_passed_the_fault_on() -> None:
-    """The rack changed before the car, so the fault came through the wheel control, even if its recorded
-    channels changed later or not at all."""
+    """The rack changed before the car, and the wheel control is the rack's only input."""
     found = path("gauge", torque=1.0, place=1.1)
     assert states(found)["wheel"] is State.PASSED
     assert passages(found)["angle"] is passages(found)["torque"] is Passage.THROUGH
     assert states(path("gauge", torque=1.0, place=1.1, angle=1.2))["wheel"] is State.REACHED
 
 
-def test_a_component_changed_no_later_than_a_component_that_only_it_feeds() -> None:
-    """Only the speed control feeds the pedals. A component with other inputs proves nothing about the
-    components that feed it."""
+def test_a_component_changed_no_later_than_those_that_it_alone_feeds() -> None:
+    """Only the speed control feeds the pedals."""
     found = path("finder", gas=1.2, place=1.3, wanted=1.25)
     assert {s.component: s.t_by for s in found.stages if s.t_by is not None} == {"speed": 1.2}
     assert [s.t_first for s in found.stages if s.component == "speed"] == [1.25]
@@ -225,22 +220,19 @@ def test_a_component_changed_no_later_than_a_component_that_only_it_feeds() -> N
 def test_the_first_changed_input_decides_between_fault_and_feedback(
     left: dict[str, float], state: State
 ) -> None:
-    """The car moved differently before the speed control changed. If the first changed input of the speed
-    control is on the path, the fault reached it; otherwise, it received feedback."""
+    """The car moved differently before the speed control changed."""
     ways = Ways([*CHANNELS, ["pace", "m/s", "internal", "gauge", ""]], STRUCTURE)
     found = path("finder", "wheel", ways=ways, torque=1.0, place=1.1, wanted=1.5, **left)
     assert states(found)["speed"] is state
 
 
 def test_a_component_with_a_single_input_is_reached_even_after_the_car() -> None:
-    """Only the speed control feeds the pedals, so the fault reached them, although the car moved differently
-    before that."""
+    """Only the speed control feeds the pedals."""
     found = path("eyes", "wheel", seen=1.0, wanted=1.0, torque=1.0, place=1.1, gas=3.0)
     assert states(found)["pedals"] is State.REACHED
 
 
 def test_components_without_channels_are_unobserved() -> None:
-    """The components after them show whether the fault went further."""
     ways = Ways([channel for channel in CHANNELS if channel[0] != "seen"], STRUCTURE)
     found = path("eyes", ways=ways, wanted=1.2, gas=1.2, place=1.3)
     assert states(found)["finder"] is State.UNSEEN
@@ -251,7 +243,6 @@ def test_components_without_channels_are_unobserved() -> None:
 
 
 def test_two_controllers_can_stop_one_fault() -> None:
-    """A sensor feeds both controllers."""
     assert path("gauge", outcome=Outcome.MASKED).stopped_at == ("speed", "wheel")
     assert path("gauge", outcome=Outcome.MASKED, angle=2.0).stopped_at == ("rack",)
 
@@ -262,13 +253,11 @@ def test_an_inactive_fault_or_a_failed_run_has_no_path(outcome: Outcome | None) 
 
 
 def test_a_fault_outside_all_components_has_no_path() -> None:
-    """No component names the fault's file, so the start of the path is unknown."""
+    """The start of the path is unknown."""
     assert WAYS.path(experiment("other"), record(Outcome.SDC, gas=1.0)) is None
 
 
 def test_without_a_structure_components_are_ordered_by_role() -> None:
-    """Components with the same role keep the order of the manifest. The fault stopped at the first unchanged
-    component after those that it reached."""
     ways = Ways(CHANNELS[::-1], None)
     found = path("eyes", ways=ways, outcome=Outcome.MASKED, angle=1.0)
     assert [*states(found)] == ["wheel", "speed", "finder", "rack", "pedals", "car"]

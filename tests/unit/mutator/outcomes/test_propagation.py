@@ -25,21 +25,18 @@ def left(golden: dict, faulty: dict, *channels: Channel, t_end: float | None = N
 
 
 def test_a_channel_leaves_golden_when_it_exceeds_its_tolerance() -> None:
-    """The channel's deviation is its largest difference."""
     faulty = {"a": stepped(2, 0.5), "b": stepped(1, 0.3) + stepped(4), "c": ZEROS}
     found = left({"a": ZEROS, "b": ZEROS, "c": ZEROS}, faulty, *(channel(n, 0.5) for n in "abc"))
     assert found == (("b", T[4], 1.3),)
 
 
 def test_differences_after_the_end_of_the_drive_are_ignored() -> None:
-    """A difference at the end itself is included."""
     golden, faulty = {"a": ZEROS, "b": ZEROS}, {"a": stepped(2) + stepped(4, 9.0), "b": stepped(4)}
     assert left(golden, faulty, channel("a"), channel("b"), t_end=T[3]) == (("a", T[2], 1.0),)
     assert left(golden, faulty, channel("b"), t_end=T[4]) == (("b", T[4], 1.0),)
 
 
 def test_non_finite_values_are_compared() -> None:
-    """Equal infinities and two NaNs do not differ. A number compared with NaN is an infinite difference."""
     golden = {"a": np.array([np.nan, np.inf, 0, 0, 0, 0])}
     assert left(golden, {"a": golden["a"].copy()}, channel("a", 1.0)) == ()
     faulty = {"a": np.array([np.nan, np.inf, np.nan, 0, 0, 0])}
@@ -60,7 +57,6 @@ def test_a_channel_that_was_not_recorded_is_left_out() -> None:
 
 
 def test_all_channels_leave_golden_where_the_shorter_run_ends() -> None:
-    """A run that ends after the end of the drive is not treated as shorter."""
     golden, faulty = {"t": T, "a": ZEROS}, {"t": T[:4], "a": ZEROS[:4]}
     assert departures(golden, faulty, [channel("a")], "t", None) == (("a", T[4], 0.0),)
     assert departures(golden, faulty, [channel("a")], "t", float(T[3])) == ()
@@ -70,7 +66,6 @@ def test_all_channels_leave_golden_where_the_shorter_run_ends() -> None:
 
 @pytest.mark.parametrize("seed", range(20))
 def test_departures_agree_with_the_comparison(seed: int) -> None:
-    """The first departure is the manifestation. The deviations are those of the whole run."""
     random = np.random.default_rng(seed)
     channels = [channel(name, float(random.integers(0, 3))) for name in "abc"]
     golden = {"t": T, **{name: random.integers(-2, 3, 6).astype(float) for name in "abc"}}
@@ -84,7 +79,6 @@ def test_departures_agree_with_the_comparison(seed: int) -> None:
 
 
 def test_the_table_keeps_the_order_of_records_and_departures() -> None:
-    """Role and component come from run.json."""
     record = Record(
         experiment_id="e1",
         status=Status.OK,

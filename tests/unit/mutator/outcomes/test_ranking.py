@@ -61,7 +61,6 @@ def test_the_worst_results_come_first(tmp_path: Path) -> None:
 
 
 def test_ranking_columns_equals_ranking_rows(tmp_path: Path) -> None:
-    """The results are random and have many ties."""
     draw = random.Random(3)
     choices = list(WORST_FIRST.values())
     lines = [dict(draw.choice(choices)) for _ in range(400)]

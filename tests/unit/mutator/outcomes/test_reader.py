@@ -46,7 +46,6 @@ def crane(toycar: Workspace) -> Workspace:
 
 
 def became(e: Experiment) -> dict[str, Any] | None:
-    """Lane faults are hazardous, silence crashes the controller, and all other faults are masked."""
     if e.fault.fault_type == "silence":
         return {"status": Status.CRASHED, "outcome": None, "max_dev": ()}
     hazard = {"outcome": Outcome.HAZARD, "hazards": (("DROPPED", 4.0), ("CRUSHED", 4.5))}
@@ -182,7 +181,6 @@ def test_a_missing_table_is_reported(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("text", ["a,b\n1,2\n", "", "\xff"])
 def test_a_file_that_is_not_a_results_table_is_refused(tmp_path: Path, text: str) -> None:
-    """No KeyError or decoding error is raised."""
     table = Results.of_run(tmp_path)
     table.path.write_bytes(text.encode("latin-1"))
     for read in (table.rows, table.texts):

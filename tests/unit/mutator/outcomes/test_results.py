@@ -106,8 +106,7 @@ def test_a_row_has_the_severity_and_the_times_to_the_hazard(
     tolerant: float | None,
     after_manifest: float | None,
 ) -> None:
-    """Only a contact after the activation has a severity class. The fault-tolerant time begins with the
-    activation, at 2 s."""
+    """The fault is activated at 2 s."""
     hit = {"outcome": Outcome.HAZARD, "t_manifest": 2.25, "t_end": 5.5, "metrics": (("delta_v", 5.5),)}
     kept = record(**hit | {"hazards": (("H1", 5.5), ("H2", 7.0))} | given)
     cells = result_rows.row(experiment(), kept, HAZARDS, scale=SCALE)
@@ -117,7 +116,6 @@ def test_a_row_has_the_severity_and_the_times_to_the_hazard(
 
 
 def test_run_json_determines_the_columns_of_severity(experiment: Callable[..., Experiment]) -> None:
-    """A run has all of these columns, only the times, or, if it is older, none."""
     scale = {"severity": SCALE.plain()}
     times = ["fault_tolerant_time", "manifest_to_hazard"]
     heads: list[tuple[dict[str, object], list[str]]] = [
@@ -148,7 +146,6 @@ def test_unknown_values_of_a_failed_run_are_empty(
     activation: bool,
     activated: int | None,
 ) -> None:
-    """Unknown values are never 0."""
     given = {} if activation else {"activation": None}
     cells = result_rows.row(
         experiment(), record(status=status, outcome=None, detail="why", max_dev=(), **given), HAZARDS
@@ -262,8 +259,6 @@ def parquet_at_once(rows: Sequence[Mapping[str, Any]], columns: Sequence[Column]
 def test_tables_built_in_batches_have_the_same_bytes(
     folder: RunFolder, monkeypatch: pytest.MonkeyPatch, record: MakeRecord, batch: int, processes: int
 ) -> None:
-    """The files equal tables that are built with all rows in memory, for one or two processes. A run without
-    records has tables, too."""
     left = (("gas", 2.0000001, 0.5), ("v_ego", 2.05, 1e-7), ("strange", 2.1, 3.0))
     last = plan_file.read_all(folder.path)[22]
     lines = LineWriter(
@@ -285,7 +280,6 @@ def test_tables_built_in_batches_have_the_same_bytes(
 def test_row_groups_of_a_long_table_have_the_same_size(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The last group can be shorter. The size of batches does not matter."""
     monkeypatch.setattr(table_files, "_ROWS", 4)
     columns = (Column("n", "count", "", ""),)
     for size, groups in ((0, [0]), (4, [4]), (8, [4, 4]), (11, [4, 4, 3])):
@@ -309,7 +303,6 @@ def is_rebuilt(folder: RunFolder, monkeypatch: pytest.MonkeyPatch) -> bool:
 def test_nothing_is_built_while_the_digests_are_the_same(
     folder: RunFolder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """File times are ignored."""
     results.build(folder.path)
     os.utime(folder.path / "records" / "0001-gw0.jsonl")
     os.utime(folder.path / "results.csv", (1, 1))
@@ -324,7 +317,6 @@ def test_nothing_is_built_while_the_digests_are_the_same(
 def test_tables_are_rebuilt_after_any_change(
     folder: RunFolder, monkeypatch: pytest.MonkeyPatch, changed: str, gone: bool
 ) -> None:
-    """Records or timings change, or a table or the stamp is edited or deleted."""
     results.build(folder.path)
     if changed == "more records":
         head = {"schema": SCHEMA, "plan": folder.head["plan"]}
@@ -341,7 +333,6 @@ def test_tables_are_rebuilt_after_any_change(
 
 @pytest.mark.parametrize("stamp", [True, False])
 def test_replacing_an_edited_table_is_reported(folder: RunFolder, stamp: bool) -> None:
-    """The table is also replaced if the stamp is missing."""
     table = results.build(folder.path)
     made = table.read_bytes()
     table.write_bytes(made.replace(b"masked", b"hazard", 1))
@@ -355,7 +346,6 @@ def test_replacing_an_edited_table_is_reported(folder: RunFolder, stamp: bool) -
 def test_an_interrupted_build_is_not_reported_as_an_edited_table(
     folder: RunFolder, monkeypatch: pytest.MonkeyPatch, record: MakeRecord
 ) -> None:
-    """The next build gives no warning, even if records were added."""
     results.build(folder.path)
     planned = plan_file.read_all(folder.path)
     for killed_before, number in ((results.CSV, 2), (results.PARQUET, 3)):

@@ -65,8 +65,7 @@ def test_unusable_experiments_are_counted_separately(tmp_path: Path, status: Sta
 
 
 @pytest.mark.parametrize("status", [Status.CRASHED, Status.TIMEOUT])
-def test_a_crash_is_counted_as_injected(tmp_path: Path, status: Status) -> None:
-    """Controllers that crash or hang have a separate column."""
+def test_a_crash_is_counted_as_injected_and_in_its_own_column(tmp_path: Path, status: Status) -> None:
     bad = SEEN | {"status": status.value, "outcome": "", "t_manifest": ""}
     rows = Results(write_table(tmp_path / "results.csv", SEEN, bad)).texts()
 
@@ -78,7 +77,6 @@ def test_a_crash_is_counted_as_injected(tmp_path: Path, status: Status) -> None:
 
 
 def test_failure_columns_appear_only_if_a_run_failed(tmp_path: Path) -> None:
-    """Failures are crashes, timeouts and unusable runs."""
     rows = Results(write_table(tmp_path / "results.csv", SEEN)).texts()
     heads, _ = count_table(counts_by(rows, kinds(rows)), "fault type", hazard_names(rows))
     assert heads[-1] == "hazard, no alert"
@@ -90,8 +88,6 @@ def test_hazards_that_a_target_does_not_check_are_left_out(tmp_path: Path) -> No
 
 
 def test_cells_have_types(tmp_path: Path) -> None:
-    """Empty cells become None, times become numbers, alerts become a tuple, and hazards are sorted by
-    time."""
     line = SEEN | {
         "outcome": "hazard",
         "h1": "1",

@@ -44,7 +44,6 @@ def stored(sampler: Sampler, faulty: Trace, record: Record) -> tuple[Series, Ser
 def test_a_channel_has_twenty_values_per_second_and_its_last_value(
     manifest: TargetManifest, record: Callable[..., Record]
 ) -> None:
-    """The manifest selects the channels."""
     one = Sampler(manifest, trace(speed=np.sin(T)))
     golden, faulty = stored(one, trace(speed=np.cos(T)), record())
     assert golden.t.tolist() == [*T[::5], 4.99]
@@ -57,7 +56,6 @@ def test_a_channel_has_twenty_values_per_second_and_its_last_value(
 def test_internal_channels_have_ten_values_per_second(
     manifest: TargetManifest, record: Callable[..., Record]
 ) -> None:
-    """Peaks in between are stored as points, even at times when other channels have a sample."""
     inside = [replace(c, role=Role.INTERNAL) if c.name == "speed" else c for c in manifest.channels]
     one = Sampler(replace(manifest, channels=tuple(inside)), trace(speed=np.sin(T)))
     speed = np.sin(T)
@@ -70,7 +68,7 @@ def test_internal_channels_have_ten_values_per_second(
 
 def test_no_peak_between_two_samples_is_lost(manifest: TargetManifest, record: Callable[..., Record]) -> None:
     """The first step that differs, and the steps with the largest differences in the drive and in the whole
-    run, are stored as points. Channels that do not differ have no points."""
+    run, are stored as points."""
     gas = np.zeros(500)
     gas[[202, 303, 304, 404]] = 0.1, -7.0, 2.0, 9.0
     one = Sampler(manifest, trace())
@@ -93,8 +91,6 @@ def test_infinite_huge_and_missing_values_survive_rounding(
 
 
 def test_all_channels_are_stored_at_a_hazard(manifest: TargetManifest, record: Callable[..., Record]) -> None:
-    """Values that equal those of the golden run are stored, too. A hazard after the end of either run has no
-    such point."""
     speed, gap = np.where(T < 2.0, T, 2 * T), 9.0 - T
     one = Sampler(manifest, trace(speed=T, gap=gap))
     hazards = (("H1", 2.52), ("H3", 3.0), ("H2", 7.0))  # there is already a sample at 3.00 s
@@ -133,7 +129,6 @@ def test_a_run_that_lasts_longer_has_more_times(
 
 
 def test_both_runs_share_one_time_axis(manifest: TargetManifest, record: Callable[..., Record]) -> None:
-    """This holds even if their steps have different lengths."""
     time = np.arange(0.0, 5.0, 0.03)
     faulty = stored(Sampler(manifest, trace()), trace(time, speed=time), record())[1]
     place = np.searchsorted(time, faulty.t + 1e-9, side="right") - 1

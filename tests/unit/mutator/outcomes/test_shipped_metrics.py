@@ -40,7 +40,7 @@ OF_THE_GAP = ("margin_h1", "smallest_gap", "smallest_hwt", "smallest_ttc", "larg
 def test_a_vehicle_beside_the_car_is_ignored(
     manifest: TargetManifest, gaps: list[float], offsets: list[float], values: list[float | None]
 ) -> None:
-    """Such a vehicle is near and harmless, so it does not affect H1's margin or a metric."""
+    """Such a vehicle is near but harmless."""
     found = dict(driven(manifest, gaps, offsets).metrics)
     expected = {name: value for name, value in zip(OF_THE_GAP, values, strict=True) if value is not None}
     assert {name: found[name] for name in OF_THE_GAP if name in found} == pytest.approx(expected)

@@ -67,5 +67,4 @@ HAZARDS = (("H3", 5.0), ("H1", 7.0))
 def test_the_reaction_time_is_first_hazard_minus_first_alert(
     hazards: tuple, alerts: tuple, expected: float | None
 ) -> None:
-    """The reaction time is empty unless the alert came strictly earlier."""
     assert reaction_time(hazards, alerts) == expected
