@@ -41,7 +41,7 @@ def test_pack_and_decode_agree_with_cantools(path, name, data):
 
 
 def test_checksum_of_a_known_frame():
-    """The half bytes of address, data and checksum add up to 8 modulo 16, as the car requires."""
+    """The nibbles of address, data and checksum add up to 8 modulo 16, as the car requires."""
     frame = Packer(load(CAR_DBC)["ENGINE_DATA"], ("XMISSION_SPEED",)).pack((96.56,), 2)
     halves = [int(digit, 16) for digit in f"{frame.address:x}" + frame.data.hex()]
     assert frame.data[:2] == (9656).to_bytes(2, "big")
@@ -61,7 +61,6 @@ def test_checksum_of_a_known_frame():
     ],
 )
 def test_unsigned_values_round_and_stay_in_range(value, raw):
-    """A value outside the field's range is set to the nearest end of the range, and NaN becomes 0."""
     field = load(CAR_DBC)["WHEEL_SPEEDS"].fields["WHEEL_SPEED_FL"]
     assert encode([field], [value]) == raw << field.shift
 
@@ -70,7 +69,7 @@ def test_unsigned_values_round_and_stay_in_range(value, raw):
     ("value", "raw"), [(-1e9, 0x7FFF), (1e9, 0x8000), (-0.1, 1), (float("-inf"), 0x7FFF), (float("nan"), 0)]
 )
 def test_signed_values_stay_in_range(value, raw):
-    """One count of the steering angle is -0.1 degrees. Angles beyond the range are set to its nearest end."""
+    """One count of the steering angle is -0.1 degrees."""
     field = load(CAR_DBC)["STEERING_SENSORS"].fields["STEER_ANGLE"]
     assert encode([field], [value]) == raw << field.shift
 

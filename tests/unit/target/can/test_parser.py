@@ -60,7 +60,6 @@ def test_frames_of_another_bus_address_or_size_are_ignored(parser, speed, change
 
 
 def test_the_bus_is_invalid_after_more_than_ten_missed_periods(parser, speed, wheels):
-    """The next frame makes the bus valid again."""
     parser.update([speed.pack((50.0,), 0), wheels.pack((50.0,))], 1.0)
     for step in range(1, 11):
         parser.update([wheels.pack((50.0,))], 1.0 + step / 100)

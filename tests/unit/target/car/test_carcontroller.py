@@ -43,7 +43,6 @@ def test_gas_is_quantised_like_openpilots(rig):
 
 
 def test_brake_rises_slowly_and_falls_at_once(rig):
-    """The brake rises by at most 0.01 a cycle and is released within the next brake frame."""
     assert rig.send(cycles=50, brake=0.8).brake == pytest.approx(0.49, abs=0.011)
     assert rig.send(cycles=50, brake=0.8).brake == pytest.approx(0.79, abs=0.004)
     assert rig.send(cycles=2, brake=0.0).brake == 0.0
@@ -73,8 +72,7 @@ def test_brake_hysteresis():
 @pytest.mark.parametrize(
     ("steer", "taken"), [(1.0, 4096), (-1.0, -4096), (2.5, 4096), (0.1, 409), (-0.1, -409)]
 )
-def test_steering_torque(rig, steer, taken):
-    """Torque is limited to its range and truncated to counts. Positive torque steers left."""
+def test_torque_is_limited_and_truncated_to_counts(rig, steer, taken):
     assert rig.send(steer=steer).steer == pytest.approx(taken / 3840)
 
 
@@ -96,8 +94,7 @@ def test_nan_and_infinite_demands_are_sent_as_zero(rig, bad):
     assert rig.send(cycles=20, brake=0.1).brake > 0.0
 
 
-def test_each_command_has_its_own_period(rig):
-    """Steering is sent every cycle, gas and brake every second cycle, the dashboard every tenth."""
+def test_periods_of_the_commands(rig):
     addresses = []
     for frame in range(20):
         frames = rig.controller.update(CarControl(enabled=True), rig.car, frame)

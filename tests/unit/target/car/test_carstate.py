@@ -25,7 +25,6 @@ def pack(name, counter, **signals):
 
 
 def test_an_ordinary_car_is_ready_to_engage(reader, bench):
-    """The car is in drive, with belts fastened, doors closed, the main switch on and no button pressed."""
     state = read(reader, bench, v_ego=20.0, steer_angle=radians(12.3), steer_rate=radians(-7.0))
     assert state.can_valid and state.cruise_available and state.gear == "drive"
     assert state.v_ego_raw == pytest.approx(20.0, abs=0.002)
@@ -68,10 +67,7 @@ def test_speed_estimate_starts_at_zero_and_overshoots(reader, bench):
     ("wheels", "gearbox", "expected"), [(0.5, 1.0, 1.0), (3.5, 4.5, 4.0), (8.0, 9.0, 8.0)]
 )
 def test_wheel_and_gearbox_speed_are_blended(reader, wheels, gearbox, expected):
-    """Below 1 m/s only the gearbox speed is used, above 6 m/s only the wheel speed.
-
-    At 3.5 m/s, the result is their mean.
-    """
+    """Below 1 m/s only the gearbox speed is used, above 6 m/s only the wheel speed."""
     kph = wheels * 3.6
     frames = [
         pack("WHEEL_SPEEDS", 0, **{f"WHEEL_SPEED_{w}": kph for w in ("FL", "FR", "RL", "RR")}),
@@ -80,8 +76,7 @@ def test_wheel_and_gearbox_speed_are_blended(reader, wheels, gearbox, expected):
     assert reader.update(frames, 0.0).v_ego_raw == pytest.approx(expected, abs=0.005)
 
 
-def test_standstill(reader, bench):
-    """Below 0.3 m/s the reported speed is 0, but only a stopped car is at standstill."""
+def test_only_a_stopped_car_is_at_standstill(reader, bench):
     assert read(reader, bench, v_ego=0.0).standstill
     creeping = read(reader, bench, v_ego=0.29)
     assert not creeping.standstill and creeping.v_ego_raw == 0.0
@@ -90,7 +85,6 @@ def test_standstill(reader, bench):
 
 
 def test_button_events(reader, bench):
-    """Pressing and releasing a button gives one event each. A direct change gives a release and a press."""
     read(reader, bench)
     assert read(reader, bench, button=CruiseButton.DECEL_SET).buttons == (ButtonEvent("decel", True),)
     assert read(reader, bench, button=CruiseButton.DECEL_SET).buttons == ()

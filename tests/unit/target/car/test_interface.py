@@ -52,8 +52,7 @@ def test_cancel_happens_on_press(car, bench):
     assert update(car, bench).events == ()
 
 
-def test_gas_pedal(car, bench):
-    """Pressing the gas pedal disengages once. Holding it only delays engaging."""
+def test_the_gas_pedal_disengages_once_and_then_delays_engaging(car, bench):
     update(car, bench)
     first = car.update([pack("POWERTRAIN_DATA", 1, PEDAL_GAS=9)], 0.01)
     assert [e.kinds for e in first.events] == [("no_entry", "user_disable"), ("pre_enable",)]
@@ -61,7 +60,7 @@ def test_gas_pedal(car, bench):
     assert [e.kinds for e in held.events] == [("pre_enable",)]
 
 
-def test_brake_pedal(car, bench):
+def test_the_brake_pedal_disengages(car, bench):
     update(car, bench, v_ego=20.0)
     for counter in (1, 2):
         state = car.update([pack("POWERTRAIN_DATA", counter, BRAKE_PRESSED=1)], 0.01 * counter)

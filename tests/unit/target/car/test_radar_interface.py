@@ -26,7 +26,6 @@ def test_a_track_has_the_radars_resolution(radar):
 
 
 def test_an_incomplete_radar_cycle_gives_no_data(radar):
-    """A step without the frame that ends a radar cycle returns None, before and after the first cycle."""
     assert radar.update([], 0.0) is None
     state, track = frames()
     assert radar.update([state], 0.05) is None
@@ -34,8 +33,7 @@ def test_an_incomplete_radar_cycle_gives_no_data(radar):
     assert radar.update([], 0.06) is None
 
 
-def test_track_ends_at_255_m(radar):
-    """A distance of 255 m or more ends the track. A shorter distance afterwards starts a new track."""
+def test_a_track_ends_at_255_m(radar):
     (first,) = radar.update(frames(d_rel=254.9), 0.0).points
     (same,) = radar.update(frames(d_rel=254.0), 0.05).points
     assert radar.update(frames(d_rel=255.0), 0.1).points == ()

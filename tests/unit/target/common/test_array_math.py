@@ -23,7 +23,6 @@ def test_length_keeps_the_summed_axis() -> None:
 
 
 def test_each_calls_the_function_for_one_value_at_a_time() -> None:
-    """The function receives floats in order. The result has the array's shape, even if the array is empty."""
     values = np.array([[1.0, 2.0], [3.0, 4.0]], np.float32)
     asked = []
     found = array_math.each(lambda value: asked.append(value) or -value, values)
@@ -36,7 +35,6 @@ def test_each_calls_the_function_for_one_value_at_a_time() -> None:
 
 @pytest.mark.parametrize(("kind", "digits"), [(np.float64, 4e-16), (np.float32, 3e-7)])
 def test_logarithm_is_exact_to_the_last_digits(kind: type, digits: float) -> None:
-    """For values over 180 powers of two and near 1, errors stay within the precision of the array's type."""
     powers = np.ldexp(RANDOM.uniform(0.5, 1.0, 2000), RANDOM.integers(-90, 90, 2000))
     values = np.concatenate((powers, np.linspace(0.6, 1.6, 101))).astype(kind)
     found = array_math.log(values)

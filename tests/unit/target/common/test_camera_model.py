@@ -30,7 +30,6 @@ def test_project_agrees_with_row_and_column_for_road_points(model, x, y):
 @CAMERAS
 @given(x=ahead)
 def test_row_and_distance_are_inverse(model, x):
-    """The row of a point x metres ahead converts back to x. `metres_per_pixel` is the scale of that row."""
     row = model.row(x)
     assert model.distance(row) == pytest.approx(x, rel=1e-6, abs=1e-6)
     assert model.metres_per_pixel(row) * (model.cx - model.column(x, 1.0)) == pytest.approx(1.0)
@@ -47,14 +46,12 @@ def test_a_straight_line_on_the_road_is_straight_in_the_picture(model, y, slope)
 
 @CAMERAS
 def test_far_points_at_camera_height_lie_on_the_horizon(model):
-    """A point above the road lies higher in the image than the road below it."""
     far = 1e7
     assert model.project(far, 0.0, model.height)[1] == pytest.approx(model.horizon, abs=1e-3)
     assert model.project(20.0, 0.0, 1.0)[1] < model.project(20.0, 0.0, 0.0)[1]
 
 
 def test_from_view_puts_the_horizon_at_the_requested_row():
-    """Pixels are square, and the optical axis goes through the middle of the image."""
     assert pytest.approx(200.0) == SQUARE.horizon
     assert (SQUARE.fx, SQUARE.fy, SQUARE.cx, SQUARE.cy) == (600.0, 600.0, 319.5, 239.5)
     assert tan(SQUARE.pitch) == pytest.approx((239.5 - 200.0) / 600.0)

@@ -13,12 +13,10 @@ def test_interp_between_and_beyond_breakpoints() -> None:
 
 
 def test_interp_takes_the_last_of_equal_breakpoints() -> None:
-    """Equal breakpoints can also be at the start of the table."""
     assert interp(0.0, (0.0, 0.0, 1.0), (5.0, 7.0, 8.0)) == 7.0
 
 
 def test_nan_has_a_defined_result() -> None:
-    """For NaN, `interp` returns the table's first value and `clip` the upper limit."""
     assert interp(nan, XP, FP) == 1.0
     assert clip(nan, -1.0, 1.0) == 1.0
 

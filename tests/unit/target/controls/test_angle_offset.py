@@ -21,7 +21,6 @@ def test_about_one_degree_is_learnt_in_two_minutes() -> None:
 
 
 def test_less_is_learnt_without_lines_at_low_speed_and_in_turns() -> None:
-    """Nothing is learnt without lane lines or at 1 m/s, and less while the wheel is turned."""
     assert learn(60.0, prob=0.0) == 0.0
     assert learn(60.0, v_ego=1.0) == 0.0
     assert learn(60.0, angle=5.0 * DEG_TO_RAD) == pytest.approx(learn(60.0) / 4.0)

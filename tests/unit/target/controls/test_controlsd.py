@@ -105,7 +105,7 @@ def test_engaging_sets_the_speed_and_takes_over(drive: Drive) -> None:
 
 
 def test_a_disengaged_car_gets_zero_commands(drive: Drive) -> None:
-    """The set speed is 255 km/h, which means that none is set."""
+    """A set speed of 255 km/h means that none is set."""
     actuators = drive.asked.actuators
     assert (actuators.gas, actuators.brake, actuators.steer) == (0.0, 0.0, 0.0)
     assert not drive.asked.enabled and drive.asked.cancel_cruise
@@ -113,14 +113,12 @@ def test_a_disengaged_car_gets_zero_commands(drive: Drive) -> None:
 
 
 def test_engaged_control_commands_torque_and_gas(drive: Drive) -> None:
-    """An error of the steering angle causes torque, and a speed below the set speed causes gas."""
     drive.engage().run(30, v_ego=19.0)
     assert drive.asked.actuators.steer == 1.0
     assert drive.asked.actuators.gas > 0.05
 
 
 def test_an_immediate_fault_zeroes_the_actuators_in_the_same_cycle(drive: Drive) -> None:
-    """The alert shows the reason, and the car stays disengaged."""
     drive.engage().run(30, v_ego=19.0).run(1, CAN, v_ego=19.0)
     actuators = drive.asked.actuators
     assert (actuators.gas, actuators.brake, actuators.steer) == (0.0, 0.0, 0.0)
@@ -145,7 +143,6 @@ def test_buttons_change_the_set_speed_once_engaged(drive: Drive) -> None:
 
 
 def test_lost_messages_disengage(drive: Drive) -> None:
-    """Without new model and radar messages, control ends after 0.5 s, with both alerts."""
     drive.engage()
     for _ in range(60):
         drive.frame += 1
@@ -162,7 +159,6 @@ def test_braking_while_the_plan_accelerates_disengages(drive: Drive) -> None:
 
 
 def test_steer_saturation_raises_an_alert_and_control_continues(drive: Drive) -> None:
-    """The alert is raised after the desired angle has been unreachable for 0.8 s."""
     drive.engage().run(78)
     assert "steer_saturated" not in drive.state.alerts
     drive.run(5)
@@ -180,7 +176,6 @@ def test_buttons_do_not_set_a_speed_while_disengaged(drive: Drive) -> None:
 
 
 def test_the_car_slows_down_if_the_driver_is_inactive(drive: Drive) -> None:
-    """The plan decelerates at 0.2 m/s^2."""
     drive.engage()
     drive.controlsd._awareness.status = -0.01
     drive.run(300)
@@ -205,7 +200,6 @@ def test_the_collision_warning_works_while_disengaged(drive: Drive) -> None:
 
 
 def test_driver_actions_restart_the_inactivity_timer(drive: Drive) -> None:
-    """Steering, pressing a button and disengaging restart the timer."""
     drive.engage().run(100)
     awareness = drive.controlsd._awareness
     assert awareness.status < 1.0
@@ -225,7 +219,6 @@ def test_the_dashboard_shows_a_lead_while_the_plan_follows_one(drive: Drive) -> 
 
 
 def test_the_angle_offset_is_learnt_while_engaged(drive: Drive) -> None:
-    """The offset is updated every fifth cycle, but not while the driver steers."""
     offset = drive.controlsd._angle_offset
     drive.run(20)
     assert offset.value == 0.0

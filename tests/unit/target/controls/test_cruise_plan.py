@@ -21,28 +21,25 @@ from selfdrive.messages import LeadData
 def test_acceleration_limits_depend_on_speed(
     v_ego: float, following: bool, a_min: float, a_max: float
 ) -> None:
-    """The jerk limits have the same values as the acceleration limits."""
     limits = cruise_limits(v_ego, following, 0.0, slow_down=False)
     assert limits == pytest.approx((a_min, a_max, a_min, a_max))
 
 
-def test_the_jerk_limit_is_at_least_a_tenth(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The jerk limit is at least 0.1 m/s^3, even if the tables allow hardly any acceleration."""
+def test_the_jerk_limit_is_at_least_0_1(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cruise_plan, "A_MIN", (-0.01,) * 5)
     monkeypatch.setattr(cruise_plan, "A_MAX", (0.01,) * 5)
     assert cruise_limits(20.0, False, 0.0, slow_down=False) == (-0.01, 0.01, -0.1, 0.1)
 
 
 def test_turns_lower_the_acceleration_limit() -> None:
-    """At 20 m/s, lateral and longitudinal acceleration share 1.9 m/s^2. The jerk limits do not change."""
+    """At 20 m/s, lateral and longitudinal acceleration share 1.9 m/s^2."""
     limits = cruise_limits(20.0, False, 1.88, slow_down=False)
     assert limits.a_max == pytest.approx((1.9**2 - 1.88**2) ** 0.5)
     assert limits.j_max == pytest.approx(0.5)
     assert cruise_limits(20.0, False, 5.0, slow_down=False).a_max == 0.0
 
 
-def test_absent_driver_slows_the_car() -> None:
-    """If the driver is absent, acceleration is limited to -0.2 m/s^2."""
+def test_an_absent_driver_slows_the_car() -> None:
     assert cruise_limits(20.0, True, 0.0, slow_down=True)[:2] == (-0.5, -0.2)
 
 
@@ -60,5 +57,4 @@ LEAD = {"status": True, "d_rel": 40.0, "v_lead_k": 21.0, "a_lead_k": 0.1}
     ],
 )
 def test_following_needs_a_near_faster_and_accelerating_lead(change: dict, expected: bool) -> None:
-    """The car follows if the lead is nearer than 45 m, faster than the car and accelerating."""
     assert is_following(20.0, LeadData(**(LEAD | change))) is expected

@@ -64,7 +64,7 @@ def test_each_condition_prevents_the_warning(
 
 
 @pytest.mark.parametrize(("car", "lead", "car_change", "lead_change"), BARELY[:6])
-def test_a_condition_must_have_held_for_ten_cycles(
+def test_a_condition_must_hold_for_ten_cycles(
     car: dict, lead: dict, car_change: dict, lead_change: dict
 ) -> None:
     checker = FcwChecker()

@@ -67,7 +67,6 @@ def test_a_nan_angle_gives_full_torque_to_the_left(params: CarParams) -> None:
 
 
 def test_control_does_not_work_against_the_driver(params: CarParams) -> None:
-    """While the driver steers, the integral does not grow and no saturation is reported."""
     lateral, _ = control(params, 5.0, 0.0)
     car = CarState(v_ego=20.0, steering_pressed=True)
     for _ in range(100):
@@ -93,7 +92,6 @@ def test_there_is_no_torque_at_rest_or_while_disengaged(
 def test_saturation_is_reported_only_above_10_mps(
     params: CarParams, v_ego: float, degrees: float, told: bool
 ) -> None:
-    """Saturation is reported after more than 0.8 s of full torque."""
     lateral, car = control(params, degrees, v_ego=v_ego)
     for _ in range(85):
         lateral.update(car, True)

@@ -21,7 +21,6 @@ def follow(control: LongControl, car: CarState, p: Plan, cycles: int = 1) -> tup
 
 
 def test_while_off_outputs_are_zero_and_the_target_follows_the_car(params: CarParams) -> None:
-    """While control is off, the target speed is at least 0.3 m/s."""
     control = LongControl(params)
     assert control.update(False, at(20.0), plan(30.0)) == (0.0, 0.0)
     assert (control.state, control.v_pid) == (OFF, 20.0)
@@ -125,7 +124,6 @@ def test_reset_clears_the_integral(params: CarParams) -> None:
 
 
 def test_stopping_does_not_wind_up(params: CarParams) -> None:
-    """However long the car rolls, the brake stays at its limit."""
     control = LongControl(params)
     follow(control, at(0.4), plan(0.0), 1000)
     assert control.state == STOPPING

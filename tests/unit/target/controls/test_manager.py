@@ -54,7 +54,7 @@ def test_controls_start_late_and_without_frames(parts: SimpleNamespace) -> None:
 
 
 def test_the_last_leads_are_used_until_new_ones_arrive(parts: SimpleNamespace) -> None:
-    """If the radar cycle is incomplete, the last leads are passed on. The planner checks their age."""
+    """The planner checks the age of the leads."""
     run(parts, START_STEP + 2)
     parts.radar.update = parts.log.call("radar", None)
     parts.manager.step(0.2, [], None)

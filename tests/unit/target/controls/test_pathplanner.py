@@ -23,7 +23,6 @@ def planned(*models: ModelData, v_ego: float = 20.0) -> PathPlanner:
 
 
 def test_the_path_is_the_middle_of_the_lane() -> None:
-    """In a lane of usual width, both lines are trusted."""
     planner = planned(model(2.05, -1.65, 0.2))
     assert planner.d_poly == pytest.approx((0.0, 0.0, 0.0, 0.2), abs=1e-9)
     assert (planner.lanes.left_prob, planner.lanes.right_prob) == (1.0, 1.0)
@@ -50,7 +49,6 @@ def test_two_uncertain_lines_have_a_higher_combined_weight() -> None:
 
 
 def test_one_line_gives_the_middle_of_the_lane() -> None:
-    """If only the left line is seen, the middle is half a lane width to its right."""
     planner = planned(model(left=2.0, right=-5.0, path=0.0, probs=(1.0, 0.0)))
     assert planner.c_poly[3] == pytest.approx(2.0 - planner.lane_width / 2.0)
 

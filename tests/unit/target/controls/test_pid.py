@@ -9,7 +9,6 @@ def make(kp: float = 1.0, ki: float = 1.0, **options) -> PIController:
 
 
 def test_the_output_is_the_sum_of_three_terms() -> None:
-    """The terms are gain times error, integral and feedforward."""
     pid = make(kp=0.2, ki=0.5)
     assert pid.update(1.0, 0.0, speed=0.0, feedforward=0.1) == pytest.approx(0.2 + 0.005 + 0.1)
 
@@ -74,7 +73,6 @@ def test_a_small_error_an_override_or_a_disabled_check_prevents_saturation() -> 
 
 
 def test_the_saturation_count_falls_as_fast_as_it_rises() -> None:
-    """The saturation count is limited to 1 s."""
     pid = saturate(300)
     for _ in range(10):
         pid.update(0.0, 0.0, speed=0.0)

@@ -97,7 +97,6 @@ def test_turns_lower_the_planned_acceleration(params: CarParams) -> None:
 
 
 def test_following_a_lead_allows_more_acceleration(params: CarParams) -> None:
-    """Behind a near lead that pulls away, the plan allows 0.7 m/s^2 at 20 m/s."""
     drive = started(params)
     drive.lead = LeadData(status=True, d_rel=30.0, v_lead=22.0, v_lead_k=22.0, a_lead_k=0.5)
     assert max(plan.a_target for plan in drive.run(300, kph=100.0)) == pytest.approx(0.7, abs=0.01)
@@ -123,7 +122,6 @@ def test_the_slowest_plan_is_selected(params: CarParams) -> None:
 
 
 def test_the_plan_is_interpolated_and_the_next_one_starts_from_it(params: CarParams) -> None:
-    """Until the next plan, acceleration changes linearly."""
     mpc = FixedMpc(-0.1, -1.0, True)
     drive = started(params, mpc)
     plans = drive.run(6)
@@ -146,7 +144,7 @@ def test_the_future_speed_is_the_lowest_of_both_mpcs_and_the_set_speed(params: C
     assert Drive(params).run(1, kph=36.0)[-1].v_target_future == pytest.approx(10.0)
 
 
-def test_absent_driver_slows_the_car(params: CarParams) -> None:
+def test_an_absent_driver_slows_the_car(params: CarParams) -> None:
     assert started(params).run(200, kph=100.0, slow_down=True)[-1].a_target == pytest.approx(-0.2, abs=0.01)
 
 
@@ -159,7 +157,6 @@ def errors(drive: Drive, plans: list[Plan]) -> dict[str, int]:
 
 
 def test_messages_older_than_half_a_second_are_an_error(params: CarParams) -> None:
-    """A radar state and a model from cycle 0 are too old in cycle 51."""
     drive = Drive(params)
     plans = drive.run(1) + drive.run(60, radar=False)
     assert errors(drive, plans) == {"model_error": 51, "radar_error": 51}
@@ -179,7 +176,6 @@ def test_radar_errors_raise_an_event_at_once(params: CarParams) -> None:
 
 
 def test_collision_warnings_are_passed_on_unless_the_driver_brakes(params: CarParams) -> None:
-    """A new lead restarts the warning's counters."""
     drive = Drive(params)
     resets = []
     drive.planner._fcw_checker = SimpleNamespace(update=lambda *_: True, reset=lambda: resets.append(1))

@@ -30,7 +30,6 @@ def test_fit_is_least_squares() -> None:
 
 @pytest.mark.skipif(not compiler(), reason="there is no C compiler")
 def test_a_compiled_fit_has_the_same_bits(all_compiled: Path) -> None:
-    """The cases include too few or too many points, infinite values and integers."""
     compiled.use(all_compiled)
     fast = build_fit()
     compiled.use(None)
@@ -56,10 +55,6 @@ def test_slope() -> None:
 
 
 def test_shift_and_blend() -> None:
-    """`shifted` moves a curve sideways.
-
-    `blend` is the weighted mean of two curves, or zero if both weights are zero.
-    """
     assert value(shifted(CURVE, 0.5), 30.0) == pytest.approx(value(CURVE, 30.0) + 0.5)
     assert value(blend(CURVE, 3.0, ZERO, 1.0), 10.0) == pytest.approx(0.75 * value(CURVE, 10.0))
     assert blend(CURVE, 0.0, CURVE, 0.0) == ZERO

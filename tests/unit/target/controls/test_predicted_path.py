@@ -7,7 +7,6 @@ from selfdrive.controls.lib.predicted_path import distance_to, model_curve, stee
 
 
 def test_straight_path() -> None:
-    """On a straight path, the distance is the object's lateral position, positive to the left."""
     straight = steering_curve(0.0)
     assert distance_to(straight, 50.0, 1.2) == pytest.approx(1.2)
     assert distance_to(straight, 50.0, -1.2) == pytest.approx(-1.2)

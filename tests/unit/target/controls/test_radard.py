@@ -80,7 +80,6 @@ def test_a_vehicle_off_the_path_is_not_a_lead(params: CarParams) -> None:
 
 
 def test_the_steering_angle_gives_the_path_while_the_driver_steers(params: CarParams) -> None:
-    """The steering angle also gives the path while control is off."""
     straight = {"steering_angle": 0.5}
     assert Drive(params, **straight).see(point(), cycles=3).lead_one.status
     assert not Drive(params, active=False, **straight).see(point(), cycles=3).lead_one.status
@@ -96,7 +95,6 @@ def test_leads_get_no_lateral_speed_while_the_driver_steers(params: CarParams, s
 
 
 def test_a_stationary_vehicle_is_a_lead_only_with_the_camera(params: CarParams) -> None:
-    """A stationary object is a lead once the camera has seen it three times at the same place."""
     drive = Drive(params)
     drive.see(point(9, 90.0), cycles=4)  # the speed history fills
     standing = point(v_rel=-20.0)

@@ -37,7 +37,6 @@ def test_an_acceleration_above_its_limit_returns_at_the_jerk_limit() -> None:
     target=st.floats(0.0, 40.0),
 )
 def test_limits_are_kept_and_the_target_reached(v: float, a: float, target: float) -> None:
-    """From any state, the jerk stays within three times its limit."""
     before, path = a, drive(v, a, target, 1200)
     for _, now in path:
         assert -1.0 - 1e-6 <= now <= 1.0 + 1e-6

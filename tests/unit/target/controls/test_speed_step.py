@@ -57,7 +57,6 @@ def drive(params: CarParams, v_rel: list[float], gap: float = 60.0, jump: float 
 
 
 def test_a_speed_step_resets_nothing(params: CarParams) -> None:
-    """The track continues, its filter converges, and the plan keeps its lead."""
     found = drive(params, [-2.0] * 60 + [18.0] * 40 + [-2.0] * 40)
     assert not any(cycle.new_lead for cycle in found[10:])
     before, after, settled = (found[k].state.lead_one for k in (59, 60, 99))

@@ -45,7 +45,6 @@ class Drive:
     ],
 )
 def test_a_button_engages_unless_an_event_prevents_it(events: tuple[Event, ...], state: str) -> None:
-    """While the gas pedal is pressed, the car is only pre-enabled."""
     drive = Drive()
     assert drive.step(*events) == (state != "disabled")
     assert drive.state == state
@@ -84,7 +83,6 @@ def test_control_becomes_active_when_the_gas_pedal_is_released() -> None:
 
 
 def test_the_driver_takes_precedence_over_a_fault() -> None:
-    """If the driver disengages in the same cycle as a fault, the alert names the driver's action."""
     assert Drive((ENGAGE,), (CAN, BRAKE)).alerts.active[0] == "disable"
 
 
@@ -98,7 +96,6 @@ def test_control_stays_active_for_300_cycles_of_soft_disabling() -> None:
 
 
 def test_soft_disabling_ends_with_its_reason() -> None:
-    """If the reason disappears, the car stays controlled, and the next soft disabling again takes 3 s."""
     drive = Drive((ENGAGE,), (DOOR,), (DOOR,), ())
     assert drive.state == "enabled"
     for _ in range(300):

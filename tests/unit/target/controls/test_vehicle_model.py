@@ -6,7 +6,6 @@ from selfdrive.controls.lib.vehicle_model import VehicleModel
 
 
 def test_at_standstill_curvature_follows_from_geometry(params: CarParams) -> None:
-    """Near standstill, curvature is the road-wheel angle over the wheelbase."""
     assert VehicleModel(params).curvature(1.3, 0.0) == pytest.approx(0.1 / 2.7)
 
 

@@ -68,7 +68,6 @@ def test_an_uncertain_lead_matches_no_track() -> None:
 
 
 def test_the_filter_restarts_when_the_lead_becomes_certain() -> None:
-    """The first certain distance is used directly, without the earlier speed."""
     point = seen(d_rel=80.0)
     point.update(LeadVision(30.0, 0.5, 0.1))
     point.update(LeadVision(30.0, 0.9, 0.1))

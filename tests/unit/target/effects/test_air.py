@@ -22,8 +22,8 @@ def test_the_light_path_of_a_road_pixel_is_its_distance(model):
 
 
 @pytest.mark.parametrize("visibility", [20.0, 40.0])
-def test_at_the_visibility_5_percent_of_the_contrast_is_left(visibility, camera, moment):
-    """At half the visibility, the square root of 5 % of the contrast is left."""
+def test_at_the_visibility_5_percent_of_the_contrast_remains(visibility, camera, moment):
+    """At half the visibility, the square root of 5 % of the contrast remains."""
     dark = np.full((camera.rows, camera.width), 50, np.uint8)
     dark[:170] = 200
     bright = dark.copy()
@@ -39,7 +39,6 @@ def test_at_the_visibility_5_percent_of_the_contrast_is_left(visibility, camera,
 
 
 def test_fog_follows_koschmieders_law_in_every_row(camera, moment, road):
-    """Every pixel is attenuated light plus airlight. High above the horizon only airlight remains."""
     visibility = 60.0
     seen = Fog(visibility, 0, camera).apply(road, moment()).astype(float)
     kept = 0.05 ** (ways(camera) / visibility)

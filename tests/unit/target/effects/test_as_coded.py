@@ -15,8 +15,7 @@ def black(camera):
 
 
 @pytest.mark.parametrize("effect", EFFECTS)
-def test_each_frame_number_has_its_own_drawing(effect, camera, moment, road):
-    """A frame number gives the same drawing in every run. Different numbers give unrelated drawings."""
+def test_each_frame_number_has_a_different_drawing(effect, camera, moment, road):
     one, other = effect(7, 3, camera), effect(7, 3, camera)
     later = other.apply(road, moment(5))
     assert np.array_equal(one.apply(road, moment(5)), later)
@@ -64,7 +63,6 @@ def test_occlusion_lies_on_the_road_and_has_a_rim(camera, moment, road):
 
 
 def test_a_flake_is_a_blurred_block():
-    """A flake has the same pixels as a block that is blurred in a large image."""
     block = np.zeros((40, 40), np.uint8)
     block[19:21, 19:21] = 255
     for layer in range(1, 11):

@@ -85,7 +85,6 @@ def both(folder):
 
 
 def pictures(random, shape):
-    """Return noise, a smooth image, a black one and a white one."""
     noise = random.integers(0, 256, shape, np.uint8)
     return [
         noise,
@@ -97,7 +96,6 @@ def pictures(random, shape):
 @pytest.mark.parametrize("size", CAMERAS)
 @pytest.mark.parametrize("kind", COMPILED)
 def test_compiled_effects_have_the_same_bits(both, kind, size):
-    """The bits agree for whole images and regions, mild and strong levels, and any seed, time and speed."""
     camera, random = CAMERAS[size], np.random.default_rng(7)
     amounts = LEVELS[kind]
     for seed, amount in enumerate({amounts[0], amounts[len(amounts) // 2], amounts[-1]}):
@@ -141,7 +139,6 @@ def test_impossible_speeds_give_the_same_drawing(both, camera, speed):
 
 @pytest.mark.parametrize(("sigma", "size"), [(0.5, 0), (1.2, 0), (5.0, 0), (7.0, 29), (0.0, 3), (0.0, 31)])
 def test_compiled_blurs_have_the_same_bits(folder, sigma, size):
-    """The bits agree for slices, flipped images and any size, even one smaller than the kernel."""
     compiled.use(folder)
     fast, plain, random = build_gaussian(sigma, size), Gaussian(sigma, size), np.random.default_rng(3)
     compiled.use(None)
@@ -154,7 +151,6 @@ def test_compiled_blurs_have_the_same_bits(folder, sigma, size):
 
 
 def test_droplets_use_numpys_random_numbers(folder):
-    """The numbers agree even if the generator still stores half of an earlier one."""
     compiled.use(folder)
     fast, by = compiled_scattered.build_scattered()
     compiled.use(None)
@@ -185,7 +181,6 @@ def test_an_edited_effect_does_not_use_its_library(folder, tmp_path, monkeypatch
 
 
 def test_the_library_is_not_used_if_opencv_computes_other_bits(folder, monkeypatch):
-    """If the bits differ, the effect calls OpenCV, and its key names no library."""
     compiled.use(folder)
     darker = Gaussian.__call__
     monkeypatch.setattr(Gaussian, "__call__", lambda blur, picture: darker(blur, picture) // 2)

@@ -95,7 +95,6 @@ def regions(shape, random):
 @pytest.mark.parametrize("model", CAMERAS, ids=["640x480", "352x264", "333x251"])
 @every
 def test_a_region_has_the_same_bits_as_in_the_whole_image(effect, model, moment):
-    """The bits also agree after two effects."""
     random = np.random.default_rng(7)
     noise = random.integers(0, 256, (model.rows, model.width), np.uint8)
     for amount in (LEVELS[effect][0], LEVELS[effect][-1]):
@@ -113,7 +112,6 @@ def test_a_region_has_the_same_bits_as_in_the_whole_image(effect, model, moment)
 
 @pytest.mark.parametrize("effect", RANDOM)
 def test_another_seed_gives_another_image(effect, camera, moment, road):
-    """Even seeds that differ only beyond 32 bits give different images."""
     one, other = (fresh(effect, camera, seed).apply(road, moment()) for seed in (1, 1 + 2**32))
     assert not np.array_equal(one, other)
 
@@ -155,7 +153,6 @@ def test_odd_sizes_work(effect, camera, moment):
 
 @every
 def test_wrong_amounts_are_refused(effect, camera):
-    """For an amount outside the limits, or NaN, the error names the effect, the amount and the limits."""
     for amount in (effect.LEAST - 1.0, 2.0 * effect.MOST + 1.0, nan, inf):
         with pytest.raises(ConfigError, match=f"{effect.__name__}: amount .*, expected .*{effect.MOST:g}"):
             effect(amount, 0, camera)
@@ -190,7 +187,6 @@ def test_wrong_seeds_are_refused(effect, camera, seed):
     ],
 )
 def test_pictures_of_another_camera_are_refused(camera, moment, picture):
-    """An image must have the type and size of the camera's grey frames. The error names both."""
     with pytest.raises(
         ConfigError, match=r"Brightness: a picture of .* expected uint8 and shape \(480, 640\)"
     ):

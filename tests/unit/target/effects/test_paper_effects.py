@@ -14,7 +14,6 @@ def black(camera):
 @pytest.mark.parametrize("thickness", [1, 3, 10, 2.5])
 @pytest.mark.parametrize(("effect", "each"), [(PaperRain, 1000), (PaperSnow, 100)])
 def test_thickness_sets_the_number_of_streaks_and_blocks(effect, each, thickness, camera):
-    """Each unit of thickness adds 1,000 streaks or 100 blocks, over all layers."""
     made = effect(thickness, 0, camera)
     assert {PaperRain: STREAKS, PaperSnow: BLOCKS}[effect] == each
     assert sum(made._count(each, layer, 5) for layer in range(5)) == each * thickness
@@ -41,7 +40,6 @@ def test_falling_layers_wrap_around(effect, camera, moment):
 
 @pytest.mark.parametrize("effect", [PaperRain, PaperSnow])
 def test_every_layer_falls(effect, camera, moment):
-    """Between frames, a layer moves down by less than half the image. Near layers move faster."""
     made = effect(1, 0, camera).ready()
     ways = []
     for tile in made._tiles:
@@ -94,10 +92,6 @@ def test_fog_noise_is_uniform_and_blurred(camera, moment):
 
 @pytest.mark.parametrize("blobs", [1, 4, 10])
 def test_blobs_have_the_papers_number_and_size(blobs, camera, moment):
-    """There are at most as many dark blobs as requested, with radii of 5 to 50 px.
-
-    A higher number includes the blobs of a lower one.
-    """
     white = np.full((camera.rows, camera.width), 200, np.uint8)
     share = 1.0 - PaperOcclusion(blobs, 4, camera).apply(white, moment()).astype(float) / 200.0
     area = share.sum() / 0.9
@@ -107,7 +101,6 @@ def test_blobs_have_the_papers_number_and_size(blobs, camera, moment):
 
 
 def test_blobs_lie_on_the_road(camera, moment):
-    """The middle of each blob lies below the horizon, so each blob hides part of the road."""
     white = np.full((camera.rows, camera.width), 200, np.uint8)
     for seed in range(20):
         seen = PaperOcclusion(10, seed, camera).apply(white, moment())

@@ -73,7 +73,6 @@ def test_falling_particles_sink(camera, moment):
 
 
 def test_a_streak_is_the_motion_during_the_exposure(camera, moment):
-    """A streak ends where the particle is when the shutter closes. At higher speed, streaks are longer."""
     particles = alone(camera, speed=5.0)
     now = moment()
     closed = now._replace(t=now.t + 0.002, position=now.position + 0.002 * now.v_ego)
@@ -107,7 +106,6 @@ def test_streaks_block_the_light_of_their_area(width, camera):
 
 
 def test_particles_show_the_sky(camera, moment):
-    """A flake is invisible against the sky's own level and bright against the dark road."""
     flat = np.full((camera.rows, camera.width), 200, np.uint8)
     snow = Snow(4.0, 0, camera)
     assert np.abs(snow.apply(flat, moment()).astype(int) - 200).max() <= 1

@@ -47,7 +47,6 @@ def test_weak_edges_are_false_edges_only_between_weak_lines(gauge, road):
 
 
 def test_pixels_are_covered_if_an_even_grey_changes_by_8_levels(gauge, road):
-    """Uniform haze covers no pixel."""
     grey = np.full_like(road, 100)
     assert gauge.covered(grey // 2) == 0.0
     half = grey.copy()
@@ -57,7 +56,7 @@ def test_pixels_are_covered_if_an_even_grey_changes_by_8_levels(gauge, road):
     assert 0.2 < gauge.covered(half) < 0.5
 
 
-def test_page_has_every_effect_and_level():
+def test_the_page_has_every_effect_and_level():
     text = (REFERENCE / "image-effects.md").read_text(encoding="utf-8")
     for effect, amounts in LEVELS.items():
         part = re.search(rf"^### {effect.__name__}$(.*?)(?=^##|\Z)", text, re.MULTILINE | re.DOTALL)
@@ -67,7 +66,7 @@ def test_page_has_every_effect_and_level():
 
 
 @pytest.mark.slow
-def test_page_is_what_the_command_writes(tmp_path):
+def test_the_page_is_what_the_command_writes(tmp_path):
     """After a change of effects or detectors, run `python -m selfdrive.sim.effects.page`."""
     page.write(tmp_path)
     made, kept = (folder / "image-effects.md" for folder in (tmp_path, REFERENCE))

@@ -20,7 +20,6 @@ def wet(glass, picture, moment, share, wipe=3):
 
 
 def test_drops_gather_until_the_wipe(glass, road, moment):
-    """Drops stay and more join them. The wiper removes all of them, and new ones land elsewhere."""
     early, late = (wet(glass, road, moment(), share) for share in (0.3, 0.9))
     assert 0 < early.sum() < 0.6 * late.sum()
     assert (late | ~early).mean() > 0.999
@@ -30,7 +29,6 @@ def test_drops_gather_until_the_wipe(glass, road, moment):
 
 
 def test_a_faster_car_meets_more_drops(glass, road, moment):
-    """The number of drops grows with the speed at which rain and glass meet."""
     slow, fast = (wet(glass, road, moment(speed=speed), 0.9).sum() for speed in (0.0, 26.8))
     assert 2.0 < fast / slow < 5.0
     assert wet(glass, road, moment(speed=90.0), 0.99).any()

@@ -26,7 +26,6 @@ def test_a_run_on_frames_is_the_same_with_a_film(drive, seeing):
 
 
 def test_the_film_has_one_frame_for_each_camera_frame(drive):
-    """The film's times, speeds and distances are those of every fifth step of the trace."""
     folder = drive()
     reel, trace = read_reel(folder / "film"), np.load(folder / "trace.npz")
     assert [frame.t for frame in reel.frames] == list(trace["t"][::5])
@@ -36,7 +35,6 @@ def test_the_film_has_one_frame_for_each_camera_frame(drive):
 
 
 def test_the_film_has_the_detected_lines_and_lead(drive):
-    """With ideal vision, both lines and the lead are at their true places."""
     frame = read_reel(drive() / "film").frames[-1]
     assert (frame.lines["left"].y[0], frame.lines["right"].y[0]) == (1.85, -1.85)
     assert frame.lines["left"].prob == 1.0
@@ -54,7 +52,6 @@ def test_a_film_of_a_free_road_has_no_lead(drive):
 
 
 def test_without_a_camera_message_the_film_shows_no_lines(drive, monkeypatch):
-    """The lines of the previous message are not repeated."""
     publish = Visiond.publish
     monkeypatch.setattr(Visiond, "publish", lambda own, model: model.t < 0.2 and publish(own, model))
     frames = read_reel(drive() / "film").frames
@@ -77,7 +74,6 @@ def test_a_crashed_run_leaves_the_frames_before_the_crash(tmp_path, monkeypatch)
 
 
 def test_a_film_folder_that_cannot_be_created_is_an_error(tmp_path, capsys):
-    """The error names the film's folder, and nothing runs."""
     (tmp_path / "file").touch()
     words = ["--scenario", str(SCENARIOS / "S1.yaml"), "--out", str(tmp_path / "out")]
     assert main([*words, "--film", str(tmp_path / "file" / "film")]) == 2
@@ -86,7 +82,6 @@ def test_a_film_folder_that_cannot_be_created_is_an_error(tmp_path, capsys):
 
 
 def test_a_full_disk_ends_the_run_with_an_error(tmp_path, seeing, capsys):
-    """The error names the film's folder."""
     (tmp_path / "film").mkdir()
     (tmp_path / "film" / "00001.jpg").symlink_to("/dev/full")
     words = ["--scenario", str(SCENARIOS / "S1.yaml"), "--out", str(tmp_path / "out"), *seeing]

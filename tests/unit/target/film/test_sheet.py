@@ -27,7 +27,6 @@ def pane_of(sheet, side):
 
 
 def test_detected_lines_lie_on_the_painted_ones(frame):
-    """A line detected at its true place covers the yellow painted line."""
     pane = CameraPane(CameraModel(), *PANE)
     without, with_lines = pane.draw(frame(lines=None, d_rel=None)), pane.draw(frame(d_rel=None))
     yellow = (without[..., 2].astype(int) - without[..., 0] > 90).sum()
@@ -52,7 +51,6 @@ def wrong_lines(y, prob):
 
 
 def test_impossible_values_can_be_drawn(reel):
-    """Missing, huge and NaN values are left out or drawn at the edge."""
     nan, infinite = float("nan"), float("inf")
     wrong = [
         {"lines": None, "camera_lead": None},
@@ -69,7 +67,6 @@ def test_impossible_values_can_be_drawn(reel):
 
 
 def test_hazards_and_alerts_are_shown_on_the_side_of_their_run(reel):
-    """A red frame appears at the hazard, and an amber bar while the driver is warned."""
     faulty = reel({}, {"hazards": ("H3",)}, {"alerts": ("steer_saturated",), "text": "Take control"})
     sheet = Sheet(reel({}, {}, {}), faulty, EVENTS)
     for index, colour in ((1, pen.HAZARD), (2, pen.ALERT)):
@@ -92,7 +89,6 @@ def test_the_sheet_marks_the_time_in_which_the_fault_is_active(reel):
 
 
 def test_the_last_frame_of_a_shorter_film_stays(reel):
-    """The last frame is darkened while the other film continues."""
     sheet = Sheet(reel({}, {}, {}), reel({}), EVENTS)
     assert sheet.count == 3
     assert pane_of(sheet.draw(2), "faulty").mean() < 0.7 * pane_of(sheet.draw(0), "faulty").mean()
@@ -119,7 +115,6 @@ def test_marks_are_drawn_at_their_times(reel):
 
 
 def test_the_sheet_is_grey_after_the_end_of_the_drive(reel):
-    """Plots leave out the later values."""
     frames = [{"d_rel": 20.0}] * 21 + [{"d_rel": 500.0}] * 20
     ended, whole = (Sheet(reel(*frames), reel(*frames), replace(EVENTS, end=end)) for end in (1.0, None))
     assert (ended.draw(20)[:580] == whole.draw(20)[:580]).all()

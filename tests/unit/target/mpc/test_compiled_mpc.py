@@ -64,7 +64,6 @@ def problem(name: str, draw: random.Random, wild: float) -> tuple[list[float], l
 
 
 def spoil(values: list[float], draw: random.Random) -> None:
-    """Sometimes replace a value with an impossible one."""
     if draw.random() < 0.03:
         values[draw.randrange(len(values))] = draw.choice(NO_NUMBERS)
 
@@ -112,7 +111,6 @@ def test_compiled_iterations_have_the_bits_of_casadis(
 @pytest.mark.usefixtures("use")
 @pytest.mark.parametrize("name", COMPILED)
 def test_a_solvers_result_does_not_depend_on_earlier_problems(name: str) -> None:
-    """Neither earlier impossible problems nor a second solver change the bytes."""
     draw = random.Random(1)
     start, parameters = problem(name, draw, 1.0)
     solver = COMPILED[name]()
@@ -132,10 +130,6 @@ def test_a_solvers_result_does_not_depend_on_earlier_problems(name: str) -> None
 
 
 def test_the_c_file_is_current() -> None:
-    """The generated part of the C file matches the installed CasADi.
-
-    Its weights are those of the problems.
-    """
     assert casadi.__version__ == compiled_mpc.CASADI
     text = C_SOURCE.read_text()
     assert mpc_parts.with_parts(text) == text
@@ -148,7 +142,6 @@ def test_the_c_file_is_current() -> None:
 def test_the_library_is_not_used_with_another_version_of_daqp(
     other: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """CasADi's version, DAQP's function and a known solution must be the expected ones."""
     compiled_mpc._daqp.cache_clear()
     if other == "version":
         monkeypatch.setattr(compiled_mpc, "CASADI", "3.7.0")

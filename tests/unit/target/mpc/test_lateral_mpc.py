@@ -30,13 +30,13 @@ def results(mpc):
     return [repr(value) for value in scalars] + [mpc.delta_plan.tobytes()]
 
 
-def test_middle_of_a_straight_lane_needs_no_steering(lateral_mpc, lanes):
+def test_no_steering_is_needed_in_the_middle_of_a_straight_lane(lateral_mpc, lanes):
     settle(lateral_mpc, lanes())
     assert lateral_mpc.angle_desired == pytest.approx(0.0, abs=1e-6)
 
 
 @pytest.mark.parametrize("side", [1, -1])
-def test_steers_towards_the_path(lateral_mpc, lanes, side):
+def test_the_plan_steers_towards_the_path(lateral_mpc, lanes, side):
     settle(lateral_mpc, lanes(0.5))
     left = list(lateral_mpc.delta_plan)
     assert left[1] > 1e-4
@@ -46,7 +46,6 @@ def test_steers_towards_the_path(lateral_mpc, lanes, side):
 
 
 def test_in_a_curve_the_plan_holds_the_wheel_angle(lateral_mpc):
-    """The curve has a radius of 500 m."""
     curve = (0.0, 1 / 1000, 0.0)
     road = Lanes((*curve, 1.85), (*curve, -1.85), (*curve, 0.0), 1.0, 1.0, 3.7)
     for _ in range(100):
@@ -66,7 +65,6 @@ def test_without_lines_the_models_path_is_followed(lateral_mpc, lanes):
 
 
 def test_one_line_and_the_width_give_the_lane(lateral_mpc, lanes):
-    """If only the left line is seen, the middle is half a lane's width to its right."""
     one = lanes(0.4, right_prob=0.0)
     one.path_poly = (0.0, 0.0, 0.0, -5.0)
     settle(lateral_mpc, one)
@@ -110,7 +108,6 @@ def test_low_speed_is_planned_as_5_mps(lateral_mpc, lanes):
 
 @pytest.mark.parametrize("where", ["lane", "speed", "angle", "lanes too far"])
 def test_nan_resets_the_controller(lateral_mpc, lanes, where):
-    """If the solution is not finite, the angle is NaN once. The next plan starts at the measured angle."""
     drive(lateral_mpc, lanes(0.5), times=3)
     broken = lanes(400.0) if where == "lanes too far" else lanes()
     if where == "lane":
@@ -127,7 +124,6 @@ def test_nan_resets_the_controller(lateral_mpc, lanes, where):
 
 
 def test_a_discarded_plan_has_no_later_effect(lateral_mpc, lanes):
-    """After two different histories, the results have the same bytes."""
     outcomes = []
     for past in (lanes(1.0), lanes(-3.0)):
         lateral_mpc.reset()
@@ -150,7 +146,6 @@ def test_an_unsolvable_problem_keeps_the_planned_rates(lateral_mpc, lanes):
 
 
 def test_a_reset_instance_behaves_like_a_new_one(lateral_mpc, lanes):
-    """A reset also clears the effects of an unsolvable problem."""
     fresh = LateralMpc(get_params())
     drive(lateral_mpc, lanes(-3.0), times=5, angle=60.0)
     drive(lateral_mpc, lanes(math.nan))

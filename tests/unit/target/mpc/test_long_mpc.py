@@ -115,7 +115,6 @@ def test_a_very_slow_or_hard_braking_lead_is_planned_as_stopped(long_mpc, lead, 
 
 
 def test_a_braking_lead_stops_but_does_not_reverse(long_mpc, lead):
-    """The lead's deceleration decays, so its planned speed ends at zero."""
     drive(long_mpc, 5.0, 0.0, lead(30.0, 2.0, -3.9), 1)
     steps = [b - a for a, b in zip(long_mpc.x_lead_plan, long_mpc.x_lead_plan[1:], strict=False)]
     assert min(steps) > -0.01
@@ -193,7 +192,6 @@ def test_standstill_is_feasible(long_mpc, lead, v, a, d_rel):
 @pytest.mark.parametrize("field", ["d_rel", "v_lead", "a_lead_k"])
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
 def test_a_lead_with_nan_raises_no_error(long_mpc, lead, field, value):
-    """The solution is used or discarded, and valid leads work again at once."""
     broken = lead(30.0, 20.0)
     setattr(broken, field, value)
     drive(long_mpc, 20.0, 0.0, broken, 3)
@@ -204,7 +202,6 @@ def test_a_lead_with_nan_raises_no_error(long_mpc, lead, field, value):
 
 
 def test_a_solution_with_nan_is_discarded(long_mpc, lead):
-    """If a solution is discarded, speed and acceleration are those of the car."""
     drive(long_mpc, 20.0, 0.0, lead(40.0, 20.0), 2)
     before = long_mpc.a_plan.tobytes()
     long_mpc.update(19.0, 0.1, lead(math.nan, 20.0))
@@ -238,7 +235,6 @@ def test_a_reset_instance_behaves_like_a_new_one(make_long, lead):
 
 
 def test_a_discarded_plan_has_no_later_effect(make_long, lead):
-    """After plans discarded for two different reasons, the results have the same bytes."""
     one, other = make_long(), make_long()
     one.update(20.0, 0.0, lead(math.nan, 20.0))
     drive(other, 20.0, 0.0, lead(40.0, 20.0), 5)

@@ -100,7 +100,6 @@ def test_iterations_converge_to_the_optimum(case):
 
 @pytest.mark.parametrize("case", CASES)
 def test_equal_input_gives_equal_bytes(case):
-    """Neither earlier problems, even infeasible ones, nor a second build change the bytes."""
     ocp, start, param, control = CASES[case]
     guess = first_guess(ocp, start, control)
     solver = build_solver(ocp)

@@ -31,10 +31,6 @@ def s1(scenarios):
 
 @pytest.mark.parametrize(("name", "rows"), [("S1", 3), ("S2", 4), ("S3", 4), ("S4", 4), ("S5", 3)])
 def test_fault_free_runs_have_no_hazard_or_alert(fault_free, name, rows):
-    """The car stays engaged and in the middle of its lane.
-
-    It reaches as many contexts as the campaigns need.
-    """
     record, trace = fault_free(name).record, fault_free(name).trace
     assert record["engaged_from"] == pytest.approx(1.31, abs=0.02)
     assert record["engaged_to"] == 29.99
@@ -74,7 +70,6 @@ def no_model_from(t):
     ids=["all CAN", "radar", "camera"],
 )
 def test_a_lost_input_raises_an_alert_and_releases_the_pedals(s1, change, alert, within):
-    """The pedals stay released, and the car hits the lead."""
     result = drive(replace(s1, steps=2500), change)
     first = result.record["alerts"][0]
     assert first["name"] == alert
@@ -102,8 +97,7 @@ def lanes_from(t, shift):
 
 
 @pytest.mark.parametrize("offset", [0.5, -0.5])
-def test_a_car_beside_the_middle_returns_without_overshoot(s1, offset):
-    """A car engaged half a metre off the middle is back within 4 s."""
+def test_a_car_off_the_middle_returns_without_overshoot(s1, offset):
     trace = drive(replace(s1, lateral_offset=offset, steps=1200)).trace
     distance = trace["lateral_offset"] * np.sign(offset)
     assert distance[:130] == pytest.approx(0.5)
@@ -112,8 +106,7 @@ def test_a_car_beside_the_middle_returns_without_overshoot(s1, offset):
 
 
 @pytest.mark.parametrize("shift", [1.0, -1.0])
-def test_lanes_seen_a_metre_aside_make_the_car_leave_its_lane(s1, shift):
-    """The car briefly steers at full torque and then moves over smoothly."""
+def test_lanes_seen_a_metre_off_make_the_car_leave_its_lane(s1, shift):
     result = drive(s1, lanes_from(5.0, lambda t: shift))
     trace = result.trace
     distance = trace["lateral_offset"] * np.sign(shift)
@@ -156,7 +149,7 @@ def test_the_car_holds_a_bend_of_500_m(s1):
     assert 0.4 < trace["steer_torque"][2500:].mean() < 0.6
 
 
-def test_a_grade_is_climbed(s1):
+def test_the_car_climbs_a_grade(s1):
     slope = replace(s1, lead=None, grade=((0.0, 10.0, 11.0), (0.0, 0.0, 1.0)))
     trace = drive(slope).trace
     assert trace["gas"][2500:].mean() > trace["gas"][700:900].mean() + 0.1
@@ -164,7 +157,6 @@ def test_a_grade_is_climbed(s1):
 
 
 def test_earlier_runs_do_not_change_a_run(scenarios, fault_free):
-    """The earlier runs are one with a failed lateral solver and one of another scenario."""
     simulator = Simulator()
     s1 = load_scenario(scenarios / "S1.yaml")
     broken = drive(replace(s1, steps=1500), lanes_from(5.0, lambda t: 50.0 * (t - 5.0)), simulator)

@@ -46,7 +46,6 @@ def test_every_c_file_names_the_python_files_that_it_replaces():
 @needs_compiler
 @pytest.mark.parametrize("edited", ["mark_windows.c", "hog.py", "lane_net.py"])
 def test_a_library_is_found_only_for_the_code_that_it_replaces(helpers, monkeypatch, tmp_path, edited):
-    """No library is found after an edit, or while compiled code is disabled."""
     compiled.use(helpers)
     assert compiled.library(C_SOURCE) is not None
     for name in (C_SOURCE.name, *compiled.stands_for(C_SOURCE.read_bytes())):
@@ -88,7 +87,6 @@ def test_a_folder_without_libraries_is_no_error(tmp_path, folder):
 @needs_compiler
 @pytest.mark.slow
 def test_compiling_again_gives_the_same_bytes_and_deletes_old_libraries(all_compiled, tmp_path):
-    """A library's name contains the digest of the code that it replaces."""
     old = tmp_path / f"warp-0{compiled.SUFFIX}"
     old.touch()
     list(compile_helpers.compile_helpers(tmp_path))
@@ -99,7 +97,6 @@ def test_compiling_again_gives_the_same_bytes_and_deletes_old_libraries(all_comp
 
 @pytest.mark.parametrize("given", ["no-such-compiler", "/", "cc '"])
 def test_without_a_compiler_the_command_exits_with_code_2(tmp_path, monkeypatch, capsys, given):
-    """The message gives CC and a remedy, and no file is written."""
     monkeypatch.setenv("CC", given)
     monkeypatch.setattr("sys.argv", ["compile_helpers", "--out", str(tmp_path)])
     assert compile_helpers.main() == 2
@@ -110,7 +107,6 @@ def test_without_a_compiler_the_command_exits_with_code_2(tmp_path, monkeypatch,
 
 @pytest.mark.parametrize("there", [True, False], ids=["ziglang", "nothing"])
 def test_without_cc_the_compiler_of_ziglang_is_used(monkeypatch, there):
-    """On a machine without cc, the installation requires the package ziglang."""
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setattr(shutil, "which", lambda name: None)
     monkeypatch.setattr(compile_helpers, "find_spec", lambda name: there or None)
@@ -120,7 +116,6 @@ def test_without_cc_the_compiler_of_ziglang_is_used(monkeypatch, there):
 @needs_compiler
 @pytest.mark.slow
 def test_runs_have_the_same_bytes_with_and_without_helpers(all_compiled, tmp_path, monkeypatch):
-    """With `--forget`, no helper is used."""
     found = []
     look = compiled.library
 

@@ -19,7 +19,6 @@ def key(number: int, bucket: int = 7) -> bytes:
 
 
 def test_stored_entries_are_recalled(tmp_path):
-    """A second memory with the same folder recalls each entry to the bit. An entry has 0 to MOST numbers."""
     memory = DetectionMemory(tmp_path)
     memory.keep(key(1), NUMBERS)
     memory.keep(key(2), ())
@@ -31,7 +30,6 @@ def test_stored_entries_are_recalled(tmp_path):
 
 
 def test_the_table_never_grows(tmp_path):
-    """The table's size is fixed, and its empty part takes no disk space. A full bucket drops an old entry."""
     memory = DetectionMemory(tmp_path)
     for number in range(1, 4 * WAYS):
         memory.keep(key(number), (float(number),))
@@ -96,7 +94,6 @@ for turn in range(30):
 
 
 def test_two_processes_can_write_at_once(tmp_path):
-    """Each process recalls only values of the right key."""
     root = str(Path(selfdrive.__path__[0]).parent)
     command = [sys.executable, "-c", WRITER, str(tmp_path)]
     both = [subprocess.Popen(command, env={"PYTHONPATH": root}) for _ in range(2)]

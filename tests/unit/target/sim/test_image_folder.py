@@ -45,7 +45,6 @@ spacing_m: 1.34
 
 @pytest.fixture
 def folder(tmp_path):
-    """A folder with twelve frames, each of one grey level, and their calibration."""
     (tmp_path / "camera.yaml").write_text(VIEW)
     for number in range(1, 13):
         cv2.imwrite(str(tmp_path / f"{number}.png"), np.full((48, 64, 3), 10 * number, np.uint8))
@@ -53,14 +52,12 @@ def folder(tmp_path):
 
 
 def test_frames_are_read_in_the_order_of_their_numbers(folder):
-    """Frame 2 comes before frame 10. All frames are grey and have the camera's size."""
     frames = list(ImageFolder(folder).read())
     assert [frame[0, 0] for frame in frames] == list(range(10, 121, 10))
     assert {frame.shape for frame in frames} == {(48, 64)}
 
 
 def test_a_folder_becomes_a_library(folder, tmp_path):
-    """A folder's frames follow the run's time at their rate. The library has the folder's name and camera."""
     library = open_library(Pictures(frames=folder, cache=tmp_path / "cache"), 0)
     assert library.name == "test drive"
     assert (library.fps, library.spacing) == (20.0, None)
@@ -78,7 +75,6 @@ def test_the_digest_changes_with_frames_and_calibration(folder, tmp_path):
 
 
 def test_a_full_calibration_gives_that_camera(folder):
-    """Focal lengths, principal point, height and pitch are converted to the camera model's units."""
     (folder / "camera.yaml").write_text(CALTECH)
     read = ImageFolder(folder)
     assert astuple(read.model) == pytest.approx(astuple(CameraModel()))
@@ -112,7 +108,6 @@ def test_the_error_names_an_unreadable_frame(folder, content):
 
 
 def test_the_error_names_a_truncated_frame(folder):
-    """Half a JPEG or PNG file is refused, even if its header and first rows are intact."""
     picture = np.random.default_rng(0).integers(0, 256, (48, 64), dtype=np.uint8)
     for kind in (".png", ".jpg"):
         whole = cv2.imencode(kind, picture)[1].tobytes()
@@ -133,10 +128,6 @@ def test_the_error_names_a_frame_too_large_to_be_read(folder):
 
 
 def test_colour_depth_and_transparency_do_not_matter(folder):
-    """Grey images, colour images with alpha, and 16-bit images are read as 8-bit grey.
-
-    A folder with a single frame is valid.
-    """
     for path in folder.glob("*.png"):
         path.unlink()
     for shape, kind in (((48, 64), np.uint8), ((48, 64, 4), np.uint8), ((48, 64), np.uint16)):
@@ -151,7 +142,6 @@ def test_the_error_names_a_missing_frame(folder):
 
 
 def test_frame_numbers_can_have_larger_steps(folder):
-    """Frames 0, 30 and 60 are a sequence without gaps, unless one of them is missing."""
     for path in folder.glob("*.png"):
         path.rename(folder / f"run{30 * int(path.stem):05}.png")
     assert len(ImageFolder(folder).files) == 12
@@ -160,10 +150,6 @@ def test_frame_numbers_can_have_larger_steps(folder):
 
 
 def test_several_sequences_follow_each_other(folder):
-    """Clips in separate folders are used in the order of the folders.
-
-    Each folder has its own numbers, or none.
-    """
     for clip in ("b", "a"):
         (folder / clip).mkdir()
         for number in (1, 2, 3):
@@ -198,7 +184,6 @@ def test_several_sequences_follow_each_other(folder):
     ],
 )
 def test_a_wrong_calibration_is_explained(folder, old, new, message):
-    """For an invalid calibration, the error gives file and line, what was found and what was expected."""
     (folder / "camera.yaml").write_text(VIEW.replace(old, new))
     assert message in error(folder)
 
@@ -217,7 +202,6 @@ EXAMPLES = re.findall(r"```yaml\n(.*?)```", PAGE.read_text(), re.DOTALL)
 
 @pytest.mark.parametrize("text", EXAMPLES)
 def test_the_calibrations_in_the_docs_are_valid(tmp_path, text):
-    """The cameras of the calibrations in the docs see the road."""
     (tmp_path / "camera.yaml").write_text(text)
     pattern = re.search(r'files: "([^"]*)"', text)
     frame = tmp_path / pattern[1].replace("*", "1")

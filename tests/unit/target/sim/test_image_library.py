@@ -41,14 +41,12 @@ def library(**given):
     return ImageLibrary(**fields | given)
 
 
-def test_frames_are_found_by_distance_and_start_again():
-    """A new frame is used every `spacing` metres, regardless of the time."""
+def test_frames_follow_the_distance_and_repeat():
     frames = library(spacing=2.0)
     assert [frames.frame(9.9, x)[0, 0] for x in (0.0, 1.9, 2.0, 9.0, 10.0, 13.0)] == [0, 0, 1, 4, 0, 1]
 
 
-def test_frames_are_found_by_time_and_start_again():
-    """At ten frames per second, frames follow the run's time, not the distance. Rounding skips no frame."""
+def test_frames_follow_the_time_and_repeat():
     frames = library(fps=10.0)
     times = [k * 0.05 for k in range(12)]
     assert [frames.frame(t, 99.0)[0, 0] for t in times] == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 0, 0]
@@ -63,7 +61,6 @@ def test_the_rendered_loop_has_whole_dash_periods():
 
 
 def test_frames_are_built_once(tmp_path):
-    """Cached frames are read-only, and frames with another digest have their own file."""
     first = cached(tmp_path, DIGEST, SHAPE, noise)
     again = cached(tmp_path, DIGEST, SHAPE, refuse)
     other = cached(tmp_path, "cd" * 32, SHAPE, lambda: noise(2))
@@ -139,7 +136,6 @@ def test_a_failed_build_leaves_no_file(tmp_path):
 
 @pytest.mark.parametrize("place", [None, "file/cache", "x" * 300])
 def test_frames_are_the_same_without_a_writable_cache(tmp_path, place):
-    """Without a cache, the frames are read-only, too."""
     (tmp_path / "file").write_text("in the way")
     cache = None if place is None else tmp_path / place
     frames = cached(cache, DIGEST, SHAPE, noise)
@@ -150,7 +146,6 @@ def test_frames_are_the_same_without_a_writable_cache(tmp_path, place):
 
 
 def test_processes_can_build_the_same_frames_at_once(tmp_path):
-    """If processes start with an empty cache, all get the same frames and leave one complete file."""
     code = (
         "import numpy as np, hashlib, pathlib, sys\n"
         "from selfdrive.sim.image_library import cached\n"
@@ -174,7 +169,6 @@ def test_processes_can_build_the_same_frames_at_once(tmp_path):
 
 @pytest.mark.slow
 def test_the_rendered_library_has_the_renderers_frames(tmp_path):
-    """The frames are the same for equal seeds, and differ for other seeds and marks."""
     pictures = Pictures(marks=DASHED, cache=tmp_path / "one")
     frames = open_library(pictures, 5)
     assert frames.frames.shape == (600, 480, 640)

@@ -36,7 +36,6 @@ def test_torque_to_the_left_gives_positive_motion(car, sign):
 
 
 def test_sides_are_symmetric():
-    """A motion to the left and one to the right are mirror images to the last bit."""
     left, right = LateralDynamics(get_params()), LateralDynamics(get_params())
     run(left, 2.0, 0.3, 20.0)
     run(right, 2.0, -0.3, 20.0)
@@ -75,7 +74,6 @@ def test_full_torque_is_limited_by_the_tyres(car):
 
 
 def test_the_wheel_returns_by_itself(car):
-    """Released in a bend, the wheel returns to the middle without lasting oscillation."""
     run(car, 3.0, 0.5, 20.0)
     turned = car.steer_angle
     run(car, 4.0, 0.0, 20.0)
@@ -91,7 +89,6 @@ def test_the_wheel_has_a_stop(car):
 
 @pytest.mark.parametrize("speed", [0.0, 0.05, 0.3, 2.0])
 def test_slow_driving_is_stable(car, speed):
-    """At walking pace and at rest no value diverges, and a standing car does not move."""
     run(car, 20.0, 1.0, speed)
     assert abs(car.steer_angle) <= 8.7
     assert abs(car.lateral_speed) <= 2 * speed

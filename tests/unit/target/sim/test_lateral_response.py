@@ -40,11 +40,7 @@ def settling(trace, start, band):
 
 
 @pytest.mark.parametrize("side", [1, -1])
-def test_offset_start(drive, side):
-    """A car engaged half a metre off the middle is within 5 % of it after 3 to 3.6 s.
-
-    It overshoots by at most 1 % and ends within 5 mm of the middle.
-    """
+def test_response_to_an_offset_start(drive, side):
     result = drive("L01", side)
     offset = side * result.trace["lateral_offset"]
     assert offset[:131] == pytest.approx(0.5)
@@ -55,11 +51,7 @@ def test_offset_start(drive, side):
 
 
 @pytest.mark.parametrize("side", [1, -1])
-def test_step_in_lane_position(drive, side):
-    """After a lane step of half a metre, the car has covered half the distance in 1.5 s, and 95 % in 3.4 s.
-
-    It overshoots by at most 1 %.
-    """
+def test_response_to_a_step_of_the_lane(drive, side):
     result = drive("L01", step=side * STEP)
     trace = result.trace
     left_to_go = -side * trace["lateral_offset"][STEP_AT:] / STEP
@@ -74,8 +66,7 @@ def test_step_in_lane_position(drive, side):
 
 
 @pytest.mark.parametrize("side", [1, -1])
-def test_bend_of_500_m(drive, side):
-    """In the bend, the car stays 0.3 m outside the middle, with half of the full torque and no overshoot."""
+def test_response_to_a_bend_of_500_m(drive, side):
     result = drive("L02", side)
     trace = result.trace
     outside = -side * trace["lateral_offset"]
@@ -90,8 +81,7 @@ def test_bend_of_500_m(drive, side):
 
 
 @pytest.mark.parametrize("side", [1, -1])
-def test_torque_saturation(drive, side):
-    """Two seconds of full torque raise an alert. The car drifts, stays in its lane and returns smoothly."""
+def test_response_to_saturated_torque(drive, side):
     result = drive("L03", side)
     trace = result.trace
     outside = -side * trace["lateral_offset"]

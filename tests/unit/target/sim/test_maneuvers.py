@@ -33,7 +33,6 @@ def show(folder, *arguments):
 
 
 def test_the_page_has_all_scenarios_and_loads_nothing(folder):
-    """Each scenario has its hazards and, if there is one, its reference."""
     code, text = show(folder, "--references", str(folder / "kept"), "--plant", "reference")
     assert code == 0
     first, second = re.findall(r"<section.*?</section>", text)
@@ -55,7 +54,6 @@ def test_the_page_is_the_same_each_time(folder):
 
 
 def test_scenarios_that_the_plant_does_not_support_are_left_out(folder, capsys):
-    """The reference plant does not support bends. Naming a scenario with a bend is an error."""
     bend = BRIEF.format(name="B") + "road: {curvature: {at_m: [0], per_m: [0.001]}}\n"
     (folder / "B.yaml").write_text(bend)
     code, text = show(folder, "--plant", "reference")
@@ -66,7 +64,6 @@ def test_scenarios_that_the_plant_does_not_support_are_left_out(folder, capsys):
 
 
 def test_user_errors_exit_with_code_2(folder, tmp_path, capsys):
-    """The errors are an unknown scenario, no scenario, a page that cannot be written, and an invalid file."""
     assert main(["--out", str(tmp_path / "page"), "--scenarios", str(folder), "X"]) == 2
     assert main(["--out", str(tmp_path / "page"), "--scenarios", str(tmp_path / "nowhere")]) == 2
     assert main(["--out", str(folder / "A.yaml"), "--scenarios", str(folder), "A"]) == 2
@@ -77,8 +74,7 @@ def test_user_errors_exit_with_code_2(folder, tmp_path, capsys):
     assert all(error.startswith("error: ") for error in errors)
 
 
-def test_simplified_line():
-    """A line with fewer points stays within the tolerance of all points and keeps both ends and peaks."""
+def test_a_simplified_line_stays_within_the_tolerance():
     x = np.linspace(0.0, 1000.0, 600)
     y = 300.0 * np.sin(x / 60.0) + 200.0 * (x > 500.0)
     few = simplify(np.column_stack((x, y)), 2.5)
@@ -88,10 +84,6 @@ def test_simplified_line():
 
 
 def test_gaps_and_constants_are_drawn():
-    """A line has gaps where values are missing.
-
-    A line without values is empty, and a constant has an axis, too.
-    """
     t = np.arange(10) / 20
     broken = np.where(np.arange(10) == 5, np.inf, 1.0)
     panel = Panel(title="a", unit="m", lines=(Line("b", 0, t, broken), Line("c", 1, t, np.full(10, np.nan))))

@@ -41,7 +41,6 @@ CUTS = [
 
 @pytest.mark.parametrize("cut", CUTS)
 def test_a_slice_equals_the_slice_of_an_array(cut):
-    """The slices are equal whether or not the pixels were computed before."""
     one = picture()
     assert np.array_equal(one[cut], WHOLE[cut])
     one.pixels()
@@ -49,7 +48,6 @@ def test_a_slice_equals_the_slice_of_an_array(cut):
 
 
 def test_only_the_requested_pixels_are_computed():
-    """Reading size or type computes nothing. Once the whole image is computed, nothing is computed again."""
     asked = []
     one = picture(asked)
     assert (one.shape, one.dtype, len(one)) == ((6, 8), np.uint8, 6) and asked == []
@@ -60,7 +58,6 @@ def test_only_the_requested_pixels_are_computed():
 
 
 def test_an_image_can_be_used_like_an_array():
-    """Operators, functions and methods of arrays give the same results as for the pixels."""
     one = picture()
     assert np.array_equal(one * 0.5 + 3, WHOLE * 0.5 + 3) and np.array_equal(200 - one, 200 - WHOLE)
     assert np.array_equal(one.astype(float), WHOLE.astype(float)) and (one == WHOLE).all()
@@ -101,7 +98,6 @@ def test_an_image_is_read_only(write, made):
 
 
 def test_results_of_arithmetic_can_be_written_to():
-    """A sum with an image is a new array. An image can be added to an array in place."""
     one = picture()
     more = one + 5
     more += one

@@ -43,7 +43,6 @@ def test_a_moved_frame_equals_the_road_rendered_from_that_pose(model, offset, he
 
 @CAMERAS
 def test_lines_in_a_moved_frame_are_at_their_true_place(model, truth):
-    """The position of a line is off by a fraction of a pixel."""
     looking, renderer = camera(model)
     offset, heading = 0.32, -0.015
     picture = looking.look(truth(lateral_offset=offset, heading=heading)).picture.astype(float)
@@ -69,7 +68,6 @@ def test_in_the_middle_of_the_lane_the_frame_is_unchanged(truth):
 
 
 def test_poses_that_round_to_the_same_values_give_the_same_frame(truth):
-    """Offset and heading are rounded to their steps before the frame is moved."""
     looking, _ = camera(CALTECH)
     exact = truth(lateral_offset=10 * OFFSET_STEP, heading=8 * HEADING_STEP)
     near = truth(lateral_offset=10.4 * OFFSET_STEP, heading=7.6 * HEADING_STEP)
@@ -85,7 +83,6 @@ def test_the_rounding_is_finer_than_a_pixel(truth):
 
 
 def test_above_the_horizon_the_frame_only_pans(truth):
-    """The sky does not follow the offset. When the car turns left, the sky moves right."""
     looking, renderer = camera(CALTECH)
     frame = renderer.grey(0.0)
     aside = looking.look(truth(lateral_offset=0.8)).picture
@@ -118,15 +115,13 @@ def test_as_coded_the_frame_shifts_by_a_fixed_scale(truth, offset):
     assert np.array_equal(picture, renderer.grey(0.0)[:, columns])
 
 
-def test_the_message_equals_the_ideal_cameras(truth):
-    """The message differs from the ideal camera's only in the image."""
+def test_only_the_image_differs_from_the_ideal_cameras_message(truth):
     looking, _ = camera(CALTECH)
     there = truth(lateral_offset=0.3, heading=0.01, d_rel=42.0)
     assert looking.look(there)._replace(picture=None) == Camera(Road(None, None)).look(there)
 
 
 def test_frames_of_any_size_are_moved(truth):
-    """The horizon can lie above the frame."""
     small = CameraModel.from_view(width=320, rows=117, horizon=-5.0, focal=260.0, height=1.5)
     looking, renderer = camera(replace(small), frames=1)
     picture = looking.look(truth(lateral_offset=0.4, heading=0.01)).picture

@@ -65,7 +65,6 @@ def test_the_wheel_does_not_return_by_itself():
 
 
 def test_longitudinal_motion_equals_that_of_the_standard_plant(car):
-    """Pedals and grade have the same effect on both plants, to the bit."""
     standard = Plant(get_params(), speed=20.0)
     for k in range(2000):
         pedals = Actuators(gas=0.3 * (k < 200), brake=0.8 * (k >= 200))
@@ -92,7 +91,6 @@ def test_headway_time(car):
 
 
 def test_distance_ends_at_zero(car):
-    """After contact, the lead stays at 0 m. On the standard plant, the distance becomes negative."""
     car.position = 10.0
     assert (car.distance_to(12.0), car.distance_to(8.0)) == (2.0, 0.0)
     standard = Plant(get_params(), speed=20.0)
@@ -101,7 +99,6 @@ def test_distance_ends_at_zero(car):
 
 
 def test_the_lane_offset_is_hidden_from_the_sensors(s1):
-    """A car half a metre off the middle sees lines at 1.85 m on both sides and the lead straight ahead."""
     simulator = Simulator()
     simulator.reset(s1, 0)
     simulator._plant.lateral.offset = 0.5
@@ -133,7 +130,6 @@ def test_the_gearbox_speed_has_the_wrong_unit(truth, speed, read):
 
 
 def test_a_scenario_can_select_the_plant(scenarios):
-    """The key `plant`, or `on_plant`, selects the plant. The default is the standard plant."""
     assert parse_scenario(TEXT, "a.yaml", "").plant == "reference"
     plain = load_scenario(scenarios / "S1.yaml")
     assert plain.plant == "standard"
@@ -150,7 +146,6 @@ def test_a_scenario_can_select_the_plant(scenarios):
     ],
 )
 def test_unsupported_scenarios_are_refused(text, line, remedy):
-    """An unknown plant, a bend and an offset start are refused at the line of `plant`."""
     with pytest.raises(ConfigError) as caught:
         parse_scenario(text, "a.yaml", "")
     assert str(caught.value).startswith(f"a.yaml:{line}: plant: ")
@@ -158,7 +153,6 @@ def test_unsupported_scenarios_are_refused(text, line, remedy):
 
 
 def test_the_command_line_can_select_the_plant(scenarios, tmp_path, capsys):
-    """The record names the plant. An unsupported road exits with code 2."""
     common = ["--max-steps", "5", "--plant", "reference", "--out", str(tmp_path / "out")]
     assert main(["--scenario", str(scenarios / "S1.yaml"), *common]) == 0
     assert json.loads((tmp_path / "out" / "record.json").read_text())["plant"] == "reference"
@@ -181,7 +175,6 @@ def test_one_simulator_can_run_both_plants(s1):
 
 
 def test_lines_are_mirrored(s1):
-    """The controller receives the left line as the right one, and never sees the true side."""
     simulator = Simulator()
     simulator.reset(s1, 0)
     simulator.step()

@@ -61,7 +61,6 @@ def rms(values):
 
 @pytest.mark.parametrize("name", RECORDED)
 def test_a_run_agrees_with_its_recording(recorded, driven, name):
-    """Speed, distance, headway, braking, engaging and set speed match openpilot's within narrow limits."""
     steps, column = recorded(name)
     result = driven(name)
     trace = {channel: values[steps] for channel, values in result.trace.items()}
@@ -82,7 +81,6 @@ def test_a_run_agrees_with_its_recording(recorded, driven, name):
 
 @pytest.mark.parametrize("name", ["S1", "S3", "O02", "O09"])
 def test_the_controllers_estimates_agree_with_the_recording(recorded, driven, name):
-    """Once engaged, the speed estimate, plan and lead follow the recording."""
     steps, column = recorded(name)
     trace = driven(name).trace
     later = steps > 150
@@ -97,15 +95,14 @@ def test_the_controllers_estimates_agree_with_the_recording(recorded, driven, na
 
 
 @pytest.mark.parametrize("name", ["S5", "O06", "O08"])
-def test_brake_at_rest(recorded, driven, name):
-    """At the end of the run, the brake equals openpilot's to the last count."""
+def test_the_final_brake_equals_the_recorded_one(recorded, driven, name):
     _, column = recorded(name)
     assert driven(name).trace["brake"][-1] == pytest.approx(column("brake")[-1], abs=1e-5)
 
 
 @pytest.mark.parametrize(("name", "rows"), [("S1", 3), ("S2", 4), ("S3", 4), ("S4", 4), ("S5", 3)])
-def test_contexts(driven, name, rows):
-    """As many rows of the context table are reached as on openpilot, except that S1 misses its fourth row."""
+def test_runs_reach_as_many_contexts_as_openpilot(driven, name, rows):
+    """S1 misses the fourth row that openpilot reaches."""
     result = driven(name)
     trace = result.trace
     armed = trace["t"] >= 1.5
@@ -153,8 +150,7 @@ def angle_off(degrees):
 @pytest.mark.parametrize(
     ("degrees", "leaves"), [(0.86, 11.9), (-0.86, 11.9), (0.576, 13.0), (0.366, 18.3), (0.34, None)]
 )
-def test_steering_angle_off(s1, degrees, leaves):
-    """The smaller the error, the later the car leaves its lane. With a very small error, it never does."""
+def test_the_offset_of_the_steering_angle_decides_when_the_car_leaves_its_lane(s1, degrees, leaves):
     record = faulty(s1, angle_off(degrees))
     assert record["alerts"] == []
     if leaves is None:
@@ -164,7 +160,6 @@ def test_steering_angle_off(s1, degrees, leaves):
 
 
 def near(truths):
-    """Return whether the headway time has been 2 s or less."""
     return any(truth.hwt <= 2.0 for truth in truths)
 
 
@@ -184,7 +179,6 @@ def lose_model(simulator, truths):
     [(lose_frames, "can_error", 7.085, 18.28), (lose_model, "model_error", 7.415, 19.30)],
 )
 def test_alert_and_contact_after_a_lost_input_occur_at_openpilots_times(s1, disturb, alert, at, hit):
-    """CAN frames or the model are lost once the headway time is 2 s."""
     record = faulty(s1, disturb)
     assert [event["name"] for event in record["alerts"]] == [alert]
     assert record["alerts"][0]["t"] == pytest.approx(at, abs=0.011)

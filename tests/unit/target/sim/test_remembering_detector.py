@@ -66,9 +66,6 @@ class Counting:
 
 @pytest.mark.parametrize("make", [PaperDetector, RobustDetector])
 def test_remembered_lines_equal_detected_ones(make, look, tmp_path):
-    """Clean and disturbed images give equal lines without a memory, and with an empty, full or partly filled
-    one.
-    """
     rain = PaperRain(6, 1, MODEL)
     way = [(0.03 * k, 0.001 * k, 0.7 * k) for k in range(8)]
     seen = [look(lateral_offset=y, heading=turn, position=x) for y, turn, x in way]
@@ -89,7 +86,6 @@ def test_remembered_lines_equal_detected_ones(make, look, tmp_path):
 
 
 def test_a_known_image_is_not_analysed_again(look, tmp_path):
-    """The pixels of an image with a known key are not computed. An array is always analysed."""
     looking = Counting()
     detector = RememberingDetector(looking, "it", DetectionMemory(tmp_path))
     lines = detector.detect(view(look(lateral_offset=0.1)))
@@ -105,9 +101,6 @@ def test_a_known_image_is_not_analysed_again(look, tmp_path):
 
 
 def test_different_images_have_different_keys(look, truth):
-    """The key depends on the frame, the pose, the translation, the library's digest, and the kind, amount,
-    seed, order and time of the effects.
-    """
     base = look()
     moment, later = truth(t=1.0), truth(t=1.05)
     rain, light = PaperRain(5, 1, MODEL), Brightness(20, 1, MODEL)
@@ -137,9 +130,6 @@ def test_different_images_have_different_keys(look, truth):
 
 
 def test_equal_images_have_equal_keys(look, truth):
-    """Poses that round to the same value share a key, and so do different times of an effect that does not
-    move.
-    """
     assert look(lateral_offset=0.1).key == look(lateral_offset=0.1004).key
     light = Brightness(20, 1, MODEL)
     assert light.apply(look(), truth(t=1.0)).key == light.apply(look(), truth(t=2.0)).key

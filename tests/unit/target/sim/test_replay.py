@@ -89,7 +89,7 @@ def test_rms_and_largest_difference(trace, reference):
 
 
 @pytest.mark.parametrize("late", [0, 3, 50, -20])
-def test_lag(trace, late):
+def test_the_lag_of_a_delayed_wave(trace, late):
     steps = np.arange(0, STEPS, 5)
     wave = 3.0 * np.sin((np.arange(STEPS) - late) / 100)
     assert time_lag(steps, 3.0 * np.sin(steps / 100), wave) == pytest.approx(late / 100, abs=0.011)
@@ -101,7 +101,7 @@ def test_a_constant_has_no_lag_and_a_slope_has_lag_zero():
     assert time_lag(steps, steps / 100, np.arange(STEPS) / 100) == 0.0
 
 
-def test_crossings():
+def test_crossings_of_a_band():
     """Each stretch outside the band is a crossing, with its ends and its worst moment.
 
     A value at the limit is inside the band.
@@ -147,7 +147,6 @@ def test_leads_are_not_compared_on_a_free_road(trace, reference):
 
 
 def test_key_figures(trace):
-    """The time of engaging is a span between two rows. The headway is used only while the car moves."""
     rows = {name: values[::5] for name, values in trace.items()}
     rows["v_ego"] = np.where(np.arange(200) > 190, 0.0, rows["v_ego"])
     rows["v_cruise"] = np.where(np.arange(200) < 100, 97, 104) * KPH_TO_MS
@@ -190,7 +189,6 @@ def test_a_run_compared_with_itself_is_within_tolerance(reference, finished, cap
 
 
 def test_an_rms_above_its_limit_gives_code_1(reference, finished, trace, capsys):
-    """The long report gives the time span of each crossing."""
     speed = trace["v_ego"].copy()
     speed[200:401] += 1.0
     assert replay(reference, finished(v_ego=speed), "--long") == 1
@@ -217,7 +215,6 @@ def test_a_key_figure_beyond_its_limit_gives_code_1(reference, finished, trace, 
 
 
 def test_references_change_only_with_the_flag(reference, finished, trace, capsys):
-    """With the flag, the run becomes the reference and then passes."""
     before = reference.path.read_bytes()
     runs = finished(v_ego=trace["v_ego"] + 1.0)
     assert replay(reference, runs) == 1
@@ -228,7 +225,6 @@ def test_references_change_only_with_the_flag(reference, finished, trace, capsys
 
 
 def test_without_finished_runs_the_scenario_is_simulated(tmp_path, scenarios):
-    """The trace, stored as a reference, matches a second simulation."""
     text = (scenarios / "S1.yaml").read_text().replace("duration_s: 30", "duration_s: 2")
     (tmp_path / "S1.yaml").write_text(text)
     given = ["--references", str(tmp_path / "kept"), "--scenarios", str(tmp_path)]
@@ -251,8 +247,9 @@ def test_without_finished_runs_the_scenario_is_simulated(tmp_path, scenarios):
         (3, "0.05,", "0,", "ascending times"),
     ],
 )
-def test_wrong_reference_file(reference, finished, capsys, line, old, new, expected):
-    """For a mistake in a reference, the error gives file and line. The exit code is 2."""
+def test_the_error_for_a_wrong_reference_file_gives_its_line(
+    reference, finished, capsys, line, old, new, expected
+):
     lines = reference.path.read_text().splitlines()
     assert old in lines[line - 1]
     lines[line - 1] = lines[line - 1].replace(old, new, 1)
@@ -263,14 +260,14 @@ def test_wrong_reference_file(reference, finished, capsys, line, old, new, expec
     assert expected in error
 
 
-def test_reference_saved_by_a_spreadsheet(reference, finished):
+def test_a_reference_saved_by_a_spreadsheet_is_read(reference, finished):
     """A byte order mark before the first column's name is ignored."""
     reference.path.write_bytes(b"\xef\xbb\xbf" + reference.path.read_bytes())
     assert list(read_reference(reference.path).channels) == list(reference.channels)
     assert replay(reference, finished()) == 0
 
 
-def test_reference_of_another_length(trace, reference):
+def test_a_reference_of_another_length_is_refused(trace, reference):
     for steps in (STEPS - 100, STEPS + 100):
         cut = {name: np.resize(values, steps) for name, values in trace.items()}
         with pytest.raises(ConfigError, match="the last row is of"):
@@ -298,15 +295,13 @@ def test_a_channel_with_a_limit_must_exist(trace, reference):
         ("", "table.yaml:1: an empty file, expected a mapping; write the keys schema, channels, figures"),
     ],
 )
-def test_wrong_tolerance_table(reference, finished, tmp_path, capsys, text, expected):
-    """For a mistake in the table, the error gives file and line. The exit code is 2."""
+def test_a_wrong_tolerance_table_is_refused(reference, finished, tmp_path, capsys, text, expected):
     (tmp_path / "table.yaml").write_text(text.replace("{v_ego}", "{rms: 0.1}"))
     assert replay(reference, finished(), "--tolerances", str(tmp_path / "table.yaml")) == 2
     assert expected in capsys.readouterr().err
 
 
-def test_wrong_folders_and_names(reference, finished, tmp_path, capsys):
-    """Missing references, scenarios or runs, and runs of another scenario, exit with code 2."""
+def test_wrong_folders_and_names_are_refused(reference, finished, tmp_path, capsys):
     assert main(["--references", str(tmp_path / "nowhere")]) == 2
     assert main(["--references", str(reference.path.parent), "X9"]) == 2
     assert main(["--references", str(reference.path.parent), "--scenarios", str(tmp_path)]) == 2

@@ -41,14 +41,12 @@ def finer(model, times):
 
 @pytest.fixture(scope="module")
 def standard():
-    """A short piece of the library's road with dashes."""
     return RoadRenderer(CALTECH, "dashed", 3, periods=2)
 
 
 @pytest.mark.parametrize("model", [CALTECH, UDACITY])
 @pytest.mark.parametrize(("offset", "heading"), [(0.0, 0.0), (0.4, 0.01), (-0.6, -0.03)])
 def test_lines_are_at_their_true_place(model, offset, heading):
-    """In each row, the middle of each line matches the analytic one within a fraction of a pixel."""
     renderer = RoadRenderer(model, BARE, 0, periods=1)
     picture = renderer.grey(5.0, offset, heading).astype(float) - BARE.asphalt
     errors = []
@@ -67,7 +65,6 @@ def test_lines_are_at_their_true_place(model, offset, heading):
 
 
 def test_lines_have_their_true_width_at_any_distance():
-    """A line's light in a row matches its width on the road, from a few metres to more than a hundred."""
     renderer = RoadRenderer(CALTECH, BARE, 0, periods=1)
     contrast = renderer.grey(0.0).astype(float) - BARE.asphalt
     a, b = CALTECH.line_in_picture(*renderer.truth()[0])
@@ -100,7 +97,7 @@ def test_far_dashes_do_not_flicker():
     assert np.ptp(far, axis=0).max() <= 10
 
 
-def test_dashes_have_us_dimensions():
+def test_dashes_have_the_dimensions_of_us_roads():
     """A dash is 3.05 m long and repeats every 12.2 m, starting where the road starts."""
     renderer = RoadRenderer(CALTECH, replace(BARE, right=replace(FRESH, dashed=True)), 0, periods=1)
     row = CALTECH.rows - 1
@@ -130,7 +127,6 @@ def test_another_seed_gives_another_road(standard):
 
 
 def test_the_standard_road_has_realistic_grey_levels():
-    """Asphalt is mid grey, white paint is bright, and yellow paint lies between them."""
     picture = RoadRenderer(CALTECH, "solid", 1, periods=4).grey(0.0)
     left, right = (CALTECH.line_in_picture(y, 0.0) for y in (1.85, -1.85))
     row = 400
@@ -179,10 +175,6 @@ def test_every_part_of_a_look_changes_the_image():
 
 
 def test_colours_keep_the_grey_values(standard):
-    """The coloured image is as bright as the grey one.
-
-    The left line is yellow, the sky blue, the verge green.
-    """
     grey, colour = standard.grey(3.0, 0.2, 0.01), standard.colour(3.0, 0.2, 0.01)
     assert np.abs(cv2.cvtColor(colour, cv2.COLOR_BGR2GRAY).astype(int) - grey).mean() < 2.0
     blue, green, red = colour[20, 320].astype(int)
@@ -196,7 +188,6 @@ def test_colours_keep_the_grey_values(standard):
 
 @pytest.mark.parametrize(("offset", "heading"), [(0.0, 0.0), (0.5, 0.02)])
 def test_the_lead_is_drawn_at_its_distance(standard, offset, heading):
-    """The lead's wheels touch the road in the row of its distance and in the middle of the lane."""
     lead = 20.0
     with_lead = standard.colour(3.0, offset, heading, lead=lead)
     changed = (with_lead != standard.colour(3.0, offset, heading)).any(axis=2)
@@ -214,7 +205,6 @@ def test_a_lead_that_cannot_be_seen_is_not_drawn(standard):
 
 
 def test_a_turn_pans_the_sky(standard):
-    """When the car turns left, the whole sky moves right. The sky does not change with the offset."""
     ahead, turned = standard.grey(0.0), standard.grey(0.0, 0.5, 0.05)
     shift = round(CALTECH.fx * np.tan(0.05) / np.cos(CALTECH.pitch))
     assert np.array_equal(turned[:150, shift:], ahead[:150, :-shift])

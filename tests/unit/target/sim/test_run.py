@@ -27,7 +27,6 @@ def contents(folder):
 
 
 def test_a_run_writes_a_trace_and_a_record(run, scenarios):
-    """The trace has one row per step. The record has the inputs and the trace's digest."""
     folder = run("a", "--seed", "5")
     trace = np.load(folder / "trace.npz")
     record = json.loads((folder / "record.json").read_text())
@@ -49,7 +48,6 @@ def test_a_run_has_the_same_bytes_after_another_run(run):
 
 
 def test_an_incomplete_run_has_no_record(run, scenarios, monkeypatch, capsys):
-    """If the disk fills up, neither an old nor a new record remains."""
     folder = run("a")
     opened = Path.open
 
@@ -76,7 +74,6 @@ def test_without_a_lead_the_road_is_free(run):
 
 
 def test_a_wrong_scenario_exits_with_code_2(tmp_path, capsys):
-    """The error gives place and remedy, and no file is written."""
     bad = tmp_path / "bad.yaml"
     bad.write_text("schema: scenario/1\nnmae: x\n")
     assert main(["--scenario", str(bad), "--out", str(tmp_path / "out")]) == 2
@@ -105,8 +102,7 @@ def test_the_option_frames_needs_the_option_pictures(scenarios, tmp_path, capsys
     "arguments",
     [[], ["--max-steps", "0"], ["--seed", "x"], ["--seed", "-1"], ["--max-steps", "many"]],
 )
-def test_wrong_arguments(scenarios, tmp_path, arguments, capsys):
-    """Missing or impossible arguments exit with code 2 and name the argument."""
+def test_a_wrong_argument_exits_with_code_2(scenarios, tmp_path, arguments, capsys):
     full = ["--scenario", str(scenarios / "S1.yaml"), "--out", str(tmp_path / "o"), *arguments]
     with pytest.raises(SystemExit) as caught:
         main(full if arguments else [])

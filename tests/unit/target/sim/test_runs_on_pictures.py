@@ -101,10 +101,6 @@ def test_a_car_that_sees_only_frames_returns_to_the_middle(
 
 @pytest.mark.parametrize("detector", [PAPER, ROBUST, AS_CODED])
 def test_the_detection_memory_changes_no_byte_of_a_run(monkeypatch, scenarios, frames, tmp_path, detector):
-    """The cache can be missing, empty, full or damaged.
-
-    The run goes from clear weather into rain. If all frames are known, no pixels are computed.
-    """
     monkeypatch.setattr(detection_memory, "BUCKETS", 512)
     clean, look = PictureCamera.look, []
 
@@ -140,10 +136,6 @@ def test_the_detection_memory_changes_no_byte_of_a_run(monkeypatch, scenarios, f
 
 
 def test_a_run_with_forget_ignores_the_memory(monkeypatch, scenarios, frames, tmp_path):
-    """Wrong entries in the memory change no byte, and nothing is stored.
-
-    Without `--forget`, the trace differs.
-    """
     monkeypatch.setattr(detection_memory, "BUCKETS", 512)
     cache = tmp_path / "cache"
 
@@ -205,7 +197,6 @@ def test_runs_with_ideal_vision_do_not_import_the_slow_libraries():
 def test_all_scenarios_run_without_alerts_on_the_rendered_road(
     monkeypatch, scenarios, tmp_path_factory, translation
 ):
-    """The lines are read from frames, and the car stays in the middle of the lane."""
     monkeypatch.setattr(vision, "_detector", lambda pictures, library: LineReader(library.model))
     pictures = Pictures(translation=translation, cache=tmp_path_factory.getbasetemp() / "pictures")
     for name in ("S1", "S2", "S3", "S4", "S5"):

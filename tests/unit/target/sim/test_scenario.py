@@ -56,7 +56,6 @@ def test_buttons_are_down_from_press_to_release():
 
 
 def test_optional_keys_can_be_left_out():
-    """Lead, buttons, road and offset are optional. A single lead speed needs no times."""
     scenario = parse("schema: scenario/1\nname: a\ntitle: b\nduration_s: 1\nhost: {speed_mps: 5}\n")
     assert (scenario.lead, scenario.buttons, scenario.grade, scenario.curvature) == (None, (), None, None)
     assert (scenario.speed, scenario.lateral_offset) == (5.0, 0.0)
@@ -111,7 +110,6 @@ def test_optional_keys_can_be_left_out():
     ],
 )
 def test_the_error_for_a_mistake_gives_place_and_remedy(text, line, got, remedy):
-    """The error also gives what was found and what was expected."""
     with pytest.raises(ConfigError) as caught:
         parse(text)
     message = str(caught.value)

@@ -66,9 +66,6 @@ def test_a_scenario_with_all_keys_is_accepted() -> None:
 
 @pytest.mark.parametrize("name", scenario_page.SECTIONS)
 def test_schema_and_parser_agree_on_keys_and_bounds(name: str) -> None:
-    """Both refuse a missing required key, an unknown key, text instead of a number, and values beyond the
-    bounds.
-    """
     _, types, needed = scenario_page.SECTIONS[name]
     breaks: list[tuple[str, Any]] = [(key, None) for key in needed] + [("unheard_of", 1)]
     for key, kind in types.items():

@@ -134,9 +134,6 @@ def test_a_mutants_tree_finds_all_compiled_code(tmp_path: Path) -> None:
 
 
 def test_a_fault_in_a_detector_does_not_depend_on_earlier_runs(drive: Drive) -> None:
-    """Trace and counts are the same in a run that shares nothing, in a repeated run, and after the same fault
-    at another time. No detection is stored.
-    """
     place = ("selfdrive/visiond/paper_detector.py", "PaperDetector._marked", "score")
     early, late = (drive(place, time_s, independent=True) for time_s in (0.3, 0.7))
     assert early[0] != late[0] and '"count": 14' in early[1] and '"count": 6' in late[1]

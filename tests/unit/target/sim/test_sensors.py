@@ -21,7 +21,6 @@ def read(database, frames):
 
 
 def test_cantools_reads_the_true_speed_and_angle(truth):
-    """All speeds equal the true speed in km/h. The angle is in degrees."""
     frames = CarSensors().measure(truth(v_ego=20.0, steer_angle=-0.1, steer_rate=0.2), 3, 0)
     values = read(CAR, frames)
     assert values["ENGINE_DATA"]["XMISSION_SPEED"] == pytest.approx(72.0)
@@ -34,7 +33,6 @@ def test_cantools_reads_the_true_speed_and_angle(truth):
 
 @pytest.mark.parametrize(("speed", "shown"), [(0.29999, 0.0), (0.3, 1.08), (0.0, 0.0)])
 def test_speed_reads_zero_below_its_threshold(truth, speed, shown):
-    """Below 0.3 m/s all speeds read 0, but turning wheels are reported as moving."""
     values = read(CAR, CarSensors().measure(truth(v_ego=speed), 0, 0))
     assert values["ENGINE_DATA"]["XMISSION_SPEED"] == pytest.approx(shown)
     assert values["STANDSTILL"]["WHEELS_MOVING"] == (speed > 0)

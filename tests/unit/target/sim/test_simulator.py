@@ -60,7 +60,6 @@ def test_a_command_acts_in_the_next_step(s1):
 
 
 def test_the_controller_gets_frames_every_step_and_views_every_fifth(s1):
-    """In every fifth step, the controller also gets radar frames."""
     script = Script()
     drive(s1, script, 20)
     assert [t for t, _, _ in script.steps] == [k / 100 for k in range(20)]
@@ -82,7 +81,7 @@ def test_buttons_reach_the_bus(s1):
     assert down == list(range(120, 130))
 
 
-def test_truth_of_a_coasting_run(s1):
+def test_a_coasting_car_moves_like_openpilots(s1):
     """The first rows match openpilot's plant to all printed digits. HWT is distance over speed."""
     trace = drive(s1, Script(), 101).result().trace
     row = {name: trace[name][100] for name in ("d_rel", "v_rel", "v_ego", "a_ego", "hwt")}
@@ -91,14 +90,13 @@ def test_truth_of_a_coasting_run(s1):
     assert trace["d_rel"][0] == pytest.approx(99.911, abs=6e-4)
 
 
-def test_hwt_at_standstill_is_infinite(s1):
+def test_headway_time_at_standstill_is_infinite(s1):
     trace = drive(replace(s1, speed=0.0), Script(lambda step: (0, 255, 0)), 5).result().trace
     assert trace["v_ego"][-1] == 0.0
     assert np.isinf(trace["hwt"][-1])
 
 
-def test_free_road(s1):
-    """Without a lead, truth, radar and camera have an object 200 m ahead at the car's speed."""
+def test_without_a_lead_sensors_report_an_object_200_m_ahead(s1):
     script = Script()
     result = drive(replace(s1, lead=None), script, 50).result()
     assert set(result.trace["d_rel"]) == {200.0}
@@ -111,10 +109,6 @@ def test_free_road(s1):
 
 
 def test_hazards_and_alerts_in_the_record(s1):
-    """The record has the first time of each hazard and of each alert, and all times of the alerts.
-
-    The start-up text is not recorded.
-    """
     script = Script(lambda step: (0, 0, 1332))
     simulator = Simulator()
     simulator.reset(replace(s1, steps=1000), 7)
@@ -137,11 +131,7 @@ def test_hazards_and_alerts_in_the_record(s1):
     assert np.unique(trace["alert"][200:300]).tolist() == [0]
 
 
-def test_trace_channels(s1):
-    """Every channel has one value per step, with the right type.
-
-    The channels include the controller's lead, plan and state.
-    """
+def test_every_channel_has_a_value_per_step(s1):
     script = Script()
     script.radar_state = SimpleNamespace(lead_one=LeadData(status=True, d_rel=50.0, v_lead_k=17.0))
     script.controlsd.plan = Plan(v_target=25.0, source="mpc2")

@@ -43,7 +43,6 @@ GRADES = {"O03": ((0, 10, 11), (0, 0, 1.0)), "O04": ((0, 10, 11), (0, 0, -1.0))}
 
 @pytest.mark.parametrize("name", MANEUVERS)
 def test_the_scenario_equals_the_stock_maneuver(scenarios, name):
-    """Speed, lead, grade, buttons and duration match openpilot's. The plant is the default one."""
     speed, gap, profile, buttons, duration = MANEUVERS[name]
     scenario = load_scenario(scenarios / f"{name}.yaml")
     assert (scenario.name, scenario.steps, scenario.plant) == (name, 100 * duration, "standard")

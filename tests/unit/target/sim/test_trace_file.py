@@ -9,7 +9,6 @@ from selfdrive.sim.trace_file import pieces
 
 @pytest.mark.parametrize("rows", [0, 1, 3000])
 def test_the_file_has_the_bytes_of_savez(rows):
-    """Floats, integers, special values and columns of a table give the same file as NumPy's."""
     values = np.random.default_rng(rows).normal(size=(rows, 3))
     values[1:2] = [np.nan, -0.0, np.inf]
     trace = {

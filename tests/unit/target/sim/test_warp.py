@@ -46,7 +46,6 @@ def sources(random):
 
 
 def test_a_region_equals_that_of_opencvs_whole_image():
-    """The matrices include impossible ones."""
     random = np.random.default_rng(1)
     for matrix in moves(random):
         flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
@@ -60,7 +59,6 @@ def test_a_region_equals_that_of_opencvs_whole_image():
 
 @needs_compiler
 def test_compiled_warps_have_the_same_bits(library):
-    """The bits agree in any region, for contiguous images and slices."""
     if not agrees(library):
         pytest.skip("OpenCV computes other bits than the C code")
     random, fast = np.random.default_rng(2), CompiledWarp(library)
@@ -92,9 +90,6 @@ def test_results_do_not_depend_on_wide_vector_instructions(library, tmp_path, op
 @needs_compiler
 @pytest.mark.parametrize("shape", [(50, 100), (64, 64), (3, 65), (1, 200), (2, 64)])
 def test_pictures_of_any_size_are_warped(library, shape):
-    """Images of any size work, even with a single row, or rows that are not a multiple of the
-    vector width.
-    """
     if not agrees(library):
         pytest.skip("OpenCV computes other bits than the C code")
     random, fast = np.random.default_rng(3), CompiledWarp(library)

@@ -11,8 +11,7 @@ STRAIGHT = Road(None, None)
 BEND = Road(None, ((0.0,), (0.002,)))
 
 
-def test_lead_follows_its_profile():
-    """In each step, the lead moves at the speed that its table has at the start of the step."""
+def test_the_lead_follows_its_profile():
     lead = LeadVehicle(100.0, (0.0, 1.0, 2.0), (10.0, 10.0, 20.0))
     speeds = []
     for frame in range(300):
@@ -25,7 +24,6 @@ def test_lead_follows_its_profile():
 
 
 def test_grade_and_curvature_tables():
-    """Grade is a table over time, and curvature is a table over distance. A plain road has neither."""
     road = Road(((0.0, 10.0, 11.0), (0.0, 0.0, 1.0)), ((100.0, 200.0), (0.0, 0.002)))
     assert [road.grade(t) for t in (5.0, 10.5, 20.0)] == [0.0, 0.5, 1.0]
     assert [road.curvature(s) for s in (0.0, 150.0, 300.0)] == [0.0, 0.001, 0.002]
@@ -61,7 +59,6 @@ def test_heading_and_bend_in_view(truth):
 
 
 def test_ideal_vision_publishes_the_true_geometry(truth):
-    """The model has the view's lines, shifted to where they pass the car, and the lead's distance."""
     visiond = Visiond(IdealDetector())
     assert visiond.latest is None
     visiond.update(Camera(BEND).look(truth(lateral_offset=0.5, d_rel=33.0)), 7.0)

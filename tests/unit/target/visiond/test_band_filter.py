@@ -25,7 +25,6 @@ def support(picture: np.ndarray, first: int, last: int) -> float:
 @pytest.mark.parametrize("width", [2, 3, 4, 5])
 @pytest.mark.parametrize("brighter", [15.0, 60.0, 140.0])
 def test_the_middle_of_a_mark_is_found(width, brighter):
-    """The filter finds a band as wide as paint at its middle in almost every row, faint or bright."""
     picture = road((100, width, brighter))
     points = mark_points(picture)
     near = np.abs(points.column - (100 + 0.5 * (width - 1))) <= 1.0
@@ -44,7 +43,6 @@ def test_a_double_line_is_found_as_one():
     ids=["tar seam", "concrete beside asphalt", "a bright strip of 1 m", "nothing"],
 )
 def test_only_bright_narrow_bands_are_found(bands):
-    """Dark seams, edges between surfaces and broad bright strips give hardly any points."""
     assert support(road(*bands), 0, COLUMNS) < 0.15
 
 

@@ -13,7 +13,6 @@ SCENARIOS = Path(__file__).resolve().parents[4] / "fault_library" / "scenarios"
 
 @pytest.fixture(scope="module")
 def cache(tmp_path_factory) -> Path:
-    """A folder for rendered pictures that all runs share."""
     return tmp_path_factory.mktemp("pictures")
 
 
@@ -29,7 +28,6 @@ def drive(name: str, marks: str, cache: Path):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["S1", "S2", "S3", "S4", "S5"])
 def test_the_lane_is_kept_between_solid_lines(name, cache):
-    """There is no hazard and no alert of the steering limit, and the car stays within 0.3 m of the middle."""
     result = drive(name, "solid", cache)
     assert set(result.record["hazards"].values()) == {None}
     assert "steer_saturated" not in [alert["name"] for alert in result.record["alerts"]]
@@ -38,7 +36,6 @@ def test_the_lane_is_kept_between_solid_lines(name, cache):
 
 @pytest.mark.slow
 def test_in_gaps_between_dashes_the_car_wanders_but_stays_in_its_lane(cache):
-    """Where a gap between dashes fills the view, the car follows the other line and stays in its lane."""
     result = drive("S3", "dashed", cache)
     assert result.record["hazards"]["H3"] is None
     assert np.abs(result.trace["lateral_offset"]).max() <= 0.5

@@ -51,7 +51,6 @@ def test_a_line_without_a_cluster_is_in_the_first_column(road: RoadRenderer) -> 
 
 
 def test_both_lines_can_be_missing(road: RoadRenderer, monkeypatch: pytest.MonkeyPatch) -> None:
-    """If there are edges but no cluster is large enough, both lines are placed in column 0."""
     monkeypatch.setattr(coded, "LEAST_POINTS", 10**6)
     found = seen(CodedDetector(CALTECH), road.grey(4.0))
     assert [line.y for line in found[:2]] == pytest.approx([7.88, 8.03], abs=0.005)
@@ -95,7 +94,6 @@ def test_the_detectors_only_memory_is_its_state(road: RoadRenderer) -> None:
 
 
 def test_steepness_is_relative_to_the_window() -> None:
-    """A tenth of the contrast gives the same edges."""
     random = np.random.default_rng(1)
     faint = random.integers(0, 10, coded.SIZE).astype(np.uint8)
     assert edges_in_windows(faint).any()
@@ -103,7 +101,6 @@ def test_steepness_is_relative_to_the_window() -> None:
 
 
 def test_edges_are_brightness_steps_between_rows() -> None:
-    """A step between columns is not an edge."""
     level, upright = np.zeros((2, *coded.SIZE), np.uint8)
     level[40:], upright[:, 40:] = 100, 100
     assert edges_in_windows(level).any()

@@ -92,7 +92,6 @@ def view(picture) -> CameraView:
 
 @pytest.mark.parametrize("name", DETECTORS)
 def test_lines_are_the_same_to_the_bit(name, pictures):
-    """The bits agree for a sequence of clean images, images with all effects, noise and empty images."""
     plain, build, kind = DETECTORS[name]
     slow, fast = plain(MODEL), build(MODEL)
     assert type(fast) is kind and fast.calculated_by != slow.calculated_by
@@ -111,7 +110,6 @@ def test_lines_are_the_same_to_the_bit(name, pictures):
     ids=["wide", "small", "narrow"],
 )
 def test_lines_of_another_camera_are_the_same_to_the_bit(model):
-    """The bits agree for cameras whose part of the road has another size."""
     slow, fast = PaperDetector(model), build_paper_detector(model)
     road = RoadRenderer(model, "dashed", 2, periods=2)
     for k in range(8):
@@ -151,7 +149,6 @@ def _outcome(detector, picture) -> str:
     "width, rows, focal", [(640, 480, 400), (512, 400, 600), (256, 200, 200), (637, 403, 500)]
 )
 def test_maps_of_any_camera_are_the_same(width, rows, focal):
-    """The maps agree for any camera, even if the image size cannot be halved evenly."""
     model = CameraModel.from_view(width=width, rows=rows, horizon=0.3 * rows, focal=focal, height=1.3)
     slow, fast = RoadView(model), CompiledRoadView(model, compiled.library(compiled_view.C_SOURCE))
     for seed in range(5):
@@ -161,10 +158,6 @@ def test_maps_of_any_camera_are_the_same(width, rows, focal):
 
 @pytest.mark.parametrize("seed", range(40))
 def test_votes_are_the_same(seed):
-    """The votes agree for any number of points, in full and empty maps, with and without history.
-
-    The votes also agree if no lane of the expected width fits, or if there are too many candidates for C.
-    """
     chance = np.random.default_rng(seed)
     view = RoadView(MODEL)
     road = chance.integers(0, 2, (len(view.drop), len(view.y)), np.uint8)

@@ -30,7 +30,6 @@ def expected(mask: np.ndarray, eps: int, min_samples: int) -> list[int]:
     need=st.floats(0.0, 1.5),
 )
 def test_random_masks_get_the_labels_of_scikit_learn(seed, rows, width, share, eps, need):
-    """Labels agree for sparse and dense masks, and for few and many required samples."""
     mask = (np.random.default_rng(seed).random((rows, width)) < share).astype(np.uint8)
     min_samples = 1 + int(need * share * (2 * eps + 1) ** 2)
     assert labels(mask, eps, min_samples) == expected(mask, eps, min_samples)
@@ -38,7 +37,6 @@ def test_random_masks_get_the_labels_of_scikit_learn(seed, rows, width, share, e
 
 @pytest.mark.parametrize(("eps", "min_samples"), [(1, 2), (3, 6), (4, 10), (6, 30)])
 def test_thin_lines_get_the_labels_of_scikit_learn(eps, min_samples):
-    """Labels agree on masks that look like edges, with many thin crossing and broken lines."""
     rng = np.random.default_rng(eps)
     mask = np.zeros((128, 320), np.uint8)
     for _ in range(25):

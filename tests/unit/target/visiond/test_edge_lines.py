@@ -75,6 +75,5 @@ def test_contrast_and_brightness_change_no_edge():
 
 
 def test_a_camera_that_sees_no_road_is_refused():
-    """A camera that looks up has too few rows of road. The error gives their number."""
     with pytest.raises(ConfigError, match="0 rows of road"):
         RoadRegion(CameraModel.from_view(width=640, rows=480, horizon=470.0, focal=600.0, height=1.2))

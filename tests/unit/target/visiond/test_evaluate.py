@@ -49,7 +49,6 @@ def _lines(folder):
 
 
 def test_the_share_of_frames_with_both_lines_is_printed(frames, capsys):
-    """Frames are found by key in any folder, with or without the key's prefix."""
     assert _run(frames, "--overlays", str(frames / "drawn")) == 0
     out = capsys.readouterr().out
     assert "both lines found in 2 of 2 = 100.0%" in out and "p1_one" in out and "tus_two" in out
@@ -60,7 +59,6 @@ def test_the_share_of_frames_with_both_lines_is_printed(frames, capsys):
 
 
 def test_a_line_off_by_more_than_the_limit_is_a_miss(frames, capsys):
-    """The command succeeds even if a line is missed."""
     lines = _lines(frames)
     lines["p1_one"]["L"][1] -= 30.0
     _write(frames, lines)
@@ -100,7 +98,6 @@ def test_centres_are_used_if_the_lines_are_null(frames, capsys):
 
 
 def test_frames_of_the_same_name_are_distinguished_by_folder(frames, capsys):
-    """The first word of the key selects the folder. If no folder matches, the frame is refused."""
     folder = frames / "frames"
     for camera in ("p1", "tus"):
         (folder / camera).mkdir()
@@ -145,7 +142,6 @@ def test_the_folders_camera_file_is_used(frames, capsys):
     ],
 )
 def test_the_error_names_a_wrong_entry(frames, capsys, lines, words):
-    """The entry has no frame or camera, or an invalid line."""
     _write(frames, lines)
     assert _run(frames) == 2
     error = capsys.readouterr().err

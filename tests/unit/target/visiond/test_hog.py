@@ -49,7 +49,6 @@ def test_contrast_and_brightness_change_no_feature():
 
 
 def test_the_tables_have_the_angle_and_length_of_every_gradient():
-    """Angles and lengths agree to the last bit, even for mirrored gradients."""
     dx, dy = np.arange(-255, 256)[np.newaxis, :], np.arange(-255, 256)[:, np.newaxis]
     turned = np.degrees(np.arctan2(dy, dx)) % 180.0
     tables = _tables()

@@ -44,7 +44,6 @@ def faded() -> RoadRenderer:
 
 @pytest.mark.parametrize(("offset", "heading"), POSES)
 def test_both_lines_are_found_at_their_true_place(road, offset, heading):
-    """The errors are at most 6 cm and 0.6 degrees, from any position in the lane and with any camera."""
     found = PaperDetector(road.model).detect(view(road.grey(4.0, offset, heading)))
     for line, (y, slope) in zip(found[:2], road.truth(offset, heading), strict=True):
         assert line.prob > 0.5
@@ -73,7 +72,6 @@ def test_read_only_images_are_accepted_and_not_changed():
 
 @pytest.mark.parametrize("level", [0, 97, 255])
 def test_an_even_image_has_no_lines(level):
-    """Both lines have probability 0 and the positions of an assumed lane."""
     found = PaperDetector(CALTECH).detect(view(np.full((480, 640), level, np.uint8)))
     assert [(line.y, line.prob) for line in found] == [(1.85, 0.0), (-1.85, 0.0), (0.0, 0.0)]
 
@@ -91,7 +89,6 @@ def test_the_middle_of_the_car_divides_left_from_right(faded):
 
 
 def test_shadows_and_seams_beside_the_middle_are_not_lines():
-    """Hard shadows and tar seams across the lane move neither line by more than 0.3 m."""
     look = Look(shadows=0.35, shadow_depth=0.6, seams=8.0, cracks=12.0, patches=6.0, joint_tone=-50.0)
     road = RoadRenderer(CALTECH, look, 11, periods=8)
     detector = PaperDetector(CALTECH)
@@ -137,7 +134,6 @@ def test_the_windows_on_a_tile_are_those_that_can_mark_it():
 
 
 def test_a_windows_score_does_not_depend_on_other_windows():
-    """The score has the same bits at any place in a stack of windows."""
     features = np.random.default_rng(1).random((64, 1764), dtype=np.float32)
     net = LaneNet.load()
     scores = net.score(features)

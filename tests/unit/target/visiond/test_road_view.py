@@ -16,7 +16,6 @@ CAMERAS = {
 @pytest.mark.parametrize("name", CAMERAS)
 @pytest.mark.parametrize("y", [-1.85, 0.0, 1.3])
 def test_a_line_along_the_road_is_vertical_in_the_map(name, y):
-    """A road line at y m is in the map's column of y, in every row where the image shows it."""
     model = CAMERAS[name]
     a, b = model.line_in_picture(y, 0.0)
     v, u = np.mgrid[: model.rows, : model.width]
@@ -34,10 +33,6 @@ def test_a_line_along_the_road_is_vertical_in_the_map(name, y):
 
 @pytest.mark.parametrize("name", CAMERAS)
 def test_the_maps_rows_cover_the_rows_of_the_image(name):
-    """The map's rows go from far to near without a gap.
-
-    Their shares add up to the image rows that they cover.
-    """
     view = RoadView(CAMERAS[name])
     step = np.diff(view.drop)
     assert (step > 0).all() and step.max() <= view.share.max() + 1
@@ -58,7 +53,6 @@ def test_near_rows_are_means_of_many_pixels():
 
 
 def test_a_camera_that_sees_no_road_near_enough_is_refused():
-    """If marks are too narrow to distinguish from texture, the error names the calibration."""
     far = CameraModel.from_view(width=640, rows=480, horizon=463, focal=600, height=1.35)
     with pytest.raises(ConfigError, match=r"calibration: 0 rows .* expected at least 8"):
         RoadView(far)

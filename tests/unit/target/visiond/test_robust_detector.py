@@ -41,7 +41,6 @@ def errors(lines: LaneLines, truth: tuple) -> list[float]:
 @pytest.mark.parametrize("marks", ["solid", "dashed"])
 @pytest.mark.parametrize(("offset", "heading"), [(0.0, 0.0), (0.6, -0.03), (-0.7, 0.04)])
 def test_one_frame_is_enough_to_find_both_lines(camera, marks, offset, heading):
-    """The errors are at most 6 cm and 10 mrad. The path lies between the lines."""
     road = renderer(camera, marks)
     truth = road.truth(offset, heading)
     lines = see(RobustDetector(road.model), road.grey(3.0, offset, heading))
@@ -73,7 +72,6 @@ def test_distractors_do_not_hide_the_lines():
 
 @pytest.mark.parametrize("tone", [0, 128, 255])
 def test_an_image_of_one_tone_has_no_lines(tone):
-    """Both lines have the positions of an assumed lane."""
     model = CAMERAS["steep"]
     lines = see(RobustDetector(model), np.full((model.rows, model.width), tone, np.uint8))
     assert (lines.left.prob, lines.right.prob, lines.path.prob) == (0.0, 0.0, 0.0)
@@ -81,7 +79,6 @@ def test_an_image_of_one_tone_has_no_lines(tone):
 
 
 def test_lines_that_disappear_are_held_with_falling_probability():
-    """After a second, the lines are dropped."""
     road = renderer()
     detector = RobustDetector(road.model)
     before = see(detector, road.grey(0.0, 0.4, 0.02))
@@ -98,7 +95,6 @@ def test_lines_that_disappear_are_held_with_falling_probability():
 
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_one_line_gives_the_position_of_the_other(side):
-    """Half of the view is covered, and the probability of the covered line falls."""
     road = renderer()
     detector = RobustDetector(road.model)
     see(detector, road.grey(0.0))
@@ -133,7 +129,6 @@ def test_lines_are_followed_through_rain():
 
 
 def test_after_crossing_a_line_the_next_lane_is_found():
-    """A car that drifts over a line keeps its old lane at first and then gets the new one."""
     road = renderer()
     detector = RobustDetector(road.model)
     for i in range(75):
@@ -145,10 +140,6 @@ def test_after_crossing_a_line_the_next_lane_is_found():
 
 
 def test_the_same_frames_give_the_same_lines():
-    """Two detectors agree to the last bit, even if a third one sees other frames in between.
-
-    Detectors do not modify the image.
-    """
     road = renderer()
     first, second, other = (RobustDetector(road.model) for _ in range(3))
     noise = np.random.default_rng(2)

@@ -13,10 +13,6 @@ def sample() -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_windows_are_balanced_and_reproducible(sample):
-    """About half of the windows have a mark, and the number per image is limited.
-
-    A second draw with the same seed gives the same bytes.
-    """
     features, labels = sample
     assert 0.4 < labels.mean() < 0.6
     assert len(labels) <= 2 * 6 * 2 * EACH
@@ -41,7 +37,6 @@ def test_weights_can_be_stored_and_loaded(tmp_path):
 
 @pytest.mark.slow
 def test_training_is_reproducible_and_agrees_with_the_shipped_net(tmp_path, sample, capsys):
-    """Two small trainings write the same bytes and agree with the shipped net on most windows."""
     for name in ("a.npz", "b.npz"):
         assert train.main(["--small", "--out", str(tmp_path / name)]) == 0
     assert "are told right" in capsys.readouterr().out

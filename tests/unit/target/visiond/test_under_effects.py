@@ -48,7 +48,6 @@ def test_more_lines_are_missed_in_heavier_rain(frames, tmp_path):
 
 
 def test_strips_show_all_levels(frames, tmp_path):
-    """A strip has five places in each row. Places without a level stay empty."""
     kinds = {kind.__name__: kind for kind in LEVELS}
     for name in ("PaperRain", "GaussianBlur"):
         assert main([*frames, "--effect", name, "--strips", str(tmp_path)]) == 0
