@@ -1,4 +1,4 @@
-"""Glue between a controller and the harness: runs the loop step by step and writes the results.
+"""Connect a controller to the harness: run its loop step by step and write the results.
 
 A target's entry module contains a class that builds the loop and simulates one step, and two lines that
 start the run:
@@ -60,8 +60,8 @@ class Run:
 
     A subclass defines `__init__(self, scenario, seed)`, which builds the loop, and `step(self)`, which
     advances it by `step_s` and ends with `self.record(...)`. `scenario` is a `Scenario`, `seed` an int.
-    Global generators are not seeded; see `seed_globals`. A subclass can use any name except `step_s`, `t`,
-    `done`, `end`, `record`, `recorded`, `hazard`, `alert`, `write`, `open` and `main`.
+    Global random generators are not seeded; see `seed_globals`. A subclass can use any name except `step_s`,
+    `t`, `done`, `end`, `record`, `recorded`, `hazard`, `alert`, `write`, `open` and `main`.
     """
 
     # two underscores keep this class's attributes apart from a subclass's
@@ -91,7 +91,7 @@ class Run:
     @step_s.setter
     def step_s(self, step_s: float) -> None:
         step_s = _length("step_s", step_s)
-        if self.__rows and step_s != self.__step_s:  # times of equal steps are products, not sums
+        if self.__rows and step_s != self.__step_s:  # a sum of equal steps would add up errors
             self.__since, self.__passed = self.t, len(self.__rows)
         self.__step_s = step_s
         self.__steps = self.__passed + round((self.__duration_s - self.__since) / step_s)
@@ -160,7 +160,7 @@ class Run:
 
     @classmethod
     def open(cls, arguments: Sequence[str]) -> Self:
-        """Build the run from the arguments `--scenario FILE --seed N --out DIR`; run no step.
+        """Build the run from the arguments `--scenario FILE --seed N --out DIR`, without running a step.
 
         The manifest names this method in `stepwise`. Any other `--key value` replaces the scenario's value of
         that key, and `--key` alone sets it to true, so changes of a scenario need no code.
@@ -199,7 +199,7 @@ def seed_globals(seed: int) -> None:
 def read_scenario(path: Path) -> Scenario:
     """Read a scenario file: `key: value` in each line, `#` before a comment.
 
-    This is a subset of YAML. A value that is not valid JSON is text. Any other line raises GlueError.
+    This is a subset of YAML. A value that is not valid JSON is text. A line of another form raises GlueError.
     """
     found: dict[str, Any] = {}
     for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):

@@ -12,7 +12,7 @@ from mutator._common.hashing import added, added_values, content_id, plain
 
 Value = int | float | str | bool | None
 
-OPERATORS = "operators"  # the module of faults made by mutation operators
+OPERATORS = "operators"  # the `module` of faults that mutation operators make
 
 
 class AnchorKind(StrEnum):
@@ -76,7 +76,7 @@ class Status(StrEnum):
     CRASHED = "crashed"  #: the controller raised an error or died
     TIMEOUT = "timeout"  #: the run reached its limit of time, steps or disk
     INVALID_MUTANT = "invalid_mutant"  #: the mutant does not compile, or an injected line raised an error
-    HARNESS_ERROR = "harness_error"  #: the harness failed; `mutator.run` tries it again
+    HARNESS_ERROR = "harness_error"  #: the harness failed; `mutator.run` retries the experiment
 
 
 class Outcome(StrEnum):
@@ -90,7 +90,7 @@ class Outcome(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Anchor:
-    """A statement of a function, an expression in it, or a value fixed when its module loads.
+    """A statement of a function, an expression in it, or a value that is fixed when a module loads.
 
     It is the `nth` match (from 1) of `kind` and `name`; without `nth` there must be exactly one match.
     `which` selects an argument of a call by position (from 1) or keyword. `name` depends on the kind:
@@ -109,7 +109,7 @@ class Anchor:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FaultLocation:
-    """A place in the target: a file relative to its root, a qualified function name, an anchor.
+    """A place in the target: a file relative to the root, a qualified function name and an anchor.
 
     The function is empty for a constant of a module or class.
     """
@@ -123,8 +123,8 @@ class FaultLocation:
 class Injection:
     """One fault model applied at one location. `params` are sorted (name, value) pairs.
 
-    With `where`, only executions of the location in which this condition holds are affected. With `call`,
-    only the n-th such execution since the fault's activation is affected; with `every`, every n-th.
+    With `where`, it affects the location only when this condition holds. With `call`, it affects only the
+    n-th such execution since the fault's activation; with `every`, every n-th.
     """
 
     location: FaultLocation
@@ -170,7 +170,7 @@ class Fault:
     #: where the source changes, and how; numbers in the unit of the changed variable
     injections: tuple[Injection, ...]
     hold: Hold | None = None  #: how long it stays active; None: as long as its trigger specifies
-    changes: tuple[str, ...] = ()  #: changes of the scenario that belong to the fault (`alone`)
+    changes: tuple[str, ...] = ()  #: changes of the scenario that the fault needs, such as `alone`
 
     @cached_property
     def id(self) -> str:

@@ -84,7 +84,7 @@ class Workspace:
         )
 
     def manifest(self, name: str) -> TargetManifest:
-        """The manifest of the target `name`, or the manifest at that path."""
+        """The manifest with this name or path."""
         manifest = load_manifest(self._file("targets", name, "target"), self.target)
         check_names(manifest)
         return manifest
@@ -125,7 +125,7 @@ class Workspace:
         return tuple(sorted((self.library / "faults").rglob("*.yaml")))
 
     def spec(self, name: str | Path) -> FaultSpec:
-        """The spec `<module>/<fault_type>`, or the spec in that file."""
+        """The spec with this name, `<module>/<fault_type>`, or path."""
         return load_spec(self._file("faults", name, "fault spec"), self.readings())
 
     def specs(self) -> tuple[FaultSpec, ...]:
@@ -201,7 +201,7 @@ class Workspace:
         return self._files("scenarios")
 
     def scenario(self, name: str | Path) -> Path:
-        """The file of the scenario `name`, or the scenario file at that path."""
+        """The file of the scenario with this name or path."""
         return self._file("scenarios", name, "scenario")
 
     @property
@@ -210,7 +210,7 @@ class Workspace:
         return self._files("campaigns")
 
     def campaign(self, name: str | Path) -> Path:
-        """The file of the campaign `name`, or the campaign file at that path."""
+        """The file of the campaign with this name or path."""
         return self._file("campaigns", name, "campaign")
 
     @property
@@ -219,7 +219,7 @@ class Workspace:
         return self._files("stpa/contexts")
 
     def context_table(self, name: str | Path, variables: Collection[str] | None = None) -> ContextTable:
-        """The context table `name`, or the one in that file; `variables` are those that a target observes."""
+        """The context table with this name or path; `variables` are those that a target observes."""
         return load_context_table(self._file("stpa/contexts", name, "context table"), variables)
 
     def hazards(self) -> HazardList | None:

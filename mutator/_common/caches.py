@@ -6,7 +6,7 @@
       runs/<digest>.json   verified run folders
       lines/<digest>.json  lines that a golden run executes
       pictures/<digest>.json  effects of image faults, for review
-      targets/<name>/      files that a target keeps for its runs: `{cache}` in its manifest
+      targets/<name>/      files that a target keeps for its runs (`{cache}` in its manifest)
 
 Results never depend on the cache. Each entry is found by a digest of its inputs and checked before use. An
 unwritable or damaged cache is ignored, and you can delete any entry at any time.
@@ -28,8 +28,9 @@ TARGET_BYTES = 4_000_000_000  # size limit for one target, enforced between seed
 class Entry:
     """A cached item that is kept or deleted as a whole.
 
-    `what` names its owner: `checks`, `goldens`, `runs`, `lines`, `pictures` or `target openpilot`. `size` is
-    its size on disk in bytes, `used` the time of its last use in seconds since the epoch.
+    `what` is the part of the cache: `checks`, `goldens`, `runs`, `lines`, `pictures` or, for example, `target
+    openpilot`. `size` is the size on disk in bytes, `used` the time of the last use in seconds since the
+    epoch.
     """
 
     what: str
@@ -102,7 +103,7 @@ def make_room(target: str) -> list[Entry]:
     """Delete the least recently used files of a target until at most TARGET_BYTES remain; return the deleted
     entries.
 
-    It is called before each seed of a run, because each seed has its own images.
+    A run calls it before each seed, because each seed has its own images.
     """
     return _pruned([_entry(f"target {target}", path) for path in _files(of_target(target))], TARGET_BYTES)
 
@@ -132,7 +133,7 @@ def _entry(what: str, path: Path) -> Entry:
     return Entry(
         what=what,
         path=path,
-        size=sum(state.st_blocks * 512 for state in states),  # a sparse file takes less than its size
+        size=sum(state.st_blocks * 512 for state in states),  # a sparse file takes less space than its size
         used=max((max(state.st_atime, state.st_mtime) for state in states), default=0.0),
     )
 

@@ -45,7 +45,7 @@ def from_json(data: bytes) -> Any:
     """Parse JSON four times as fast as `json.loads`; integers of more than 64 bits become floats."""
     try:
         return orjson.loads(data)
-    except ValueError:  # orjson also rejects e.g. nan
+    except ValueError:  # orjson also rejects NaN
         return json.loads(data)
 
 

@@ -34,7 +34,7 @@ def owned(run: Path, patience_s: float = _PATIENCE_S) -> Iterator[None]:
             os.write(fd, f"{os.getpid()}\n".encode())
         if living := wait_for_workers(run, patience_s):
             raise MutatorError(
-                f"workers of an earlier run are still running (processes {', '.join(map(str, living))})",
+                f"workers of an earlier run are still running (process id: {', '.join(map(str, living))})",
                 where=run,
                 expected="no workers in this folder",
                 remedy="wait for them or end them, then run the same command again",

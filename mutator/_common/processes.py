@@ -28,8 +28,8 @@ def shared(made: Callable[[T], R], items: Sequence[T], processes: int) -> Iterat
     """Yield `made(item)` for each item, in order, computed by `processes` processes (with fewer than two: by
     this process).
 
-    Each process is at most one result ahead, which saves memory. Exceptions of `made` are raised here;
-    MutatorError if a process dies.
+    Each process is at most one result ahead, which saves memory. Exceptions that `made` raises are raised
+    again; MutatorError if a process dies.
     """
     if processes < 2:
         yield from map(made, items)

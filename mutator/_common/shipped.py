@@ -63,7 +63,7 @@ def make_empty(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         problem = f"not empty ({sorted(folder.iterdir())[0].name})" if any(folder.iterdir()) else ""
     except OSError as err:
-        problem = f"cannot be made ({err.strerror})"
+        problem = f"cannot be created ({err.strerror})"
     if problem:
         raise MutatorError(
             problem,
@@ -90,7 +90,7 @@ def _unpacked(archive: Path, home: Path) -> Path:
             f"changed since installation: {', '.join(changed[:_SHOWN])}{more}",
             where=folder,
             expected="the files that were installed with mutator, unedited",
-            remedy="delete this folder to unpack it again; make edits in a library of `mutator init DIR`",
+            remedy="delete this folder to unpack it again; edit a library made by `mutator init DIR` instead",
         )
     return folder
 

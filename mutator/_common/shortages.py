@@ -10,7 +10,7 @@ _PROCESSES = "can't start new thread"
 _LOADING = (
     "failed to map segment",
     "cannot allocate memory",
-)  # errors when memory is too short to load a library
+)  # errors when there is too little memory to load a library
 _AGAIN = "run the same command again; finished experiments are kept and not repeated"
 
 

@@ -84,7 +84,7 @@ class Table:
 
 
 def markdown_line(text: str) -> str:
-    """Convert text to one line of Markdown that shows every character, e.g. of `<class 'float'>` and
+    """Convert text to one line of Markdown that shows every character, even in `<class 'float'>` and
     `__init__`.
     """
     return _MARKUP.sub(_escaped, " ".join(text.splitlines()))

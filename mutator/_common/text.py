@@ -33,7 +33,7 @@ _QUOTED = re.compile(r"\"[^\"]*\"|'[^']*'")
 
 
 def operator_hint(text: str) -> str:
-    """Return which Python operators to write instead of, e.g., `&&`; '' if the text needs none."""
+    """Return which Python operators to write for those of other languages, such as `&&`; '' without any."""
     found = dict.fromkeys(_WRONG.findall(_QUOTED.sub("", text)))
     return ", ".join(f"write '{_OPERATORS[one]}' for '{one}'" for one in found)
 

@@ -76,7 +76,7 @@ def verify(
     repair: bool = False,
     workspace: WorkspaceLike = None,
 ) -> Audit:
-    """Audit the run folder at `run`, finished or not, even if it no longer opens.
+    """Audit the run folder at `run`, finished or not, even if `load_run` can no longer open it.
 
     `rerun` is the number of randomly drawn experiments to rerun on the reference engine. `expect` is the seal
     that the run must have. With `repair`, damaged parts are set aside, and the next run of the campaign in
@@ -117,7 +117,7 @@ def _workspace(given: WorkspaceLike) -> Workspace | None:
 def _rerun(folder: RunFolder, workspace: Workspace | None, count: int, facts: dict[str, str]) -> Check:
     what = "experiments rerun on the reference engine"
     if workspace is None:
-        raise MutatorError("no library found", argument="rerun", expected="the sources of the run")
+        raise MutatorError("no library found", argument="rerun", expected="the library of the run")
     try:
         ids = drawn(folder, count)
     except MutatorError as err:

@@ -71,10 +71,10 @@ def run(
 
 
 def _what_is_left(summary: Summary) -> str:
-    parts = [f"{summary.done} of {summary.planned} experiments have a result"]
+    parts = [f"experiments with a result: {summary.done} of {summary.planned}"]
     if summary.harness_errors:
         name, detail = summary.harness_errors[0]
-        parts.append(f"{len(summary.harness_errors)} harness errors, the first {name}: {detail}")
+        parts.append(f"harness errors: {len(summary.harness_errors)} (first: {name}: {detail})")
     if summary.problem:
         parts.append(summary.problem)
     if summary.interrupted:

@@ -80,9 +80,9 @@ class RunComparison:
         return {sheet.name: sheet.frame() for sheet in self.comparison.sheets}
 
     def findings(self, gates: Sequence[Gate | str]) -> tuple[Finding, ...]:
-        """Return the experiments that fail a gate, in the order of `gates`, e.g. `("new-hazard",
-        "severity:S2")`.
+        """Return the experiments that fail a gate, in the order of `gates`.
 
+        A gate is a Gate or its name, such as `new-hazard` or `severity:S2`.
         MutatorError for an unknown gate, and for a severity gate if a run has no severity classes.
         """
         known = [gate.value for gate in Gate]
@@ -93,7 +93,7 @@ class RunComparison:
         return comparing.findings(self.comparison, [Gate(gate) for gate in gates])
 
     def write(self, out: str | Path | None = None) -> pages.Written:
-        """Write page, Markdown and CSV into `out`; default: report/compare-<first run> in the second run."""
+        """Write HTML, Markdown and CSV to `out`; default: report/compare-<first run> in the second run."""
         a, b = self.comparison.a, self.comparison.b
         default = b.folder.path / "report" / f"compare-{a.name}"
         return pages.write(self.comparison, default if out is None else Path(out))

@@ -118,8 +118,8 @@ class ExperimentResult(ABC):
         return readable(self.patch)[0]
 
     def propagation(self) -> "pd.DataFrame":
-        """Return the channels that differ from golden, earliest first: name (index), component, role, unit,
-        time of the first difference (`t_first`, s), largest difference up to the end of the drive
+        """Return the channels that differ from the golden run, earliest first: name (index), component, role,
+        unit, time of the first difference (`t_first`, s), largest difference up to the end of the drive
         (`max_dev`). Empty until the experiment has run."""
         import pandas as pd
 
@@ -149,7 +149,7 @@ class ExperimentResult(ABC):
 
 
 def trace_frame(trace: Trace, manifest: TargetManifest) -> "pd.DataFrame":
-    """Return a trace as a frame by time in s; `attrs["units"]` has the units of the manifest's channels.
+    """Return a trace as a frame indexed by time in s; `attrs["units"]` has the units of its channels.
 
     A channel without a value at a given time keeps its last value.
     """

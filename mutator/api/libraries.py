@@ -53,7 +53,7 @@ def unfilled_places(folder: str | Path) -> list[MutatorError]:
 def upgrade_manifest(path: str | Path) -> Upgrade | None:
     """Rewrite a target's manifest of an older schema in the current schema; return None if it is up to date.
 
-    Unaffected lines are unchanged. The result's `lost` lists the comments that rewritten lines lost.
+    The result's `lost` lists the comments that rewritten lines lost; other lines stay unchanged.
     MutatorError for a file that is not a manifest.
     """
     upgrade = manifest_files.upgrade_manifest(Path(path))

@@ -29,7 +29,7 @@ def from_here(path: Path) -> Path:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RunContents:
-    """A run folder and its workspace (None: found when needed)."""
+    """A run folder and its workspace."""
 
     folder: RunFolder  #: reads the files of the run folder
     given_workspace: Workspace | None = None  #: the workspace that was passed; None: found when needed
@@ -79,12 +79,12 @@ class RunContents:
 
     @cached_property
     def results(self) -> "pd.DataFrame":
-        """One row per experiment that has a record, by experiment id: the columns of results.csv, typed."""
+        """One row per experiment with a record, indexed by its id, with the columns of results.csv, typed."""
         return Results.up_to_date(self.path).frame()
 
     def propagation(self) -> "pd.DataFrame":
-        """Return, for each experiment, one row for each channel that differs from golden, with the columns of
-        propagation.parquet.
+        """Return, for each experiment, one row for each channel that differs from the golden run, with the
+        columns of propagation.parquet.
 
         MutatorError for a run of an older version that did not record these differences.
         """
@@ -118,7 +118,7 @@ class RunContents:
 
     @cached_property
     def traces(self) -> Traces:
-        """The traces. Those that the run folder lacks are made when needed."""
+        """The traces. Traces that the run folder lacks are made when needed."""
         return Traces(self.workspace, self.folder)
 
     def _workspace_if_any(self) -> Workspace | None:

@@ -123,7 +123,7 @@ class RunExperiment(ExperimentResult):
     @property
     def fault_path(self) -> FaultPath | None:
         """How far the fault propagated along the control structure; None if that is unknown, if the fault was
-        never active, or without an outcome.
+        never active, or if the run has no outcome.
         """
         ways = self.run.ways
         return ways.path(self.experiment, self.record) if ways and self.record else None

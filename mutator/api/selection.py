@@ -143,7 +143,7 @@ def find_trigger(
     if len(named) > 1:
         known = ", ".join(f"{table.name}/{row}" for table, row in named)
         raise MutatorError(
-            f"context '{text}' in {len(named)} tables", argument="trigger", expected=f"one of {known}"
+            f"context '{text}' is in {len(named)} tables", argument="trigger", expected=f"one of {known}"
         )
     if named:
         table, row = named[0]
@@ -168,7 +168,7 @@ def _split(name: str) -> tuple[str, str | None]:
 def _warn_of_value(value: float, declared: FaultSpec, faults: Collection[Fault], models: FaultModels) -> None:
     idle = [fault.label for fault in faults if changes_nothing(fault, models)]
     if idle:
-        warnings.warn(f"{', '.join(idle)} changes nothing", MutatorWarning, stacklevel=4)
+        warnings.warn(f"the value changes nothing: {', '.join(idle)}", MutatorWarning, stacklevel=4)
     outside = []
     for variant in declared:
         if variant.draw and f"{declared.name}/{variant.name}" in {fault.spec for fault in faults}:

@@ -69,7 +69,7 @@ class Trial(ExperimentResult):
         )
 
     def save_plot(self, path: Path) -> Path | None:
-        """Write `plot()` to an .svg or .png; returns None if the faulty run left no trace."""
+        """Write `plot()` to an .svg or .png file; return None if the faulty run left no trace."""
         if not self.has_trace:
             return None
         save(self.plot(), [path])

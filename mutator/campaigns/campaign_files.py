@@ -63,9 +63,9 @@ class Campaign:
     armed_after_s: Mapping[str, float]
     random_until_s: float | None
     hold_s: float | None  # how long faults stay active; None: while the context holds, or to the end
-    sample: int | None  # number of experiments, equally per variant
-    proportional: bool  # whether to sample pairs, in proportion to each fault type and scenario
-    seeds: range  # the campaign is repeated with each
+    sample: int | None  # number of experiments, balanced over the variants
+    proportional: bool  # whether to sample pairs, in proportion to the size of each fault type and scenario
+    seeds: range  # the campaign is repeated with each seed
     canary: Canary
     limits: Limits
     chunk: int
@@ -85,7 +85,7 @@ class Campaign:
         return _in(self.setting, reading)
 
     def setting_keys(self, reading: str) -> Keys:
-        """Return the keys of the value of `setting_in` in the campaign file."""
+        """Return where the campaign file has the value of `setting_in`."""
         return ("setting", reading) if reading in self.setting else ("setting",)
 
     def error(self, keys: Keys, got: str, *, expected: str, remedy: str) -> MutatorError:
@@ -100,7 +100,7 @@ def _in(told: Mapping[str, _Told], reading: str) -> _Told:
 def load_campaign(path: Path) -> Campaign:
     """Read a campaign file strictly; any mistake raises MutatorError with file and line.
 
-    The study need not be installed, so that old runs still open. `load_study` checks it.
+    The study need not be installed, so that old runs can be read. `load_study` checks it.
     """
     model, source = read(path, CampaignModel, SCHEMA, older={SCHEMA: with_list})
     _check_once(model, source)

@@ -92,7 +92,7 @@ class _LimitsModel(StrictModel, title="Limits"):
         default=1024,
         ge=1,
         le=MOST,
-        description="MiB in the run's output folder and TMPDIR together. Also the limit of each single file.",
+        description="MiB in the run's output folder and TMPDIR together. It also limits each file.",
     )
 
 
@@ -117,14 +117,14 @@ class CampaignModel(StrictModel, title="The file"):
     study: str | None = Field(
         None, description="The [study](../how-to/add-a-study.md) with which its reports compare the results."
     )
-    target: str = Field(description="The target, named by its manifest.")
+    target: str = Field(description="The name of the target's manifest.")
     scenarios: list[str] = Field(min_length=1, description="The scenarios by name, each once.")
     setting: Annotated[
         dict[str, list[str]], BeforeValidator(by_reading), WithJsonSchema(or_by_reading(_NAMES))
     ] = Field(
         {EVERY_READING: []},
-        description="Manifest changes that apply to every run, including fault-free runs. Give one list, or "
-        "one list for each reading by its name.",
+        description="Changes from the manifest that apply to every run, including fault-free runs. Give one "
+        "list, or a list for each reading, by name.",
     )
     faults: list[SelectionModel] = Field(
         min_length=1, description="The selections of faults. The campaign runs all of them."
@@ -143,7 +143,7 @@ class CampaignModel(StrictModel, title="The file"):
     sample: int | None = Field(
         None,
         ge=1,
-        description="How many experiments to take, equally per variant. Default: all.",
+        description="How many experiments to take, balanced over the variants. Default: all.",
     )
     proportional: bool = Field(
         False,

@@ -40,7 +40,7 @@ class Pending:
 
 
 def pending(folder: RunFolder, records: Mapping[str, Record]) -> tuple[Pending, ...]:
-    """Return the chunks of this folder's share that have experiments to run.
+    """Return the chunks of the folder's shard that still have experiments to run.
 
     Experiments to run are those without a record, and harness errors, which are retried.
     """

@@ -286,7 +286,7 @@ class Expansion:
 
     @contextmanager
     def _placed(self, keys: Keys) -> Iterator[None]:
-        """Locate errors that lack a line number at `keys` of the campaign file; leave others unchanged."""
+        """Point errors without a line number to `keys` in the campaign file; leave others unchanged."""
         try:
             yield
         except MutatorError as err:

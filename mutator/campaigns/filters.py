@@ -35,7 +35,7 @@ def compile_filter(text: str, columns: Collection[str]) -> Predicate:
     text, the mistake and the known columns.
     """
     if len(text) > _LONGEST:
-        raise _error(text[:60] + "...", f"a filter of {len(text)} characters", f"at most {_LONGEST}")
+        raise _error(text[:60] + "...", f"{len(text)} characters", f"at most {_LONGEST}")
     try:
         tree = ast.parse(text.strip(), mode="eval")
         return _Compiler(text, columns).predicate(tree.body)

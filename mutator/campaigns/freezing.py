@@ -1,4 +1,4 @@
-"""Freezes a plan into a run folder, together with its sources."""
+"""Freezes a plan into a run folder, together with the digests of its sources."""
 
 import csv
 import io

@@ -15,7 +15,7 @@ class When(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OperatorSelection:
-    """A selection of mutants of operators in places of the source."""
+    """Which operator mutants to take: operators, places, number and activation."""
 
     operators: tuple[Operator, ...]
     places: tuple[str, ...]

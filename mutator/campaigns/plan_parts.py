@@ -29,7 +29,7 @@ class Part:
 
 @dataclass(slots=True, kw_only=True)
 class Tally:
-    """The totals of the parts of a plan that have been added."""
+    """The totals of the plan parts added so far."""
 
     canary: Experiment
     several_seeds: bool  # each seed has its own golden runs

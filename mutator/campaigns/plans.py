@@ -1,4 +1,4 @@
-"""Plans: the frozen, ordered list of a campaign's experiments, and the expected cost of running them."""
+"""A plan: the frozen, ordered list of a campaign's experiments, and the expected cost of running them."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 RUNS_PER_GOLDEN = 3  # two golden runs and the null mutant, for each scenario with its changes
 _DEFAULT_CPU_S = 1.4  # one run on the reference engine, including interpreter start
-_START_S = 3.0  # time of a campaign outside its runs
+_START_S = 3.0  # time that a campaign needs outside its runs
 _BYTES_PER_EXPERIMENT = 9_000  # series, patch, record and table rows of an experiment
 _BYTES_PER_GOLDEN = 1_200_000
 _IN_MEMORY = 50_000  # larger plans are not read as a whole

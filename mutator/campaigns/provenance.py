@@ -38,7 +38,7 @@ def check_sources(run: Path, frozen: dict[str, str], now: dict[str, str]) -> Non
     changed = [name for name in frozen if now.get(name) != frozen[name]]
     if changed:
         raise MutatorError(
-            f"these sources changed since this run was planned: {', '.join(changed)}",
+            f"sources changed since this run was planned: {', '.join(changed)}",
             where=run,
             expected="the same target, templates and scenarios during the whole run",
             remedy=_REMEDY,
@@ -73,7 +73,7 @@ def check_versions(folder: RunFolder, *, accept: bool = False) -> tuple[str, ...
 
 
 def other_versions(run: Path, what: str, found: Iterable[str]) -> MutatorError:
-    """Return an error about different versions, which the caller raises. Its text begins with `what`."""
+    """Return an error about different versions, for the caller to raise. Its text begins with `what`."""
     return MutatorError(
         f"{what} other versions: {'; '.join(found)}",
         where=run,

@@ -1,4 +1,4 @@
-"""Draws a small, even and reproducible sample of many experiments."""
+"""Draws a small, even and reproducible sample from many experiments."""
 
 import random
 from collections import Counter, defaultdict, deque

@@ -10,8 +10,8 @@ from mutator.triggers.kinds import time_of
 def run_key(manifest: TargetManifest, experiment: Experiment) -> Hashable:
     """Return a key that is equal for experiments that share a run.
 
-    Such experiments differ only in scenarios that a change makes identical. The manifest lists them in
-    `same_in`, and the preflight checks them.
+    Such experiments differ only in scenarios that a change makes identical. The manifest lists these
+    scenarios in `same_in`, and the preflight checks that they are identical.
     """
     scenarios = same_in(manifest, experiment.changes)
     place: Hashable = scenarios if experiment.scenario in scenarios else experiment.scenario
@@ -23,7 +23,7 @@ def same_in(manifest: TargetManifest, changes: Sequence[str]) -> tuple[str, ...]
 
 
 def in_turn(runs: Iterable[list[Experiment]]) -> list[list[Experiment]]:
-    """Order runs so that they share the most work: by golden run, then by trigger, then by time."""
+    """Order runs so that they share the most work: by golden run, trigger time and condition."""
 
     def turn(run: list[Experiment]) -> tuple[str, tuple[str, ...], float, str]:
         first = run[0]

@@ -91,8 +91,8 @@ class TriggersModel(StrictModel, title="Triggers"):
         default_factory=dict,
         min_length=1,
         description="The time in s before which no trigger fires and no random time is drawn. Give one "
-        "number, or one for each reading by its name. Default: the time in the target's "
-        "manifest. It does not delay an `at_s`.",
+        "number, or one for each reading, by name. Default: the time in the target's "
+        "manifest. A trigger with `at_s` is not delayed.",
     )
     random_until_s: float | None = Field(
         None,
@@ -136,7 +136,7 @@ Triggers = Annotated[
 
 
 def with_list(source: Source) -> Source:
-    """Convert a campaign whose `triggers` is a list into one with that list under `list`."""
+    """Convert a campaign whose key `triggers` has a list into one with that list under `list`."""
     given = source.data.get("triggers")
     if not isinstance(given, list):
         return source

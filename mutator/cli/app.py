@@ -138,8 +138,8 @@ for module in (
 
 
 def program() -> int:
-    """Run `mutator`. With unfinished experiments, end the process without the interpreter's cleanup, which
-    can crash after memory has run out.
+    """Run `mutator`. If experiments are left unfinished, end the process without the interpreter's cleanup,
+    which can crash after memory has run out.
     """
     code = main()
     if code == EXIT_HARNESS_ERRORS:

@@ -131,7 +131,7 @@ def _print_plan(terminal: Terminal, made: "mutator.Plan", cost: "Cost", anew: di
     if len(made.seeds) > 1:
         terminal.say(f"{seeds_text(made.seeds)}: {len(made.goldens())} golden runs (each seed has its own)")
     if shared := len(made.experiments) - made.runs:
-        terminal.say(f"{made.runs} runs: {shared} experiments reuse the identical run of another scenario")
+        terminal.say(f"runs: {made.runs}; experiments that reuse another scenario's identical run: {shared}")
     for why, variants in _by_reason(anew).items():
         terminal.say(f"only the reference engine can run {', '.join(variants)}: {why}")
     terminal.say(f"expected: {_cost_line(cost)}")
@@ -280,7 +280,7 @@ def _print_end(
         terminal.say(f"seal: {summary.seal}")
     if summary.harness_errors:
         terminal.say(
-            f"harness errors, left out of rates; the same command retries them: {len(summary.harness_errors)}"
+            f"harness errors: {len(summary.harness_errors)} (left out of rates; the same command retries)"
         )
         for name, detail in summary.harness_errors[:5]:
             terminal.say(f"  {name}: {detail}", style="red")

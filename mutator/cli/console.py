@@ -95,7 +95,7 @@ class Terminal:
             self.say(Table(heads=heads, rows=cells, right=right).as_text(), whole=True)
 
     def diff(self, patch: str) -> None:
-        """Print a unified diff: coloured in a terminal, byte for byte elsewhere, for `patch`."""
+        """Print a unified diff: coloured in a terminal, elsewhere unchanged, as `patch` needs it."""
         if self.as_json:
             return
         if not self.out.is_terminal:

@@ -162,8 +162,8 @@ def _events(record: "Record", manifest: "TargetManifest | None") -> list[tuple[f
     hazards = {h.name: f": {h.about}" for h in manifest.rules if h.about} if manifest else {}
     events: list[tuple[float, str]] = []
     if record.activation:
-        times = record.activation.count
-        events.append((record.activation.first, f"fault first active ({times} times in all)"))
+        times = counted(record.activation.count, "time")
+        events.append((record.activation.first, f"fault first active ({times} in all)"))
         events.append((record.activation.last, "fault last active"))
     if record.t_manifest is not None:
         events.append((record.t_manifest, "manifested: an actuator differs from the golden run"))

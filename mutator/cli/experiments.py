@@ -78,7 +78,7 @@ def show(
 ) -> None:
     """Show an experiment: diff, times, verdict, plot, film.
 
-    Without an experiment, lists the worst of a run, by severity class, delta-v and margin.
+    Without an experiment, lists the worst experiments of a run, by severity class, delta-v and margin.
     """
     from mutator.cli import experiment_view
 
@@ -150,7 +150,7 @@ def _film(terminal: Terminal, found: "RunExperiment", video: Path | None, stills
 
 
 def _still(text: str, found: "RunExperiment") -> "mutator.Shot":
-    """Parse `T=FILE` or `T`. The still of `T` is written next to the plots, where the report finds it."""
+    """Parse `T=FILE` or `T`. With `T` alone, the file is one next to the plots, where the report finds it."""
     t, named, name = text.partition("=")
     try:
         time = float(t)

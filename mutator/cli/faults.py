@@ -90,7 +90,7 @@ def try_spec(
     faults = bench.faults(choice)
     fault, _ = one_of_each_variant(faults)[0]
     if len(faults) > 1:
-        terminal.note(f"{fault.label}, one of {len(faults)} (choose with --variant or --value)")
+        terminal.note(f"{fault.label}, one of {len(faults)} faults (choose with --variant or --value)")
     when = bench.trigger(trigger, armed_after)
     with terminal.wait(f"running {scenario}, fault-free and faulty"):
         trial = mutator.try_fault(
@@ -166,7 +166,7 @@ def _print_diffs(terminal: Terminal, diffs: list[tuple[str, str, str]], *, whole
     if terminal.as_json:
         terminal.emit([{"fault": fault, "id": name, "patch": patch} for fault, name, patch in diffs])
     for fault, _, patch in diffs:
-        # `patch` skips text before a diff, so the heading can stay in a pipe.
+        # `patch` skips text before a diff, so piped output can include the heading.
         terminal.say(f"# {fault}", style="bold", whole=True)
         text, note = (patch, "") if whole else readable(patch)
         terminal.diff(text)
@@ -233,7 +233,7 @@ def generate(
     sample: Annotated[
         int | None,
         typer.Option(
-            min=1, help="With --operators: draw this many mutants, in proportion by operator and function."
+            min=1, help="With --operators: draw this many mutants, spread over operators and functions."
         ),
     ] = None,
     seed: Seed = None,

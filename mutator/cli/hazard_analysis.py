@@ -62,8 +62,8 @@ def stpa(
         raise typer.Exit(EXIT_CHECK_FAILED)
     faults = {fault for factor in analysis.factors.values() for fault in factor.faults}
     terminal.say(
-        f"all well: {len(analysis.factors)} causal factors, {len(faults)} fault specs, no gap, "
-        "no contradiction",
+        f"all well: {counted(len(analysis.factors), 'causal factor')}, {counted(len(faults), 'fault spec')}, "
+        "no gap, no contradiction",
         style="green",
     )
 

@@ -155,7 +155,7 @@ def check(
     scenario: Annotated[
         list[str] | None,
         typer.Option(
-            help="With --drive: this scenario; repeatable. Default: the scenarios of the campaigns.",
+            help="With --drive: only this scenario; repeatable. Default: the scenarios of the campaigns.",
             autocompletion=completion.scenarios,
         ),
     ] = None,

@@ -38,7 +38,7 @@ def list_places(
 ) -> None:
     """List where faults can be injected, and with which models.
 
-    Each line shows an anchor as you write it in a spec at `at`: a statement, a value changed in place, a
+    Each line shows an anchor as you write it under `at` in a spec: a statement, a value changed in place, a
     constant, or a default.
     """
     terminal = Terminal(as_json)

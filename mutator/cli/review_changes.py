@@ -22,7 +22,7 @@ SomeGroups = Annotated[
     typer.Argument(metavar="[GROUP...]", help="Ids of groups, or the start of each id; not with --only."),
 ]
 Yes = Annotated[
-    bool, typer.Option("--yes", "-y", help="Decide without asking on the groups that --only finds.")
+    bool, typer.Option("--yes", "-y", help="Do not ask for confirmation of the groups that --only finds.")
 ]
 Remark = Annotated[str, typer.Option(metavar="TEXT", help="Add this remark to each group.")]
 
@@ -145,7 +145,11 @@ def _chosen(
     many = f"{counted(len(chosen), 'group')} ({review_view.counts(found.review, chosen)})"
     if not yes:
         if not sys.stdin.isatty():
-            raise MutatorError(many, argument="only", remedy=f"add --yes to {verb} them without confirmation")
+            raise MutatorError(
+                f"no terminal to ask for confirmation of {many}",
+                argument="only",
+                remedy=f"add --yes to {verb} without confirmation",
+            )
         if not typer.confirm(f"{verb} {many}?"):
             return ()
     return chosen

@@ -59,7 +59,7 @@ def print_list(terminal: Terminal, review: "Review", groups: Sequence["Group"]) 
     terminal.say(f"{counted(len(groups), 'group')}: {counts(review, groups)}")
     gone = review.entries.keys() - {group.id for group in groups}
     if gone:
-        terminal.note(f"{len(gone)} blocks of the review file belong to groups that are not listed")
+        terminal.note(f"blocks of the review file for groups that are not listed: {len(gone)}")
 
 
 def _short(injection: str) -> str:

@@ -58,7 +58,7 @@ def test_groups_are_found_by_filter_or_start_of_id(cli: Cli, root: Path, known: 
     only = 'model == "omission" and match(trigger, "*time*") and not flagged'
     assert ids(cli, "--only", only, "--exclude", "faults > 7") == [silent]
     assert cli("review", "show", silent[:8], "--json").json[0]["group"] == silent
-    for word, said in (("zz", "no group 'zz'"), ("", "5 groups start with ''")):
+    for word, said in (("zz", "no group 'zz'"), ("", "several groups (5) start with ''")):
         answer = cli("review", "show", word)
         assert (answer.code, said in answer.err) == (2, True)
     assert "unknown column `color`" in cli("review", "--only", "color == 1").err
@@ -125,8 +125,8 @@ def test_deciding_about_a_filter_asks_first(
     """Without a terminal --yes is required. Ids and a filter together are refused."""
     words = ("review", "approve", "--only", 'state == "new" and model == "offset"', *JANE)
     asked = cli(*words)
-    assert (asked.code, "--only: 3 groups (3 new)" in asked.err) == (2, True)
-    assert "add --yes to approve them" in asked.err
+    assert (asked.code, "confirmation of 3 groups (3 new)" in asked.err) == (2, True)
+    assert "add --yes to approve without confirmation" in asked.err
     questions: list[str] = []
     monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)
     monkeypatch.setattr(typer, "confirm", lambda text: bool(questions.append(text)))

@@ -12,7 +12,7 @@ Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, jso
 @pytest.mark.parametrize(
     ("words", "warnings"),
     [
-        (["sensor/lane", "--value", "0"], ["sensor/lane/shifted 0 m changes nothing"]),
+        (["sensor/lane", "--value", "0"], ["the value changes nothing: sensor/lane/shifted 0 m"]),
         (
             ["sensor/distance", "--value", "500"],
             [
@@ -23,7 +23,7 @@ Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, jso
         (
             ["sensor/distance", "--variant", "longer", "--value", "0"],
             [
-                "sensor/distance/longer 0 m changes nothing",
+                "the value changes nothing: sensor/distance/longer 0 m",
                 "value 0 is outside the range that the spec declares: sensor/distance/longer, 1 to 65 m",
             ],
         ),
@@ -52,7 +52,7 @@ def test_a_plan_warns_of_values_without_effect(cli: Cli, root: Path) -> None:
     words = ("plan", "toy", "--only", 'fault_type == "lane"', "--out")
     answer = cli(*words, "p")
     assert answer.code == 0
-    assert "warning: the value of 3 of 6 experiments changes nothing: sensor/lane/shifted 0 m" in answer.err
+    assert "warning: value that changes nothing, in 3 of 6 experiments: sensor/lane/shifted 0 m" in answer.err
     spec.write_text(spec.read_text().replace("{by_m: offset}", "{by_m: offset, low_m: 0}"))
     assert "warning" not in cli(*words, "q").err
 
