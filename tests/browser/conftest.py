@@ -1,5 +1,5 @@
-"""A toy run with synthetic records, and the system's Chromium, which opens its report. Every test fails on an
-error in the browser's console."""
+"""A toy run with synthetic records, whose report opens in the system's Chromium. Every test fails on an error
+in the browser's console."""
 
 import os
 import shutil
@@ -56,8 +56,8 @@ def browser() -> Iterator[Any]:
 
 
 def record(experiment: Experiment, number: int, patch: bytes) -> Record:
-    """Return a synthetic record with that patch. Of ten records, two are not activated and three are hazards.
-    One is a harness error and one a crash."""
+    """Return a synthetic record with this patch. Of ten records, two are not activated, three are hazards,
+    one is a harness error and one a crash."""
     status = {3: Status.HARNESS_ERROR, 4: Status.CRASHED}.get(number, Status.OK)
     active = number % 5 > 0
     hazard = status is Status.OK and number % 10 > 6

@@ -37,7 +37,6 @@ def test_a_long_comparison_is_cut_and_can_be_filtered(
     serious_faults: Callable[[Any], list[str]],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """New hazards come first. Filters search all changes."""
     monkeypatch.setattr(pages, "SHOWN", SHOWN)
     page = browser.new_page()
     errors: list[str] = []

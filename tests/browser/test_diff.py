@@ -13,8 +13,7 @@ TAG = '# fi:a0 was:    x = "a\u2028b" # c'
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n"])
-def test_a_tag_reaches_to_the_end_of_its_line(browser: Any, end: str) -> None:
-    """A diff shows the tag dimmed, and the injected lines leave it out."""
+def test_a_tag_extends_to_the_end_of_its_line(browser: Any, end: str) -> None:
     lines = ["+from car import _fi  # fi:probe", '-x = "a\u2028b" # c', f"+{CHANGED}{TAG}", "+y = 1  # fi:a0"]
     patch = "diff --git a/m.py b/m.py\n--- a/m.py\n+++ b/m.py\n@@ -1,1 +1,3 @@\n" + end.join([*lines, ""])
     page = browser.new_page()

@@ -47,7 +47,6 @@ def values() -> dict[str, np.ndarray]:
 
 
 def test_python_and_the_page_agree_on_formulas(browser: Any, values: dict[str, np.ndarray]) -> None:
-    """The inputs include infinite and missing values."""
     rng = random.Random(18)
     formulas = [check_formula(formula(rng), NAMES, over_time=True) for _ in range(COUNT)]
     conditions = [check_condition(condition(rng), variables=NAMES, over_time=True) for _ in range(COUNT)]

@@ -29,7 +29,7 @@ def height(page: "Page") -> float:
     return float(page.page.evaluate(f"{WINDOW}.clientHeight"))
 
 
-def test_the_window_is_low_if_few_rows_match(page: "Page") -> None:
+def test_the_window_shrinks_if_few_rows_match(page: "Page") -> None:
     before = height(page)
     page.page.fill("#search", "crashed")
     page.page.wait_for_function("document.querySelectorAll('#grid tr[data-at]').length < 3")
@@ -49,7 +49,7 @@ def test_a_filter_scrolls_to_the_worst_rows(page: "Page") -> None:
     assert page.page.evaluate(f"{WINDOW}.scrollTop") == 0
 
 
-def test_an_experiment_named_by_the_start_of_its_id_is_marked_in_the_list(page: "Page") -> None:
+def test_an_experiment_opened_by_an_id_prefix_is_marked_in_the_list(page: "Page") -> None:
     name = page.page.inner_text("#grid tr[data-at='0'] code")
     page.open(f"e={name[:6]}")
     page.page.wait_for_selector("#experiment h2")

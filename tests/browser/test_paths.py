@@ -76,7 +76,6 @@ def opened(open_report: "Callable[[Path], Page]", report: Path) -> "Page":
 
 
 def test_an_experiment_opens_with_its_path(opened: "Page") -> None:
-    """Boxes are in causal order. A replay highlights the boxes reached so far."""
     opened.choose("kind", "sensor/lane")
     opened.page.click("#grid tr[data-at] >> nth=0")
     opened.page.wait_for_selector(".path-strip")

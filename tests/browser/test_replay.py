@@ -139,7 +139,6 @@ def seek(replayed: Replayed, t: float) -> None:
 
 
 def test_a_replay_starts_paused_shortly_before_the_activation(browser: Any, replayed: Replayed) -> None:
-    """Plots of actuators come first."""
     replayed.show(FACTS)
     assert replayed.t == BEGIN - 1.0
     assert not replayed.page.evaluate("player.clock.isPlaying")
@@ -152,7 +151,6 @@ def test_a_replay_starts_paused_shortly_before_the_activation(browser: Any, repl
 
 
 def test_keys_move_the_replay(replayed: Replayed) -> None:
-    """An arrow key moves by a sample, or by a second with Shift. End jumps to the end."""
     seek(replayed, 1.0)
     replayed.press("ArrowRight")
     assert replayed.t == 1.05
@@ -167,7 +165,7 @@ def test_keys_move_the_replay(replayed: Replayed) -> None:
     assert replayed.text(".state") == "0.00 s\nfault not active yet"
 
 
-def test_the_time_bar_is_dragged_and_has_a_button_for_each_mark(replayed: Replayed) -> None:
+def test_the_time_bar_can_be_dragged_and_has_a_button_for_each_mark(replayed: Replayed) -> None:
     bar = replayed.page.locator(".timebar").bounding_box()
     y = bar["y"] + bar["height"] / 2
     replayed.page.mouse.move(bar["x"] + 5, y)
@@ -184,7 +182,6 @@ def test_the_time_bar_is_dragged_and_has_a_button_for_each_mark(replayed: Replay
 
 
 def test_plots_show_the_values_of_the_series(replayed: Replayed) -> None:
-    """Moving the pointer does not change the time."""
     seek(replayed, 3.0)
     at = TIMES.index(3.0)
     head = '.plot-of[data-channel="gap"] .value'
@@ -205,7 +202,6 @@ def test_plots_show_the_values_of_the_series(replayed: Replayed) -> None:
 def test_a_moment_of_huge_values_does_not_flatten_the_plot(
     replayed: Replayed, high: float, note: str | None
 ) -> None:
-    """The axis is cut off with a note. Values a hundred times the usual ones are not cut off."""
     values = {"golden": [2.0] * STEPS, "faulty": [3.0 if t > BEGIN else 2.0 for t in TIMES]}
     values["faulty"][50] = high
     channel = SERIES["channels"][0] | {"name": "hwt"} | values
@@ -226,7 +222,7 @@ def test_marks_close_together_have_separate_buttons(replayed: Replayed) -> None:
     replayed.show(FACTS)
 
 
-def test_plots_are_selected_and_zoomed(replayed: Replayed) -> None:
+def test_plots_can_be_selected_and_zoomed(replayed: Replayed) -> None:
     replayed.page.click(".gauge:has-text('calm')")
     assert replayed.page.locator('.plot-of[data-channel="calm"]').count() == 1
     assert replayed.page.get_attribute(".gauge:has-text('calm')", "aria-pressed") == "true"
@@ -289,8 +285,7 @@ def test_a_replay_pauses_at_the_end_of_the_drive_and_can_continue(replayed: Repl
     assert not replayed.page.evaluate("player.clock.isPlaying")
 
 
-def test_the_plots_and_the_replay_show_the_same_time(replayed: Replayed) -> None:
-    """The check is made during playback."""
+def test_plots_and_replay_show_the_same_time_during_playback(replayed: Replayed) -> None:
     replayed.show(FACTS)
     seek(replayed, 2.2)
     replayed.page.evaluate("""() => {

@@ -33,7 +33,6 @@ def rows(run: Path) -> list[dict[str, str]]:
 
 
 def test_filters_select_rows_and_are_in_the_address(page: "Page", rows: list[dict[str, str]]) -> None:
-    """Back undoes each step."""
     hazards = [row for row in rows if row["outcome"] == "hazard"]
     page.choose("outcome", "hazard")
     assert page.found == f"{len(hazards)} of {COUNT} experiments"
@@ -70,7 +69,6 @@ def test_a_click_on_a_column_title_sorts_with_empty_cells_last(
 
 
 def test_an_opened_experiment_shows_its_diff_spec_and_commands(page: "Page", run: Path) -> None:
-    """Commands contain the opened folder."""
     page.page.click("#grid tr[data-at] >> nth=0")
     page.page.wait_for_selector("#experiment .diff")
     name = page.fragment.removeprefix("e=")
@@ -97,7 +95,6 @@ def test_an_opened_experiment_shows_its_diff_spec_and_commands(page: "Page", run
 
 
 def test_the_list_stays_next_to_an_opened_experiment(page: "Page") -> None:
-    """A click in the list opens another experiment."""
     page.choose("outcome", "hazard")
     count, title = len(page.column("ending")), page.page.title()
     page.page.locator("#grid tr[data-at] >> nth=1").scroll_into_view_if_needed()
@@ -164,7 +161,6 @@ def test_none_is_a_value_of_a_filter_and_of_a_search(page: "Page", rows: list[di
 
 
 def test_terms_of_the_page_are_explained(page: "Page") -> None:
-    """The terms include outcomes, counts, silent hazards and triggers."""
     page.page.click(".words summary")
     assert page.page.is_visible(".glossary")
     words = {"sdc", "masked", "golden run", "silent hazard", "guided", "rank", "near"}
@@ -178,7 +174,6 @@ def test_the_first_tab_stop_skips_to_the_list(page: "Page") -> None:
 
 
 def test_series_are_loaded_from_their_files(page: "Page", run: Path, rows: list[dict[str, str]]) -> None:
-    """The replay has the numbers that Python reads. An experiment without a series shows the command."""
     series = SeriesFolder(run)
     assert series.index is not None
     names = {*series.index.entries, *series.kept_ids()}
@@ -221,7 +216,6 @@ def test_a_damaged_series_is_shown_with_the_command_that_restores_it(page: "Page
 
 
 def test_a_cell_of_the_heat_map_filters_the_list(page: "Page", rows: list[dict[str, str]]) -> None:
-    """Filters for results do not change the counts. A second press removes the filter."""
     cell = '#heat button[aria-label^="sensor/lane in B:"]'
     here = [row for row in rows if (row["fault_type"], row["scenario"]) == ("lane", "B")]
     used = [row for row in here if row["status"] != "harness_error"]
@@ -255,7 +249,6 @@ MEDIANS = """async () => {
 
 
 def test_the_map_shows_the_median_of_a_metric(page: "Page", rows: list[dict[str, str]]) -> None:
-    """The median is over the activated faults. The user can also choose worst values and shares."""
     used = [row for row in rows if row["status"] != "harness_error"]
     times = [float(row["t_activation"]) for row in used if row["t_activation"]]
     text, options = page.page.evaluate(MEDIANS)
@@ -299,7 +292,6 @@ def test_a_shared_link_restores_filter_order_and_experiment(page: "Page") -> Non
 
 
 def test_the_page_can_be_used_with_the_keyboard_alone(page: "Page") -> None:
-    """`/` searches, j and k move, Enter opens, Esc closes, ? helps."""
     keys, focused = page.page.keyboard, "document.activeElement.dataset.at"
     keys.press("/")
     assert page.page.evaluate("document.activeElement.id") == "search"
@@ -336,10 +328,9 @@ def test_text_of_a_run_is_never_markup(page: "Page", rows: list[dict[str, str]])
     assert page.page.inner_text("#experiment .detail") == "<b>the disk</b> is gone"
 
 
-def test_a_target_without_alerts_has_no_column_for_them(
+def test_a_target_without_alerts_has_no_alert_column(
     page: "Page", run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Table, filters and map do not mention alerts. Sorting still works."""
     other = tmp_path / "run"
     shutil.copytree(run, other, ignore=shutil.ignore_patterns("report"))
     monkeypatch.setattr(RunFolder, "has_alerts", False)

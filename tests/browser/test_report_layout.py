@@ -15,7 +15,6 @@ EXPERIMENTS = 24  # of the run
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_a_narrow_screen_does_not_scroll_sideways(browser: Any, run: Path, scheme: str) -> None:
-    """At 400 pixels only tables are wider than the screen."""
     context = browser.new_context(viewport={"width": 400, "height": 800}, color_scheme=scheme)
     page = context.new_page()
     page.goto((run / "report" / "index.html").as_uri())
@@ -47,7 +46,6 @@ TITLES = """[...document.querySelectorAll("h1")].filter((h) => h.checkVisibility
 def test_axe_finds_no_serious_fault(
     page: "Page", serious_faults: "Callable[[Any], list[str]]", width: int
 ) -> None:
-    """The screen is wide or narrow, and light or dark, with the list alone or with an open experiment."""
     page.page.set_viewport_size({"width": width, "height": 900})
     for scheme in ("light", "dark"):
         page.page.emulate_media(color_scheme=scheme, reduced_motion="reduce")
@@ -85,8 +83,6 @@ def scrolled(page: "Page") -> Iterator["Page"]:
 
 
 def test_paper_has_the_filtered_rows(page: "Page") -> None:
-    """The number of printed rows has a stated limit. Parts that are only for screens are left
-    out."""
     page.page.emulate_media(media="print")
     page.page.evaluate("dispatchEvent(new Event('beforeprint'))")
     assert len(page.column("experiment_id")) == EXPERIMENTS
@@ -99,7 +95,6 @@ def test_paper_has_the_filtered_rows(page: "Page") -> None:
 
 @pytest.mark.parametrize("due", ["grid.scrollTop = 310", "grid.style.height = '200px'"])
 def test_paper_has_the_first_rows_after_a_late_redraw(scrolled: "Page", due: str) -> None:
-    """The window is scrolled or resized right before printing."""
     printing = f"""async () => {{
         const frame = () => new Promise(requestAnimationFrame), grid = document.querySelector('#grid');
         {due};

@@ -70,7 +70,6 @@ def test_filters_narrow_the_list_and_are_in_the_address(open_page: Callable[...,
 
 
 def test_marks_become_commands(open_page: Callable[..., Any]) -> None:
-    """The commands name the marked groups with shell quoting."""
     page = open_page("q=gap")
     unfold(page)
     for key in "jajr":
@@ -89,7 +88,6 @@ def test_marks_become_commands(open_page: Callable[..., Any]) -> None:
 
 
 def test_similar_groups_are_folded(open_page: Callable[..., Any]) -> None:
-    """One key unfolds similar groups, and another marks all of them after confirmation."""
     page = open_page("q=gap")
     assert shown(page) == 1
     assert page.inner_text("[data-do=unfold]:visible") == "1 more like this"
@@ -116,7 +114,6 @@ def test_all_filtered_groups_are_marked_after_confirmation(open_page: Callable[.
 
 
 def test_a_diff_shows_its_holes_and_their_values(open_page: Callable[..., Any]) -> None:
-    """A key opens the table of values with their range above it."""
     page = open_page("q=longer")
     page.keyboard.press("j")
     assert page.locator(".group:visible mark.hole").all_inner_texts() == ["⟨by⟩"]

@@ -64,7 +64,6 @@ def as_read(run: Path, name: str) -> list[dict[str, Any]]:
 
 
 def test_a_page_and_python_read_the_numbers_of_the_fixture(browser: Any, run: Path) -> None:
-    """The series is packed or in a separate file."""
     expected = json.loads((FIXTURE / "series.json").read_text())
     for name, known in expected.items():
         told = [{key: one[key] for key in ("name", "t", "golden", "faulty")} for one in known["channels"]]
@@ -76,7 +75,6 @@ def test_a_page_and_python_read_the_numbers_of_the_fixture(browser: Any, run: Pa
 
 
 def test_the_page_reads_the_points_between_the_values(browser: Any, run: Path) -> None:
-    """The cases are a value at every second time, infinite values and a longer run."""
     t = np.arange(9) / 20
     rows = [np.arange(7, dtype="<f4"), np.array([1, np.inf, -np.inf, np.nan], dtype="<f4")]
     about = {"start": 0.0, "end": 0.3, "channels": [{"name": "a"}, {"name": "b"}]}
@@ -101,7 +99,6 @@ def test_the_page_reads_the_points_between_the_values(browser: Any, run: Path) -
 
 
 def test_a_damaged_series_gives_a_message(browser: Any, run: Path) -> None:
-    """An experiment without a series gives null."""
     name = next(iter(json.loads((FIXTURE / "series.json").read_text())))
     for path in (run / "series").glob(f"{16 * '[0-9a-f]'}.js"):
         data = path.read_bytes()

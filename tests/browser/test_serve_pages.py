@@ -62,8 +62,6 @@ def test_a_refused_job_shows_the_servers_message(address: str, visit: Visit) -> 
 
 @pytest.mark.slow
 def test_an_experiment_is_rerun_from_its_report(address: str, visit: Visit, folder: Path) -> None:
-    """The job is shown next to the experiment and at the foot of the page, also after a reload. When the job
-    is finished, the report has the new plot."""
     page = visit(address, "/runs/night/report/index.html")
     page.wait_for_selector("html[data-ready]", state="attached")
     page.click("#grid tr[data-at] >> nth=0")
@@ -81,10 +79,7 @@ def test_an_experiment_is_rerun_from_its_report(address: str, visit: Visit, fold
 
 
 @pytest.mark.slow
-def test_a_try_and_a_campaign_run_and_a_job_can_be_cancelled(
-    address: str, visit: Visit, folder: Path
-) -> None:
-    """A campaign becomes a listed run, and a cancelled job leaves no files."""
+def test_a_try_and_a_campaign_run_and_jobs_can_be_cancelled(address: str, visit: Visit, folder: Path) -> None:
     page = visit(address)
     page.fill("[name=spec]", "sensor/distance")
     page.select_option("[name=variant]", "longer")

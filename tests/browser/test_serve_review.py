@@ -63,7 +63,7 @@ def words(page: Any, group: str) -> str:
     return str(page.inner_text(f"#group-{group}"))
 
 
-def test_marks_are_kept_and_found_after_a_reload(review: Callable[..., Any], library: Workspace) -> None:
+def test_marks_survive_a_reload(review: Callable[..., Any], library: Workspace) -> None:
     page = review("Jane <b>Doe</b>")
     for key in "jjaf":
         page.keyboard.press(key)
@@ -87,8 +87,7 @@ def test_marks_are_kept_and_found_after_a_reload(review: Callable[..., Any], lib
     assert [remark.text for remark in kept.remarks(group)] == ["<i>limits</i> are right"]
 
 
-def test_a_decision_and_a_flag_are_taken_back(review: Callable[..., Any], library: Workspace) -> None:
-    """The same key again, or `u`, removes a mark."""
+def test_a_decision_and_a_flag_can_be_withdrawn(review: Callable[..., Any], library: Workspace) -> None:
     page = review("Jane")
     page.keyboard.press("j")
     for key in "rffu":
@@ -107,8 +106,9 @@ def test_a_decision_needs_a_name(review: Callable[..., Any], library: Workspace)
     assert not load_review(library, "toycar").entries
 
 
-def test_reviewers_do_not_overwrite_each_other_unseen(review: Callable[..., Any], library: Workspace) -> None:
-    """The second reviewer sees the first one's decision and decides again."""
+def test_reviewers_do_not_overwrite_decisions_that_they_have_not_seen(
+    review: Callable[..., Any], library: Workspace
+) -> None:
     first, second = review("Jane"), review("Jim")
     for page in (first, second):
         page.keyboard.press("j")
@@ -164,7 +164,6 @@ def test_an_image_effect_has_images(review: Callable[..., Any]) -> None:
 def test_a_change_since_an_approval_is_shown_as_a_diff(
     review: Callable[..., Any], library: Workspace
 ) -> None:
-    """The approval becomes stale even in an open page."""
     page = review("Jane", "q=light")
     page.keyboard.press("j")
     page.keyboard.press("a")
@@ -245,7 +244,6 @@ def test_a_late_answer_does_not_hide_a_mark(review: Callable[..., Any], library:
 
 @pytest.mark.slow
 def test_marks_survive_a_stopped_server(library: Workspace, serve: Callable[..., Any], visit: Visit) -> None:
-    """Marks stay in the tab and are sent to the next server."""
     rmtree(library.library / "reviews", ignore_errors=True)
     with serve(library, token="first") as address:
         page = visit(address, ADDRESS)

@@ -73,7 +73,6 @@ def shown(page: Any, group: str) -> str:
 
 
 def test_twenty_marks_survive_reloads_and_killed_servers(browser: Any, root: Path) -> None:
-    """Ten marks come before the reload, five during the kill and five after the restart."""
     context = browser.new_context(reduced_motion="reduce")
     context.set_default_timeout(90_000)
     marks: dict[str, str] = {}

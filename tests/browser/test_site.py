@@ -65,7 +65,6 @@ def visited(browser: Any) -> Iterator[Any]:
 
 @pytest.mark.parametrize("width", [WIDE, NARROW])
 def test_every_page_works_from_its_file(site: Path, visited: Any, width: int) -> None:
-    """No page logs an error, misses a file, uses the network or is wider than the screen."""
     pages = sorted(page for page in site.rglob("*.html") if page != site / "index.html")  # which redirects
     assert len(pages) > 60
     visited.set_viewport_size({"width": width, "height": 900})
@@ -78,7 +77,6 @@ def test_every_page_works_from_its_file(site: Path, visited: Any, width: int) ->
 
 
 def test_index_html_leads_to_the_readme(site: Path, visited: Any) -> None:
-    """The first page's sidebar lists every page of the site."""
     visited.goto((site / "index.html").as_uri())
     visited.wait_for_url("**/docs/README.html")
     links = "all => all.map((a) => new URL(a.href).pathname)"
@@ -99,7 +97,6 @@ def test_pages_are_accessible(
 
 
 def test_search_finds_what_newcomers_look_for(site: Path, visited: Any) -> None:
-    """For each word, the page that answers it is among the first results."""
     missed = {}
     for words, page in FOUND.items():
         visited.goto(f"{(site / 'search.html').as_uri()}?q={words}")

@@ -44,7 +44,6 @@ def report(
 def test_a_mark_lists_its_experiments(
     report: Path, open_report: "Callable[[Path], Page]", serious_faults: Callable[[Any], list[str]]
 ) -> None:
-    """The number of a line lists its permanent and its transient experiments."""
     page = open_report(report)
     assert serious_faults(page.page) == []
     line = page.page.locator(".source tr", has_text="gas = min")
@@ -63,7 +62,6 @@ def test_a_mark_lists_its_experiments(
 
 
 def test_the_source_fits_a_narrow_screen(report: Path, open_report: "Callable[[Path], Page]") -> None:
-    """Long lines scroll in their own box."""
     page = open_report(report).page
     page.set_viewport_size({"width": 390, "height": 800})
     page.emulate_media(color_scheme="dark")

@@ -29,7 +29,6 @@ def large(run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_the_page_lists_the_worst_and_counts_all(
     run: Path, large: Path, open_report: "Callable[[Path], Page]"
 ) -> None:
-    """In every measure, map and tiles equal those of the whole page."""
     whole, page = open_report(run), open_report(large)
     assert page.found == "10 experiments listed, the worst of 24"
     told = page.page.inner_text(".listed")

@@ -125,7 +125,6 @@ def test_an_invalid_option_is_reported(cli: Cli, own: Path, root: Path, words: l
 
 
 def test_an_injected_line_that_raises_is_shown(cli: Cli, own: Path, root: Path) -> None:
-    """The mutant is invalid, and the command succeeds."""
     template = root / "templates" / "offset.py.j2"
     template.write_text("if _fi.active('{{ fi }}'):\n    {{ target }} = [][int({{ by }})]\n")
     answer = cli("try", own, "-s", "A")
@@ -165,7 +164,7 @@ def test_a_run_folder_of_a_newer_schema_is_refused(cli: Cli, root: Path) -> None
         (["list", "--library", "gone"], "to do: correct --library or MUTATOR_LIBRARY, --root or"),
     ],
 )
-def test_the_command_line_names_its_options(
+def test_errors_name_the_options_of_the_command_line(
     cli: Cli, own: Path, root: Path, words: list[str], said: str
 ) -> None:
     answer = cli(*words)

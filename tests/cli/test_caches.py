@@ -39,7 +39,6 @@ def test_cached_files_are_listed(cli: Cli, filled: Path) -> None:
 
 
 def test_path_prints_only_the_folder(cli: Cli) -> None:
-    """The folder can be missing."""
     assert cli("cache", "--path").out == f"{caches.folder()}\n"
 
 

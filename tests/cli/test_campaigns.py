@@ -62,7 +62,6 @@ def experiment_with(run: Path, word: str) -> str:
 
 
 def test_plan_writes_the_plan_and_runs_nothing(cli: Cli, root: Path) -> None:
-    """The output includes the expected time and disk space."""
     answer = cli("plan", "toy", "--out", "p", "--only", 'fault_type == "distance"', "-n", "4")
     assert answer.code == 0
     for wanted in ("sensor/distance", "guided", "random", "total", "with 4 workers", "MB of disk"):
@@ -128,7 +127,6 @@ def test_a_plan_is_the_same_each_time(cli: Cli, root: Path) -> None:
     ],
 )
 def test_an_invalid_plan_is_refused(cli: Cli, root: Path, words: list[str], said: str) -> None:
-    """A wrong name, expression, reading or folder exits with 2 before anything is written."""
     Path("full").mkdir()
     Path("full/mine.txt").touch()
     answer = cli("plan", *words)
@@ -178,7 +176,6 @@ def wait_for(folder: Path, files: str) -> None:
 
 
 def test_an_interrupted_run_prints_the_command_that_resumes_it(cli: Cli, root: Path) -> None:
-    """While a command runs, a second one in the same folder is refused."""
     words = ["run", "toy", "--out", "runs/cut", "-n", "0", "--limit", "6"]
     command = [sys.executable, "-m", "mutator", *words]
     environment = os.environ | {"MUTATOR_ROOT": str(root)}
@@ -226,7 +223,6 @@ def test_report_of_a_folder_of_runs_is_their_history(cli: Cli, run: Path, tmp_pa
 def test_a_failed_proof_is_at_the_top_of_the_report(
     cli: Cli, run: Path, tmp_path: Path, reseal: Reseal
 ) -> None:
-    """The command exits with 1 and names the experiment."""
     run = Path(shutil.copytree(run, tmp_path / "run"))
     shutil.copytree(run / "records", run / "proof", dirs_exist_ok=True)
     path = next(path for path in sorted((run / "proof").iterdir()) if len(path.read_text().splitlines()) > 1)
@@ -286,8 +282,7 @@ def test_show_without_an_experiment_lists_the_worst(cli: Cli, run: Path) -> None
     assert "unknown column `speed`" in cli("show", "--only", "speed > 3").err
 
 
-def test_show_takes_the_start_of_an_id(cli: Cli, run: Path) -> None:
-    """Without a named run, the newest one is used."""
+def test_show_accepts_an_id_prefix(cli: Cli, run: Path) -> None:
     name = experiment_with(run, "hazard")
     answer = cli("show", name[:8], "--json", "--no-plot").json
     assert answer["experiment"] == name

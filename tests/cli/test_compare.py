@@ -29,7 +29,6 @@ def runs(root: Path, write_run: Write) -> tuple[Path, Path]:
 
 
 def test_compare_prints_and_writes_the_changes(cli: Cli, runs: tuple[Path, Path]) -> None:
-    """The files are written next to the second run."""
     answer = cli("compare", *runs)
     assert answer.code == 0, answer.err
     for wanted in ("new-hazard", "sensor/silence", "In both runs: 24 experiments"):
@@ -39,7 +38,6 @@ def test_compare_prints_and_writes_the_changes(cli: Cli, runs: tuple[Path, Path]
 
 
 def test_a_different_selection_is_reported_before_any_table(cli: Cli, root: Path, write_run: Write) -> None:
-    """The Markdown and the JSON output have the remark, too."""
     workspace = Workspace.find(root)
     runs = write_run(workspace, Path("whole")), write_run(workspace, Path("part"), limit=6)
     said = "The runs are different parts of a campaign: whole has everything, part has --limit 6."
@@ -70,7 +68,6 @@ def test_alerts_of_fault_free_runs_are_named(
 
 
 def test_a_gate_fails_for_a_new_hazard(cli: Cli, runs: tuple[Path, Path]) -> None:
-    """In the other direction the gate passes."""
     failed = cli("compare", *runs, "--out", "c", "--fail-on", "new-hazard,unmatched")
     assert failed.code == 1
     assert "new-hazard: sensor/silence/no_data, A, guided" in failed.err
@@ -119,7 +116,6 @@ def test_an_unknown_kind_or_filter_is_refused(
 
 
 def test_each_format_is_exported(cli: Cli, runs: tuple[Path, Path]) -> None:
-    """Without a path, the file is in the run folder."""
     _, after = runs
     answer = cli("export", after, "--format", "mutation-elements", "--out", "m.json")
     assert answer.code == 0, answer.err

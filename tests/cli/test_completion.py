@@ -69,7 +69,6 @@ def test_run_folders_and_their_experiments_are_completed(complete: Complete, cli
 def test_library_options_apply_to_completion(
     complete: Complete, root: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Without options, the environment's library is used."""
     monkeypatch.delenv("MUTATOR_ROOT")
     assert "small" not in complete("run", "")
     assert "small" in complete("--root", str(root), "run", "")

@@ -225,7 +225,7 @@ def links(page: Path) -> list[tuple[Path, str]]:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name)
-def test_links_lead_somewhere(page: Path) -> None:
+def test_no_link_is_broken(page: Path) -> None:
     for file, anchor in links(page):
         assert file.exists(), f"{name(page)}: {file}"
         assert not anchor or anchor in anchors(file), f"{name(page)}: {file.name}#{anchor}"
@@ -239,13 +239,11 @@ def test_no_page_installs_by_name(page: Path) -> None:
 
 @pytest.mark.parametrize("command", ["pip install mutator", "pip install 'mutator[dev]'", "uv add mutator"])
 def test_the_pattern_finds_installs_by_name(command: str) -> None:
-    """Installs from a folder or a file are accepted."""
     assert BY_NAME.search(command)
     assert not BY_NAME.search("pip install dist/mutator-0.1.0.whl && .venv/bin/mutator list")
 
 
 def test_the_index_names_every_page() -> None:
-    """Pages that belong to a named page need no entry."""
     listed = {file for file, _ in links(INDEX)}
     pages = {page for page in PAGES if INDEX.parent in page.parents and page != INDEX}
     assert pages - listed == set()

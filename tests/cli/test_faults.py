@@ -15,7 +15,6 @@ Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, jso
 
 
 def test_diff_shows_one_diff_for_each_variant(cli: Cli, root: Path) -> None:
-    """The diff leaves out the probe's file."""
     answer = cli("diff", "sensor/distance")
     assert answer.code == 0
     headings = [line for line in answer.out.splitlines() if line.startswith("# ")]
@@ -32,8 +31,6 @@ def test_a_given_value_is_used_exactly(cli: Cli, root: Path) -> None:
 
 
 def test_a_whole_diff_can_be_applied(cli: Cli, root: Path) -> None:
-    """With `--patch` the output is a patch for the target's root, which applies with or without its
-    heading."""
     answer = cli("diff", "sensor/silence", "--trigger", "near", "--patch")
     tree = root / "tree"
     subprocess.run(["patch", "-p1", "-s"], input=answer.out, text=True, cwd=tree, check=True)
@@ -73,7 +70,6 @@ def read_index(out: Path) -> list[dict[str, str]]:
 
 
 def test_generate_writes_patches_that_apply(cli: Cli, root: Path) -> None:
-    """Un-splicing a patched file restores the pristine target."""
     out = Path("mutants")
     assert cli("generate", "sensor/*", "--out", out).code == 0
     index = read_index(out)

@@ -69,7 +69,6 @@ def test_a_film_adds_no_file_to_the_run(cli: Cli, name: str) -> None:
 
 
 def test_a_still_without_a_file_name_is_in_the_report(cli: Cli, name: str) -> None:
-    """Without a file name, a still is stored next to the plots."""
     answer = cli("show", name, "--no-plot", "--still", "1.5", "--json").json
     assert [Path(path).name for path in answer["films"]] == [f"{name}-1.50s.jpg"]
     page = Path(cli("report", "runs/a", "--json").json["page"])
@@ -84,8 +83,6 @@ def test_a_still_without_a_file_name_is_in_the_report(cli: Cli, name: str) -> No
 def test_a_run_takes_stills_of_its_worst_experiments(
     cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Stills show activation and hazard, if they are visible. Their number is in proportion to the size of
-    the plan."""
     manifest = root / "fault_library/targets/toycar.yaml"
     manifest.write_text(manifest.read_text().replace("still: [", "pictures: [alone]\n  still: ["))
     monkeypatch.setattr(stills, "ONE_IN", 2)
@@ -107,7 +104,6 @@ def test_a_run_takes_stills_of_its_worst_experiments(
 
 
 def test_an_error_of_the_film_command_is_quoted(cli: Cli, name: str) -> None:
-    """The target cannot write the requested format."""
     answer = cli("show", name, "--no-plot", "--video", "a.avi")
     assert answer.code == 2
     assert "a.avi: no .avi here" in answer.err
@@ -128,7 +124,6 @@ def test_a_target_without_films_is_reported(cli: Cli, root: Path) -> None:
 
 @pytest.mark.parametrize("still", ["early", "early=a.json", "=a.json", "nan=a.json", "1.5="])
 def test_an_invalid_time_of_a_still_is_refused(cli: Cli, name: str, still: str) -> None:
-    """A file name without a time is refused as well."""
     answer = cli("show", name, "--no-plot", "--still", still)
     assert answer.code == 2
     assert "14.5=early.png" in answer.err

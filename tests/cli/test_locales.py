@@ -51,7 +51,6 @@ def test_non_ascii_output_is_escaped_in_an_ascii_environment(place: Path) -> Non
 
 @pytest.mark.parametrize("what", ["run folder", "library", "target file"])
 def test_a_name_that_cannot_be_decoded_is_refused(place: Path, what: str) -> None:
-    """The message suggests LC_ALL=C.UTF-8."""
     out = "run"
     if what == "run folder":
         out = "läufe"

@@ -142,10 +142,9 @@ def test_an_error_shows_place_expectation_and_remedy(
         (KeyboardInterrupt(), 130, "interrupted"),
     ],
 )
-def test_errors_have_their_exit_codes(
+def test_exit_codes_of_errors(
     cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException, code: int, said: str
 ) -> None:
-    """The code is 1 for a failed check, 2 for an unreadable folder, 3 for a full disk and 130 for Ctrl-C."""
     fail_with(monkeypatch, error)
     answer = cli("list", "specs")
     assert answer.code == code
@@ -184,7 +183,6 @@ def test_main_returns_the_code_of_a_verb(root: Path) -> None:
     ],
 )
 def test_a_command_works_without_standard_error(root: Path, tmp_path: Path, streams: str) -> None:
-    """Standard error can be closed, full or unread."""
     words = ["plan", "small", "--out", str(tmp_path / "run"), "--root", str(root)]
     begin = f"import os, sys; {streams}; os.execv(sys.executable, [sys.executable, *sys.argv[1:]])"
     for code in (0, 2):

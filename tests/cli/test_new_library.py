@@ -169,7 +169,6 @@ def test_a_tree_with_a_controller_and_an_unreadable_file_has_no_warning(
 def test_a_tree_can_have_any_name(
     name: str, cli: Cli, nowhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A name with a special meaning in YAML is quoted."""
     folder = nowhere / name
     folder.mkdir()
     for file in ("steer.py", "null.py"):

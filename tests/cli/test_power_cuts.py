@@ -100,7 +100,6 @@ def test_files_are_synced_before_the_records_that_refer_to_them(
 
 @pytest.mark.parametrize("rest", ["cut off", "zeros"])
 def test_a_record_without_its_patch_is_refused(cli: Cli, cut: Path, seal: str, rest: str) -> None:
-    """Any part of the patch's block can survive. The repaired run has the original result."""
     [path] = (cut / "patches").iterdir()
     data, name = path.read_bytes(), read_blocks(path).blocks[-1].key
     for length in range(last_block(path), len(data)):
@@ -122,7 +121,6 @@ def test_a_record_without_its_patch_is_refused(cli: Cli, cut: Path, seal: str, r
 
 
 def test_a_lost_series_is_restored_by_a_rerun(cli: Cli, cut: Path) -> None:
-    """Any part of the series' block can survive. The run completes."""
     [path] = segments(cut)
     data = path.read_bytes()
     names = [block.key.split()[0] for block in read_blocks(path).blocks if block.kind]

@@ -10,7 +10,6 @@ from mutator.workspace import Workspace
 def test_frames_are_written_and_named(
     cli: Callable[..., Any], root: Path, toy: Workspace, tmp_path: Path, give_eyes: Callable[..., None]
 ) -> None:
-    """A group without an image effect has no frames."""
     give_eyes(toy, values="[10, 50]")
     groups = {group["model"]: group["group"] for group in cli("review", "--json").json}
     light, silent = groups["image_effect"], groups["omission"]

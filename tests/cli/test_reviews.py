@@ -40,7 +40,6 @@ def about(known: dict[str, str], words: str) -> str:
 
 
 def test_groups_without_approval_are_listed_first(cli: Cli, root: Path, known: dict[str, str]) -> None:
-    """An approved group is listed as changed once its template has changed."""
     first, *rest = known
     cli("review", "approve", first, *JANE)
     lines = cli("review").out.splitlines()
@@ -52,8 +51,7 @@ def test_groups_without_approval_are_listed_first(cli: Cli, root: Path, known: d
     assert states == ["new"] * 4 + ["changed"]
 
 
-def test_groups_are_found_by_filter_or_start_of_id(cli: Cli, root: Path, known: dict[str, str]) -> None:
-    """Filters use the table's columns."""
+def test_groups_are_found_by_filter_or_id_prefix(cli: Cli, root: Path, known: dict[str, str]) -> None:
     silent = about(known, "omission()")
     only = 'model == "omission" and match(trigger, "*time*") and not flagged'
     assert ids(cli, "--only", only, "--exclude", "faults > 7") == [silent]
@@ -65,7 +63,6 @@ def test_groups_are_found_by_filter_or_start_of_id(cli: Cli, root: Path, known: 
 
 
 def test_a_group_is_shown_with_holes_and_values(cli: Cli, root: Path, known: dict[str, str]) -> None:
-    """A group has a row of values for each fault."""
     longer = about(known, "offset(by, target=gap)")
     answer = cli("review", "show", longer)
     assert f"group {longer}: new" in answer.out
@@ -106,7 +103,6 @@ def test_decisions_are_stored(cli: Cli, root: Path, known: dict[str, str]) -> No
 def test_a_decision_needs_a_reviewer(
     cli: Cli, root: Path, known: dict[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Git's user name is the default."""
     monkeypatch.setenv("HOME", str(root))
     monkeypatch.delenv("XDG_CONFIG_HOME", raising=False)
     group = next(iter(known))
@@ -122,7 +118,6 @@ def test_a_decision_needs_a_reviewer(
 def test_deciding_about_a_filter_asks_first(
     cli: Cli, root: Path, known: dict[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Without a terminal --yes is required. Ids and a filter together are refused."""
     words = ("review", "approve", "--only", 'state == "new" and model == "offset"', *JANE)
     asked = cli(*words)
     assert (asked.code, "confirmation of 3 groups (3 new)" in asked.err) == (2, True)
@@ -139,7 +134,6 @@ def test_deciding_about_a_filter_asks_first(
 
 
 def test_remarks_and_flags_are_stored_and_removed(cli: Cli, root: Path, known: dict[str, str]) -> None:
-    """Remarks and flags have authors and can be filtered."""
     first, second, *_ = known
     cli("review", "approve", first, *JANE)
     cli("review", "remark", first, second, *JANE, "--text", "why not\nbelow?")
@@ -210,7 +204,6 @@ def test_a_mistake_in_the_review_file_is_reported_at_its_line(
 
 
 def test_a_walk_needs_a_terminal(cli: Cli, root: Path) -> None:
-    """The error names the commands that work without one."""
     answer = cli("review", "walk", *JANE)
     assert answer.code == 2
     assert "no terminal to ask for decisions" in answer.err
@@ -244,7 +237,6 @@ def keys(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
 def test_a_walk_asks_about_each_group(
     cli: Cli, root: Path, keys: Callable[..., None], known: dict[str, str]
 ) -> None:
-    """Any key except a, r, s and q asks again."""
     first, second, third, *_ = known
     keys("axrsq", "good", "")
     answer = cli("review", "walk", *JANE)
@@ -316,7 +308,6 @@ def test_the_page_is_one_self_contained_file(
 
 @pytest.mark.slow
 def test_only_approved_groups_run(cli: Cli, root: Path, tmp_path: Path) -> None:
-    """A changed template is refused again."""
     out = tmp_path / "run"
     words = ("run", "small", "--out", out, "--require-reviewed")
     refused = cli(*words)

@@ -8,7 +8,6 @@ Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, jso
 
 
 def test_a_shard_is_run_and_merged(cli: Cli, root: Path) -> None:
-    """`merge` refuses to write its result again."""
     ran = cli("run", "small", "--out", "part", "-n", "0", "--shard", "1/2", "--limit", 4)
     assert ran.code == 0, ran.err
     assert "2 of 2 experiments done" in ran.err + ran.out

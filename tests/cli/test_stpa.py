@@ -66,7 +66,6 @@ def test_an_unreadable_analysis_exits_with_2(cli: Cli, library: Path, nowhere: P
 
 
 def test_the_error_names_a_missing_file_of_the_analysis(cli: Cli, root: Path) -> None:
-    """Campaigns need no analysis."""
     answer = cli("stpa")
     assert answer.code == 2
     assert "no control_structure.yaml" in answer.err

@@ -68,7 +68,6 @@ def notify_all(notify: Callable[[Progress], None]) -> None:
 
 
 def test_a_terminal_shows_a_progress_bar(capsys: pytest.CaptureFixture[str], terminal: None) -> None:
-    """The bar shows the count, the rate, the outcomes so far, and the remaining time."""
     with campaign_progress(Terminal()) as notify:
         notify_all(notify)
     err = ANSI.sub("", capsys.readouterr().err)
@@ -128,7 +127,6 @@ COMMAND = "`mutator review approve 3b5103806ae0 a9281388d042 --campaign paper_sm
     ],
 )
 def test_long_lines_are_folded(text: str, width: int, lines: list[str]) -> None:
-    """Lines break between words and continue indented. Commands and long words stay whole."""
     assert folded(text, width).split("\n") == lines
 
 
@@ -136,7 +134,6 @@ def test_long_lines_are_folded(text: str, width: int, lines: list[str]) -> None:
 def test_a_pipe_gets_lines_of_100_columns(
     columns: str | None, width: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The width can be set with COLUMNS. Tables and text to copy are not folded."""
     monkeypatch.delenv("COLUMNS")
     if columns:
         monkeypatch.setenv("COLUMNS", columns)

@@ -17,7 +17,6 @@ Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, jso
 
 
 def test_try_needs_no_campaign(cli: Cli, root: Path) -> None:
-    """`try` takes a fault from any file and does not write to the library."""
     shutil.move(root / "fault_library/faults/sensor/silence.yaml", "own.yaml")
     answer = cli("try", "own.yaml", "--scenario", "A", "--trigger", "2")
     assert answer.code == 0
@@ -71,7 +70,6 @@ def test_try_reports_hazards_of_the_fault_free_run(cli: Cli, root: Path) -> None
 
 
 def test_try_prints_json(cli: Cli, root: Path) -> None:
-    """The same fault always has the same id."""
     words = ("try", "sensor/lane", "-s", "A", "--value", "2.4", "--trigger", "1", "--json")
     one, two = cli(*words).json, cli(*words).json
     assert one == two

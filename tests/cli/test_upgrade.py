@@ -27,7 +27,6 @@ def changed(before: TargetManifest, after: TargetManifest) -> list[str]:
 
 
 def test_an_older_manifest_is_rewritten(cli, path: Path) -> None:
-    """Comments that cannot be kept are printed."""
     text = path.read_text().replace("step_s:", "# of the world\nstep_s:")
     text = text.replace("compare:", "compare:  # pedals").replace("target/1\n", "target/1\n\n")
     path.write_text(text.replace("t: now\n", 't: "now  # b"\n'))
@@ -45,7 +44,6 @@ def test_an_older_manifest_is_rewritten(cli, path: Path) -> None:
 
 @pytest.mark.parametrize("indent", [None, 1])
 def test_a_manifest_on_one_line_keeps_its_meaning(cli, path: Path, indent: int | None) -> None:
-    """If keys share a line, the whole manifest is rewritten."""
     path.write_text(json.dumps(yaml.safe_load(path.read_text()), indent=indent) + "  # all of it\n")
     before = load_manifest(path)
     answer = cli("upgrade", path)
@@ -56,7 +54,6 @@ def test_a_manifest_on_one_line_keeps_its_meaning(cli, path: Path, indent: int |
 
 
 def test_a_compared_and_plotted_channel_becomes_an_actuator(cli, path: Path) -> None:
-    """The channel keeps its settings for `compare`."""
     path.write_text(path.read_text().replace("plot:\n", 'plot:\n  gas: {unit: "%"}\n'))
     loaded = load_manifest(path)
     assert cli("upgrade", path).code == 0
@@ -64,7 +61,7 @@ def test_a_compared_and_plotted_channel_becomes_an_actuator(cli, path: Path) -> 
         assert next((c.name, c.unit) for c in manifest.compared) == ("gas", "-")
 
 
-def test_line_breaks_and_links_stay(cli, path: Path) -> None:
+def test_line_endings_and_links_are_preserved(cli, path: Path) -> None:
     path.write_bytes(path.read_bytes().replace(b"\n", b"\r\n"))
     link = path.with_name("link.yaml")
     link.symlink_to(path.name)

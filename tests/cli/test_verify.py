@@ -50,7 +50,6 @@ def test_an_audit_is_printed_on_one_page(cli: Cli, sealed: str) -> None:
 
 
 def test_the_seal_is_shown_wherever_a_run_ends(cli: Cli, sealed: str) -> None:
-    """`run` prints the seal even if nothing is left to do. The JSON output and the report have it, too."""
     again = cli("run", "small", "--out", "run", "-n", "0", "--json")
     assert (again.code, again.json["ran"], again.json["seal"]) == (0, 0, sealed)
     assert f"| seal | {sealed} |" in Path("run/report/REPORT.md").read_text()
@@ -101,7 +100,6 @@ def chunks() -> dict[str, str]:
 def test_rerun_restores_damaged_series(
     cli: Cli, sealed: str, what: str, become: Callable[[Path], None]
 ) -> None:
-    """The golden runs' chunk is rebuilt at the first rerun."""
     before = {path.name: path.read_bytes() for path in Path("run/series").iterdir()}
     name, *others = packed().entries
     became = Path("run/series") / chunks()[what]
@@ -138,7 +136,6 @@ def test_rerun_restores_damaged_series(
 
 
 def test_the_audit_names_the_command_that_restores_a_series(cli: Cli, sealed: str) -> None:
-    """A drawn plot does not hide the damage."""
     name = next(iter(packed().entries))
     assert cli("show", name, "--run", "run").code == 0
     kept = SeriesFolder(Path("run")).kept(name)

@@ -34,7 +34,6 @@ Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, jso
 def test_a_chosen_value_without_effect_gets_a_warning(
     cli: Cli, root: Path, words: list[str], warnings: list[str]
 ) -> None:
-    """A value outside the declared range gets a warning, too."""
     answer = cli("diff", *words)
     assert answer.code == 0
     assert "+" in answer.out

@@ -330,7 +330,7 @@ WORLD = Anchor(kind=AnchorKind.BEFORE_ASSIGN, name="offset")
     ],
     ids=["itself", "in the target's code that it calls", "the target wraps it", "in a helper of the probe"],
 )
-def test_an_injected_line_raises(
+def test_an_injected_line_that_raises_makes_the_mutant_invalid(
     blamed: Blamed, injected: Fault, scenario: str, code: str, error: str
 ) -> None:
     record = blamed.record(injected, scenario=scenario)
@@ -382,7 +382,7 @@ def test_a_bad_end_before_the_first_activation_is_a_harness_error(
 
 
 @pytest.mark.slow
-def test_a_hang_after_the_activation(blamed: Blamed) -> None:
+def test_a_hang_after_the_activation_is_a_timeout(blamed: Blamed) -> None:
     record = blamed.record(sensed("hang"))
     assert (record.status, record.detail) == (Status.TIMEOUT, "CPU time limit of 1 s")
 
@@ -413,8 +413,6 @@ def test_a_damaged_report_costs_one_experiment(blamed: Blamed) -> None:
 
 @pytest.mark.parametrize("mood", ["stop_the_time", "observe_again_and_hide_it", "lose_the_lead"])
 def test_a_failed_observation_is_a_probe_error(blamed: Blamed, mood: str) -> None:
-    """The error names the place, even if the target catches it. Observing twice at one time is an error,
-    too."""
     record = blamed.record(sensed(mood))
     assert record.status is Status.HARNESS_ERROR
     assert record.error is not None

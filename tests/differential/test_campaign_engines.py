@@ -67,7 +67,6 @@ def test_killing_servers_or_workers_changes_no_table(
 def test_an_equivalence_check_resumes_after_kills(
     toy: Workspace, tmp_path: Path, expected: dict[str, bytes]
 ) -> None:
-    """No experiment is checked twice."""
     out, proved = tmp_path / "run", 0
     for _ in range(3):
         process = _begun(toy, out)

@@ -133,7 +133,6 @@ def test_a_killed_campaign_resumes_to_the_same_bytes(
 
 @pytest.mark.slow
 def test_pytest_resumes_a_killed_run(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
-    """No process or registration of a killed worker is left."""
     out = tmp_path / "run"
     command = Command(toy, out, "-m", "mutator", "run", "small", "--out", str(out), "-n", "2")
     command.wait_for_records(4)
@@ -187,7 +186,6 @@ def test_a_run_with_a_killed_worker_exits_with_3_and_can_be_resumed(
 def test_a_starting_worker_ends_when_its_command_is_killed(
     toy: Workspace, tmp_path: Path, words: list[str] | None
 ) -> None:
-    """The worker is stopped before it has read anything."""
     out = tmp_path / "run"
     command = Command(toy, out, *(pytest_words(out, workers=1) if words is None else [*words, str(out)]))
     while not (started := [pid for pid, line in command.others() if re.match("[^ ]+ -u -c .*stdin", line)]):

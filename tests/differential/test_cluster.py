@@ -66,7 +66,6 @@ def on(machines: Machines, toy: Workspace, out: Path, **more: object) -> Summary
 def test_two_workers_give_the_same_bytes(
     toy: Workspace, tmp_path: Path, undisturbed: tuple[Bytes, str], two: Machines
 ) -> None:
-    """The workers have separate folders and keep no files."""
     out = tmp_path / "run"
     summary = on(two, toy, out)
     assert (summary.exit_code, summary.problem, summary.done) == (0, "", 12)
@@ -94,7 +93,6 @@ def test_pytest_distributes_experiments_to_a_cluster(
 def test_workers_that_do_not_reproduce_the_golden_run_are_refused(
     toy: Workspace, tmp_path: Path, two: Machines, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The error names each worker with its versions."""
     real = bundle.read_json
     monkeypatch.setattr(
         bundle,
@@ -128,7 +126,6 @@ def test_workers_stop_when_their_command_dies(
     number: signal.Signals,
     code: int,
 ) -> None:
-    """All processes of the workers' jobs end within 10 s."""
     out = tmp_path / "run"
     words = ["-m", "mutator", "run", "small", "--out", str(out)]
     words += ["--engine", "fork", "--cluster", str(two.file)]
@@ -214,7 +211,7 @@ _OTHER = "import mutator._common.version as version\nversion.VERSION = '0.0.1'\n
     ],
     ids=["arithmetic", "version"],
 )
-def test_the_others_do_the_work_of_a_refused_worker(
+def test_other_workers_do_the_work_of_a_refused_one(
     toy: Workspace, tmp_path: Path, machines: Machines, whole_toy: tuple[Bytes, str], code: str, why: str
 ) -> None:
     (tmp_path / "site").mkdir()
@@ -259,8 +256,9 @@ def test_a_campaign_resumes_with_a_new_scheduler(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("campaign", ["quickstart", "paper_smoke"])
-def test_shipped_campaigns_on_three_workers(tmp_path: Path, machines: Machines, campaign: str) -> None:
-    """Shipped campaigns give the same bytes as with two local workers."""
+def test_shipped_campaigns_give_the_same_bytes_on_three_workers(
+    tmp_path: Path, machines: Machines, campaign: str
+) -> None:
     shipped = Workspace.find(CLONE)
     here = run_campaign(shipped, campaign, tmp_path / "here", workers=2)
     assert here.exit_code == 0

@@ -206,7 +206,6 @@ def check_same(three: Engines, job: Job, how: RunMode | None = None) -> Executio
 
 @pytest.mark.parametrize("model", ["offset", "omission", "image_effect", "reordering", "slow_call"])
 def test_a_fault_in_a_context_is_forked(three: Engines, model: str) -> None:
-    """The fork gives the reference engine's bytes."""
     execution = check_same(three, three.job(fault(*MODELS[model]), TRIGGERS["in a context"]), RunMode.FORK)
     assert execution.start > 20
 
@@ -215,7 +214,6 @@ def test_a_fault_in_a_context_is_forked(three: Engines, model: str) -> None:
 @pytest.mark.parametrize("trigger", TRIGGERS)
 @pytest.mark.parametrize("model", MODELS)
 def test_engines_agree_on_every_model_under_every_trigger(three: Engines, model: str, trigger: str) -> None:
-    """A trigger that never holds gives the reference engine's bytes without a run."""
     how = RunMode.GOLDEN if trigger == "never" else RunMode.FORK
     for scenario in ("A", "B"):
         check_same(
@@ -237,7 +235,6 @@ def test_a_changed_value_is_forked(three: Engines) -> None:
 @pytest.mark.parametrize("trigger", ["always", "for 1 s", "off and on"])
 @pytest.mark.parametrize("path", ["toycar/sensing.py", "toycar/driver.py"])
 def test_engines_agree_on_every_value_under_some_triggers(three: Engines, path: str, trigger: str) -> None:
-    """Every value is changed at each of its anchors."""
     places = values(three, path)
     assert len(places) > 10
     changes: tuple[tuple[str, dict[str, Value]], ...] = (

@@ -148,7 +148,6 @@ def everything(tmp_path: Path, copy_toycar: Callable[[Path], Workspace]) -> Work
 
 
 def test_the_campaign_has_every_anchor_and_model(everything: Workspace) -> None:
-    """The operators' own models are excluded."""
     anchors = {kind for kind in AnchorKind for fault in FAULTS if kind.value in fault["at"]}
     assert anchors == set(AnchorKind)
     shipped = {model.name for model in everything.fault_models() if not model.name.startswith("operator_")}

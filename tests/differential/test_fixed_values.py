@@ -97,7 +97,6 @@ def fault(*locations: FaultLocation) -> Fault:
 
 
 def test_engines_agree_on_a_mutant_that_sets_all_values(three: Engines) -> None:
-    """Each value is counted once in each active step."""
     job = three.job(fault(*PLACES.values()), TRIGGERS["off and on"])
     execution = check_same(three, job, RunMode.FORK)
     assert execution.probe is not None

@@ -49,7 +49,6 @@ def fault(*injections: Injection) -> Fault:
 
 
 def test_engines_agree_on_a_mutant_with_all_limits(three: Engines) -> None:
-    """The injections are limited to one instance, to some executions, and to both."""
     execution = check_same(three, three.job(fault(*INJECTIONS), TRIGGERS["for 1 s"]), RunMode.FORK)
     assert execution.probe is not None
     counts = [told["count"] for told in execution.probe["injections"].values()]

@@ -107,7 +107,6 @@ class Campaign:
 
 
 def test_a_campaign_survives_twenty_kills(tmp_path: Path, copy_toycar: Callable[[Path], Workspace]) -> None:
-    """INT, TERM and KILL are sent to the command or to one worker."""
     words = ["-m", "mutator", "run", "small", "-n", "2"]
     campaign = Campaign(copy_toycar(tmp_path), tmp_path, words, seed=5)
     campaign.kill_and_resume(random.Random(5).sample(EVERY * 4, 20))
@@ -116,7 +115,6 @@ def test_a_campaign_survives_twenty_kills(tmp_path: Path, copy_toycar: Callable[
 
 
 def test_a_campaign_on_the_shipped_controller_survives_kills(tmp_path: Path) -> None:
-    """A run of 30 experiments without frames is killed six times."""
     for name in ("fault_library", "templates", "target"):
         shutil.copytree(CLONE / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
     words = ["-m", "mutator", "run", "paper_reference", "-n", "2", "--limit", "30"]

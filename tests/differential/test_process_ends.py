@@ -181,7 +181,6 @@ def test_exit_handlers_leave_the_same_bytes(misbehave: Misbehave) -> None:
 
 
 def test_an_exit_handler_of_the_target_runs_once_per_run(misbehave: Misbehave, tmp_path: Path) -> None:
-    """The handler never runs in the waiting processes."""
     calls = tmp_path / "calls"
     head = (
         "import atexit, os\n"
@@ -261,7 +260,6 @@ def test_exceeding_the_space_limit_is_a_timeout(misbehave: Misbehave, how: str) 
 
 
 def test_a_run_can_use_almost_all_its_space(misbehave: Misbehave) -> None:
-    """Existing files and holes do not count."""
     body = (
         "f = open('x', 'wb')\nf.write(bytes(2 << 20))\nf.close()\nimport os\nos.truncate('x', (3 << 20) - 1)"
     )

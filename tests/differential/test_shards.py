@@ -96,7 +96,6 @@ def test_merged_shards_have_the_seal_of_the_single_run(runs: Runs, tmp_path: Pat
 def test_the_whole_plan_decides_the_engine_of_a_shard(
     runs: Runs, toy: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A plan that is large enough to fork is forked in every shard, however small."""
     monkeypatch.setattr(registry, "WORTH_IT", RunFolder.open(runs["whole"]).planned)
     assert {Session(toy, RunFolder.open(path)).engine for path in runs.values()} == {"fork"}
 
@@ -120,7 +119,6 @@ def test_each_experiment_is_in_exactly_one_shard(runs: Runs) -> None:
 
 
 def test_a_shard_resumes_without_its_option(copies: Runs, toy: Workspace) -> None:
-    """The folder refuses any other shard."""
     summary = run_campaign(toy, "small", copies["1/2"])
     assert (summary.ran, summary.done) == (0, RunFolder.open(copies["1/2"]).planned)
     with pytest.raises(MutatorError, match="shard 2/2"):
@@ -222,7 +220,6 @@ def test_shards_are_not_merged_into_a_folder_with_a_run(runs: Runs, tmp_path: Pa
 
 
 def test_the_same_command_completes_a_killed_merge(runs: Runs, tmp_path: Path) -> None:
-    """The command deletes no other files."""
     out, shards = tmp_path / "out", [runs["1/2"], runs["2/2"]]
     for name in (".run.json.1", "owner.lock", "golden/A/log.npz", "records/0001-a.jsonl", "thesis.tex"):
         (out / name).parent.mkdir(parents=True, exist_ok=True)
@@ -253,7 +250,6 @@ def fail(run: Path) -> Path:
 
 @pytest.mark.parametrize("shard", ["0/3", "4/3", "1", "a/b", "1/0", "-1/3", "1/7"])
 def test_impossible_shards_are_refused(toy: Workspace, shard: str) -> None:
-    """More shards than chunks are refused, too."""
     with pytest.raises(MutatorError, match=f"shard:? '?{shard}"):
         make_plan(toy, "small", Choices(shard=shard))
 

@@ -71,8 +71,7 @@ def finished(finished_once: Finished, tmp_path: Path) -> Path:
     return Path(shutil.copytree(finished_once.run, tmp_path / "finished"))
 
 
-def test_bad_endings_have_their_own_statuses(toy: Workspace, tmp_path: Path) -> None:
-    """Loops, crashes, exits, exhausted memory and mutants that do not compile are not harness errors."""
+def test_bad_endings_are_not_harness_errors(toy: Workspace, tmp_path: Path) -> None:
     summary = run_campaign(toy, "hostile", tmp_path / "run")
     assert (summary.exit_code, summary.harness_errors, summary.problem) == (0, (), "")
     found = {row["fault_type"]: (row["status"], row["outcome"]) for row in rows_of(tmp_path / "run")}
@@ -120,7 +119,6 @@ def test_a_run_leaves_its_results_and_no_scratch_files(finished_once: Finished) 
 
 
 def test_the_next_command_deletes_half_written_files(toy: Workspace, finished: Path) -> None:
-    """No other file is deleted."""
     places = (".run.json.7", "plan/.faults.jsonl.7", "report/tables/.a.csv.7", "series/.index.js.7")
     left = [finished / place for place in places]
     mine = finished / "report" / "tables" / ".notes"
@@ -149,7 +147,6 @@ def test_a_stored_patch_produces_the_mutant(toy: Workspace, finished: Path, tmp_
 def test_rerun_gives_the_same_record_and_a_trace(
     toy: Workspace, finished: Path, reseal: Callable[[Path], None]
 ) -> None:
-    """A changed record is noticed."""
     for row in rows_of(finished)[:3]:
         single, same = rerun(toy, finished, row["experiment_id"][:8])
         assert same
@@ -207,7 +204,6 @@ def test_harness_errors_are_run_again(
 def test_a_defect_in_a_worker_is_reported(
     toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The other chunks complete."""
     run, seen = Worker.run, []
 
     def broken(self: Worker, pending: Pending) -> list[tuple[str, str]]:
@@ -226,7 +222,6 @@ def test_a_defect_in_a_worker_is_reported(
 def test_pytest_settings_of_the_user_do_not_reach_the_campaign(
     toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The settings remain in the environment."""
     told = {"PYTEST_ADDOPTS": "--no-such-option", "PYTEST_PLUGINS": "no_such_plugin"}
     for name, value in told.items():
         monkeypatch.setenv(name, value)
@@ -255,8 +250,6 @@ def test_a_campaign_that_cannot_be_planned_leaves_no_folder(toy: Workspace, tmp_
 
 
 def test_a_run_keeps_its_options(toy: Workspace, finished: Path) -> None:
-    """A run can be resumed without repeating its options. Other options, or another campaign text, are
-    refused."""
     assert run_campaign(toy, "small", finished, choices=Choices(seed=3)).exit_code == 0
     for choices in (
         Choices(seed=4),

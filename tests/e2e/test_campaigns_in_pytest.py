@@ -68,7 +68,6 @@ def test_the_plugin_does_nothing_without_a_campaign(toy: Workspace) -> None:
 
 @pytest.mark.slow
 def test_pytest_runs_a_campaign_in_one_process(toy: Workspace, tmp_path: Path) -> None:
-    """The items are the same as with xdist."""
     words = ("--campaign", "small", "--campaign-out", tmp_path / "run")
     answer = pytest_campaign(toy, *words)
     assert answer.returncode == 0, answer.stdout

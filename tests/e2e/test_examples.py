@@ -54,7 +54,7 @@ def test_check_finds_nothing_to_fix(workspace: Workspace) -> None:
 
 
 def test_every_experiment_ends_well(run: Path) -> None:
-    """Crashes of the controller are results. Some faults do harm and some do not."""
+    """A crash of the controller is a result."""
     statuses = Counter(row["status"] for row in rows(run))
     assert sum(statuses.values()) >= 40
     assert set(statuses) <= {"ok", "crashed"}

@@ -27,7 +27,6 @@ def cli(pole: Workspace, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureF
 
 @pytest.mark.slow
 def test_both_engines_give_the_same_table(cli: Cli, pole: Workspace, tmp_path: Path) -> None:
-    """The equivalence check covers every experiment, and the report shows only what the target has."""
     tables = {}
     for engine in ("reference", "fork"):
         code, said = cli("run", "upright", "--out", tmp_path / engine, "-n", "0", "--engine", engine)

@@ -269,7 +269,6 @@ BLIND = {the_table: ("show", "rerun", "compare", "merge")}
 def test_every_reader_finds_a_plain_forgery(
     genuine: tuple[Workspace, Path], run: Path, cli: Cli, forge: Callable[[Path, bool], None]
 ) -> None:
-    """A forged table is rebuilt with a warning."""
     forge(run, False)
     for reader, words in readers(run, genuine[1]).items():
         if reader in BLIND.get(forge, ()):
@@ -302,7 +301,6 @@ def test_the_api_finds_a_plain_forgery(
 
 
 def test_the_genuine_run_passes(genuine: tuple[Workspace, Path], run: Path, cli: Cli, tmp_path: Path) -> None:
-    """The run is verified as a read-only copy in another folder."""
     known = seal_of(RunFolder.open(genuine[1]))
     for path in [run, *run.rglob("*")]:
         path.chmod(0o555 if path.is_dir() else 0o444)
@@ -322,7 +320,7 @@ def test_the_seal_reveals_a_forgery_with_consistent_digests(
     cli: Cli,
     forge: Callable[[Path, bool], None],
 ) -> None:
-    """An edited table does not match the records."""
+    """An edited table does not change the seal, but it does not match the records."""
     known = seal_of(RunFolder.open(genuine[1]))
     forge(run, True)
     if forge is not the_table:

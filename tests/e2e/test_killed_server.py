@@ -181,7 +181,6 @@ def test_a_killed_job_leaves_the_run_folder_unchanged_or_complete(server: Server
 
 @pytest.mark.slow
 def test_a_cancelled_job_leaves_nothing_running(server: Server) -> None:
-    """The next job runs."""
     server.ask("/api/jobs", CAMPAIGN)
     server.wait_for(lambda job: job["message"].startswith("experiments"))
     pids = descendants(server.process.pid)

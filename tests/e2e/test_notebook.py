@@ -43,7 +43,6 @@ def test_the_comparison_notebook_runs(tmp_path: Path, monkeypatch: pytest.Monkey
 def test_the_research_notebook_gives_the_answer_of_its_page(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The effect and the interval are those of the research tour."""
     shown, plots = run(RESEARCH, tmp_path, monkeypatch)
     assert plots == 2
     page = (TUTORIALS / "tour-researcher.md").read_text(encoding="utf-8")

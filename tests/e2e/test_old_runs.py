@@ -125,7 +125,6 @@ def test_an_old_run_compares_with_itself_and_a_fresh_one(cli: Cli, fresh: Path) 
 
 @pytest.mark.parametrize("format", list(Format))
 def test_an_old_run_exports_in_every_format(cli: Cli, place: Path, fixture: Path, format: Format) -> None:
-    """MCAP contains the experiments that have series or traces."""
     file = place / f"export-{format.value}"
     code, _, err = cli("export", "small", "--format", format.value, "--out", file)
     assert code == 0, err
@@ -172,7 +171,6 @@ def test_approvals_of_an_old_run_still_apply(cli: Cli, place: Path) -> None:
 
 
 def test_an_old_run_is_not_resumed(cli: Cli, place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The error names the version that planned the run, or the changed sources."""
     shutil.copytree(place / "small", copy := place / "resumed")
     shutil.copytree(place / "toy", library := place / "changed")
     before = sorted((path, path.stat().st_mtime_ns) for path in copy.rglob("*") if path.name != "owner.lock")

@@ -69,7 +69,6 @@ SWAPPED = {
 
 
 def test_faults_that_depend_on_the_swapped_lanes_have_the_effects_of_the_original(tmp_path: Path) -> None:
-    """A drifting right lane and a steering-angle offset have the original's effects, within 0.1 s."""
     workspace, out = Workspace.find(root=Path(__file__).parents[2]), tmp_path / "run"
     values = " or ".join(
         f'(fault_type == "{kind}" and variant == "{variant}" and value == {value})'

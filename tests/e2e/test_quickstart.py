@@ -37,8 +37,6 @@ def rows(quickstart: Path) -> list[Row]:
 
 
 def test_every_run_ends_well_and_every_outcome_occurs(rows: list[Row]) -> None:
-    """There are hazards of all three kinds, silent corruption, and faults that are masked or never
-    activated."""
     assert Counter(row["status"] for row in rows) == {"ok": 60}
     assert {row["outcome"] for row in rows} == {"hazard", "sdc", "masked", "not_activated"}
     assert all(any(row[name] == "1" for row in rows) for name in ("h1", "h2", "h3"))
@@ -59,8 +57,7 @@ def test_lost_radar_or_camera_data_raise_an_alert_within_0_6_s(
 
 
 def test_a_wrong_camera_distance_alone_changes_little(rows: list[Row]) -> None:
-    """A wrong radar distance reaches the actuators. `test_published_faults` compares the number of hazards
-    with the original's, value by value."""
+    """A wrong radar distance reaches the actuators."""
 
     def manifested(module: str, fault_type: str) -> list[str]:
         return [
@@ -74,7 +71,6 @@ def test_a_wrong_camera_distance_alone_changes_little(rows: list[Row]) -> None:
 
 
 def test_times_are_in_order(rows: list[Row]) -> None:
-    """No event precedes the activation. Reaction times are positive or missing."""
     for row in rows:
         for name in ("t_manifest", "t_h1", "t_h2", "t_h3", "t_alert"):
             assert not row[name] or float(row[name]) >= float(row["t_activation"])

@@ -52,7 +52,6 @@ def gate(root: Path, base: str, new: str) -> subprocess.CompletedProcess[str]:
 
 
 def test_a_worse_version_is_refused(root: Path) -> None:
-    """The gate names the faults that became hazardous."""
     refused = gate(root, "tree", "worse")
     assert refused.returncode == 1, refused.stderr
     named = [line for line in refused.stderr.splitlines() if line.startswith("error: ")]

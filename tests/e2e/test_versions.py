@@ -112,7 +112,6 @@ def test_another_python_is_refused(cli: Cli, half: Path) -> None:
 def test_another_python_can_be_accepted_and_is_noted(
     cli: Cli, toy: Workspace, driven: list[str], half: Path, tmp_path: Path
 ) -> None:
-    """The fault-free runs are repeated. run.json, the report and `show` say which version ran what."""
     before = len(driven)
     code, _, err = cli("run", "small", "--out", half, "-n", "0", "--accept-versions")
     assert code == 0, err
@@ -133,8 +132,9 @@ def test_another_python_can_be_accepted_and_is_noted(
     assert cli("run", "small", "--out", half, "-n", "0")[0] == 0  # nothing is left to run
 
 
-def test_accepted_versions_must_compute_alike(cli: Cli, half: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """If the fault-free runs differ, nothing is written."""
+def test_accepted_versions_must_compute_the_same_results(
+    cli: Cli, half: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     before = contents(half)
     monkeypatch.setattr(ReferenceEngine, "execute", other_digits(ReferenceEngine.execute))
     code, _, err = cli("run", "small", "--out", half, "-n", "0", "--accept-versions")
@@ -159,7 +159,6 @@ def test_pytest_refuses_and_accepts_versions_like_the_command(
 def test_another_machine_repeats_the_golden_runs(
     toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, driven: list[str]
 ) -> None:
-    """If the golden runs differ, the run is refused."""
     out = tmp_path / "run"
     run_campaign(toy, "small", out, distributor=OnePiece())
     assert sorted(driven) == ["a-A", "a-A+alone", "b-A", "b-A+alone"]
@@ -197,7 +196,6 @@ def shard(
 
 @pytest.mark.slow
 def test_shards_of_other_versions_are_merged_only_if_accepted(cli: Cli, shard: Shard, tmp_path: Path) -> None:
-    """The merged run keeps and lists the stretches of both shards."""
     words = ("merge", shard(1, "3.11.7"), shard(2, "3.12.1"), "--out", tmp_path / "out")
     code, _, err = cli(*words)
     assert code == 2 and "part2: unlike " in err and PYTHONS in err and "--accept-versions" in err

@@ -78,7 +78,6 @@ def elsewhere(tmp_path: Path) -> Path:
 
 
 def test_clone_and_sdist_build_the_same_wheel(clone: Path, built: Path, wheel: Path, tmp_path: Path) -> None:
-    """Leftovers of earlier builds stay out of the wheel."""
     stale = clone / "build" / "lib" / "mutator" / "stale.py"
     stale.parent.mkdir(parents=True, exist_ok=True)
     stale.touch()
@@ -122,7 +121,6 @@ def test_the_controller_is_neither_importable_nor_compiled(python: Path, elsewhe
 
 
 def test_the_first_commands_in_an_empty_folder(python: Path, elsewhere: Path) -> None:
-    """The campaign runs the same experiments as in the clone."""
     mutator, workspace = python.with_name("mutator"), Workspace.find(CLONE)
     listed = json.loads(call(mutator, "list", "--json", here=elsewhere))
     assert [spec["name"] for spec in listed["specs"]] == [spec.name for spec in workspace.specs()]

@@ -50,7 +50,6 @@ def test_canonical_text_means_the_same(text: str, values: dict[str, float]) -> N
 @settings(max_examples=200, deadline=None)
 @given(CONDITIONS, TERMS, TERMS, OBSERVED)
 def test_no_observation_raises(text: str, a: str, b: str, values: dict[str, float]) -> None:
-    """Division by zero, infinities and NaN are included."""
     try:
         canonical = check_condition(f"({text}) and ({a}) / ({b}) > 1")
     except MutatorError as error:
@@ -85,7 +84,6 @@ def test_a_trace_gives_the_same_results_as_its_single_steps(text: str, steps: li
 
 
 def test_formulas_are_evaluated_over_a_trace() -> None:
-    """The formulas are a choice, a division by 0, and a rate of change."""
     trace = {
         "t": np.array([0.0, 0.5, 1.5]),
         "gap": np.array([3.0, 2.0, -1.0]),

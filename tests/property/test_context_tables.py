@@ -34,7 +34,6 @@ def contexts_at(conditions: dict[str, str], hwt: float, rs: float, v_ego: float)
 def test_a_proved_table_has_one_context_for_every_observation(
     first: str, second: str, hwt: float, rs: float, v_ego: float
 ) -> None:
-    """Observations can be infinite."""
     texts = {"A": first, "B": f"not ({first}) and ({second})", "C": f"not ({first}) and not ({second})"}
     right = {row: check_condition(text) for row, text in texts.items()}
     assert measure_coverage(right).place is None

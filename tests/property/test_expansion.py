@@ -35,7 +35,6 @@ def library(seed: int, reading: str) -> list[Fault]:
 def test_draws_lie_in_their_ranges(
     seed: int, key: str, ranges: tuple[tuple[float, float], ...], kind: str, cap: int | None
 ) -> None:
-    """Each range has one value, up to the cap. It is an integer if the range is."""
     draw = Draw(key=key, name="x", unit="m", kind=kind, ranges=ranges, decimals=None, cap=cap)
     values = draw_values(draw, seed)
     assert len(values) == len(ranges)
@@ -68,7 +67,6 @@ def test_more_ranges_do_not_change_earlier_values(
 @settings(max_examples=20, deadline=None)
 @given(SEEDS)
 def test_both_readings_have_the_same_values(seed: int) -> None:
-    """Both readings have the same specs and values in the same order, and unique ids."""
     described, coded = library(seed, "as_described"), library(seed, "as_coded")
     assert [(f.spec, f.value, f.unit) for f in described] == [(f.spec, f.value, f.unit) for f in coded]
     assert len({f.id for f in (*described, *coded)}) == 2 * sum(spec.count for spec in SPECS)

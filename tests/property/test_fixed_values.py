@@ -133,7 +133,6 @@ def checked(names: Sequence[str], count: int, *, run: bool) -> int:
 
 
 def test_values_that_the_probe_sets_are_restored() -> None:
-    """After a fault, each value is the same object again."""
     assert checked(FEW, 200, run=True) == 200
 
 

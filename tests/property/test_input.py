@@ -37,7 +37,6 @@ PLAIN = st.recursive(
     | st.text("a: -[]{}#&*!|>'\"\n\t%@", max_size=60).map(str.encode)
 )
 def test_any_bytes_are_read_or_refused(tmp_path: Path, data: bytes) -> None:
-    """Arbitrary bytes are read as strict YAML or raise a MutatorError that names the file."""
     path = tmp_path / "x.yaml"
     path.write_bytes(data)
     try:
@@ -88,7 +87,6 @@ def test_a_damaged_spec_is_read_or_refused(tmp_path: Path, data: st.DataObject) 
 @given(st.binary(max_size=100) | st.text("def f(x):\n=1#\"'\\ \t;", max_size=80).map(str.encode))
 @example(b"#\x80")  # LibCST has no line for it
 def test_any_source_is_read_or_refused(data: bytes) -> None:
-    """Arbitrary bytes are read as Python that can be spliced, or raise a MutatorError."""
     try:
         file = parse_file("x.py", data, Path("root"))
     except MutatorError as error:
@@ -99,7 +97,6 @@ def test_any_source_is_read_or_refused(data: bytes) -> None:
 
 @given(st.floats() | st.integers(-(10**30), 10**30))
 def test_rendered_numbers_are_exact(value: float) -> None:
-    """Signed terms are exact, too."""
     assert repr(eval(literal(value))) == repr(value)
     if value == value:
         assert eval(f"0 {signed(value)}") == value
@@ -107,7 +104,6 @@ def test_rendered_numbers_are_exact(value: float) -> None:
 
 @given(st.floats(), st.floats(allow_nan=False), st.sampled_from(["float", "np.float64", "np.float32"]))
 def test_a_whole_number_adds_the_same_as_a_float(variable: float, value: float, kind: str) -> None:
-    """The sum has the same bits, with or without numpy."""
     sign = "-" if math.copysign(1.0, value) < 0 else "+"
     with np.errstate(all="ignore"):
         texts = (f"{kind}(x) {signed(value)}", f"{kind}(x) {sign} {literal(abs(value))}")
@@ -141,7 +137,6 @@ SHAPES = {
 
 @pytest.mark.parametrize("shape", SHAPES)
 def test_input_that_takes_long_to_parse_is_refused_at_once(tmp_path: Path, shape: str) -> None:
-    """The error names the line."""
     path = tmp_path / "x.yaml"
     path.write_text(SHAPES[shape], encoding="utf-8")
     began = time.process_time()

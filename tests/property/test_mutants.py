@@ -114,7 +114,6 @@ def made(way: object, fault: Fault, trigger: Trigger) -> Mutant | tuple[type, st
 @settings(max_examples=50, deadline=None)
 @given(varied() | others(), triggers())
 def test_reused_changes_give_the_same_mutants_as_splicing(fault: Fault, trigger: Trigger) -> None:
-    """Files, patch, ids, digest and errors are the same."""
     made(build, fault, trigger)  # leaves a reusable change if it is the first of its kind
     assert made(build, fault, trigger) == made(build_directly, fault, trigger)
 

@@ -125,7 +125,6 @@ def can_guard(data: bytes, name: str) -> bool:
 @settings(max_examples=150, deadline=None)
 @given(st.data())
 def test_unsplicing_restores_every_byte(data: st.DataObject) -> None:
-    """A mutant compiles and differs only by tagged lines (and guarded statements)."""
     source, names = data.draw(sources())
     chosen = data.draw(st.lists(st.sampled_from(names), unique=True)) if names else []
     guarded = [n for n in data.draw(st.permutations(names))[: len(names) // 2] if can_guard(source, n)]
@@ -143,7 +142,6 @@ def test_unsplicing_restores_every_byte(data: st.DataObject) -> None:
 @settings(max_examples=100, deadline=None)
 @given(st.data())
 def test_splicing_equals_inserting_into_the_tree(data: st.DataObject) -> None:
-    """Inserting parsed statements with LibCST gives the same program."""
     source, names = data.draw(sources())
     chosen = data.draw(st.lists(st.sampled_from(names), unique=True)) if names else []
     guarded = [n for n in names if n not in chosen and can_guard(source, n)][:2]

@@ -48,7 +48,6 @@ PARTS = 8  # of a slow test, for as many workers
     [(0, 6), *(pytest.param(2500 * part, 2500, marks=pytest.mark.slow) for part in range(PARTS))],
 )
 def test_mutants_of_generated_modules_are_correct(first: int, count: int) -> None:
-    """The mutants also act like the original."""
     seeds = range(first, first + count)
     figures = proved(((seed, ModuleWriter(seed).module()) for seed in seeds), behaviour)
     assert not figures.wrong
@@ -58,7 +57,6 @@ def test_mutants_of_generated_modules_are_correct(first: int, count: int) -> Non
 
 @pytest.mark.parametrize("part", [None, *(pytest.param(n, marks=pytest.mark.slow) for n in range(PARTS))])
 def test_mutants_of_the_standard_library_are_correct(part: int | None) -> None:
-    """The library's own tests are included."""
     paths = sorted(path for path in LIBRARY.rglob("*.py") if "site-packages" not in path.parts)
     chosen = random.Random(4).sample(paths, 4) if part is None else paths[part::PARTS]
     figures = proved(((path, path.read_bytes()) for path in chosen), None)
@@ -88,7 +86,6 @@ READS = b"def f(a):\n    b = T(1, abs(a) + max(a, 1))\n    return b\ncall(f, 2)\
 def test_a_broken_splicer_is_found(
     place: ModuleType, name: str, source: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Without one of its checks, or with a wrong statement end or depth, the splicer fails a proof."""
     assert not proved([("", source)], behaviour, 20).wrong
     broken = {
         "libcst_module": without_check_of_bytes,

@@ -158,7 +158,6 @@ def checked(names: Sequence[str], count: int) -> int:
 
 
 def test_a_mutant_differs_only_in_its_changed_values() -> None:
-    """Each anchor leads to its own expression."""
     assert checked(FEW, 300) == 300
 
 
@@ -196,7 +195,6 @@ def checked_mutations(names: Sequence[str], count: int) -> int:
 
 
 def test_a_mutation_changes_nothing_else() -> None:
-    """Deleted statements are included."""
     assert checked_mutations(FEW, 150) == 150
 
 

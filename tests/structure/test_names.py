@@ -55,7 +55,6 @@ def test_car_names_of_any_spelling_are_found(code: str) -> None:
 
 @pytest.mark.parametrize("line", ["// #kind=radar%2Fchaff", "<p>no lane</p>", "const gasMax = 1;"])
 def test_car_names_are_found_in_pages_scripts_and_templates(line: str) -> None:
-    """Comments are checked, too."""
     assert found(line, ".js")
 
 

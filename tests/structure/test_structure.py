@@ -103,13 +103,11 @@ def is_clean(root: Path) -> bool:
 
 
 def test_packages_import_in_one_direction() -> None:
-    """Harness and target do not import each other."""
     done = lint(CLONE)
     assert done.returncode == 0, done.stdout + done.stderr
 
 
 def test_modules_have_no_import_cycles_or_hidden_imports() -> None:
-    """Few modules lie at the top."""
     top, hidden, circle = top_modules(CLONE), hidden_imports(CLONE), cycle(CLONE)
     print(
         f"modules at the top: {len(top)}, cycles: {bool(circle):d}, imports inside functions: {len(hidden)}"
