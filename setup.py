@@ -15,16 +15,14 @@ ARCHIVE = Path("mutator", "_common", "shipped.zip")  # where mutator/_common/shi
 COMPILER = "ziglang>=0.13"  # a C compiler from the package index for machines without one
 
 sys.path.insert(0, str(CLONE / "target"))
-sys.dont_write_bytecode = True  # no bytecode may lie beside a target's sources
+sys.dont_write_bytecode = True  # keep bytecode out of the target's sources
 from selfdrive.common import compiled  # noqa: E402
 from selfdrive.common.errors import ConfigError  # noqa: E402
 from selfdrive.sim.compile_helpers import FOLDER, compile_helpers, compiler  # noqa: E402
 
 
 class BuildWithShipped(build_py):
-    """Compiles helpers and builds the packages and, unless the install is editable, the archive of what ships
-    with them.
-    """
+    """Compiles helpers, builds the packages and, unless the install is editable, packs the shipped files."""
 
     def run(self) -> None:
         try:
@@ -32,7 +30,7 @@ class BuildWithShipped(build_py):
         except ConfigError as error:
             print(f"warning: {error}", file=sys.stderr)
         if not self.editable_mode:
-            shutil.rmtree(self.build_lib, ignore_errors=True)  # modules of an earlier build stay out
+            shutil.rmtree(self.build_lib, ignore_errors=True)  # drop modules of an earlier build
         super().run()
         if not self.editable_mode:
             archive = Path(self.build_lib) / ARCHIVE
@@ -41,7 +39,7 @@ class BuildWithShipped(build_py):
 
 
 class WheelOfOneMachine(bdist_wheel):
-    """A wheel for any Python 3, but for this kind of machine alone if helpers were compiled."""
+    """A wheel for any Python 3, but only for this platform if helpers were compiled."""
 
     def get_tag(self) -> tuple[str, str, str]:
         if not any(FOLDER.glob(f"*{compiled.SUFFIX}")):

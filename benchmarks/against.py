@@ -3,8 +3,7 @@
 `python benchmarks/against.py CLONE [--campaign NAME]`. CLONE is a checkout of the older commit, installed
 into its .venv as its README says. Both versions run alternately, each time with an empty cache. Code that an
 old version compiles with a separate command is compiled before the measurement. CPU time covers all
-processes. Wall time needs otherwise idle cores. Idle time is the time in which a core has no work. The exit
-code is 1 if a run fails.
+processes. Wall time needs otherwise idle cores. Idle time is the time in which a core has no work.
 """
 
 import argparse
@@ -28,7 +27,7 @@ Parts = dict[str, dict[str, float]]  # by stage: wall_s, cpu_s
 
 
 def run(clone: Path, campaign: str, workers: int, more: list[str]) -> Parts:
-    """Run a campaign with the version of `clone` and empty caches. Return the times of each stage."""
+    """Run a campaign with the version in `clone` and empty caches. Return the times of each stage."""
     python = sys.executable if clone == ROOT else str(clone / ".venv" / "bin" / "python")
     with tempfile.TemporaryDirectory() as place:
         # older versions ignore XDG_CACHE_HOME for frames, detections and helpers
@@ -113,7 +112,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("clone", type=Path, help="checkout of the older commit")
     parser.add_argument("--campaign", default="paper_sample")
-    parser.add_argument("--limit", metavar="N", help="number of its experiments")
+    parser.add_argument("--limit", metavar="N", help="run only N experiments of the campaign")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--json", type=Path, metavar="FILE")

@@ -1,9 +1,8 @@
 """Measure whole campaigns with one worker and with two.
 
-`python benchmarks/campaigns.py [--campaign paper_smoke]`. A first run fills the caches (frames,
-detections, passed checks) and is not compared. Then runs with one worker and with two alternate. CPU time
-covers all processes. Wall time needs otherwise idle cores. The exit code is 1 if a run fails or any byte of
-the results differs.
+`python benchmarks/campaigns.py [--campaign paper_smoke]`. A first run fills the caches (frames, detections,
+passed checks) and is not compared. Then runs with one worker and with two alternate. CPU time covers all
+processes. Wall time needs otherwise idle cores.
 """
 
 import argparse

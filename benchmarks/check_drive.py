@@ -1,8 +1,7 @@
 """Measure the CPU time of `mutator check --drive` beyond that of three golden runs.
 
 `python benchmarks/check_drive.py [--rounds N]`. Each round measures the command for one scenario of the
-shipped target, then three golden runs, each in its own process. The exit code is 1 if the smallest difference
-is above the goal.
+shipped target, then three golden runs, each in its own process.
 """
 
 import argparse

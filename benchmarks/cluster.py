@@ -3,9 +3,8 @@
 `python benchmarks/cluster.py [overhead] [intake] [ends] [--campaign NAME]`. Without a name, it measures all
 three. `overhead` is the CPU time of all processes for a campaign on two Dask workers of this machine and on
 two local workers, alternately and with warm caches. `intake` is the number of results a second that the
-command accepts from two workers with a simulated engine that takes no time. Patches and series have their
-usual size. `ends` simulates 64 workers that run 10,000 experiments with a campaign's durations, and compares
-the time at which the last worker ends with the mean.
+command accepts from two workers whose runs take no time. `ends` simulates 64 workers that run 10,000
+experiments with a campaign's durations, and compares the time at which the last worker ends with the mean.
 """
 
 import argparse
@@ -64,7 +63,6 @@ PR_SET_CHILD_SUBREAPER = 36  # of prctl: orphans become children of this process
 
 
 def overhead(campaign: str, rounds: int) -> None:
-    """Compare CPU time on a cluster of this machine with local workers."""
     took: dict[str, list[float]] = {"local": [], "cluster": []}
     options = {"local": ["-n", "2"], "cluster": ["-n", "2", "--cluster", "local:2"]}
     with tempfile.TemporaryDirectory() as place:
@@ -89,7 +87,7 @@ def cpu_s(command: list[str], env: dict[str, str]) -> float:
     ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run(command, cwd=ROOT, env=env, capture_output=True, check=True)
-    with suppress(ChildProcessError):  # when none is left
+    with suppress(ChildProcessError):  # no child is left
         while True:
             os.wait()
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -98,14 +96,14 @@ def cpu_s(command: list[str], env: dict[str, str]) -> float:
 
 @contextmanager
 def planned(name: str = "paper") -> Iterator[tuple[Workspace, RunFolder, tuple[Pending, ...]]]:
-    """Return a frozen plan of 11,280 experiments without running anything."""
+    """Yield a frozen plan, by default that of the paper's 11,280 experiments."""
     workspace = Workspace.find(ROOT)
     with tempfile.TemporaryDirectory() as place:
         folder = freeze(make_plan(workspace, name), Path(place) / "run", workspace)
         yield workspace, folder, pending(folder, {})
 
 
-# These functions replace a worker's and take no time. Dask sends them to the workers.
+# These functions replace those of a real worker and take no time. Dask sends them to the workers.
 
 
 def facts(packages: Any) -> dict[str, Any]:
@@ -145,7 +143,6 @@ def work(run: str, data: bytes) -> bytes:
 
 
 def intake() -> None:
-    """Measure how many results a second the command takes in."""
     for fake in (facts, deliver, attend, leave, work):
         setattr(dask_side, fake.__name__, fake)
     with planned() as (workspace, folder, left):

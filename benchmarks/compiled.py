@@ -1,8 +1,7 @@
 """Measure what compiled helpers save in runs of 30 s.
 
 `python benchmarks/compiled.py [--rounds N] [--json FILE]`. Runs without and with helpers alternate. Times are
-CPU times of this process in one thread. It prints medians and their ratio. The exit code is 1 if a trace
-differs.
+CPU times of this process in one thread.
 """
 
 import argparse
@@ -61,7 +60,7 @@ def main() -> int:
                     traces.add(trace)
                 same &= len(traces) == 1
             without, having = (statistics.median(times) for times in spent.values())
-            name = f"{kind} detector, nothing known" if kind else "without pictures"
+            name = f"{kind} detector, uncached" if kind else "without pictures"
             figures[name] = {"without": spent[False], "with": spent[True]}
             print(f"{name:34} {without:6.2f} s  compiled {having:6.2f} s  ratio {having / without:.2f}")
     print("traces are the same:", same)

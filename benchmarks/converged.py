@@ -1,10 +1,10 @@
 """Estimate what a campaign could save by ending runs that have become equal to the golden run.
 
-`python benchmarks/converged.py RUN [--json FILE]`. A fork whose state equals the golden run's after the fault
-is over could end there and take the rest from the golden run. This prints an upper bound of the saving, as a
-share of the CPU of all runs. If a trace has the golden run's bytes, everything after the last activation
-counts as saved; otherwise, everything after the last difference from golden in any channel of the series (six
-digits, 20 values a second). Equal channels are necessary for equal states, but not sufficient.
+`python benchmarks/converged.py RUN [--json FILE]`. Once the fault is over and a fork's state equals the
+golden run's, the fork could end and copy the rest from the golden run. This prints an upper bound on the
+saving, as a share of the CPU of all runs. If a trace has the golden run's bytes, everything after the last
+activation counts as saved; otherwise, everything after the last difference from golden in any channel of the
+series (six digits, 20 values a second). Equal channels are necessary for equal states, but not sufficient.
 """
 
 import argparse
@@ -30,7 +30,7 @@ from mutator.store.series_format import Series  # noqa: E402
 from mutator.workspace import Workspace  # noqa: E402
 
 WORTH_IT = 0.02  # of the CPU
-_LAST_S = 0.06  # a fault that acts in every fifth step until the end may be last active this long before it
+_LAST_S = 0.06  # a fault that acts in every fifth step can be last active this long before the end of the run
 
 
 @dataclass
@@ -56,7 +56,7 @@ def last_difference(golden: Series, faulty: Series) -> float:
 
 
 def bound(folder: RunFolder, workspace: Workspace) -> tuple[Saved, float]:
-    """Return an upper bound of what a campaign could save and the CPU (s) of all its runs."""
+    """Return an upper bound on the saving, and the CPU time (s) of all runs."""
     manifest, series = workspace.manifest(folder.head["target"]), SeriesFolder(folder.path)
     timings, records = folder.timings(), folder.records()
     digests: dict[Path, str] = {}
@@ -81,10 +81,10 @@ def _saved(record: Record, golden: str, series: SeriesFolder) -> tuple[str, floa
     end = float(found[0].about["end"])
     same = record.trace_digest == golden
     over = max(active.last, -math.inf if same else last_difference(*found))
-    kind = "golden's all the time" if same else "golden's again"
+    kind = "equal to golden throughout" if same else "equal to golden again"
     if over >= end - _LAST_S:
-        return f"{kind}, at fault to the end" if same else "different, or at fault, to the end", 0.0
-    return f"{kind}, and the fault is over", (end - over) / (end - active.first)
+        return f"{kind}, fault active to the end" if same else "different or fault active to the end", 0.0
+    return f"{kind}, fault over before the end", (end - over) / (end - active.first)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

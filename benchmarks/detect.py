@@ -2,8 +2,8 @@
 
 `python benchmarks/detect.py [--repeat N]`. It prints the median CPU time (ms, one thread) of a detection,
 compiled and in Python, and of each step in Python. The frames show the rendered road, clean and with rain,
-snow and noise. A run of 30 s makes 600 detections. The last column divides the time of the detection that a
-run uses (the compiled one, if it exists) by its goal. The exit code is 1 if a detection misses its goal.
+snow and noise. The last column divides the time of the compiled detection (if there is none, of that in
+Python) by its goal.
 """
 
 import argparse

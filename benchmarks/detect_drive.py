@@ -1,8 +1,7 @@
 """Measure the median time per frame of the geometric and the as-coded detectors.
 
 `python benchmarks/detect_drive.py [--repeat N] [--plain]`. It runs on one core, in clear and in bad weather,
-with compiled code unless given `--plain`; the last column says whether the code was compiled. Times are CPU
-times of this process. The exit code is 1 if a median is above its goal.
+with compiled code unless given `--plain`. Times are CPU times of this process.
 """
 
 import argparse
@@ -36,7 +35,7 @@ from selfdrive.visiond.robust_detector import RobustDetector  # noqa: E402
 ROBUST = ((None, 0.0, 2.5), ("PaperRain", 10.0, 4.0), ("PaperSnow", 10.0, 4.0), ("Rain", 100.0, 4.0))
 CODED = ((None, 0.0, 3.0), ("CodedRain", 10, 3.0), ("CodedSnow", 10, 3.0), ("CodedOcclusion", 10, 3.0))
 STEP = 1.342  # m between frames
-DIFFERENT = 40  # frames of a drive
+DIFFERENT = 40  # different frames in a drive
 
 
 class Moment(NamedTuple):

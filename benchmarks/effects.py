@@ -1,8 +1,8 @@
-"""Measure the image effects' time for a frame, as medians over a run.
+"""Measure the median time per frame of each image effect.
 
 `python benchmarks/effects.py [EFFECT ...] [--repeat N] [--plain]`. It measures mild and strong effects on one
-core, with the default camera. It uses compiled code unless given `--plain`; the last column says for each
-effect whether it used any. Times are CPU times of this process. The exit code is 1 if a median is above 3 ms.
+core, with the default camera. It uses compiled code unless given `--plain`. Times are CPU times of this
+process. The exit code is 1 if a median is above 3 ms.
 """
 
 import argparse

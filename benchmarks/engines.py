@@ -3,8 +3,8 @@
 `python benchmarks/engines.py [--experiments 200] [--json FILE] [--skip reference]`. Half of the experiments
 are guided and half random. Times are CPU times (user and system) of this process and all its children. Golden
 runs and the work done once for a campaign (loading the target, observing each golden run) are counted
-separately. `--library DIR --campaign NAME` uses another library, such as an example with steps so fast that
-the overhead shows. The exit code is 1 if records differ or the fork engine exceeds its goals.
+separately. `--library DIR --campaign NAME` uses another library, such as an example whose steps cost almost
+nothing.
 """
 
 import argparse
@@ -40,7 +40,7 @@ GOAL_OF_REFERENCE = 1 / 3
 class Measured:
     cpu_s: float = 0.0
     children_s: float = 0.0  # the part for the runs themselves
-    steps: int = 0  # steps that the runs simulated
+    steps: int = 0
     how: Counter[str] = field(default_factory=Counter)
     why: Counter[str] = field(default_factory=Counter)
     records: dict[str, Record] = field(default_factory=dict)
@@ -68,7 +68,7 @@ class Bench:
         return self.folder / "golden" / GoldenRun.of(experiment, several_seeds=False).key
 
     def steps(self, experiment: Experiment) -> int:
-        """Return the number of steps of the golden run, and so of every run that ends normally."""
+        """Return the number of steps of every run that ends normally."""
         trace = golden.load_trace(self.manifest, self.golden(experiment))
         return len(trace[self.manifest.time_channel])
 

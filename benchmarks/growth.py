@@ -3,7 +3,7 @@
 `python benchmarks/growth.py [--json FILE]`. It measures plans of 1,000 to 50,000 experiments, a table of
 100,000 and opening the paper's 11,280. Each size runs in its own process, which plans and freezes, or does a
 worker's work before and after each run (read the chunk, build the mutant, append the record). Times are CPU
-times. The exit code is 1 if a goal is missed.
+times.
 """
 
 import argparse
@@ -38,10 +38,10 @@ ROOT = Path(__file__).resolve().parents[1]
 SIZES = (1_000, 5_000, 20_000, 50_000)
 TABLE, LOAD_GOAL_S = 100_000, 2.0
 PAPER, OPEN_GOAL_S = 11_280, 1.0
-GOLDEN_BYTES = 650_000  # a golden run
-PATCH_BYTES = 7200  # a stored patch
+GOLDEN_BYTES = 650_000
+PATCH_BYTES = 7200
 CHUNK = 20
-MORE_MEMORY_MB = 5.0  # of a worker, between 1,000 and 50,000 experiments
+MORE_MEMORY_MB = 5.0  # growth of a worker from 1,000 to 50,000 experiments
 
 
 def plan_of(workspace: Workspace, size: int) -> Plan:
@@ -122,7 +122,7 @@ def working(size: int, out: Path) -> dict[str, float]:
 
 
 def written_run(size: int, out: Path, patch: bytes = b"") -> RunFolder:
-    """Write a run folder with that many synthetic records and, if they name a patch, as many patches."""
+    """Write a run folder with that many synthetic records and, if given a patch, as many copies of it."""
     workspace = Workspace.find(root=ROOT)
     plan = make_plan(workspace, "paper")
     more = (replace(e, seed=e.seed + k) for k in range(size) for e in plan.experiments)
@@ -141,8 +141,7 @@ def written_run(size: int, out: Path, patch: bytes = b"") -> RunFolder:
 
 
 def opening(size: int, out: Path) -> dict[str, float]:
-    """Open a finished run of that many experiments and compare all digests, checksums and ids. Return its
-    seal."""
+    """Open and seal a finished run of that many experiments. Return the CPU times."""
     folder = written_run(size, out, bytes(PATCH_BYTES))
     head, data = folder.head, bytes(GOLDEN_BYTES)
     goldens = [folder.golden(scenario, tuple(changes)) for scenario, changes in head["goldens"]]

@@ -1,8 +1,7 @@
 """Measure the lateral behaviour at 60 mph: overshoot, settling time and steady error.
 
 `python benchmarks/lateral.py [--figure FILE.svg]` simulates scenarios L01 to L03 and a step of the lane and
-prints a table. With `--figure` it plots offset, steering angle and torque over time. Equal sources give equal
-bytes.
+prints a table. With `--figure` it plots offset, steering angle and torque over time.
 """
 
 import argparse
@@ -63,7 +62,6 @@ def measure(trace: Trace, start: float, band: float) -> tuple[float, ...]:
 
 
 def figure(traces: Mapping[str, Trace], path: Path) -> None:
-    """Draw three rows of curves with one column for each case."""
     import matplotlib
 
     matplotlib.use("svg")

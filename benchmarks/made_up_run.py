@@ -53,7 +53,7 @@ SEED = 11_280  # experiments of a seed
 KINDS = 480  # different records, used in turn
 PATCHES = 240  # different patches
 SERIES, SERIES_MOST = 48, 150_000  # different series; experiments with a series, limited to fit 500 MB
-WORKERS, PIECE = 2, 20  # files, and consecutive experiments in one of them
+WORKERS, PIECE = 2, 20  # number of files; consecutive experiments per file
 _WHOLE_EVERY = 256  # the first of this many patches is stored whole, as in mutator.store.patches
 _NO_ID = "0" * 16
 
@@ -246,7 +246,7 @@ def write_proof(
 def write_series(
     workspace: Workspace, folder: RunFolder, ids: Sequence[str], experiments: Sequence[Experiment]
 ) -> None:
-    """Write packed series. The experiments that fit the budget share a few of them."""
+    """Write packed series: a few different ones, shared by the experiments that fit the budget."""
     manifest, place = workspace.manifest("openpilot"), folder.path / "series"
     place.mkdir()
     first = folder.goldens[0]

@@ -2,11 +2,10 @@
 
 `python benchmarks/million.py [--sizes N ...] [--keep DIR]`. It measures plan, tables, resume, report and page
 at three sizes. The runs are synthetic (`made_up_run.py`) and kept in DIR for later calls. Each row is a
-separate process, with CPU and wall seconds and the peak memory of the process and its children together.
-Shared pages count once, and memory is sampled twice a second. The page opens in the system's Chromium,
-headless. Its wall time runs from the navigation until its list is usable. Growth is the CPU time per
-experiment relative to that of the smallest size. `new here` means a machine that has not verified the run
-before; afterwards only its bytes are compared.
+separate process, with CPU and wall seconds and the peak memory of the process and its children, sampled twice
+a second. Shared pages count once. The page opens in a headless Chromium; its wall time ends when its list is
+usable. Growth is the CPU time per experiment relative to that of the smallest size. `new here` means a
+machine that has not verified the run before; afterwards only its bytes are compared.
 """
 
 import argparse
@@ -74,7 +73,7 @@ def page(size: int, run: Path) -> float:
         browser = report_page.launched(playwright)
         times = report_page.opened(
             browser, run / "report" / "index.html", 1, steps={}
-        )  # made-up runs have no series
+        )  # measures only how the page opens
         browser.close()
     return times["open_ms"] / 1000
 
@@ -112,7 +111,7 @@ def family(pid: int) -> list[int]:
 
 
 def memory_mb(pid: int) -> float:
-    """Return the memory (MB) of a process with its share of shared pages."""
+    """Return the memory (MB) of a process, including its share of shared pages."""
     try:
         lines = Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()
     except OSError:

@@ -1,8 +1,8 @@
 """Measure the CPU time of both model-predictive controllers: build, iteration and the solver's share.
 
 `python benchmarks/mpc.py [--plain] [--rounds N] [--json FILE]`. The solvers are those compiled at
-installation, or CasADi's with `--plain`. Each round measures all of them, so that other work on the machine
-affects all equally. It prints the medians and the best rounds.
+installation, or CasADi's with `--plain`. Each round measures both, so that other work on the machine affects
+them equally.
 """
 
 import argparse

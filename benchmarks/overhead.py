@@ -5,7 +5,7 @@ faults of the paper's campaign with ideal vision, each of which first acts at a 
 steps of a 30 s run. All of a worker's steps are included: mutant, run, comparison with golden, patch, record.
 It prints the CPU of the worker, of its children and of the processes from which they fork, and the CPU of 30
 s of the same simulation. With `--against`, a checkout of an older commit runs alternately. Compare the
-ratios, not the times. The exit code is 1 if the overhead exceeds its goal.
+ratios, not the times.
 """
 
 import argparse
@@ -76,7 +76,7 @@ class Bench:
         self.common = (self.manifest, prepare_base(self.manifest, folder / "base"), self.work, limits)
 
     def golden(self) -> float:
-        """Simulate the golden run and return its CPU time (s) minus that of a two-step run."""
+        """Return the CPU time (s) of the golden run minus that of a two-step run."""
         job = Job(name="golden", scenario=self.workspace.scenario(SCENARIO), seed=1)
         engine = ReferenceEngine(*self.common)
         whole = engine.execute(job, self.folder / "golden")
@@ -85,8 +85,7 @@ class Bench:
         return whole.cpu_s - short.cpu_s
 
     def cost(self, experiments: Sequence[Experiment]) -> Cost:
-        """Return an engine's time for the experiments, without the first `FEW`. All experiments must be
-        forked."""
+        """Return the cost of the experiments without the first `FEW`. All must be forked."""
         null = build(self.manifest, self.models, None, always()).files
         engine = ForkEngine(*self.common, null=null)
         goldens = Goldens(self.manifest, lambda experiment: self.folder / "golden" / "out")
@@ -122,10 +121,7 @@ class Bench:
 
 
 def against(clone: Path, options: argparse.Namespace) -> int:
-    """Run this version and the one in `clone` alternately, each in separate processes.
-
-    Return the ratios of medians.
-    """
+    """Measure this version and the one in `clone` alternately. Return the exit code."""
     found: dict[str, list[dict[str, float]]] = {"older": [], "this": []}
     for number in range(options.rounds):
         for name in found if number % 2 == 0 else reversed(found):

@@ -64,7 +64,7 @@ class Version:
 
 
 def answers(cache: Path) -> Iterator[object]:
-    """Answer the parent's requests for the existing detectors and effects, or for times and results of
+    """Yield the answers to the parent's requests: existing detectors and effects, or the times and lines of
     frames."""
     import cv2
     from selfdrive.common import compiled
@@ -87,7 +87,7 @@ def answers(cache: Path) -> Iterator[object]:
 
 
 class Drive:
-    """A moving car that never repeats a pose and takes frames with an effect."""
+    """Frames with an effect, from a moving car that never repeats a pose."""
 
     def __init__(self, detector: str, effect: str, cache: Path) -> None:
         from selfdrive.sim import effects, vision

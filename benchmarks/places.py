@@ -137,8 +137,7 @@ class Counting(ast.NodeVisitor):
         self.generic_visit(node)
 
     def bound(self, target: ast.expr, value: ast.expr | None) -> None:
-        """Record a place for each assigned name, attribute or item. At the level of a module or class, record
-        the constants."""
+        """Record each assigned name, attribute or item; at the level of a module or class, the constants."""
         if isinstance(target, ast.Tuple | ast.List):
             for element in target.elts:
                 self.bound(element, None)
@@ -233,7 +232,7 @@ class Reach:
         return _spot(site.node) in self.spots or (bool(site.name) and self.is_assigned(site))
 
     def sets(self, site: Site) -> bool:
-        """Return whether the probe can set the place, by building the edit against the whole package."""
+        """Build the edit against the whole package, and return whether the probe can set the place."""
         function, _, name = site.name.rpartition(":")
         kind = AnchorKind.DEFAULT if site.kind == "default" else AnchorKind.CONSTANT
         location = FaultLocation(path=self.file.path, function=function, anchor=Anchor(kind=kind, name=name))

@@ -1,9 +1,8 @@
 """Measure the CPU time of the work around the paper's 11,280 experiments.
 
 `python benchmarks/planning.py`. It measures planning, freezing, reaching the first experiment and resuming a
-complete run. In the complete run, which is synthetic, every experiment has a record of a masked fault. The
-cached checks are synthetic, too. The start uses no workers and ends before the first mutant runs. Each time
-is also printed per experiment and relative to planning.
+complete run. The complete run, in which every fault is masked, and the cached checks are synthetic. The start
+uses no workers and ends before the first mutant runs.
 """
 
 import argparse
@@ -84,7 +83,7 @@ def make_up_checks(workspace: Workspace, folder: RunFolder) -> None:
 
 
 def until_the_first_run(workspace: Workspace, out: Path) -> float:
-    """Return the CPU seconds from the command to the point where the first mutant would be run."""
+    """Return the CPU seconds until the first mutant would run."""
     reached = []
 
     def stop(self: ReferenceEngine, job: Job, folder: Path) -> Execution:

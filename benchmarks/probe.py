@@ -2,7 +2,7 @@
 
 `python benchmarks/probe.py [--rounds N]`. Both simulate the same scenario for 30 s in one interpreter,
 alternating every 20 steps, so that other work on the machine affects both. The result is the median of the
-ratios of such pairs. The exit code is 1 if the null mutant is slower by more than its goal.
+ratios of such pairs.
 """
 
 import argparse
@@ -29,7 +29,7 @@ import types
 from time import process_time
 from selfdrive.sim import run as entry
 
-def begun(file):  # starts the simulator in that file; everything else is the same for both
+def begun(file):  # starts the simulator defined in that file; everything else is the same for both
     module = types.ModuleType("selfdrive.sim.simulator")
     with open(file) as source:
         exec(compile(source.read(), file, "exec"), vars(module))

@@ -1,9 +1,8 @@
 """Measure the cost of finding which channels diverged from the golden run.
 
-`python benchmarks/propagation.py [--repeat N]`. It compares the CPU time of a verdict with all channels of
-the manifest with that of a verdict with only the needed ones, and relates the difference to the CPU time of
-the run. The run is one experiment of the shipped target on the reference engine. The exit code is 1 if the
-difference is more than 1 % of the run's CPU.
+`python benchmarks/propagation.py [--repeat N]`. It compares the CPU time of a verdict on all channels with
+that of a verdict on the needed ones, as a share of the CPU time of the run: one experiment of the shipped
+target on the reference engine. The goal is at most 1 %.
 """
 
 import argparse
@@ -38,7 +37,7 @@ def main() -> int:
     before = getrusage(RUSAGE_CHILDREN)
     trial = mutator.try_fault("radar/chaff", "S1", "C2", workspace=workspace)
     after = getrusage(RUSAGE_CHILDREN)
-    run_ms = 1000 * (after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime) / 2  # for both runs
+    run_ms = 1000 * (after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime) / 2  # two runs
     manifest, out = workspace.manifest("openpilot"), trial.folder / "faulty"
     golden, faulty = load_channels(manifest, trial.single.golden), load_channels(manifest, out)
     needed = [*dict.fromkeys((*manifest.compared, *manifest.judged))]

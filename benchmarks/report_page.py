@@ -1,10 +1,9 @@
 """Measure the size and opening time of the report's page for 1,000, 11,280 and 100,000 experiments.
 
 `python benchmarks/report_page.py [--json FILE]`. The experiments are those of the paper's campaign, with more
-seeds if needed. Their records are synthetic. The page opens in the system's Chromium, headless. Times are
-wall times in the browser, the best of several: from the navigation until the table is usable, then for the
-first filter, sort, search and opened experiment. The exit code is 1 if 11,280 experiments do not open in a
-second or take more than 8 MB.
+seeds if needed. Their records are synthetic. The page opens in a headless Chromium. Times are wall times in
+the browser, the best of several: until the table is usable, then for the first filter, sort, search and
+opened experiment. Goal: 11,280 experiments open within a second and take at most 8 MB.
 """
 
 import argparse
@@ -101,7 +100,7 @@ def written_run(workspace: Workspace, size: int, out: Path) -> list[Experiment]:
 
 
 def patches(workspace: Workspace, experiments: Sequence[Experiment]) -> Iterator[tuple[str, str, str]]:
-    """Return the diffs without the probe, which are the same for every seed."""
+    """Yield the diffs without the probe, which are the same for every seed."""
     manifest, models = workspace.manifest("openpilot"), workspace.fault_models()
     known: dict[tuple[str, Trigger], str] = {}
     for experiment in experiments:
@@ -120,7 +119,7 @@ def write_series(workspace: Workspace, records: Sequence[Record], out: Path) -> 
     golden = time | {name: draw.normal(size=3000).cumsum().cumsum() for name in names}
     sampler, made = Sampler(manifest, golden), []
     for one in records[:SERIES]:
-        change = draw.normal(size=2000).cumsum().cumsum()  # as long as the fault is active
+        change = draw.normal(size=2000).cumsum().cumsum()  # a value per step after the activation
         faulty = golden | {
             name: golden[name] + np.concatenate((np.zeros(1000), change)) for name in names[:7]
         }

@@ -193,7 +193,6 @@ class MixedDetector:
         self._last = [RoadLine(y=side * LANE_WIDTH) for side in (0.5, -0.5)]
 
     def detect(self, view: CameraView) -> LaneLines:
-        """Return the lines in this view."""
         lines = list(self._detector.detect(view)[:2])
         if CLUSTERS in self._parts and MISSING not in self._parts:
             lines = [self._unseen(*pair) for pair in enumerate(lines)]
@@ -234,7 +233,7 @@ def drive(case: Case) -> tuple[Case, Ending]:
 
 
 def faulty(free: dict[Case, Ending], names: Iterable[str], levels: Sequence[int]) -> Iterator[Case]:
-    """Return the runs with these effects, based on the fault-free ones."""
+    """Yield the runs with these effects, in the contexts that the fault-free ones reach."""
     for golden, ending in free.items():
         for context, name, level in product(sorted(ending.reached), names, levels):
             yield golden._replace(context=context, effect=name, level=level)

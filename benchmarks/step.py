@@ -2,7 +2,7 @@
 
 `python benchmarks/step.py [scenario.yaml] [--plain] [--repeat N]`. The parts are measured in a separate run,
 because measuring slows it down. Times are CPU times of this process. It uses the code compiled at
-installation unless given `--plain`. The exit code is 1 if 30 s of simulation exceed their goal.
+installation unless given `--plain`.
 
 With `--against CLONE` it instead compares the times of imports, building and loop with a checkout of an older
 commit. The versions alternate, each time in a fresh interpreter with bytecode and compiled code ready.
@@ -131,7 +131,7 @@ def part_name(owner: type, name: str) -> str:
 
 
 def run(scenario: Scenario) -> tuple[float, float]:
-    """Return the CPU seconds of building the loop and of running it, with its result."""
+    """Return the CPU seconds for building the loop and for running it."""
     start = process_time()
     simulator = Simulator()
     simulator.reset(scenario, 0)
@@ -226,7 +226,7 @@ def print_parts(scenario: Scenario) -> None:
         per_step = 1000 * seconds / scenario.steps
         return f"  {name:26} {per_step:.4f} ms a step  {seconds / total:6.1%}  {calls} calls"
 
-    print(f"\nOwn CPU time of each part in a timed run ({total:.3f} s, including the cost of measuring):")
+    print(f"\nCPU time of each part without those it calls ({total:.3f} s, with the cost of measuring):")
     for name, parts in GROUPS.items():
         keys = [part_name(*part) for part in parts]
         print(line(name, sum(watch.seconds[key] for key in keys), sum(watch.calls[key] for key in keys)))

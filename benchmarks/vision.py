@@ -1,8 +1,7 @@
 """Measure the cost of frames: drawing one, moving it to the car's pose, opening the library, and whole runs.
 
 `python benchmarks/vision.py [render] [view] [library] [runs] [--repeat N]`. Times are CPU times of this
-process, in one thread. The result is the median; the minimum shows the idle machine's speed. The exit code is
-1 if a median misses its goal.
+process, in one thread. The result is the median; the minimum shows the idle machine's speed.
 """
 
 import argparse
@@ -30,7 +29,7 @@ from selfdrive.sim.vision import DETECTORS, Pictures  # noqa: E402
 from selfdrive.visiond.road_region import RoadRegion  # noqa: E402
 
 GOALS = {"render": 2.0, "view": 0.75}  # ms: a grey frame of 640 x 480, moved by the ground's homography
-RUN_GOAL = 1500.0  # ms: 30 s of simulation with frames that are all new
+RUN_GOAL = 1500.0  # ms: 30 s of simulation without cached detections
 
 
 def times(work: Callable[[int], object], repeat: int) -> list[float]:
@@ -47,13 +46,13 @@ def show(name: str, spent: list[float], goal: float | None = None) -> bool:
 
 
 def render(repeat: int) -> bool:
-    """Draw consecutive frames of the standard road, from its middle and from aside, turned."""
+    """Draw consecutive frames of the standard road, from mid-lane and from an offset, turned pose."""
     renderer = RoadRenderer(CameraModel(), "dashed", 0)
     straight = times(lambda number: renderer.grey(number * SPACING), repeat)
     aside = times(lambda number: renderer.grey(number * SPACING, 0.5, 0.02), repeat)
     build = times(lambda number: RoadRenderer(CameraModel(), "dashed", number), 5)
     good = show("render: grey frame", straight, GOALS["render"])
-    good &= show("render: from aside, turned", aside, GOALS["render"])
+    good &= show("render: offset and turned", aside, GOALS["render"])
     show("render: painting 97.6 m of road", build)
     return good
 
@@ -67,7 +66,7 @@ def view(repeat: int) -> bool:
     part = RoadRegion(model).part
     looked_at = times(lambda number: ground.seen(frame, 0.01 * number, 0.02)[part], repeat)
     good = show("view: ground", whole, GOALS["view"])
-    show("view: ground, what `paper` looks at", looked_at)
+    show("view: ground, used by `paper`", looked_at)
     show("view: shift", times(lambda number: shifted.seen(frame, 0.01, 0.0).pixels(), repeat))
     return good
 
@@ -82,7 +81,7 @@ def library(repeat: int) -> bool:
 
 
 def runs(repeat: int) -> bool:
-    """Simulate 30 s without frames, with new ones, and with cached ones."""
+    """Simulate 30 s without frames, with frames but no cached detections, and with cached detections."""
     scenario, good = load_scenario(ROOT / "fault_library/scenarios/S1.yaml"), True
     show("runs: without pictures", times(lambda number: simulate(scenario, 0), 2))
     with TemporaryDirectory() as folder:
@@ -94,8 +93,8 @@ def runs(repeat: int) -> bool:
             for _ in range(3):
                 (Path(folder) / FILE).unlink()
                 unknown.append(spent_in(work))
-            good &= show(f"runs: {detector}, nothing is known", unknown, RUN_GOAL)
-            show(f"runs: {detector}, all is known", [spent_in(work) for _ in range(3)])
+            good &= show(f"runs: {detector}, uncached", unknown, RUN_GOAL)
+            show(f"runs: {detector}, cached", [spent_in(work) for _ in range(3)])
     return good
 
 
@@ -115,7 +114,7 @@ def main() -> None:
     options = parser.parse_args()
     for part in options.parts:
         if part not in parts:
-            parser.error(f"{part!r} is none of {', '.join(parts)}")
+            parser.error(f"{part!r} is not one of {', '.join(parts)}")
     cv2.setNumThreads(1)
     print("CPU time in one thread:")
     good = [parts[part](options.repeat) for part in options.parts or parts]

@@ -1,7 +1,7 @@
 """The documentation site: `sphinx-build -c docs . build/site`, or `tox -e docs`.
 
-Sources are the Markdown pages as a code host shows them, so the source folder is the clone itself. The tables
-of docs/README.md are the navigation.
+The pages are the Markdown files that a code host also shows, so the source folder is the clone itself. The
+tables of docs/README.md are the navigation.
 """
 
 import re
@@ -30,7 +30,7 @@ myst_heading_anchors = 6
 myst_enable_extensions = ["html_image"]
 nb_execution_mode = "off"
 
-highlight_language = "none"  # of blocks without a language
+highlight_language = "none"  # for blocks without a language
 
 html_theme = "furo"
 pygments_dark_style = "github-dark"
@@ -47,7 +47,7 @@ RAW_IMAGE = re.compile(r'\b(?:src|srcset)="([^":]+)"')
 
 
 def add_navigation(app: Sphinx, docname: str, source: list[str]) -> None:
-    """Append to the front page a table of contents for each of its sections, out of the pages it links."""
+    """Append to the front page a table of contents for each section, made from the section's links."""
     if docname == app.config.root_doc:
         for title, body in re.findall(r"^## (.+)\n((?:(?!## ).*\n?)*)", source[0], re.MULTILINE):
             pages = "\n".join(f"{text} <{page}>" for text, page in LINK.findall(body))

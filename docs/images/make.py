@@ -96,14 +96,14 @@ def served(*runs: Path) -> Iterator[str]:
 
 
 def report(page: Any, path: Path, name: str) -> None:
-    """The report's first screen, the worst experiment, and the film of its replay."""
+    """Save the report's first screen, the worst experiment, and a film of its replay."""
     page.goto(path.as_uri())
     page.wait_for_selector("html[data-ready]")
     save(page.screenshot(), "report" + name)
     page.locator(WORST).first.click()
     page.wait_for_selector(".replay-player")
     page.locator(".jumps button").last.click()
-    page.mouse.move(0, 0)  # nothing is hovered over
+    page.mouse.move(0, 0)  # so that the pointer highlights nothing
     show(page, ".replay-player", below="#experiment > header")
     save(page.screenshot(), "experiment" + name)
     page.add_style_tag(content=FILM_STYLE)
@@ -128,7 +128,7 @@ def show(page: Any, what: str, *, below: str) -> None:
 
 
 def film(page: Any, name: str) -> None:
-    """Step the replay from one second before the activation to the last event, and keep its frames."""
+    """Step the replay from one second before the activation to the last event, and save the frames."""
     end = time(page)
     page.locator(".jumps button").first.click()
     page.mouse.move(0, 0)
