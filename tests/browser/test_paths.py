@@ -53,7 +53,6 @@ def report(
     copy_toycar: Callable[[Path], Workspace],
     write_run: Callable[..., Path],
 ) -> Path:
-    """The report of synthetic toy records with a control structure."""
     folder = tmp_path_factory.mktemp("paths")
     workspace = copy_toycar(folder)
     manifest = workspace.library / "targets" / "toycar.yaml"
@@ -106,7 +105,6 @@ def test_the_path_names_the_component_that_stopped_a_masked_fault(opened: "Page"
 
 
 def test_the_control_structure_shows_counts_and_filters_the_list(opened: "Page") -> None:
-    """A link leads to the experiments whose faults passed it, and a box to those that it stopped."""
     count = "#ways [data-link='commands'] .count"
     opened.choose("kind", "sensor/lane")
     lanes = int(opened.found.split()[0])

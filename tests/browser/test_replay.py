@@ -72,8 +72,6 @@ T = "Number(document.querySelector('.replay-player').dataset.t)"
 
 
 class Replayed:
-    """A page with only a replay."""
-
     def __init__(self, page: Any) -> None:
         self.page = page
 

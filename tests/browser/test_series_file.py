@@ -1,4 +1,4 @@
-"""The page and Python read the same numbers from a series in a fixture of the format."""
+"""The page and Python read the same numbers from the fixture of the series format."""
 
 import json
 import shutil
@@ -27,7 +27,6 @@ LOADED = """async (id) => {
 
 @pytest.fixture
 def run(tmp_path: Path) -> Path:
-    """The fixture's series in a run folder with a page that only loads them."""
     shutil.copytree(FIXTURE / "small" / "series", tmp_path / "series")
     facts = {"series": {"packed": True, "kept": SeriesFolder(tmp_path).kept_ids()}}
     (tmp_path / "report").mkdir()

@@ -35,8 +35,8 @@ def test_a_served_report_works(address: str, visit: Callable[..., Any], run: Pat
 
 
 def test_a_hostile_report_runs_no_script(address: str, browser: Any, tmp_path: Path) -> None:
-    """The report has a valid stamp. The foreign scripts are inline, in a handler, in a link, from a file of
-    the run and from elsewhere."""
+    """The report has a valid stamp. Its scripts are inline, in an event handler, in a link, in a file of the
+    run and on another server."""
     night = tmp_path / "runs" / "night"
     (night / "series/kept").mkdir(parents=True, exist_ok=True)
     (night / "series/kept/0123456789abcdef.js").write_text(f"{HACKED};")
@@ -121,8 +121,6 @@ class _Foreign(BaseHTTPRequestHandler):
 
 
 def test_a_page_of_another_origin_reads_nothing(address: str, browser: Any, tmp_path: Path) -> None:
-    """The browser sends the cookie to our server. The page of the other server gets no response, script or
-    image, and cannot frame a page of ours."""
     picture = tmp_path / "runs/night/plots/picture.png"
     picture.parent.mkdir(exist_ok=True)
     picture.write_bytes(PIXEL)

@@ -213,8 +213,9 @@ def test_a_pending_approval_is_not_applied_to_later_code(
     assert not load_review(library, "toycar").entries
 
 
-def test_a_late_answer_does_not_hide_a_mark(review: Callable[..., Any], library: Workspace) -> None:
-    """An answer from before the mark arrives after it. The next mark must not be refused as unseen."""
+def test_a_late_response_does_not_hide_a_mark(review: Callable[..., Any], library: Workspace) -> None:
+    """A response from before the mark arrives after it. If the page used it, the server would refuse the next
+    mark."""
     page = review("Jane")
     late: list[Any] = []
 

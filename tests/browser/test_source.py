@@ -30,7 +30,6 @@ def report(
     write_run: Callable[..., Path],
     of_operators: Callable[..., Any],
 ) -> Path:
-    """The report of synthetic records of mutants in the toy's driver."""
     folder = tmp_path_factory.mktemp("source")
     workspace = copy_toycar(folder)
     out = write_run(workspace, folder / "run", became, changed=of_operators(workspace, "toycar/driver.py"))

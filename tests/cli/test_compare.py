@@ -16,14 +16,12 @@ Write = Callable[..., Path]
 
 
 def worse(e: Experiment) -> dict[str, Any]:
-    """Return the changes of a record: a hazard for silence in scenario A."""
     hazard = {"outcome": Outcome.HAZARD, "hazards": (("H1", 3.0),)}
     return hazard if e.fault.fault_type == "silence" and e.scenario == "A" else {}
 
 
 @pytest.fixture
 def runs(root: Path, write_run: Write) -> tuple[Path, Path]:
-    """Two toy runs in the current folder, the second one worse."""
     workspace = Workspace.find(root)
     return write_run(workspace, Path("before")), write_run(workspace, Path("after"), worse)
 

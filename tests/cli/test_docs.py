@@ -74,7 +74,6 @@ def name(page: Path) -> str:
 
 
 def sessions(page: Path) -> list[tuple[str, list[str]]]:
-    """Return the commands of a page with the lines that the page shows for them."""
     return [step for step in steps(page) if isinstance(step[1], list)]  # type: ignore[misc]
 
 
@@ -103,7 +102,6 @@ def _commands(block: str) -> list[tuple[str, list[str]]]:
 
 @pytest.fixture
 def work(tmp_path: Path) -> Path:
-    """A folder with the parts of a clone that the commands in the docs need."""
     for folder in ("fault_library", "templates", "target"):
         shutil.copytree(CLONE / folder, tmp_path / folder, ignore=shutil.ignore_patterns("__pycache__"))
     for toy in (Path("tests") / "toy", Path("tests") / "pole"):
@@ -146,7 +144,6 @@ def lines_of(output: str) -> list[str]:
 
 
 def rewrite(page: Path, printed: list[tuple[str, str]]) -> None:
-    """Write the commands' output into the page, and the tutorial's table into the README."""
     rest = iter(printed)
 
     def session(block: re.Match[str]) -> str:

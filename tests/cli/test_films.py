@@ -20,7 +20,6 @@ Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, jso
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]) -> Path:
-    """A toy's root with runs/a, a finished run of some experiments."""
     root = copy_toycar(tmp_path_factory.mktemp("finished")).library.parent
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(root)
@@ -36,7 +35,6 @@ def finished(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Pa
 
 @pytest.fixture
 def name(finished: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    """Return the id of an experiment with a hazard in the newest run."""
     monkeypatch.chdir(finished)
     monkeypatch.setenv("MUTATOR_ROOT", str(finished))
     lines = Path("runs/a/results.csv").read_text().splitlines()

@@ -1,4 +1,4 @@
-"""After a power cut the disk has everything that was synced and any part of the rest."""
+"""After a power cut, the disk has everything that was synced and any part of the rest."""
 
 import os
 import re
@@ -26,14 +26,14 @@ WORDS = ("run", "small", "--out", "run", "-n", "0", "--limit", 4, "--engine", "r
 
 @pytest.fixture(scope="module")
 def driven(tmp_path_factory: pytest.TempPathFactory) -> list[Any]:
-    """A list of the run folder that all tests share and, once it is known, the folder's seal."""
+    """A list of the shared run folder and, once it is known, its seal."""
     return [tmp_path_factory.mktemp("driven") / "run"]
 
 
 @pytest.fixture
 def cut(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch, driven: list[Any]) -> Path:
-    """An unfinished run folder in which all experiments have run. The command runs only once, because all
-    tests have the same library."""
+    """An unfinished run folder in which all experiments have run. All tests share it, because they have the
+    same library."""
 
     def end(self: Session) -> None:
         raise MutatorError("the power is cut")

@@ -29,7 +29,6 @@ def ids(cli: Cli, *words: object) -> list[str]:
 def known(
     tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]
 ) -> dict[str, str]:
-    """The toy's groups by id, with their subjects."""
     toy = copy_toycar(tmp_path_factory.mktemp("known"))
     groups = of_library(toy, toy.manifest("toycar"), specs=["sensor/*"])
     return {group.id: group.what for group in groups}

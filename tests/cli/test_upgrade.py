@@ -16,7 +16,6 @@ OLD = Path(__file__).parents[1] / "fixtures" / "run-2" / "toy"
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
-    """A manifest of target/1, in a library with its tree."""
     shutil.copytree(OLD, tmp_path / "toy")
     return tmp_path / "toy" / "fault_library" / "targets" / "toycar.yaml"
 

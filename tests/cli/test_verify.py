@@ -16,14 +16,14 @@ Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, jso
 
 @pytest.fixture(scope="module")
 def driven(tmp_path_factory: pytest.TempPathFactory) -> list[Any]:
-    """A list of the run folder that all tests share and, once it is known, the folder's seal."""
+    """A list of the shared run folder and, once it is known, its seal."""
     return [tmp_path_factory.mktemp("driven") / "run"]
 
 
 @pytest.fixture
 def sealed(cli: Cli, root: Path, driven: list[Any]) -> str:
-    """The seal of the run folder `run`, as `mutator run` prints it. Each test has the same library, so the
-    folder is run once."""
+    """The seal that `mutator run` prints. All tests share the folder `run`, because they have the same
+    library."""
     kept, *seals = driven
     if not seals:
         ran = cli("run", "small", "--out", "run", "-n", "0", "--limit", 4, "--engine", "fork")

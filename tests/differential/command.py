@@ -78,7 +78,6 @@ class Command:
         return sorted(pid for pid, _ in self.others() if str(pid) in registered)
 
     def end(self, *, longest_s: float = 600.0) -> str:
-        """Wait until the command and everything it started have ended, and return its output."""
         printed = self.process.communicate(timeout=longest_s)[0]
         deadline = time.monotonic() + LINGER_S
         while left := list(self.others()):

@@ -1,4 +1,4 @@
-"""A run's process ends in the same way in every engine, with the same files and processes left."""
+"""A run's process ends in the same way in every engine, and leaves the same files and processes."""
 
 import os
 import signal

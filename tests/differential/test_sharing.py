@@ -108,8 +108,8 @@ def test_checks_compare_scenarios_declared_equal(runs: tuple[Path, Path]) -> Non
 
 
 def test_one_experiment_of_a_shared_run_can_run_on_a_cluster(runs: tuple[Path, Path], tmp_path: Path) -> None:
-    """A kill or a split of the work can leave one experiment of a shared run. The worker then runs the golden
-    run itself."""
+    """A kill or a split of the work can leave a single experiment of a shared run. The worker then runs the
+    golden run itself."""
     folder = RunFolder.open(runs[0])
     toy = Workspace(
         library=runs[0].parent / "toy" / "fault_library", templates=runs[0].parent / "toy" / "templates"

@@ -23,8 +23,8 @@ class Killed(BaseException):
 
 
 class Death:
-    """Allow this many renames and deletions in a run folder and fail all later ones. A rename puts each file
-    in place. Scratch files are ignored."""
+    """Allow this many renames and deletions in a run folder and fail all later ones. Each file is put in
+    place by a rename. Scratch files are ignored."""
 
     def __init__(self, run: Path, after: int, patch: pytest.MonkeyPatch) -> None:
         self.left, self._run = after, run
@@ -64,7 +64,6 @@ def check_kill(workspace: Workspace, out: Path, after: int, expected: tuple[str 
 
 @pytest.fixture
 def undisturbed(toy: Workspace, tmp_path: Path) -> tuple[str | None, bytes]:
-    """The seal and table of an undisturbed run, which also caches the checks."""
     out = tmp_path / "undisturbed"
     found = run(toy, out)
     assert found == seal_of(RunFolder.open(out)) is not None

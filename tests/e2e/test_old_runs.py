@@ -39,7 +39,6 @@ def place(fixture: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def fresh(place: Path) -> Path:
-    """The same campaign of the same library, run by the current code."""
     workspace = Workspace.find(root=place / "toy")
     out = place / "fresh"
     assert run_campaign(workspace, "small", out, engine="reference").exit_code == 0
@@ -163,7 +162,7 @@ def test_show_runs_nothing_in_an_old_run(cli: Cli, place: Path) -> None:
 
 
 def test_approvals_of_an_old_run_still_apply(cli: Cli, place: Path) -> None:
-    """Three of the four decisions are in two groups each."""
+    """Three of the four decisions apply to two groups each."""
     code, out, err = cli("review", "list", "--campaign", "small", "--json")
     assert code == 0, err
     approved = json.loads((place / "small" / "reviewed.json").read_text())["groups"]

@@ -57,8 +57,6 @@ def test_lost_radar_or_camera_data_raise_an_alert_within_0_6_s(
 
 
 def test_a_wrong_camera_distance_alone_changes_little(rows: list[Row]) -> None:
-    """A wrong radar distance reaches the actuators."""
-
     def manifested(module: str, fault_type: str) -> list[str]:
         return [
             row["manifested"]

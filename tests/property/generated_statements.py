@@ -80,7 +80,6 @@ class StatementWriter:
     # Expressions; the value is a number
 
     def expression(self, scope: Scope, depth: int = 2) -> str:
-        """Return an expression, which can span several lines."""
         if depth <= 0 or self.chance(0.3):
             return self.rng.choice([self.number(), self.number(), *self.rng.choices(scope.known, k=3)])
         e, f = (self.expression(scope, depth - 1) for _ in "ef")

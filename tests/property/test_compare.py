@@ -50,7 +50,7 @@ def test_a_run_does_not_differ_from_itself(row: Row) -> None:
 
 @given(rows(), rows())
 def test_swapping_two_runs_swaps_better_and_worse(a: Row, b: Row) -> None:
-    """A different hazard can be a change either way."""
+    """A different hazard has no opposite change."""
     there = Pair(None, None, a, b).changes - {Change.OTHER_HAZARD}  # type: ignore[arg-type]
     back = Pair(None, None, b, a).changes - {Change.OTHER_HAZARD}  # type: ignore[arg-type]
     assert {MIRROR[change] for change in there} == back

@@ -28,7 +28,6 @@ MORE += ("tkinter.constants", "token", "xmlrpc.client")
 
 
 def locations(file: ParsedFile) -> list[tuple[FixedValue, FaultLocation]]:
-    """Yield every settable value of a file, and the anchor that leads to it."""
     found = []
     for one in file.fixed:
         if one.reason is None:
@@ -121,7 +120,6 @@ def check(file: ParsedFile, cases: Sequence[tuple[FixedValue, FaultLocation]], *
 
 
 def checked(names: Sequence[str], count: int, *, run: bool) -> int:
-    """Check many cases drawn from these modules, and return their number."""
     files = [file for name in names if (file := module(name))]
     cases = [(file, pair) for file in files for pair in locations(file)]
     chosen = random.Random(1).sample(cases, min(count, len(cases)))

@@ -93,7 +93,6 @@ def check(file: ParsedFile, injection: Injection) -> None:
 
 
 def checked(names: Sequence[str], count: int) -> int:
-    """Check many cases drawn from these modules, and return their number."""
     files = [file for name in names if (file := module(name))]
     cases = [(file, location) for file in files for _, location in anchors(file)]
     guarded = [(file, location) for file in files for location in statements(file)]

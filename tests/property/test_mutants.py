@@ -63,7 +63,6 @@ def triggers(draw: st.DrawFn) -> Trigger:
 
 @st.composite
 def varied(draw: st.DrawFn) -> Fault:
-    """Return a fault of the library with other numbers."""
     fault = draw(st.sampled_from(faults()))
     injections = []
     for injection in fault.injections:

@@ -147,7 +147,6 @@ def check_edits(file: ParsedFile, edits: Sequence[Edit | ValueEdit], cases: obje
 
 
 def checked(names: Sequence[str], count: int) -> int:
-    """Check many cases drawn from these modules, and return their number."""
     files = [file for name in names if (file := module(name))]
     cases = [(file, pair) for file in files for pair in anchors(file)]
     chosen = random.Random(1).sample(cases, min(count, len(cases)))

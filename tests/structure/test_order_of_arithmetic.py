@@ -77,7 +77,6 @@ def _is_unordered(call: ast.Call) -> bool:
 
 
 def test_results_depend_on_no_order() -> None:
-    """No file that affects results sums, multiplies or sorts in a processor-dependent order."""
     wrong = []
     for path in sorted(TARGET.rglob("*.py")):
         name = path.relative_to(TARGET)

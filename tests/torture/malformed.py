@@ -29,7 +29,6 @@ SHAPES = (
 
 
 def change_a_value(text: str, chance: Chance) -> str:
-    """Return well-formed YAML with another value somewhere."""
     data = changed(yaml.safe_load(text), chance, WILD)
     return yaml.safe_dump(data, allow_unicode=True, sort_keys=False)
 

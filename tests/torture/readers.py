@@ -140,7 +140,6 @@ def _export(format: str) -> Reader:
 
 
 def verify(place: Place) -> Told:
-    """Return the files that a passing audit covers."""
     code, out, err = cli("verify", place.run)
     found, genuine = contents(place.run) if code == 0 else {}, contents(place.genuine)
     ledger = json.loads(genuine["digests.json"])
@@ -174,8 +173,8 @@ def api(place: Place) -> Told:
 
 
 def rows(place: Place) -> Told:
-    """Return rows of the results that the undamaged folder lacks. There must be none. A killed run can lack
-    some, because the same command runs them again."""
+    """Return the rows of the results that the undamaged folder lacks: there must be none. A killed run can
+    have fewer rows, because the same command runs the others again."""
     told = api(place)
     if told.code != 0:
         return told

@@ -1,5 +1,6 @@
 """Surroundings of a command: locales and clocks, little disk, memory or file handles, and closed streams.
-Each is a context manager that takes chance and the case's folder. The command starts within it."""
+Each is a context manager that takes a random generator and the case's folder. The command starts within
+it."""
 
 import os
 import subprocess

@@ -10,8 +10,6 @@ from mutator._common.tables import Table
 
 
 class End(StrEnum):
-    """The ways in which a case can end."""
-
     RIGHT = "right"  # with the undisturbed result
     REFUSED = "refused"  # with an error that names the file and the remedy
     WRONG = "wrong"  # with anything else
@@ -48,7 +46,6 @@ class Tally:
 
     @property
     def wrong(self) -> list[str]:
-        """Return a line for each failure, with the seed that repeats it."""
         return [
             f"--seed {seed}: {case.kind}: {case.story}" for seed, case in self.cases if case.end is End.WRONG
         ]

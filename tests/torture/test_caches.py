@@ -109,7 +109,6 @@ def checks(toy: Workspace, folder: Path) -> Cache:
 
 
 def pictures(toy: Workspace, folder: Path) -> Cache:
-    """Frames and detections of the shipped controller, on a road of a few frames."""
     frames, home, at = folder / "frames", folder / "home", folder / "cache"
     frames.mkdir()
     (frames / "camera.yaml").write_text(CAMERA)

@@ -72,7 +72,6 @@ class Edits:
         return [Case(kind=kind, damage=what.split(" of ")[0], reader="run", end=end, story=story)]
 
     def _kill(self, chance: Chance) -> None:
-        """Kill the command at a random moment after it wrote its plan."""
         run = self.place.run
         words = map(str, ("run", *WORDS, "-n", "2", "--out", run))
         command = Command(self.workspace, run, "-m", "mutator", *words)

@@ -134,7 +134,6 @@ def test_without_severity_the_number_of_silent_hazards_decides(said: dict[str, A
 
 
 def hazards(*rows: tuple[str, str, float]) -> pd.DataFrame:
-    """A frame of silent hazards, worst first: fault type, severity class and time after the activation."""
     names = ["kind", "severity", "after"]
     frame = pd.DataFrame(rows, columns=names)
     frame["t_hazard"] = 2 + frame["after"]

@@ -127,7 +127,7 @@ def test_figures_are_in_the_markdown_and_in_the_page(run: Path) -> None:
 
 
 def test_experiments_and_runs_are_counted_separately(run: Path) -> None:
-    """Run folders from before runs could be shared do not contain the number of runs."""
+    """Older run folders do not contain the number of runs."""
     assert "3 experiments are planned, in 2 runs" in building.write(run, None).markdown.read_text()
     (run / "run.json").write_text(json.dumps({name: x for name, x in HEAD.items() if name != "runs"}))
     assert "3 experiments are planned.\n" in building.write(run, None).markdown.read_text()

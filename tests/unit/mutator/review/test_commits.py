@@ -34,7 +34,6 @@ def commit(root: Path, path: str, author: str) -> str:
 
 @pytest.fixture
 def root(toycar: Workspace) -> Path:
-    """The toy in a clone with `four_eyes`, written by one author."""
     root = toycar.library.parent
     (root / "fault_library/reviews").mkdir()
     (root / "fault_library/reviews/toycar.yaml").write_text(HEAD)

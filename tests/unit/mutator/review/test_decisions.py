@@ -43,7 +43,6 @@ def group(name: str, bound: Bound = BOUND, diff: str = "+x = 1\n") -> Group:
 
 
 def say(toy: Workspace, kind: Kind, *names: str, by: str = "Jane Doe", text: str = "") -> Review:
-    """Apply these changes to these groups, by a reviewer who has seen the latest decisions."""
     changes = [Change(group=group(name), kind=kind, by=by, text=text) for name in names]
     review = load_review(toy, "toycar")
     return record(toy, "toycar", changes, {one.group.id: review.revision(one.group.id) for one in changes})

@@ -100,7 +100,6 @@ IN_SENSE = {VEIL, GLARE, HELPER, GAP, LOW, LANE, SILENCE}
 
 @pytest.fixture(scope="module")
 def original(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]) -> Path:
-    """A toy with two image effects and a fault model that calls a helper. Everything is approved."""
     toycar = copy_toycar(tmp_path_factory.mktemp("approved"))
     car = toycar.library.parent / "tree" / "toycar"
     (car / "effects.py").write_text(EFFECTS)

@@ -107,8 +107,6 @@ class Client:
 
 @pytest.fixture(scope="session")
 def served_at(_caches: Path) -> Callable[[Workspace, Path], Any]:
-    """Serve a library and a folder of runs until the end of a `with`."""
-
     @contextmanager
     def serve(workspace: Workspace, runs: Path) -> Iterator[Client]:
         site = Site(workspace=workspace, runs=Runs((runs,)))

@@ -41,7 +41,6 @@ def eventually(holds: Callable[[], bool]) -> bool:
 
 
 def kept(folder: Path, script: str, patience_s: float = 10.0) -> tuple[subprocess.Popen[bytes], int]:
-    """Start the keeper of a script. Return it and the server's end of the pipe."""
     watched, hold = os.pipe()
     words = [sys.executable, "-c", KEEPER, str(watched), script, str(patience_s)]
     keeper = subprocess.Popen(words, cwd=folder, pass_fds=[watched], start_new_session=True)

@@ -21,14 +21,12 @@ API = "/api/review/toycar"
 def reviewed(
     toycar: Workspace, tmp_path: Path, served_at: Callable[[Workspace, Path], Any]
 ) -> Iterator[tuple[Client, list[str]]]:
-    """A server of a writable library, and the ids of its groups of lane specs."""
     (tmp_path / "runs").mkdir()
     with served_at(toycar, tmp_path / "runs") as client:
         yield client, list(client.get(f"{API}?spec=sensor/*").json["groups"])
 
 
 def decided(client: Client, *changes: tuple[str, str], by: str = "Jane", **more: Any) -> Any:
-    """Send changes, given as group and kind, from a reviewer with the current view. Return the response."""
     groups = client.get(f"{API}?spec=sensor/*").json["groups"]
     body = {
         "changes": [{"group": group, "kind": kind, "text": more.get("text", "")} for group, kind in changes],

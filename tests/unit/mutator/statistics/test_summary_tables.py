@@ -16,7 +16,7 @@ HIT = {"t_activation": 7.0, "t_manifest": 7.1, "h1": 1, "t_h1": 18.0}
 
 
 def test_wilson_interval_of_a_published_example() -> None:
-    """81 of 263 gives 25.5 to 36.6 % (Newcombe 1998, table I, method 3)."""
+    """The example is in Newcombe 1998, table I, method 3."""
     assert str(share(81, 263)) == "30.8 % (81/263; 25.5 to 36.6)"
     assert share(0, 20).low == 0
     assert str(share(0, 0)) == "- (0/0)"

@@ -70,8 +70,8 @@ def test_the_interval_of_the_median_equals_that_of_lifelines(sample: dict[str, A
 
 
 def test_the_published_curve_of_freireich() -> None:
-    """The curve for 6-MP is 0.857, 0.807, 0.753, 0.690, 0.627, 0.538, 0.448, and the medians are 23 and 8
-    weeks (Kleinbaum and Klein, Survival Analysis: A Self-Learning Text, chapter 2)."""
+    """The curve for 6-MP and the medians are in Kleinbaum and Klein, Survival Analysis: A Self-Learning Text,
+    chapter 2."""
     drug, placebo = LIFELINES["6-MP"], LIFELINES["placebo"]
     curve = [round(reaction(drug, week).survival, 3) for week in (6, 7, 10, 13, 16, 22, 23)]
     assert curve == [0.857, 0.807, 0.753, 0.690, 0.627, 0.538, 0.448]
@@ -79,8 +79,7 @@ def test_the_published_curve_of_freireich() -> None:
 
 
 def test_the_published_medians_of_miller() -> None:
-    """The medians are 31 weeks with maintenance and 23 without, as R's `survfit` prints for its data set
-    `aml`."""
+    """R's `survfit` prints these medians, with and without maintenance, for its data set `aml`."""
     medians = [reaction(LIFELINES[name]).median for name in ("maintained", "not maintained")]
     assert medians == [31.0, 23.0]
 

@@ -57,7 +57,6 @@ def made(request: pytest.FixtureRequest) -> Campaign:
 
 
 def same(found: Sequence[object], expected: Sequence[object]) -> bool:
-    """Compare cells: texts and counts exactly, numbers to 9 digits, a share together with its interval."""
     assert len(found) == len(expected)
     for cell, wanted in zip(found, expected, strict=True):
         if isinstance(cell, Share):

@@ -36,8 +36,6 @@ def test_a_reaction_time_needs_an_earlier_alert() -> None:
 
 
 def test_kaplan_meier_of_a_textbook_sample() -> None:
-    """For hazards 1, 2, 2.5 and 4 s after the alert and one run censored at 3 s, the survival is 0.8, 0.6,
-    0.4, 0.4 and 0."""
     frame = results(
         *(run(10.0, hazard) for hazard in (11.0, 12.0, 12.5, 14.0)),
         run(17.0, "", scenario="S2"),

@@ -18,7 +18,6 @@ USE = "import os\nassert (os.environ['ROAD'], os.environ['PYTHONHASHSEED']) == (
 
 
 def with_env(workspace: Workspace, env: str) -> Path:
-    """The toy's manifest, with `env` on its third line."""
     path = workspace.library.parent / MANIFEST
     head, about, rest = path.read_text().split("\n", 2)
     path.write_text(f"{head}\n{about}\nenv: {env}\n{rest}")

@@ -23,7 +23,6 @@ SAID = (
 
 
 def requiring(workspace: Workspace, *requirements: str) -> Workspace:
-    """The toy, with these requirements on the third line of its manifest."""
     path = workspace.library / "targets" / "toycar.yaml"
     head, about, rest = path.read_text().split("\n", 2)
     path.write_text(f"{head}\n{about}\nrequires: {list(requirements)}\n{rest}")

@@ -26,7 +26,6 @@ def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def installed(pole: Workspace, **keys: str) -> Workspace:
-    """The pole's library, with other keys in its manifest."""
     path = pole.library / "targets" / "pole.yaml"
     lines = [line for line in path.read_text().splitlines() if line.partition(":")[0] not in keys]
     path.write_text("\n".join([lines[0], *(f"{k}: {v}" for k, v in keys.items() if v), *lines[1:]]) + "\n")

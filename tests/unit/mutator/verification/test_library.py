@@ -38,7 +38,6 @@ BEYOND = ("software", "vision_weather")  # modules of unpublished faults
 
 @pytest.fixture(scope="module")
 def everything() -> dict[str, tuple[Fault, ...]]:
-    """All faults of the library in both readings, with seed 1."""
     clone = Workspace.find(root=Path(__file__).parents[4])
     manifest, models = clone.manifest("openpilot"), clone.fault_models()
     return {

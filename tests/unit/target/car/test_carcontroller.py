@@ -18,7 +18,6 @@ class Rig:
         self.car = CarState()
 
     def send(self, cycles=2, enabled=True, **demand):
-        """Repeat a demand for this many cycles and return the commands that the actuators receive."""
         for _ in range(cycles):
             control = CarControl(enabled=enabled, actuators=Actuators(**demand))
             frames = self.controller.update(control, self.car, self.frame)

@@ -19,10 +19,8 @@ def warnings(
 
 
 def test_time_to_collision() -> None:
-    """Time to collision is the gap divided by the closing speed, and less if the lead brakes.
-
-    It is limited to 5 s, which is also its value for an opening gap.
-    """
+    """Time to collision is the gap divided by the closing speed, and less if the lead brakes. The limit is 5
+    s."""
     assert time_to_collision(20.0, 0.0, LEAD) == pytest.approx(2.0)
     assert time_to_collision(20.0, 0.0, replace(LEAD, a_lead_k=-2.0)) == pytest.approx(1.7082, abs=1e-3)
     assert time_to_collision(5.0, 0.0, LEAD) == 5.0
@@ -90,7 +88,6 @@ def test_a_condition_must_hold_for_ten_cycles(
 def test_a_warning_needs_a_plan_that_brakes_hard(
     a_plan: tuple[float, ...], a_ego: float, expected: int
 ) -> None:
-    """The plan must brake at more than 3 m/s^2 or, within 2.8 s, much harder than the car does now."""
     assert len(warnings(replace(CAR, a_ego=a_ego), a_plan=a_plan)) == expected
 
 

@@ -22,7 +22,6 @@ class FixedMpc:
 
 
 def control(params: CarParams, *degrees: float, v_ego: float = 20.0) -> tuple[LatControl, CarState]:
-    """Build lateral control for a straight wheel, and plan the first angle of `degrees`."""
     lateral = LatControl(params)
     lateral.mpc = FixedMpc(*degrees)
     car = CarState(v_ego=v_ego)
@@ -42,7 +41,6 @@ def test_the_desired_angle_is_held_until_the_next_plan(params: CarParams) -> Non
 
 
 def test_torque_follows_the_gains_per_degree(params: CarParams) -> None:
-    """At walking pace, an error of one degree gives a torque of 0.8, which grows by 0.24 per second."""
     lateral, car = control(params, 1.0, v_ego=0.3)
     assert lateral.update(car, True) == pytest.approx(0.8 + 0.0024, abs=1e-5)
     assert lateral.update(car, True) == pytest.approx(0.8 + 0.0048, abs=1e-5)
@@ -57,7 +55,7 @@ def test_feedforward_grows_with_lateral_acceleration(params: CarParams) -> None:
 
 
 def test_a_nan_angle_gives_full_torque_to_the_left(params: CarParams) -> None:
-    """The angle is NaN if the MPC has no solution. At the next valid angle, control is normal again."""
+    """The angle is NaN if the MPC has no solution."""
     lateral, car = control(params, nan, 1.0)
     assert [lateral.update(car, True) for _ in range(100)] == [1.0] * 100
     assert not lateral.saturated

@@ -43,17 +43,13 @@ def test_while_off_outputs_are_zero_and_the_target_follows_the_car(params: CarPa
 def test_output_is_the_scaled_acceleration(
     params: CarParams, v_ego: float, v_target: float, a_target: float, gas: float, brake: float
 ) -> None:
-    """The output is the acceleration divided by 4.8, within limits that depend on the speed.
-
-    Below 2.3 m/s, the loop brakes against creeping.
-    """
+    """The output is the acceleration divided by 4.8. Below 2.3 m/s, the loop brakes against creeping."""
     assert follow(LongControl(params), at(v_ego), plan(v_target, a_target)) == pytest.approx(
         (gas, brake), abs=1e-5
     )
 
 
 def stopped(params: CarParams) -> LongControl:
-    """Return a control that has braked the car to rest and holds it."""
     control = LongControl(params)
     follow(control, at(0.4), plan(0.2))
     follow(control, at(0.0, standstill=True), plan(0.2), 400)
@@ -61,7 +57,6 @@ def stopped(params: CarParams) -> LongControl:
 
 
 def test_stopping_needs_low_speed_target_and_future(params: CarParams) -> None:
-    """Open-loop braking begins below 0.5 m/s if the target speed and the future speed are below 0.31 m/s."""
     for car, p in ((at(0.6), plan(0.2)), (at(0.4), plan(0.4)), (at(0.4), plan(0.2, future=0.4))):
         control = LongControl(params)
         follow(control, car, p, 2)
@@ -78,10 +73,6 @@ def test_the_drivers_brake_also_starts_stopping(params: CarParams) -> None:
 
 
 def test_the_brake_ramps_up_to_the_holding_value(params: CarParams) -> None:
-    """At rest the brake rises by 0.2 per second to 0.5 and stays there.
-
-    While the car rolls, it rises further.
-    """
     control = LongControl(params)
     follow(control, at(0.3), plan(0.2))
     start = control.output
@@ -95,7 +86,6 @@ def test_the_brake_ramps_up_to_the_holding_value(params: CarParams) -> None:
 
 
 def test_moving_off_releases_the_brake_first(params: CarParams) -> None:
-    """The brake falls by 0.8 per second to 0.2. Then the control loop takes over."""
     control = stopped(params)
     follow(control, at(0.0, standstill=True), plan(0.3, future=0.5))
     assert control.state == STOPPING

@@ -46,7 +46,6 @@ def test_camera_radar_and_controls_run_in_this_order(parts: SimpleNamespace) -> 
 
 
 def test_controls_start_late_and_without_frames(parts: SimpleNamespace) -> None:
-    """The control loop starts 0.11 s after the car. In its first cycle it has no frames or leads."""
     assert run(parts, START_STEP) == []
     assert "controlsd" not in [name for name, *_ in parts.log]
     parts.manager.step(START_STEP * 0.01, ["frame"], None)

@@ -55,12 +55,10 @@ def test_one_line_gives_the_middle_of_the_lane() -> None:
 
 @pytest.mark.parametrize(("width", "prob"), [(3.7, 1.0), (3.9, 1.0), (4.35, 0.504), (4.8, 0.0), (2.6, 0.0)])
 def test_the_right_line_is_less_probable_if_the_width_is_unusual(width: float, prob: float) -> None:
-    """The right line's probability falls from 1 to 0 as the width error grows from 0.3 to 1 m."""
     assert planned(model(right=1.85 - width)).lanes.right_prob == pytest.approx(prob, abs=0.005)
 
 
 def test_the_width_is_learnt_slowly() -> None:
-    """Each message moves the width estimate by 0.5 % of the difference."""
     assert planned(model(left=1.95, right=-1.95)).lane_width == pytest.approx(3.7 + 0.005 * 0.2)
     assert planned(*[model(left=1.95, right=-1.95) for _ in range(200)]).lane_width == pytest.approx(
         3.9 - 0.2 * 0.995**200
@@ -68,7 +66,7 @@ def test_the_width_is_learnt_slowly() -> None:
 
 
 def test_without_lines_the_width_approaches_the_usual_one() -> None:
-    """Each message without lines lowers the certainty by 5 %. The usual width depends on the speed."""
+    """The usual width depends on the speed."""
     blind = [model(probs=(0.0, 0.0)) for _ in range(200)]
     assert planned(*blind[:10], v_ego=31.0).lane_width == pytest.approx(3.8 - 0.1 * 0.95**10)
     assert planned(*blind, v_ego=31.0).lane_width == pytest.approx(3.8, abs=1e-3)

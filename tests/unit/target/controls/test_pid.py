@@ -43,7 +43,6 @@ def test_limits_apply_after_conversion() -> None:
 
 
 def test_driver_override_unwinds_the_integral() -> None:
-    """The integral moves towards zero by 0.3 per second."""
     pid = make()
     pid.i = -0.3
     for _ in range(50):

@@ -72,9 +72,6 @@ def test_while_off_the_plan_starts_from_the_cars_speed(params: CarParams) -> Non
 
 
 def test_moving_off_starts_at_walking_pace(params: CarParams) -> None:
-    """While the brake is being released, the planned speed stays near 0.3 m/s and the acceleration is 0.5
-    m/s^2.
-    """
     drive = Drive(params)
     drive.car = CarState(v_ego=0.0)
     plan = drive.run(1, "starting")[-1]
@@ -110,10 +107,7 @@ def test_the_cruise_speed_is_never_negative(params: CarParams) -> None:
 
 
 def test_the_slowest_plan_is_selected(params: CarParams) -> None:
-    """The plan with the lowest speed after 0.2 s is selected.
-
-    An MPC's plan is considered only if it has a lead.
-    """
+    """An MPC's plan is considered only if it has a lead."""
     slow, slower = FixedMpc(-0.1, -0.5, True), FixedMpc(-0.2, -1.0, True)
     assert started(params, slow, slower).run(1)[-1].source == "mpc2"
     assert started(params, slower, slow).run(1)[-1].source == "mpc1"

@@ -39,7 +39,6 @@ def test_a_stationary_object_can_start_moving() -> None:
 
 
 def test_an_object_can_stop_being_oncoming() -> None:
-    """An object is oncoming while it moves towards the car at more than 3.9 m/s."""
     t = track(v_rel=-24.0)
     assert t.oncoming
     step(t, -23.0)
@@ -102,9 +101,6 @@ def lead(d_rel: float = 50.0, d_path: float = 0.0, v_lat: float = 0.0, v_rel: fl
     ],
 )
 def test_lead_is_on_the_path_or_cuts_in(cluster: Cluster, expected: bool) -> None:
-    """A lead is within 1.5 m of the path, corrected for its lateral speed, and neither stationary nor
-    oncoming.
-    """
     assert cluster.is_lead(20.0) is expected
 
 
@@ -115,7 +111,6 @@ def test_one_moving_track_makes_a_cluster_a_lead(v_rel: float) -> None:
 
 
 def test_the_second_lead_must_be_apart_from_the_first() -> None:
-    """The second lead is more than 8 m further away, or its speed differs by more than 1 m/s."""
     first = lead(d_rel=40.0)
     assert not lead(d_rel=48.0).is_apart(first)
     assert lead(d_rel=48.1).is_apart(first)
@@ -150,10 +145,6 @@ def test_no_tracks_give_no_clusters() -> None:
 
 
 def test_lead_data_has_the_means_of_the_tracks() -> None:
-    """The radar's position is subtracted from the distance.
-
-    One track with 20 fusions is enough for warnings.
-    """
     near, far = track(d_rel=40.0, v_rel=-1.0), track(d_rel=42.0, v_rel=-2.0)
     for _ in range(20):
         far.fuse()

@@ -1,9 +1,6 @@
-"""The effect of a step in the radar's relative speed on the lead's history and the collision warning.
-
-In openpilot, a distance jump of more than 2.5 m or a lost lead resets everything. A jump of the relative
-speed resets nothing, unless the plan cannot follow it. We measured these rules on v0.4.2. The
-numbers of cycles here follow from them and from this controller.
-"""
+"""The effect of a step in the radar's relative speed on the lead's history and the collision warning. We
+measured on openpilot v0.4.2 that a distance jump of more than 2.5 m or a lost lead resets everything. A jump
+of the relative speed resets nothing, unless the plan cannot follow it."""
 
 from typing import NamedTuple
 
@@ -66,7 +63,6 @@ def test_a_speed_step_resets_nothing(params: CarParams) -> None:
 
 
 def test_fusions_pause_while_the_camera_disagrees(params: CarParams) -> None:
-    """Fusion stops while camera and radar differ by more than 10 m/s. Earlier fusions are still counted."""
     found = drive(params, [-2.0] * 60 + [18.0] * 40 + [-2.0] * 40)
     assert found[59].fusions >= 20 and found[59].state.lead_one.fcw
     assert found[99].fusions == found[59].fusions and found[99].state.lead_one.fcw
@@ -81,20 +77,14 @@ def test_a_warning_needs_half_a_second_after_the_step(params: CarParams) -> None
 
 
 def test_a_step_that_the_plan_cannot_follow_resets_the_lead(params: CarParams) -> None:
-    """A plan that passes the lead by more than 50 m is discarded, and the lead is treated as new.
-
-    The longest counter of the warning, 3 s without a blinker, restarts.
-    """
+    """The longest counter of the warning, 3 s without a blinker, restarts."""
     found = drive(params, [-2.0] * 80 + [-20.0] * 80, gap=50.0)
     assert [k for k, cycle in enumerate(found) if cycle.new_lead and k >= 80] == [81]
     assert [k for k, cycle in enumerate(found) if cycle.fcw] == [81 + 60]
 
 
 def test_a_jump_of_the_distance_resets_the_lead(params: CarParams) -> None:
-    """A jump of more than 2.5 m is treated as another lead.
-
-    The warning's counters (30 cycles of detection, 3 s without a blinker) restart.
-    """
+    """The warning's counters (30 cycles of detection, 3 s without a blinker) restart."""
     found = drive(params, [-2.0] * 80 + [-18.0] * 40, jump=-3.0)
     assert found[80].new_lead
     assert not any(cycle.fcw for cycle in found[: 80 + 30])

@@ -66,10 +66,6 @@ def test_a_refused_engagement_shows_the_reasons() -> None:
     ],
 )
 def test_disengaging(first: tuple[Event, ...], event: Event, state: str, alert: str) -> None:
-    """The driver and immediate faults disengage at once, soft faults after a warning.
-
-    The alert shows the reason.
-    """
     drive = Drive(first, (event,))
     assert drive.state == state
     assert alert in drive.alerts.active

@@ -33,7 +33,6 @@ every = pytest.mark.parametrize("effect", ALL)
 
 
 def fresh(effect, camera, seed=3):
-    """Return a new instance of the effect at its highest level."""
     return effect(LEVELS[effect][-1], seed, camera)
 
 
@@ -82,7 +81,6 @@ CAMERAS = [
 
 
 def regions(shape, random):
-    """Yield random rows and columns, and the pixels in the four corners."""
     for _ in range(6):
         top, left = (int(random.integers(size)) for size in shape)
         bottom, right = random.integers((top + 1, left + 1), (shape[0] + 1, shape[1] + 1)).tolist()

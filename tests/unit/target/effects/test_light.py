@@ -19,7 +19,6 @@ def test_rays_meet_the_horizon(camera):
 
 
 def test_glare_falls_off_with_the_square_of_the_angle(camera):
-    """At twice the angle from the sun, the veil is a quarter as bright. The veil grows with the scatter."""
     veil = SunGlare(0.5, 3, camera).ready()._light.astype(float)
     more = SunGlare(1.0, 3, camera).ready()._light.astype(float)
     sky = veil[: int(camera.horizon)]
@@ -36,10 +35,6 @@ def test_glare_falls_off_with_the_square_of_the_angle(camera):
 
 
 def test_noise_follows_the_number_of_electrons(camera, moment):
-    """The mean does not change.
-
-    The spread is that of shot noise and read noise, and is smaller in bright light.
-    """
     flat = np.full((camera.rows, camera.width), 128, np.uint8)
     for lux in (100000.0, 100.0, 20.0):
         seen = LowLight(lux, 0, camera).apply(flat, moment()).astype(float)

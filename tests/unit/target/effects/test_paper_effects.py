@@ -62,7 +62,6 @@ def test_more_snow_includes_the_blocks_of_less(camera, moment):
 
 
 def test_rain_dims_the_background(camera, moment, road):
-    """Between the streaks, the image keeps 0.75 of its brightness at thickness 1 and 0.65 at 10."""
     for thickness, alpha in ((1, 0.75), (10, 0.65)):
         made = PaperRain(thickness, 0, camera)
         flat = np.full_like(road, 100)
@@ -118,7 +117,6 @@ def test_motion_blur_has_the_papers_length_and_angle():
 
 
 def test_contrast_and_brightness_saturate(camera, moment, road):
-    """A gain of 3 turns asphalt white, so the marks disappear. With a bias of 100, they stay visible."""
     strong = Contrast(3.0, 0, camera).apply(road, moment())[300:]
     bright = Brightness(100, 0, camera).apply(road, moment())[300:]
     assert strong.min() == 255

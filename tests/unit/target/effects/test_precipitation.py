@@ -42,7 +42,6 @@ def test_flakes_are_slow_and_large(camera):
 
 
 def test_particles_ahead_come_nearer(camera, moment):
-    """Particles ahead move away from the focus of expansion and grow, as their distance requires."""
     straight = replace(camera, pitch=0.0)
     particles = alone(straight)
     before = particles.streaks(moment()._replace(position=0.0), 0.0)
@@ -95,7 +94,6 @@ def test_boxes_repeat_without_gaps(camera, moment):
 
 @pytest.mark.parametrize("width", [0.4, 1.2, 2.0, 5.0])
 def test_streaks_block_the_light_of_their_area(width, camera):
-    """A particle blocks the light of pi / 4 * width^2 pixels, wherever it lies between pixels."""
     start = np.array([[100.3, 300.0, 500.7], [200.1, 240.5, 300.9]], np.float32)
     streaks = Streaks(start, start + np.float32(6.3), np.full(3, width, np.float32))
     taken = Cover(camera).taken(streaks, whole((camera.rows, camera.width))).astype(float) / 255.0

@@ -35,10 +35,6 @@ def test_a_faster_car_meets_more_drops(glass, road, moment):
 
 
 def test_drops_show_the_scene_upside_down(glass, camera, moment):
-    """A drop in front of the dark road is bright at the bottom.
-
-    A drop in front of the bright sky is dark at the top.
-    """
     picture = np.full((camera.rows, camera.width), 60, np.uint8)
     picture[:200] = 200
     start = 3 * WIPE - glass._start

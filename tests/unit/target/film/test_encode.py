@@ -22,7 +22,6 @@ EVENTS = {
 
 
 def pictures(count=8):
-    """Yield grey images that become brighter, with a bar in one of the sheet's colours."""
     for number in range(count):
         picture = np.full((180, 320, 3), 60 + 10 * number, np.uint8)
         picture[:40] = pen.FAULTY
@@ -49,7 +48,6 @@ def test_an_mp4_shows_every_picture_at_20_per_second(tmp_path):
 
 
 def test_a_gif_plays_at_the_same_speed(tmp_path):
-    """A GIF has every fourth frame, shown four times as long, in the sheet's colours."""
     write_video(pictures(), tmp_path / "a.gif")
     with Image.open(tmp_path / "a.gif") as gif:
         assert (gif.n_frames, gif.info["duration"], gif.size) == (2, 200, (800, 450))

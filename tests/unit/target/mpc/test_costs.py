@@ -52,7 +52,6 @@ def test_longitudinal_plan_minimises_its_cost(long_mpc, lead, v, a, gap, v_lead)
 
 
 def test_the_first_guess_brakes_evenly_to_the_leads_speed(long_mpc):
-    """Over a gap of 80 m, braking from 20 to 10 m/s takes 0.625 m/s^2."""
     long_mpc.v_mpc = 20.0
     long_mpc._simulate(80.0, 10.0, 0.0, LEAD_DECAY)
     speeds = long_mpc._iteration.guess[1:126:6]

@@ -25,7 +25,6 @@ def settle(mpc, lanes, times=60):
 
 
 def results(mpc):
-    """Return all public results, to the last bit."""
     scalars = (mpc.angle_desired, mpc.delta_desired, mpc.nans)
     return [repr(value) for value in scalars] + [mpc.delta_plan.tobytes()]
 
@@ -72,7 +71,6 @@ def test_one_line_and_the_width_give_the_lane(lateral_mpc, lanes):
 
 
 def test_the_plan_keeps_the_rate_and_angle_limits(lateral_mpc, lanes):
-    """A car that hardly turns is steered at up to 0.1 rad/s and up to 25 degrees at the road wheels."""
     for _ in range(120):
         lateral_mpc.update(lanes(8.0), V, 0.0, 0.0, 0.02)
         plan = lateral_mpc.delta_plan
@@ -135,7 +133,7 @@ def test_a_discarded_plan_has_no_later_effect(lateral_mpc, lanes):
 
 
 def test_an_unsolvable_problem_keeps_the_planned_rates(lateral_mpc, lanes):
-    """A heading of more than 90 degrees has no solution. The failure is counted."""
+    """A heading of more than 90 degrees has no solution."""
     drive(lateral_mpc, lanes(2.0), times=3)
     planned = list(lateral_mpc._iteration.guess[84:])
     delta = lateral_mpc.delta_desired

@@ -24,7 +24,6 @@ def drive(mpc, v, a, lead, times):
 
 
 def results(mpc):
-    """Return all public results, to the last bit."""
     scalars = (mpc.v_mpc, mpc.a_mpc, mpc.v_mpc_future, mpc.prev_lead_status, mpc.new_lead)
     plans = (mpc.x_plan, mpc.v_plan, mpc.a_plan, mpc.x_lead_plan)
     return [repr(value) for value in scalars] + [plan.tobytes() for plan in plans]
@@ -109,7 +108,6 @@ def test_a_lead_is_new_when_it_appears_or_jumps(long_mpc, lead):
 
 @pytest.mark.parametrize(("v", "a"), [(0.09, 0.0), (2.0, -4.1), (-3.0, 0.0)])
 def test_a_very_slow_or_hard_braking_lead_is_planned_as_stopped(long_mpc, lead, v, a):
-    """Leads below 0.1 m/s, and leads that stop within two seconds, are planned as standing still."""
     drive(long_mpc, 5.0, 0.0, lead(30.0, v, a), 1)
     assert list(long_mpc.x_lead_plan) == [30.0] * 21
 
@@ -128,7 +126,6 @@ def test_decay_of_the_leads_acceleration(long_mpc, lead):
     """
 
     def travelled(decay):
-        """Integrate a decaying acceleration of 1 m/s^2 with RK4, as the plan does."""
         x, v, a, h = 0.0, 10.0, 1.0, 0.2
         for _ in range(50):
             z = decay * h
@@ -157,9 +154,6 @@ def test_the_plan_for_a_new_lead_depends_only_on_the_planned_speed(make_long, le
 
 
 def test_a_plan_through_the_lead_is_discarded(long_mpc, lead):
-    """If a plan passes the lead by more than 50 m, the measured speed and acceleration are used, and the next
-    lead is new.
-    """
     drive(long_mpc, 20.0, 0.0, lead(30.0, 20.0), 3)
     long_mpc.set_cur_state(20.0, 0.0)
     long_mpc.update(19.5, -0.3, lead(-51.0, 20.0))

@@ -57,7 +57,6 @@ def first_guess(ocp, start, control):
 
 @pytest.mark.parametrize("case", CASES)
 def test_one_iteration_is_the_full_gauss_newton_step(case):
-    """A step of the condensed problem equals that of the full quadratic program in another solver."""
     ocp, start, param, control = CASES[case]
     w, residuals, defects, low, high = full_problem(ocp, start, param)
     guess = first_guess(ocp, start, control)

@@ -18,7 +18,6 @@ def scenarios():
 
 @pytest.fixture(scope="session")
 def fault_free():
-    """Run a scenario of the library without a fault, once, and return its result."""
     return cache(lambda name: simulate(load_scenario(SCENARIOS / f"{name}.yaml"), 0))
 
 

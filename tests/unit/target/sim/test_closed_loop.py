@@ -140,7 +140,6 @@ def test_lanes_too_far_off_for_a_solution_give_full_torque_to_the_left(s1, side)
 
 
 def test_the_car_holds_a_bend_of_500_m(s1):
-    """At 60 mph, the car stays within half a metre of the middle and needs half the torque."""
     bend = replace(s1, lead=None, curvature=((0.0, 150.0, 250.0), (0.0, 0.0, 0.002)))
     trace = drive(bend).trace
     offset = trace["lateral_offset"]

@@ -33,7 +33,6 @@ def test_position_uses_the_old_speed(plant):
 
 
 def test_gas_below_and_above_base_speed():
-    """Gas gives constant force below 19.6 m/s and constant power above."""
     assert abs(BASE_SPEED - 19.608) < 1e-3
     for speed, force in ((10.0, 5100 * 3.33), (25.0, 100_000 / 25.0 * 3.33)):
         gain = acceleration(speed, 0.5, 0.0, 0.0) - acceleration(speed, 0.0, 0.0, 0.0)
@@ -41,7 +40,6 @@ def test_gas_below_and_above_base_speed():
 
 
 def test_brake_and_grade():
-    """Full brake decelerates by 3.0 m/s^2. A grade of 1 m/s^2 decelerates by that value."""
     free = acceleration(15.0, 0.0, 0.0, 0.0)
     assert free - acceleration(15.0, 0.0, 1.0, 0.0) == pytest.approx(3.0)
     assert free - acceleration(15.0, 0.0, 0.0, 1.0) == pytest.approx(1.0)

@@ -33,10 +33,6 @@ def s1(scenarios):
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("speed", [0.0, 30.0])
 def test_torque_turns_the_wheel_slowly(sign, speed):
-    """Full torque turns the wheel by 0.1 degrees per second.
-
-    A fifth of the angle moves the car, at any speed.
-    """
     lateral = CrudeLateral()
     assert [lateral.step(sign * 1.0, speed, 0.0) for _ in range(200)] == [speed] * 200
     assert degrees(lateral.steer_angle) == pytest.approx(0.2 * sign)

@@ -37,8 +37,6 @@ def frames():
 
 @pytest.fixture
 def look(frames, truth):
-    """Return an image of these frames from a pose, moved by `translation`."""
-
     def taken(translation=GROUND, digest="d", **pose):
         library = ImageLibrary(
             name="few", digest=digest, model=MODEL, frames=frames, spacing=SPACING, fps=None

@@ -25,7 +25,6 @@ TABLE = "schema: replay-tolerances/1\nchannels:\n  v_ego: {v_ego}\nfigures:\n  e
 
 @pytest.fixture
 def trace():
-    """Return a synthetic trace of 10 s with a wavy speed, engaged from 1.3 s and set to 97 km/h."""
     t = np.arange(STEPS) / 100
     channels = {name: np.zeros(STEPS) for name in CHANNELS}
     channels |= {"t": t, "v_ego": 20.0 + 3.0 * np.sin(t), "d_rel": 50.0 - 2.0 * t, "v_cruise": 97 * KPH_TO_MS}
@@ -47,8 +46,6 @@ def reference(trace, tmp_path):
 
 @pytest.fixture
 def finished(trace, tmp_path):
-    """Put a trace into the folder of a finished run of S1 and return the folder of runs."""
-
     def put(**changes):
         folder = tmp_path / "runs" / "S1"
         folder.mkdir(parents=True, exist_ok=True)
@@ -78,7 +75,6 @@ def test_a_written_reference_is_read_back(trace, reference):
 
 
 def test_rms_and_largest_difference(trace, reference):
-    """A dip of up to 0.6 m/s in a tenth of the rows gives the RMS and the time that were computed by hand."""
     trace["v_ego"] = trace["v_ego"].copy()
     trace["v_ego"][300:400] -= 0.5
     trace["v_ego"][350] -= 0.1

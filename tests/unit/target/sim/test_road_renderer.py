@@ -77,7 +77,6 @@ def test_lines_have_their_true_width_at_any_distance():
 
 @pytest.mark.parametrize("heading", [0.0, 0.02])
 def test_the_far_field_is_anti_aliased(heading):
-    """An image equals the average of an image with sixteen times the pixels, up to the horizon."""
     look = replace(BARE, right=replace(FRESH, dashed=True))
     coarse = RoadRenderer(CALTECH, look, 0, periods=1).grey(5.0, 0.3, heading).astype(np.float32)
     fine = RoadRenderer(finer(CALTECH, 4), look, 0, periods=1).grey(5.0, 0.3, heading).astype(np.float32)
@@ -89,7 +88,6 @@ def test_the_far_field_is_anti_aliased(heading):
 
 
 def test_far_dashes_do_not_flicker():
-    """Beyond 150 m, where a row covers two dash periods, a line hardly changes between frames."""
     renderer = RoadRenderer(CALTECH, replace(BARE, right=replace(FRESH, dashed=True)), 0, periods=1)
     last = int(CALTECH.row(150.0))
     pictures = np.stack([renderer.grey(1.342 * k) for k in range(9)]).astype(int)

@@ -83,7 +83,6 @@ def frames(tmp_path):
 
 
 def brought_aside(scenarios, steps):
-    """Return S1, started 0.3 m left of the middle of the lane."""
     return replace(load_scenario(scenarios / "S1.yaml"), lateral_offset=0.3, steps=steps)
 
 

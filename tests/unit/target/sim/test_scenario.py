@@ -137,10 +137,6 @@ def test_unreadable_files_are_refused(tmp_path):
 
 @pytest.mark.parametrize("name", ["S1", "S2", "S3", "S4", "S5"])
 def test_the_five_scenarios(scenarios, name):
-    """All five scenarios start at 60 mph, 100 m behind a lead at 40 mph (S2: 25 mph), and last 30 s.
-
-    The set button is pressed at 1.2 s for 0.1 s.
-    """
     scenario = load_scenario(scenarios / f"{name}.yaml")
     assert (scenario.name, scenario.steps, scenario.speed) == (name, 3000, pytest.approx(26.8224))
     assert scenario.lead.gap == 100.0

@@ -31,10 +31,8 @@ Drive = Callable[..., tuple[str, str]]
 
 @pytest.fixture
 def drive(tmp_path: Path) -> Drive:
-    """Run a mutant for a second on three frames, and return its record, which has the trace's digest, and its
-    counts. `place` is a file, a function and a name. The fault follows the assignment of the name and is
-    active from `time_s` on.
-    """
+    """Run a mutant for a second on three frames. Return its record and its counts. The fault follows the
+    assignment at `place` (file, function, name)."""
     frames, work = tmp_path / "frames", tmp_path / "work"
     frames.mkdir()
     work.mkdir()

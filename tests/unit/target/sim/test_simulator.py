@@ -82,7 +82,7 @@ def test_buttons_reach_the_bus(s1):
 
 
 def test_a_coasting_car_moves_like_openpilots(s1):
-    """The first rows match openpilot's plant to all printed digits. HWT is distance over speed."""
+    """The first rows match openpilot's plant to all printed digits."""
     trace = drive(s1, Script(), 101).result().trace
     row = {name: trace[name][100] for name in ("d_rel", "v_rel", "v_ego", "a_ego", "hwt")}
     expected = {"d_rel": 91.058, "v_rel": -8.7637, "v_ego": 26.645, "a_ego": -0.17485, "hwt": 3.4174}

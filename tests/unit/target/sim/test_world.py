@@ -31,7 +31,6 @@ def test_grade_and_curvature_tables():
 
 
 def test_bend_is_a_parabola_for_constant_curvature():
-    """A road of constant curvature leaves its tangent by k x^2 / 2, to the side of the curvature."""
     points = BEND.bend(0.0, 50)
     assert points == pytest.approx([0.001 * x * x for x in range(50)])
     assert BEND.sideways(0.0, 40.2) == points[40]
@@ -39,10 +38,6 @@ def test_bend_is_a_parabola_for_constant_curvature():
 
 
 def test_lane_in_view(truth):
-    """In the middle of the lane, the lines are 1.85 m to either side.
-
-    A car 0.4 m to the left sees them 0.4 m further right.
-    """
     view = Camera(STRAIGHT).look(truth(d_rel=42.0))
     assert (view.left_lane_y, view.right_lane_y, view.path_y, view.lead_d_rel) == (1.85, -1.85, 0.0, 42.0)
     assert view.bend == (0.0,) * 50
@@ -51,7 +46,6 @@ def test_lane_in_view(truth):
 
 
 def test_heading_and_bend_in_view(truth):
-    """A car turned left sees the lane run to the right. In a left-hand bend, the lane curves to the left."""
     assert Camera(STRAIGHT).look(truth(heading=0.1)).bend[49] == pytest.approx(-49 * 0.100335, rel=1e-4)
     assert Camera(BEND).look(truth()).bend[49] == pytest.approx(0.001 * 49**2)
     both = Camera(BEND).look(truth(heading=0.1)).bend

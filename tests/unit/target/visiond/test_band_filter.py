@@ -55,7 +55,6 @@ def test_brightness_does_not_matter(light):
 
 
 def test_points_on_rough_ground_weigh_little():
-    """If the ground is as rough as a mark is bright, its points weigh much less than those of a mark."""
     rough = road(noise=25.0)
     points = mark_points(rough)
     assert points.weight.sum() / ROWS * 7 / COLUMNS < 0.1

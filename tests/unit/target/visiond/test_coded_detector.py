@@ -39,7 +39,6 @@ def test_lines_are_read_in_one_row(road: RoadRenderer, offset: float) -> None:
 
 
 def test_a_line_without_a_cluster_is_in_the_first_column(road: RoadRenderer) -> None:
-    """A line in column 0 is far to the left of the car, and has probability 1."""
     for half, expected in ((slice(320, None), (None, 8.03)), (slice(None, 320), (7.88, None))):
         picture = road.grey(4.0).copy()
         picture[:, half] = 97

@@ -61,10 +61,8 @@ def _found(helpers):
 
 @pytest.fixture(scope="module")
 def pictures():
-    """Images of a road with either kind of marks, from many poses, clean, with every effect and with noise.
-
-    Images of pure noise and of a single tone are added.
-    """
+    """Images of a road from many poses, clean, with every effect and with noise, and images of pure noise and
+    of a single tone."""
     chance, found = np.random.default_rng(3), []
     roads = [RoadRenderer(MODEL, marks, 1, periods=3) for marks in ("solid", "dashed")]
     changes = [None] * 8 + [
@@ -201,10 +199,6 @@ def test_the_library_is_not_used_if_python_computes_other_bits(name, monkeypatch
 
 
 def test_features_and_marked_windows_are_the_same(helpers, pictures):
-    """Rounded to steps, the features of each window equal those of `Hog`.
-
-    The windows above the threshold are those of the net.
-    """
     size = 112, 480
     hog, net = Hog(*size), LaneNet.load()
     for threshold in (0.0, 4.0, -2.5):

@@ -9,7 +9,6 @@ TOLERANCE = 1e-6  # features are at most 1
 
 
 def pictures() -> dict[str, np.ndarray]:
-    """Return images of 64 x 96 pixels: noise, even grey, a checkerboard, and a slope that wraps around."""
     rng = np.random.default_rng(7)
     row, column = np.mgrid[:64, :96]
     return {

@@ -27,7 +27,6 @@ def frames(tmp_path_factory):
 
 
 def test_misses_are_counted_by_level(frames, tmp_path, capsys):
-    """A random effect has one image for each seed, and a deterministic effect has one image."""
     chosen = ["--effect", "PaperOcclusion", "--effect", "MedianBlur", "--seeds", "3"]
     assert main([*frames, *chosen, "--csv", str(tmp_path / "found.csv")]) == 0
     printed = capsys.readouterr().out.splitlines()
