@@ -1,4 +1,4 @@
-"""Responses: files, JSON and errors. None shows a path of this machine."""
+"""HTTP responses: files, JSON and errors, none of which contains an absolute path."""
 
 import os
 import re
@@ -32,7 +32,7 @@ _FOLDERS = re.compile(r"(?<![\w.~-])/(?!dev/null)(?:[^/\s'\"`]+/)+")
 
 
 class OpenFile(FileResponse):
-    """Sends a file by its descriptor, and closes it."""
+    """Sends an open file, and then closes it."""
 
     def __init__(self, descriptor: int, name: str) -> None:
         self._descriptor = descriptor

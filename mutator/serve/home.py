@@ -42,7 +42,7 @@ def offered(workspace: Workspace) -> dict[str, Any]:
 
 
 def _pairs(runs: Sequence[Mapping[str, Any]]) -> list[tuple[str, str]]:
-    """Return pairs of consecutive runs of one campaign and target."""
+    """Return pairs of consecutive runs with the same campaign and target."""
     latest: dict[tuple[str, str], str] = {}
     pairs = []
     for run in runs:

@@ -22,7 +22,7 @@ from mutator.store.progress import Tail
 _KEEPER = "mutator.serve.keeper"
 _COLUMNS = "200"  # line width of a job's output; pages wrap the lines
 _LOG_BYTES = 100_000  # only the last bytes of a job's output are kept
-_MOST_JOBS = 200  # jobs to keep: the newest of those that have ended
+_MOST_JOBS = 200  # ended jobs to keep, the newest
 _MOST_WAITING = 50
 _NEWS = ("the same as", "no record to compare", "film: ", "verdict: ", "outcomes: ")
 _STYLES = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")  # terminal escape codes
@@ -57,7 +57,7 @@ class Job:
     ended: datetime | None = None
     log: bytearray = field(default_factory=bytearray)
     tail: Tail | None = None  # follows the records of a campaign while its experiments run
-    hold: int | None = None  # the writing end of the pipe to its keeper
+    hold: int | None = None  # the writing end of the pipe to the job's keeper
 
     def told(self) -> dict[str, Any]:
         order = self.work.order
@@ -73,7 +73,7 @@ class Job:
 
     @property
     def text(self) -> str:
-        """The output, without control characters and paths on the disk."""
+        """The output, without control characters and absolute paths."""
         return _plain(self.log)
 
     def hear(self, line: bytes) -> None:
@@ -90,7 +90,7 @@ class Job:
 
 
 class Jobs:
-    """The jobs of a server. `report_at` returns the address of a result."""
+    """The jobs of a server. `report_at` returns the address of a run's report."""
 
     def __init__(self, at_once: int, report_at: Callable[[Work], str | None]) -> None:
         self._jobs: dict[str, Job] = {}

@@ -37,7 +37,7 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
 class Rerun(StrictModel):
-    """Rerun an experiment; with `plot`, keep its exact plot and series."""
+    """Rerun an experiment. The kind `plot` also keeps an exact plot and the series."""
 
     kind: Literal["rerun", "plot"]
     run: Text
@@ -221,7 +221,7 @@ class Desk:
             check_condition(text, None, manifest.observation.variables)
             return
         if not math.isfinite(time) or time < 0:
-            raise MutatorError(f"'{text}'", where="trigger", expected="a time in s")
+            raise MutatorError(f"'{text}'", where="trigger", expected="a finite time of at least 0 s")
 
     def _folder(self, key: str) -> Path:
         """Return the run folder with this key; MutatorError if it contains links."""
@@ -252,6 +252,6 @@ def _unknown(what: str, name: str, known: Collection[str]) -> MutatorError:
     return MutatorError(
         f"no {what} '{name}'",
         where=what,
-        expected=f"one of {', '.join(known) or 'none'}",
+        expected=f"one of {', '.join(known)}" if known else f"a {what}, but the library has none",
         remedy="correct the name" + suggestion(name, list(known)),
     )

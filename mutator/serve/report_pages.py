@@ -28,7 +28,7 @@ _MOST_COMPARED = 4  # cached comparisons
 
 
 class Shown:
-    """Files of the runs, and pages made from them, one at a time."""
+    """Serves files of the runs, and pages made from them. Only one page is made at a time."""
 
     def __init__(self, workspace: Workspace, runs: Runs) -> None:
         self._workspace, self._runs = workspace, runs

@@ -1,4 +1,4 @@
-"""Reviews: the current groups of a target, and decisions, which are saved at once."""
+"""Reviews on the server: the current groups of a target, and decisions, which are saved immediately."""
 
 import os
 import threading
@@ -22,7 +22,7 @@ from mutator.serve.runs import Absent
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
-_MOST_KEPT = 8  # selections with cached groups
+_MOST_KEPT = 8  # selections whose groups are cached
 _SKIPPED = {"reviews", "__pycache__", ".git", "runs"}
 Short = Annotated[str, Field(max_length=2000)]
 
@@ -49,8 +49,8 @@ class _ChangeModel(StrictModel):
 
 
 class Decisions(StrictModel):
-    """Changes that a page sends, with the revisions and digests of the diffs that it shows. Without digests,
-    nothing is approved or rejected.
+    """Changes that a page sends, with the revision and the diff's digest of each group, as the page shows it.
+    Approving or rejecting a group requires the digest.
     """
 
     changes: Annotated[list[_ChangeModel], Field(min_length=1, max_length=5000)]
@@ -121,12 +121,12 @@ class Reviews:
         return page_html(review, review.in_turn(groups), chosen.options, served)
 
     def told(self, chosen: Selection) -> dict[str, Any]:
-        groups = self.groups(chosen)  # first, as it may take seconds, in which others decide
+        groups = self.groups(chosen)  # first, because this can take seconds, and others can decide meanwhile
         review = load_review(self.workspace, chosen.target)
         return {"target": chosen.target, "by": self.reviewer, "groups": _states(review, groups)}
 
     def decide(self, chosen: Selection, wanted: Decisions) -> dict[str, Any]:
-        """Save all changes or none; raises Moved if others changed a group, or if a diff differs."""
+        """Save all changes or none; Moved if somebody else changed a group, or if a diff has changed."""
         known = {group.id: group for group in self.groups(chosen)}
         if strangers := [one.group for one in wanted.changes if one.group not in known]:
             raise Absent(f"no group '{strangers[0]}'", expected="the id of a group on the page")
@@ -152,7 +152,7 @@ class Reviews:
         return load_review(self.workspace, chosen.target).changes(self.group(chosen, name))
 
     def picture(self, chosen: Selection, name: str, level: str, *, after: bool) -> bytes:
-        """Return a frame with the group's effect, as a JPEG file; Absent if there is none."""
+        """Return a frame before or after the group's effect, as a JPEG file; Absent if there is none."""
         manifest = self.workspace.manifest(chosen.target)
         found = pictures.of_group(self.workspace, manifest, self.group(chosen, name), level)
         if found is None:
@@ -182,7 +182,7 @@ class Reviews:
         }
         if other:
             names = ", ".join(other)
-            raise Moved(f"{names}: the diff has changed; reload the page", other)
+            raise Moved(f"the diff has changed in {names}; reload the page", other)
 
     def _found(self, chosen: Selection) -> tuple[Group, ...]:
         workspace = self.workspace

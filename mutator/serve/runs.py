@@ -128,7 +128,7 @@ def check_no_links(run: Path) -> None:
 
 
 def open_in_run(run: Path, name: str) -> int:
-    """Open a served file and return its descriptor; Absent otherwise."""
+    """Open a file of a run and return its descriptor; Absent if the file is not served."""
     folder, _, last = name.rpartition("/")
     if Path(last).suffix not in SERVED.get(folder, ()):
         raise _absent()

@@ -52,7 +52,7 @@ def listening(port: int) -> socket.socket:
         raise MutatorError(
             f"cannot use port {port} ({err.strerror})",
             argument="port",
-            remedy="choose another port, or leave it out",
+            remedy="choose another port, or leave out `port`",
         ) from None
     listener.listen()
     return listener

@@ -27,11 +27,12 @@ def overall_sheet(frame: pd.DataFrame, published: Published | None) -> Sheet:
     return Sheet(
         name="guided_against_random",
         title="Guided against random: hazards",
-        note="Fault types with faults of both methods. Odds ratio: Mantel-Haenszel over fault types, above 1 "
-        "if guided faults are more hazardous. p tests that the odds ratio is 1, p equal that it is the same "
-        "in all types; both assume independent runs, so they are too small. Difference: the rate of guided "
-        "minus that of random faults, as a fraction. Its interval resamples whole faults (location and "
-        "value), which needs single runs; there is none if all faults agree.",
+        note="The table covers fault types that have faults of both methods. Odds ratio: Mantel-Haenszel "
+        "over fault types, above 1 if guided faults are more hazardous. The column `p` tests that the odds "
+        "ratio is 1, and `p equal` that it is the same in all fault types; both p-values are too small, "
+        "because the tests assume independent runs. Difference: the rate of guided minus that of random "
+        "faults, as a fraction. Its interval comes from resampling whole faults (location and value); there "
+        "is none if all faults agree, or for published counts.",
         heads=(
             *("hazards of", "from", "guided", "random", "fault types"),
             *("odds ratio", "odds ratio, low", "odds ratio, high", "p", "p equal"),
@@ -62,7 +63,8 @@ def kinds_sheet(frame: pd.DataFrame, published: Published | None) -> Sheet:
     return Sheet(
         name="guided_against_random_by_fault_type",
         title="Guided against random by fault type",
-        note="p: Fisher's exact test; p, Holm: adjusted over the fault types of the same source and whole.",
+        note="The column `p` is from Fisher's exact test; `p, Holm` is adjusted over all fault types with "
+        "the same `hazards of` and `from`.",
         heads=("hazards of", "from", "fault type", "guided", "random", "p", "p, Holm"),
         lines=tuple(lines),
     )
@@ -87,9 +89,10 @@ def pairs_sheet(frame: pd.DataFrame) -> Sheet:
     return Sheet(
         name="matched_pairs",
         title="Guided and random runs of the same fault, in pairs",
-        note="Pairs of runs with the same fault and value, scenario and context row, by which of the two has "
-        "a hazard. p: McNemar's exact test, too small because it assumes that pairs of one fault are "
-        "independent; p, Holm: adjusted over fault types.",
+        note="A pair is a guided and a random run with the same fault, scenario, context and seed. The table "
+        "counts pairs in which both runs, only one or neither has a hazard. The column `p` is from McNemar's "
+        "exact test; it is too small, because the test assumes that pairs of the same fault are independent. "
+        "`p, Holm` is adjusted over fault types.",
         heads=("pairs", "fault type", "N", "both", "guided only", "random only", "neither", "p", "p, Holm"),
         lines=tuple(lines),
     )

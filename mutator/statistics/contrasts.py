@@ -69,7 +69,7 @@ class Difference:
 
 
 def strata(counts: Mapping[tuple[str, str], Tally], whole: Whole) -> tuple[Stratum, ...]:
-    """The fault types that have faults of both methods. `counts` are by (method, fault type)."""
+    """Return the fault types that have faults of both methods. `counts` has (method, fault type) as keys."""
     made = []
     for kind in dict.fromkeys(kind for _, kind in counts):
         guided, random = counts.get((GUIDED, kind)), counts.get((RANDOM, kind))
@@ -127,8 +127,7 @@ def holm(p_values: Sequence[float]) -> tuple[float, ...]:
 
 
 def pairs(frame: pd.DataFrame) -> pd.DataFrame:
-    """A frame of guided runs with their random partners, which have the same fault, scenario, context row and
-    seed.
+    """Pair each guided run with the random run of the same fault, scenario, context row and seed.
 
     Columns end in `_guided` and `_random`. Runs without a partner (unfinished or failed) are left out.
     """
@@ -151,7 +150,7 @@ def resampled(frame: pd.DataFrame, whole: Whole) -> Difference:
 
 
 def _sums(frame: pd.DataFrame) -> tuple[Any, Any, Any, Any]:
-    """Four numbers for each fault: guided hazards, random hazards, guided runs, random runs."""
+    """Count, for each fault: guided hazards, random hazards, guided runs, random runs."""
     faults = sorted(frame["fault_id"].unique())
     guided, random = frame["method"] == GUIDED, frame["method"] == RANDOM
     hazard = frame["is_hazard"]
@@ -165,7 +164,7 @@ def _sums(frame: pd.DataFrame) -> tuple[Any, Any, Any, Any]:
 def _rate_difference(
     guided_hazards: Any, random_hazards: Any, guided: Any, random: Any, axis: int = -1
 ) -> Any:
-    """The difference of hazards per run, summed over faults along `axis`; NaN if a method has no run."""
+    """Return guided minus random hazards per run, over the faults on `axis`; NaN if a method has no run."""
     totals = [np.sum(x, axis=axis) for x in (guided_hazards, guided, random_hazards, random)]
     with np.errstate(invalid="ignore"):
         return totals[0] / totals[1] - totals[2] / totals[3]

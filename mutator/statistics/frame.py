@@ -1,8 +1,9 @@
 """The results of a run as a pandas frame with a row for each usable experiment.
 
-In addition to the columns of results.csv it has `kind` (`sensor/bias`), `row` (the context row of the trigger
-or of its random partner), `t_hazard` (first hazard, s) and the flags `is_activated, is_manifested, is_hazard,
-is_alert`. Times are in simulated seconds; NaN means that the event did not happen.
+In addition to the columns of results.csv, it has `kind` (`sensor/bias`), `row` (the context row of the
+trigger; for a random run, that of its guided partner), `t_hazard` (first hazard, s) and the flags
+`is_activated, is_manifested, is_hazard, is_alert`. Times are in simulated seconds; NaN means that the event
+did not happen.
 """
 
 from pathlib import Path
@@ -14,7 +15,7 @@ from mutator.outcomes.reader import Results
 from mutator.outcomes.rows import UNUSABLE
 
 _TIMES = ("t_activation", "t_manifest", "t_alert")
-_RANDOM = "random/"  # prefix of the trigger of a random partner: random/C1
+_RANDOM = "random/"  # prefix of a random run's trigger: random/C1
 
 
 def load(results: Path) -> pd.DataFrame:
@@ -62,8 +63,8 @@ _SHARED = (
 
 
 def slim(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
-    """Keep only the columns that most statistics need, and those in `more`. With all columns, selecting rows
-    from a million takes seconds."""
+    """Keep only the columns that most statistics need, and those in `more`. Selecting from a million rows
+    with all columns takes seconds."""
     flags = [hazard.lower() for hazard in hazard_names(frame)]
     wanted = {*_SHARED, *flags, *more}
     return frame[[name for name in frame.columns if name in wanted or name.startswith(("t_", "is_"))]]

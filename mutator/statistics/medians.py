@@ -56,8 +56,8 @@ def _interval(samples: list[np.ndarray], cluster: pd.Series) -> tuple[float, flo
 
 
 def _block_of(clusters: int, runs: int) -> int:
-    """The number of values per block. It balances two costs: a product for each block and cluster, and the
-    work on each value in the block that has the median, about 50 times as much."""
+    """The number of values per block. It balances two costs: a product for each block and cluster, and work
+    on each value in the median's block, which is about 50 times as slow."""
     return max(_BLOCK, math.isqrt(clusters * runs // 50))
 
 

@@ -14,13 +14,14 @@ from mutator.targets.severity import CLASSES
 HIGHER = "higher"
 TOTAL = "total"
 _INTERVAL = (
-    "The 95 % intervals of medians resample whole faults (location and value); none if all runs agree."
+    "The 95 % interval of a median comes from resampling whole faults (location and value); there is none if "
+    "all runs agree."
 )
 
 
 def metrics_sheet(frame: pd.DataFrame, metrics: Sequence[Sequence[str]]) -> Sheet:
-    """The table of the spread of each metric (name, unit, meaning, worse direction). Without values, it has
-    no lines."""
+    """Tabulate the spread of each metric, given as (name, unit, meaning, worse direction). Without values,
+    the table has no lines."""
     lines: list[tuple[Cell, ...]] = []
     activated = frame.loc[frame["is_activated"], ["kind", "fault_id", *(name for name, *_ in metrics)]]
     for name, unit, _, worse in metrics:
@@ -32,8 +33,9 @@ def metrics_sheet(frame: pd.DataFrame, metrics: Sequence[Sequence[str]]) -> Shee
     return Sheet(
         name="metrics",
         title="Metrics by fault type",
-        note="The N runs with an activated fault and a value, up to the end of the drive. "
-        f"{_INTERVAL} A quarter of the runs are at least as bad as the worse quartile.",
+        note="N: the runs in which the fault was activated and the metric has a value. Metrics cover a run "
+        f"up to the end of the drive. {_INTERVAL} A quarter of the runs are at least as bad as the worse "
+        "quartile.",
         heads=(
             *("fault type", "metric", "unit", "worse", "N"),
             *("median", "median, low", "median, high", "worse quartile", "worst"),

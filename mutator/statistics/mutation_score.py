@@ -26,13 +26,13 @@ _EFFECTS = ("actuator changed", "new alert", "hazard", "crash or timeout")
 _ALERT, _ACTIVE = _EFFECTS[1], "active"
 _HEADS = ("of", "counted", "fault", "number", "not activated", *_EFFECTS, "no effect")
 _NOTE = (
-    "How mutants of operators affect the closed loop. *Permanent* mutants are active in the whole "
-    "drive, *transient* ones while their trigger holds. Shares are of *activated* mutants; a mutant has an "
-    "effect if any of its drives shows it. Intervals are 95 % Wilson intervals; for counts of drives, "
+    "This table shows how operator mutants affect the closed loop. *Permanent* mutants are active in the "
+    "whole drive, *transient* ones while their trigger holds. Shares are of *activated* mutants; a mutant "
+    "has an effect if any of its drives shows it. Intervals are 95 % Wilson intervals; for counts of drives, "
     "whole mutants are resampled (bootstrap). *New alert*: an alert that the scenario's fault-free run "
     "does not raise. A drive that crashed or timed out is not judged; it counts only as a crash or timeout "
-    "and in the total. *No effect*: none of the four effects, which includes mutants that are equivalent to "
-    "the original."
+    "and in the total. *No effect*: none of the four effects; some of these mutants can be equivalent to the "
+    "original."
 )
 _SEVERAL = " The chosen mutants are counted together, without weights for different sampling rates."
 _UNKNOWN_ALERTS = " The fault-free runs cannot be read, so alerts are not compared with theirs."
@@ -96,7 +96,7 @@ def score_sheet(
     drives = drives_of(frame, faults, golden_alerts)
     planned = {name for name, fault in faults.items() if fault.module == OPERATORS}
     missing = len(planned - set(drives["mutant"]))
-    without = f" {missing} of {len(planned)} mutants have no result and are not counted." if missing else ""
+    without = f" Without a result, and therefore not counted: {missing} of {len(planned)}." if missing else ""
     chosen = f" Chosen: {'; '.join(f'`{text}`' for text in told)}." if told else ""
     chosen += _SEVERAL if len(told) > 1 and any(" draw" in text for text in told) else ""
     return Sheet(

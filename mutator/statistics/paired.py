@@ -116,8 +116,8 @@ def _mean(changes: Any, pairs: Any, axis: int = -1) -> Any:
 
 
 def times(first: pd.Series, second: pd.Series) -> Times:
-    """Compare the times of complete pairs: medians, the median difference with an exact interval from order
-    statistics, and p of Wilcoxon's signed-rank test (NaN if no time differs). From scipy."""
+    """Compare the times of complete pairs (scipy): medians, the median difference with an exact interval from
+    order statistics, and p of Wilcoxon's signed-rank test (NaN if no time differs)."""
     from scipy.stats import quantile_test
 
     known = first.notna() & second.notna()

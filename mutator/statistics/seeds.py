@@ -1,7 +1,7 @@
-"""The variation between a campaign's seeds. Each seed is the whole campaign with different draws.
+"""The variation between a campaign's seeds. Each seed repeats the whole campaign with different draws.
 
 An interval over runs assumes independence and ignores the variation of draws. Resampling whole seeds shows
-how much another campaign with as many seeds could differ.
+how much another campaign with the same number of seeds could differ.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -35,7 +35,7 @@ def seeds_of(frame: pd.DataFrame) -> list[str]:
 
 
 def seeds_sheet(frame: pd.DataFrame, *, alerts: bool = True) -> Sheet:
-    """The table of each share over all faults and by method. With a single seed, it has no lines."""
+    """Tabulate each share over all faults and by method. With a single seed, the table has no lines."""
     methods = sorted(map(str, frame["method"].unique()))
     groups = {ALL: np.ones(len(frame), dtype=bool)}
     if len(methods) > 1:

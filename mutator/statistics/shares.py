@@ -9,7 +9,7 @@ _DIGITS = 12
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Share:
-    """A share: `count` of `of`, with the interval of the rate, which is NaN if there is none."""
+    """A share: `count` of `of`. The rate's interval is `low` to `high`; both are NaN if there is none."""
 
     count: int
     of: int
@@ -37,5 +37,5 @@ def share(count: int, of: int) -> Share:
     if not of:
         return Share(count=count, of=of, low=math.nan, high=math.nan)
     low, high = proportion_confint(count, of, alpha=1 - CONFIDENCE, method="wilson")
-    # rounded, because last bits differ between machines, and because 0 of n must begin at 0, not 2e-18
+    # rounded, because last bits differ between machines, and the interval of 0 of n must begin at exactly 0
     return Share(count=count, of=of, low=round(float(low), _DIGITS), high=round(float(high), _DIGITS))

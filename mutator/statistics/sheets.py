@@ -1,4 +1,4 @@
-"""Selects the statistical tables of a run that fit its results."""
+"""Select the statistical tables that fit a run's results."""
 
 from collections.abc import Mapping
 
@@ -21,12 +21,12 @@ def run_sheets(
     alerts: Alerts | None,
     ends: Mapping[str, float] | None,
 ) -> tuple[Sheet, ...]:
-    """The tables of a frame; none for one method without published counts, because they would only repeat
-    counts.
+    """Return the tables of a frame. A single method without published counts gets none, because they would
+    only repeat counts.
 
-    `alerts` are those of each run with a hazard (None: the target has no alerts); they decide which event
-    came first. `ends` is the end of a run of each scenario in simulated seconds; censored times need it.
-    Tables whose inputs are missing are left out.
+    `alerts` has the alerts of each run with a hazard (None: the target has no alerts); they decide which
+    event came first. `ends` maps each scenario to the end of its runs in simulated seconds; censored times
+    need it. Tables whose inputs are missing are left out.
     """
     frame = slim(frame)
     if not published and not {GUIDED, RANDOM} <= set(frame["method"]):

@@ -53,13 +53,12 @@ def reaction_sheet(frame: pd.DataFrame, ends: Mapping[str, float], driver_s: flo
     return Sheet(
         name="alert_to_hazard",
         title="From alert to hazard, censored",
-        note="Runs whose first alert came before any hazard. Without a hazard, they are "
-        "censored at their end. "
-        "Median: Kaplan-Meier with its 95 % interval, `-` or `inf` if not reached; if the curve is flat at "
-        "one half, the middle of the flat part. The last "
-        f"columns: share of alerts without a hazard within {late}, the driver's reaction time "
-        f"(Kaplan-Meier), and share of hazards after an alert that came more than {late} later. Alerts "
-        "with or after the first hazard are counted separately.",
+        note="The table covers runs whose first alert came before any hazard. Runs without a hazard are "
+        "censored at their end. Median: Kaplan-Meier with its 95 % interval, `-` or `inf` if not reached; if "
+        "the curve is flat at one half, the middle of the flat part. The last columns: the share of alerts "
+        f"that no hazard follows within {late}, the driver's reaction time (Kaplan-Meier); and, of the "
+        f"hazards that follow an alert, the share that come more than {late} later. Alerts with or after the "
+        "first hazard are counted separately.",
         heads=(
             *("method", "scenario", "alerts first", "then hazard", "censored", "alert not before hazard"),
             *("median, s", "median, low, s", "median, high, s"),
@@ -78,7 +77,7 @@ def alerts_sheet(frame: pd.DataFrame, alerts: times.Alerts) -> Sheet:
         name="alerts_before_hazards",
         title="Alerts before hazards",
         note="Runs with a hazard in which an alert came first, with 95 % Wilson intervals. "
-        "A run with several alerts is in several lines; `any` and `none` cover all alerts.",
+        "A run with several alerts is in several lines. `any`: at least one alert; `none`: no alert.",
         heads=("method", "hazard", "alert", "came before it"),
         lines=tuple(lines),
     )

@@ -80,8 +80,8 @@ def propagation(frame: pd.DataFrame) -> dict[str, Spread]:
 def reaction(frame: pd.DataFrame, ends: Mapping[str, float], driver_s: float) -> Reaction:
     """The Kaplan-Meier estimate (statsmodels) over the runs with an alert before any hazard.
 
-    `ends` is the end of a run of each scenario, in simulated seconds. Crashed and timed-out runs are left
-    out, because their ends are unknown.
+    `ends` maps each scenario to the end of its runs, in simulated seconds. Crashed and timed-out runs are
+    left out, because their ends are unknown.
     """
     from statsmodels.duration.survfunc import SurvfuncRight  # type: ignore[import-untyped]
 
@@ -89,7 +89,7 @@ def reaction(frame: pd.DataFrame, ends: Mapping[str, float], driver_s: float) ->
     first = alerted[~alerted["is_hazard"] | _warned(alerted)]
     status = first["is_hazard"].astype(int)
     times = first["t_hazard"].fillna(first["scenario"].map(ends)) - first["t_alert"]
-    # a hazard exactly at the driver's reaction time is not later, despite rounding errors
+    # rounded, so that a hazard exactly at the driver's reaction time is not later
     late = times.round(6) > driver_s
     events = int(status.sum())
     found = {
@@ -138,8 +138,8 @@ def _median_interval(curve: Any) -> tuple[float, float]:
 
 
 def alerts_before(frame: pd.DataFrame, alerts: Alerts) -> dict[tuple[str, str], Share]:
-    """By (hazard, alert), the share of the runs with this hazard in which the alert came first. The names
-    `any` and `none` mean any alert and no alert.
+    """Return, by (hazard, alert), the share of the runs with this hazard in which the alert came first. The
+    names `any` and `none` mean at least one alert and no alert.
 
     `alerts` has, by experiment id, the name and first time (s) of each alert of a run with a hazard.
     """

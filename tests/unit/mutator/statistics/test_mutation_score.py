@@ -91,7 +91,7 @@ def test_harness_errors_are_excluded_from_all_shares(faults: dict[str, Fault]) -
     assert (total["number"], total["not activated"]) == (2, 0)
     assert total["crash or timeout"] == share(1, 2)
     assert total["hazard"] == share(0, 2)
-    assert "2 of 4 mutants have no result" in sheet.note
+    assert "Without a result, and therefore not counted: 2 of 4." in sheet.note
 
 
 def test_the_note_warns_of_several_draws(faults: dict[str, Fault]) -> None:
