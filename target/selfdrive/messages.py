@@ -85,8 +85,8 @@ class RadarData:
 class CameraView(NamedTuple):
     """What the camera sees, as geometry in the car's frame (m, left positive).
 
-    `picture` is the detector's input, 8 bit grey, rows x columns; None if the run has no pictures. Detectors
-    of pictures use no other field.
+    `picture` is 8 bit grey, rows x columns; None if the run has no pictures. Lane detectors that read it
+    use no other field.
     """
 
     left_lane_y: float  # at the car
@@ -112,7 +112,7 @@ class PathData:
 
 @dataclass(slots=True)
 class LeadVision:
-    """The lead vehicle as the camera sees it; `d_rel` in m from the front bumper, `std` in m."""
+    """The lead vehicle as the camera sees it; `d_rel` (m from the front bumper) and its `std` (m)."""
 
     d_rel: float
     prob: float
@@ -199,7 +199,7 @@ class Plan:
 
 @dataclass(slots=True)
 class ControlsState:
-    """The controller's state in one cycle, for other parts and the log."""
+    """The controller's state in one cycle."""
 
     t: float = 0.0
     state: str = "disabled"  # disabled, pre_enabled, enabled, soft_disabling

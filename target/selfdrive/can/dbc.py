@@ -1,7 +1,7 @@
 """Reads a DBC file into bit layouts.
 
-A message is one big-endian integer of its payload, so a signal is a shift and a mask; this works only for
-Motorola signals. Reading takes 1 ms; importing cantools, the tests' reference, takes 100 ms.
+A payload is read as one big-endian integer, so a signal is a shift and a mask; only Motorola signals work.
+Reading takes 1 ms; importing cantools, which tests use, takes 100 ms.
 """
 
 import re
@@ -35,7 +35,7 @@ class Field(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Message:
-    """One frame's layout. `has_checksum` implies the checksum is the low half of the last byte."""
+    """One frame's layout. A checksum is the low half of the last byte."""
 
     name: str
     address: int
@@ -47,7 +47,7 @@ class Message:
 
 @cache
 def load(path: Path) -> Mapping[str, Message]:
-    """Return all messages of a DBC file by name. Cached per process; the result is immutable.
+    """Return all messages of a DBC file by name.
 
     Raises ValueError, with the line, for an unsupported message or signal.
     """

@@ -10,19 +10,16 @@ _HALF_BYTE_SUMS = bytes((value >> 4) + (value & 0xF) for value in range(256))
 
 
 def half_byte_sum(data: bytes) -> int:
-    """Sum of the high and low four bits of all bytes."""
     return sum(data.translate(_HALF_BYTE_SUMS))
 
 
 def checksum_base(address: int) -> int:
-    """The address's part of the checksum: the half bytes of address, payload and checksum add up to 8 modulo
-    16."""
+    """The address's part of the checksum: all half bytes of a frame add up to 8 modulo 16."""
     return 8 - half_byte_sum(address.to_bytes(4, "big"))
 
 
 def encode(fields: Sequence[Field], values: Sequence[float]) -> int:
-    """Return the payload as one big-endian integer. Values are rounded to raw values and clipped to each
-    field's range; NaN becomes raw 0."""
+    """Return the payload as one big-endian integer. Values are clipped to their fields; NaN is raw 0."""
     word = 0
     for (_, shift, mask, sign_bit, factor, offset), value in zip(fields, values, strict=True):
         scaled = (value - offset) / factor
@@ -53,7 +50,7 @@ class Packer:
         self._frames: dict[int, CanFrame] = {}  # by counter, for the current word; values often stay the same
 
     def pack(self, values: tuple[float, ...], counter: int = 0) -> CanFrame:
-        """Return the frame for physical `values`; `counter` counts the frames sent of this message."""
+        """Return the frame for physical `values`; `counter` is the number of its earlier frames."""
         if values != self._values:
             word = encode(self._fields, values)
             self._values = values

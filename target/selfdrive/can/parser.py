@@ -20,8 +20,6 @@ class Expected(NamedTuple):
 
 
 class _State:
-    """A message's layout, newest values and reception state."""
-
     __slots__ = (
         "bad_counters",
         "body",
@@ -55,7 +53,7 @@ class _State:
         self.bad_counters = 0
 
     def accepts(self, data: bytes, word: int) -> bool:
-        """Check size, checksum and counter. Wrong counters are counted."""
+        """Check size, checksum and counter."""
         if len(data) != self.size or (half_byte_sum(data) - self.checksum_base) & self.checksum_mask:
             return False
         counter = word >> self.counter_shift & self.counter_mask

@@ -31,6 +31,6 @@ class CarParams:
     gas_max: tuple[tuple[float, ...], tuple[float, ...]]
     brake_max: tuple[tuple[float, ...], tuple[float, ...]]
     acceleration_per_output: float  # m/s^2 for an output of 1; divides the feedforward
-    radar_offset: float  # m from the radar to the bumper reference
+    radar_offset: float  # m from the camera to the radar, which is at the front bumper
     steer_limit_alert: bool
     start_acceleration: float = 0.5  # m/s^2, target while the brake is released to start moving

@@ -1,7 +1,7 @@
 """Array arithmetic in a fixed order, so that results do not depend on the processor's vector width.
 
-Matrix products and numpy's elementary functions do. C library functions can differ in the last digit on a
-processor without fused multiply-add.
+numpy's own matrix products and elementary functions do depend on it. Functions of `math` can still differ in
+the last digit on a processor without fused multiply-add.
 """
 
 from collections.abc import Callable
@@ -22,12 +22,12 @@ def dot(a: np.ndarray, b: np.ndarray) -> float:
 
 
 def length(vectors: np.ndarray) -> np.ndarray:
-    """The length of each vector along the last axis, which keeps one element."""
+    """The length of each vector along the last axis, which is kept with size 1."""
     return np.sqrt((vectors * vectors).sum(axis=-1, keepdims=True))
 
 
 def each(function: Callable[[float], float], values: np.ndarray) -> np.ndarray:
-    """Apply a function of `math` to each value (slow); returns float64 of the same shape."""
+    """Apply a function of `math` to each value (slow); return float64 of the same shape."""
     found = np.fromiter(map(function, values.ravel().tolist()), float, values.size)
     return found.reshape(values.shape)
 

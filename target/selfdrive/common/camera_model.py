@@ -1,7 +1,7 @@
 """The camera's geometry: a pinhole over a flat road.
 
 Car frame: x forward from the camera, y left, in m on the road. Picture: column u right, row v down, in
-pixels. The camera is pitched down, without roll and lens distortion.
+pixels. The camera is pitched down and has no roll or lens distortion.
 """
 
 from dataclasses import dataclass
@@ -76,8 +76,7 @@ class CameraModel:
     def from_view(
         cls, *, width: int, rows: int, horizon: float, focal: float, height: float
     ) -> "CameraModel":
-        """The camera with square pixels and its principal point in the picture's centre, for a horizon in
-        that row."""
+        """The camera with square pixels and its principal point in the picture's centre."""
         pitch = atan((0.5 * (rows - 1) - horizon) / focal)
         middle = 0.5 * (width - 1), 0.5 * (rows - 1)
         return cls(

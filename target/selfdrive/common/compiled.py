@@ -1,8 +1,8 @@
 """Optional compiled C libraries that replace Python calculations: same numbers, but faster.
 
 A C file lists the Python files that it replaces: `Stands for: hog.py, mark_edges.py.` The library's name
-contains a digest of all of these, so an edited file has no library and runs in Python.
-`selfdrive.sim.compile_helpers` builds the libraries.
+contains a digest of all of these. After an edit of one of them, Python is used until
+`selfdrive.sim.compile_helpers` rebuilds the library.
 """
 
 import ctypes
@@ -21,8 +21,6 @@ _folder: Path | None = None
 
 
 class Library(NamedTuple):
-    """A loaded library and the digest of its bytes."""
-
     code: ctypes.CDLL
     digest: bytes
 

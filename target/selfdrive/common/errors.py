@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 class ConfigError(Exception):
-    """A wrong input file. The text reads `file:line: got, expected, remedy`."""
+    """Invalid input. The message reads `file:line: GOT, expected EXPECTED; REMEDY`."""
 
     def __init__(
         self, got: str, *, where: str = "", line: int | None = None, expected: str, remedy: str

@@ -76,7 +76,7 @@ class Controlsd:
     def _make_plan(
         self, t: float, car: CarState, radar_state: RadarState | None, model: ModelData | None
     ) -> Plan:
-        """Plans are made in every state, so that a lead is known before the driver engages."""
+        """Plan in every state, so that a lead is known before the driver engages."""
         if self._planner.take_model(car.v_ego, model):
             self._lateral.plan(car, self._planner.path.lanes, self._angle_offset.value)
         state, absent = self._longitudinal.state, self._awareness.absent

@@ -60,8 +60,8 @@ class Planner:
     ) -> Plan:
         """Return the plan for this cycle at time `t` (s).
 
-        `long_state` is the state of the longitudinal control, `v_cruise` the set speed in km/h; `slow_down`
-        requests a gentle deceleration because the driver is absent.
+        `v_cruise` is the set speed in km/h; `slow_down` requests a gentle deceleration because the driver is
+        absent.
         """
         if radar is not None and radar is not self._radar:
             self._radar = radar
@@ -109,7 +109,7 @@ class Planner:
         self._v_cruise = max(v, 0.0)
 
     def _follow_car(self, car: CarState, long_state: str) -> None:
-        """Start the plan at the car's state, because the loop is not closed."""
+        """Start the plan at the car's state, because the control loop is open."""
         if long_state == STARTING:
             v, a = MIN_CAN_SPEED, self._params.start_acceleration
         else:
@@ -124,7 +124,7 @@ class Planner:
                 self._source, self._v_goal, self._a_goal = name, mpc.v_mpc, mpc.a_mpc
 
     def _interpolate(self, t: float) -> None:
-        """Set the plan's speed and acceleration one cycle from now. A plan that is not renewed ends."""
+        """Set speed and acceleration planned for the next cycle. Past the plan's end, they stay constant."""
         dt = min(t - self._planned_at, DT_PLAN + DT_CTRL) + DT_CTRL
         self._a_now = self._a_start + dt / DT_PLAN * (self._a_goal - self._a_start)
         self._v_now = self._v_start + dt * (self._a_now + self._a_start) / 2.0

@@ -32,7 +32,6 @@ class Radard:
         self._times: deque[float] = deque([0.0] * SPEED_HISTORY, maxlen=SPEED_HISTORY)
 
     def update(self, radar: RadarData, model: ModelData | None, controls: ControlsState) -> RadarState:
-        """Process one radar cycle with the newest model and controls state."""
         now = self._cycle * DT_MDL
         self._speeds.append(controls.v_ego)
         self._times.append(now)

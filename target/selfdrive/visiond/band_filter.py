@@ -33,12 +33,12 @@ Crests = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 def crests(road: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers (row-major, without the edge columns) and weights of the crests of bright bands."""
+    """Return positions (row-major, without the edge columns) and weights of the crests of bright bands."""
     road = cv2.morphologyEx(road, cv2.MORPH_OPEN, SPECK)
     side, single, double = (_mean(road, columns) for columns in (SIDE, SINGLE[0], DOUBLE[0]))
     single = _inner(single)
     sides = _sides(side, SINGLE[1])
-    # Most results overwrite one that is no longer needed, because allocating memory is as slow as the sums.
+    # Results overwrite old arrays, because allocating memory is as slow as the sums.
     contrast = np.maximum(*sides)
     np.subtract(single, contrast, out=contrast)
     other = np.maximum(*_sides(side, DOUBLE[1]))

@@ -1,8 +1,7 @@
-"""The lane detector as the paper's authors coded it, which is less selective than their text.
+"""The lane detector as the paper's authors coded it, which is less selective than the one in their text.
 
 Each window with a mark is used independently. Edges are clustered by linkage, and the two clusters next to
-the picture's middle are the lane's lines, whatever their shape. The net is ours, because theirs is not
-published.
+the picture's middle are the lane's lines, whatever their shape. Their net is unpublished; this one is ours.
 """
 
 from collections.abc import Sequence
@@ -42,8 +41,8 @@ MISSING = 0  # column of a line without a cluster
 class CodedDetector:
     """Examines pictures of 640 x 480 pixels and remembers where it last saw the lines.
 
-    Its lines are always certain and parallel to the car, and so is its path. `calculated_by` identifies the
-    compiled code in use, if any. Raises ConfigError for a camera with pictures of another size.
+    Its lines and path have probability 1 and are parallel to the car. `calculated_by` identifies the compiled
+    code in use, if any. Raises ConfigError for a camera with pictures of another size.
     """
 
     calculated_by = ""
@@ -54,7 +53,7 @@ class CodedDetector:
                 f"pictures of {model.width} x {model.rows}",
                 where="the camera's calibration",
                 expected=f"{WIDTH} x {ROWS} for the detector as coded",
-                remedy="take another detector",
+                remedy="choose another --detector",
             )
         self._hog = Hog(*SIZE)
         self._net, self._threshold = LaneNet.load(), threshold
@@ -147,5 +146,5 @@ def _crossing(pixels: np.ndarray, counts: np.ndarray) -> float:
 
 
 def metres(column: float) -> float:
-    """Lateral position (m, left positive) of the road in this column of the row where lines are read."""
+    """Lateral position (m, left positive) of the road in this column of row ROW."""
     return (MIDDLE - column) * METRES_PER_PIXEL

@@ -1,8 +1,7 @@
 """Finds the threshold of the detector as coded: `python -m selfdrive.visiond.coded_threshold`.
 
-Uses only clean pictures. Of the thresholds with which at most ALLOWED of the windows inside the lane are
-classified as marks, those with the fewest pictures that have a line more than OFF away qualify. The middle
-one is used.
+Considers thresholds that mistake at most ALLOWED of the windows inside the lane for marks. Of those that
+misplace a line by more than OFF in the fewest pictures, the middle one is printed. All pictures are clean.
 """
 
 from collections.abc import Sequence

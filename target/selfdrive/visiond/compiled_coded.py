@@ -31,8 +31,6 @@ _ROOMS = {  # shape and type of C's outputs, in order
 
 
 class _Coded(ctypes.Structure):
-    """`Coded` of the C file."""
-
     _fields_ = (*((name, ctypes.c_void_p) for name in _ROOMS), ("lines", ctypes.c_double * 2))
 
 
@@ -44,7 +42,7 @@ def build_coded_detector(model: CameraModel) -> CodedDetector:
 
 
 class CompiledCodedDetector(CodedDetector):
-    """CodedDetector with `lines`, compiled `coded_lines.c`, and `windows`, compiled `mark_windows.c`."""
+    """CodedDetector that calls the compiled `coded_lines.c` (`lines`) and `mark_windows.c` (`windows`)."""
 
     def __init__(self, model: CameraModel, lines: compiled.Library, windows: compiled.Library) -> None:
         super().__init__(model)

@@ -24,14 +24,10 @@ NONE = 2**31 - 1
 
 
 class _Points(ctypes.Structure):
-    """`Points` of the C file."""
-
     _fields_ = [(name, ctypes.c_void_p) for name in ("row", "column", "scale", "rising")]
 
 
 class _Paper(ctypes.Structure):
-    """`Paper` of the C file."""
-
     _fields_ = (
         *((name, ctypes.c_int64) for name in ("rows", "width", "first_row", "first_column")),
         *((name, ctypes.c_double) for name in ("cx", "horizon", "cos_pitch", "tan_pitch")),
@@ -57,7 +53,7 @@ def build_paper_detector(model: CameraModel) -> PaperDetector:
 
 
 class CompiledPaperDetector(PaperDetector):
-    """PaperDetector with `lines`, compiled `mark_lines.c`, and `windows`, compiled `mark_windows.c`."""
+    """PaperDetector that calls the compiled `mark_lines.c` (`lines`) and `mark_windows.c` (`windows`)."""
 
     def __init__(self, model: CameraModel, lines: compiled.Library, windows: compiled.Library) -> None:
         super().__init__(model)

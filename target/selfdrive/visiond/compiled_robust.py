@@ -36,8 +36,6 @@ def build_robust_detector(model: CameraModel) -> RobustDetector:
 
 
 class _Bands(ctypes.Structure):
-    """`Bands` of the C file."""
-
     _fields_ = (
         ("road", ctypes.c_void_p),
         *((name, ctypes.c_int64) for name in ("rows", "width")),
@@ -48,7 +46,7 @@ class _Bands(ctypes.Structure):
 
 
 class CompiledCrests:
-    """`crests` for maps of that shape, with `library`, compiled `band_filter.c`."""
+    """`crests` for maps of one shape, in the compiled `band_filter.c`."""
 
     def __init__(self, library: compiled.Library, shape: tuple[int, int]) -> None:
         self._crests = library.code.crests
@@ -82,7 +80,7 @@ class CompiledCrests:
 
 @cache
 def maps_alike(library: compiled.Library, model: CameraModel) -> bool:
-    """Whether maps have OpenCV's bits; other versions can interpolate differently."""
+    """Whether compiled maps equal this OpenCV's; versions can interpolate differently."""
     shape = model.rows, model.width
     noise = (
         (np.arange(model.rows * model.width, dtype=np.uint32) * 40503 >> 7).astype(np.uint8).reshape(shape)
@@ -92,7 +90,7 @@ def maps_alike(library: compiled.Library, model: CameraModel) -> bool:
 
 @cache
 def finds_alike(library: compiled.Library) -> bool:
-    """Whether crests have the bits of OpenCV's means; other versions can add in a different order."""
+    """Whether compiled crests equal this OpenCV's; versions can add in a different order."""
     number = np.arange(48 * 260)
     road = (60 + number * 40503 % 65521 % 61 + 12 * (number % 260 % 37 < 3)).astype(np.uint8).reshape(48, 260)
     found, wanted = CompiledCrests(library, road.shape)(road), crests(road)
@@ -100,8 +98,6 @@ def finds_alike(library: compiled.Library) -> bool:
 
 
 class _Map(ctypes.Structure):
-    """`Map` of voting.c."""
-
     _fields_ = (
         *((name, ctypes.c_void_p) for name in ("y", "drop", "scale", "share")),
         *((name, ctypes.c_int64) for name in ("rows", "columns", "edge")),
@@ -111,7 +107,7 @@ class _Map(ctypes.Structure):
 
 
 class CompiledVote:
-    """`vote` for maps of `view`, with `library`, compiled `voting.c`."""
+    """`vote` for maps of `view`, in the compiled `voting.c`."""
 
     def __init__(self, library: compiled.Library, view: RoadView) -> None:
         pointer, number = ctypes.c_void_p, ctypes.c_long
@@ -147,7 +143,7 @@ class CompiledVote:
 
 @cache
 def votes_alike(library: compiled.Library, model: CameraModel) -> bool:
-    """Whether votes have the bits of OpenCV's filters; other versions can add in a different order."""
+    """Whether compiled votes equal those with this OpenCV; versions can add in a different order."""
     view = RoadView(model)
     number = np.arange(400)
     road = (np.arange(len(view.drop) * len(view.y)) % 251).astype(np.uint8).reshape(len(view.drop), -1)

@@ -14,14 +14,10 @@ MORE = 4  # pixels past the end of a picture that C can read
 
 
 class _Level(ctypes.Structure):
-    """`Level` of the C file."""
-
     _fields_ = (("rows", ctypes.c_int64), ("first", ctypes.c_int64), ("places", ctypes.c_void_p))
 
 
 class _View(ctypes.Structure):
-    """`View` of the C file."""
-
     _fields_ = (
         *((name, ctypes.c_int64) for name in ("rows", "width", "columns")),
         ("levels", _Level * LEVELS),
@@ -31,7 +27,7 @@ class _View(ctypes.Structure):
 
 
 class CompiledRoadView(RoadView):
-    """RoadView with `library`, compiled `road_view.c`."""
+    """RoadView that calls the compiled `road_view.c`."""
 
     def __init__(self, model: CameraModel, library: compiled.Library) -> None:
         super().__init__(model)
@@ -63,7 +59,7 @@ class CompiledRoadView(RoadView):
 
 
 def _places(columns: np.ndarray, parts: np.ndarray, width: int) -> np.ndarray:
-    """Position of each map point in its row, as in the C file; points outside are at the ends."""
+    """The C file's positions of each map point in its row; points outside are at the ends."""
     place = (columns[:, :, 0].astype(np.int32) << 5) + parts
     place = np.clip(place, 0, (width - 1) << 5)
     column = np.minimum(place >> 5, width - 2)

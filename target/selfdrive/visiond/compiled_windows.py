@@ -11,13 +11,11 @@ from selfdrive.visiond.hog import BINS, BLOCK_FEATURES, CELL, FEATURES
 from selfdrive.visiond.lane_net import FEATURE_STEPS, HIDDEN, WEIGHT_STEPS, LaneNet
 
 C_SOURCE = Path(__file__).with_name("mark_windows.c")
-FINEST = 2**13  # most weight steps per 1 in the first of two scores
+FINEST = 2**13  # largest number of weight steps per 1 in the coarse score
 PADDED = 1776  # number of a window's features, padded to whole vectors
 
 
 class _Net(ctypes.Structure):
-    """`Net` of the C file."""
-
     _fields_ = (
         ("rows", ctypes.c_int64),
         ("width", ctypes.c_int64),
@@ -29,7 +27,7 @@ class _Net(ctypes.Structure):
 
 
 class MarkWindows:
-    """Examines windows of pictures of one size. `library` is compiled `mark_windows.c`."""
+    """Examines windows of pictures of one size with the compiled `mark_windows.c`."""
 
     def __init__(self, size: tuple[int, int], threshold: float, library: compiled.Library) -> None:
         net, (rows, width) = LaneNet.load(), size

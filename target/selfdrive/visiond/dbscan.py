@@ -17,8 +17,8 @@ def dbscan(points: np.ndarray, shape: tuple[int, int], eps: int, min_samples: in
     """Return the cluster (0, 1, ...) of each pixel, or NOISE for outliers.
 
     `points` are row-major numbers of pixels in a picture of that shape, ascending. A core pixel has at least
-    `min_samples` of them, itself included, within `eps` pixels. The numbering of clusters, and the choice for
-    pixels at the edge of several, are scikit-learn's.
+    `min_samples` of them, itself included, within `eps` pixels. Clusters are numbered, and pixels between
+    clusters assigned, as in scikit-learn.
     """
     mask = _marked(points, shape)
     square = np.ones((2 * eps + 1, 2 * eps + 1), np.uint8)
@@ -49,7 +49,7 @@ def _marked(points: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
 
 
 def _order(labels: np.ndarray, count: int) -> np.ndarray:
-    """Rank `count` components by the first of the core pixels with these labels; uint16."""
+    """Rank `count` components (uint16) by their first core pixel; `labels` are those of the core pixels."""
     first = np.empty(count, np.intp)
     first[labels[::-1]] = np.arange(labels.size)[::-1]  # the last assignment wins
     order = np.empty(count, np.uint16)

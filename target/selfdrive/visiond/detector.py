@@ -31,7 +31,7 @@ class LaneDetector(Protocol):
     """Finds the lane's lines in the camera's view, at 20 Hz."""
 
     def detect(self, view: CameraView) -> LaneLines:
-        """Return the lines in this view. A detector may remember only earlier views of the same run."""
+        """Return the lines in this view. They must not depend on other runs."""
         ...
 
 
@@ -62,10 +62,7 @@ def _mirrored(line: RoadLine) -> RoadLine:
 
 
 def path_between(left: RoadLine, right: RoadLine, width: float = LANE_WIDTH) -> RoadLine:
-    """The lane centre: between two lines, or half a `width` (m) from a single one.
-
-    If none is seen, the path goes straight ahead.
-    """
+    """The lane centre: between two lines, or half a `width` (m) from a single one, or straight ahead."""
     seen = [line for line in (left, right) if line.prob > 0.0]
     if len(seen) == 2:
         return RoadLine(

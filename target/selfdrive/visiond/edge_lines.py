@@ -14,7 +14,7 @@ MIN_PIXELS = 24  # in a cluster, or a line, that is used
 MIN_SPREAD = 3.0  # standard deviation of its rows
 MAX_SLOPE = 0.15  # lines that diverge more from the car's heading do not bound its lane
 BESIDE = 8.0  # m ahead, where the nearest line is determined
-CROWD = 0.8  # m; of lines this close, the one with more edges is used
+CROWD = 0.8  # m; of lines this close to each other, the one with more edges is used
 TRIES = 8  # clusters examined on each side, from the nearest
 REACHES = 0.3, 0.2  # m; distance of edges that belong to a line, in each round of fitting
 LEAST_SHARE = 0.12  # smallest share of a mark's edges that lead into the paint, and out of it
@@ -25,7 +25,7 @@ SURE_SPREAD = 0.25  # m: root mean square distance of a line's edges at which it
 
 
 class Points(NamedTuple):
-    """Edge pixels: row and column in the picture, whether the picture gets brighter there, m per pixel."""
+    """Edge pixels: row and column in the picture, whether it gets brighter to the right, m per pixel."""
 
     row: np.ndarray
     column: np.ndarray
@@ -53,7 +53,7 @@ class EdgeLines:
     ) -> tuple[RoadLine | None, RoadLine | None]:
         """The lines next to the car, left and right, among the edges at the pixels `at` (row-major numbers).
 
-        For each of them, `rising` is whether the picture gets brighter there, `labels` is the cluster.
+        `rising` says for each edge whether the picture gets brighter to the right; `labels` are its clusters.
         """
         clustered = labels >= 0
         if not clustered.any():
@@ -96,10 +96,7 @@ class EdgeLines:
         return best
 
     def _line(self, a: float, b: float, points: Points) -> tuple[RoadLine | None, int]:
-        """The line through all edges near column = a * row + b, and their number.
-
-        None if these are not the edges of a mark.
-        """
+        """The line through all edges near column = a * row + b, and their number; (None, 0) if not a mark."""
         own = points
         for reach in REACHES:
             away = np.abs(_away(own, a, b))

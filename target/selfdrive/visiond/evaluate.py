@@ -70,7 +70,6 @@ class Frame:
 
     @property
     def grey(self) -> np.ndarray:
-        """The detector's input (rows x columns, uint8)."""
         return cv2.cvtColor(self.colour, cv2.COLOR_BGR2GRAY)
 
 
@@ -130,7 +129,6 @@ def evaluate(detector: str, frames: list[Frame]) -> list[Finding]:
 
 
 def look(detector: LaneDetector, frame: Frame, picture: np.ndarray) -> Finding:
-    """The detector's result for a picture (rows x columns, uint8) of the frame's scene."""
     view = CameraView(left_lane_y=0.0, right_lane_y=0.0, path_y=0.0, bend=(), lead_d_rel=0.0, picture=picture)
     lines = detector.detect(view)
     errors = []
@@ -145,7 +143,6 @@ def build(name: str, model: CameraModel) -> PaperDetector | RobustDetector:
 
 
 def report(detector: str, findings: list[Finding]) -> str:
-    """The table of errors, and the share of frames in which both lines were found."""
     rows = [f"{detector}: errors in row {ROW} (px), limit {TOLERANCE:.4f} of the spacing"]
     for finding in findings:
         frame = finding.frame
@@ -217,7 +214,7 @@ def _read_truth(path: Path) -> dict:
             return lines
         got = "no lines"
     raise ConfigError(
-        got, where=str(path), expected='JSON with {"lines": {KEY: ...}}', remedy="name a truth file"
+        got, where=str(path), expected='JSON with {"lines": {KEY: ...}}', remedy="give a truth file"
     )
 
 
@@ -244,7 +241,7 @@ def _centres(key: str, entry: dict, truth: Path) -> tuple[float, float]:
 def _image(key: str, images: list[Path], folder: Path) -> Path:
     """The key's file: `KEY.jpg`, or without the key's first word. Raises ConfigError if it is missing.
 
-    Of several files, the one in a folder named by the key's first word is used.
+    Of several files, the one in a folder named after the key's first word is used.
     """
     camera, _, name = key.partition("_")
     named = [path for path in images if path.stem == key] or [path for path in images if path.stem == name]
@@ -255,8 +252,8 @@ def _image(key: str, images: list[Path], folder: Path) -> Path:
     raise ConfigError(
         f"{'more than one' if named else 'no'} frame {key!r}",
         where=str(folder),
-        expected=f"{key}.jpg or {name}.jpg (or .png, .jpeg) in the folder or below, of several in {camera}/",
-        remedy="leave one such file there, or take it out of the truth file",
+        expected=f"one {key}.jpg or {name}.jpg (or .png, .jpeg) in the folder or below it, or in {camera}/",
+        remedy="leave one such file there, or remove the key from the truth file",
     )
 
 
@@ -274,8 +271,8 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     )
     parser.add_argument("frames", type=Path, metavar="FRAMES", help="folder of frames")
     parser.add_argument("truth", type=Path, metavar="TRUTH", help="JSON file with the true lines")
-    parser.add_argument("--detector", choices=(PAPER, ROBUST, BOTH), default=BOTH, help="who looks")
-    parser.add_argument("--overlays", type=Path, metavar="DIR", help="where to draw what was found")
+    parser.add_argument("--detector", choices=(PAPER, ROBUST, BOTH), default=BOTH, help="what to measure")
+    parser.add_argument("--overlays", type=Path, metavar="DIR", help="write frames with found lines here")
     return parser.parse_args(arguments)
 
 

@@ -34,7 +34,7 @@ class _Tables:
 
 
 def _tables() -> _Tables:
-    """Calculated for a quarter of the gradients and mirrored."""
+    """Calculate the tables for a quarter of the gradients and mirror them."""
     step = np.arange(_STEPS // 2 + 1)
     dx, dy = step[np.newaxis, :], step[:, np.newaxis]
     angle = np.array([[atan2(y, x) for x in range(_STEPS // 2 + 1)] for y in range(_STEPS // 2 + 1)])
@@ -50,8 +50,7 @@ def _tables() -> _Tables:
 class Hog:
     """Computes the blocks of pictures of one size, a multiple of a cell's.
 
-    Memory is reused, because allocating it takes as long as the calculation. `calculated_by` identifies the
-    implementation.
+    Memory is reused, because allocating it takes as long as the calculation.
     """
 
     calculated_by = ""

@@ -35,10 +35,10 @@ def tile_numbers(rows: int, width: int) -> np.ndarray:
 
 
 def edges(part: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Find steep edges in `part` (uint8, sides are multiples of a tile's), and which of them get brighter.
+    """Find steep edges in `part` (uint8, sides are multiples of a tile's).
 
     Steepness is relative to the root mean square of nearby tiles, so light and haze do not matter. Returns
-    row-major pixel numbers, and for each a bool: the picture is brighter on its right.
+    row-major pixel numbers, and whether the picture gets brighter to the right of each.
     """
     rows, width = part.shape
     gradient = cv2.Sobel(part, cv2.CV_32F, 1, 0, ksize=3)
@@ -51,5 +51,5 @@ def edges(part: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def limits(power: np.ndarray) -> np.ndarray:
-    """For each tile, the squared gradient above which edges are steep; `power` has the tiles' means."""
+    """Each tile's squared gradient above which edges are steep; `power` has the tiles' means."""
     return np.maximum(RATIO**2 * cv2.blur(power, (3, 3)), FLOOR**2)

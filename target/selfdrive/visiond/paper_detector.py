@@ -1,7 +1,7 @@
 """The paper's lane detector, which examines each picture independently.
 
-It finds windows with a lane mark (HOG and a net with one hidden layer of ten), Sobel edges inside them, and
-clusters of edges (DBSCAN); straight lines are fitted to the clusters next to the car's middle.
+It finds windows with a lane mark (HOG and a net with ten hidden nodes), Sobel edges inside them, and clusters
+of edges (DBSCAN); straight lines are fitted to the clusters next to the car's middle.
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
 """The part of the picture in which the paper's detector searches for lane marks, and its windows.
 
 It is the road from `NEAR` to `FAR` metres ahead and `SIDE` metres to each side (more further ahead, because
-the car may point off the road).
+the car can point off the road).
 """
 
 from math import ceil, floor

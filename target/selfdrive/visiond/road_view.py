@@ -40,7 +40,7 @@ class RoadView:
                 expected=f"at least {LEAST_ROWS}",
                 remedy="use larger pictures, or a camera that sees the road before the car",
             )
-        # Rows above this one are not used. At every level, a row begins here, so the levels stay the same.
+        # The first row used; a row of every level begins here.
         self._first = int(min(rows)) >> LEVELS << LEVELS
         self._levels = [_maps(model, of_level, self.y, level, self._first) for level, of_level in found]
         self.drop = np.array(rows, np.float32) - np.float32(model.horizon)
@@ -63,7 +63,7 @@ class RoadView:
 
 
 def _rows_of(model: CameraModel, level: int) -> list[float]:
-    """The picture's rows (full size) taken from this level, one per row of its picture."""
+    """The rows of the full picture that are taken from this level."""
     step = 2**level
     finest = BLEND * step / 2 if level else 0.0
     coarsest = BLEND * step if level < LEVELS - 1 else np.inf

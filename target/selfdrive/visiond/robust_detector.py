@@ -1,7 +1,7 @@
 """The geometric lane detector: bands as wide as marks, votes for two parallel lines, and a memory.
 
-Its last result determines where to look next, so rain, snow or dirt hardly matter. A missing line is placed
-relative to the other one; if both are missing, their positions are kept for a while.
+It searches near its last result, so rain, snow or dirt hardly matter. A missing line is placed relative to
+the other one; if both are missing, their positions are kept for a while.
 """
 
 from selfdrive.common.camera_model import CameraModel

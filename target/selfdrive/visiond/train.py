@@ -1,7 +1,7 @@
 """Trains the neural net of the paper's lane detector: `python -m selfdrive.visiond.train`.
 
-It uses only windows of rendered roads, drawn from the seed, and prints its accuracy on windows of different
-roads. It takes minutes, or seconds with `--small`. Needs scikit-learn.
+Training uses only rendered roads, drawn from the seed; the accuracy on different roads is printed. It takes
+minutes, or seconds with `--small`. Needs scikit-learn.
 """
 
 import argparse
@@ -56,8 +56,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     marked = net.score(features) > 0.0
     net.save(chosen.out)
     right, found, false = (np.mean(part) for part in (marked == labels, marked[labels], marked[~labels]))
-    print(f"{scenes} roads; of {len(labels)} windows of others {right:.1%} are told right")
-    print(f"with a mark: {found:.1%} found; without: {false:.1%} taken for one")
+    print(f"{scenes} roads; {right:.1%} of {len(labels)} windows of others are classified correctly")
+    print(f"with a mark: {found:.1%} found; without: {false:.1%} mistaken for marks")
     return 0
 
 

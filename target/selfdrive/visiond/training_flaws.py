@@ -14,7 +14,7 @@ NEAR_HORIZON = 4.0  # rows below it, where the road is assumed to end
 class Ground:
     """A verge that can begin directly at the lane, and darker or lighter bands along the road.
 
-    Bands are shadows of barriers, strips of newer asphalt, gutters. They are drawn once per scene.
+    Bands are shadows of barriers, strips of newer asphalt, gutters.
     """
 
     def __init__(self, model: CameraModel, lane_width: float, rng: np.random.Generator) -> None:

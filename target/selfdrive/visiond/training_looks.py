@@ -1,7 +1,4 @@
-"""Roads and cameras for training the lane detector, varied far more than the simulated road.
-
-The detector thus learns to recognise all kinds of lane marks. Tones are grey levels.
-"""
+"""Roads and cameras for training the lane detector, varied far more than the simulated road."""
 
 from dataclasses import replace
 

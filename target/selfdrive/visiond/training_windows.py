@@ -7,7 +7,7 @@ from selfdrive.visiond.hog import FEATURES, STRIDE, WINDOW, Hog, windows
 from selfdrive.visiond.road_region import RoadRegion
 from selfdrive.visiond.training_scenes import VIEWS, View, views
 
-EACH = 12  # most windows per picture with a mark, and without
+EACH = 12  # largest number of windows per picture with a mark, and without one
 LEAST_PAINT = 40.0  # pixels of paint in a mark; windows between NO_PAINT and this are not used
 LEAST_CONTRAST = 6.0  # grey levels between paint and surroundings; windows with less are not used
 NO_PAINT = 2.0  # pixels
@@ -44,7 +44,7 @@ def _drawn(weight: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 def _weights(view: View, region: RoadRegion) -> tuple[np.ndarray, np.ndarray]:
     """Sampling weight of each window (rows x columns) with a mark, and of each without.
 
-    Windows with a visible mark have equal weights; those without have more weight the more edges they have,
+    Windows with a visible mark have equal weights; the others have more weight the more edges they have,
     because only edges can mislead the detector.
     """
     picture = view.picture[region.part].astype(np.float32)

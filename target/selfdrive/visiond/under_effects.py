@@ -2,8 +2,7 @@
 
 `python -m selfdrive.visiond.under_effects FRAMES TRUTH` takes the same input as `selfdrive.visiond.evaluate`.
 Each frame is changed by each level of each effect, once per seed. The result is the number of pictures in
-which a detector misses a line; these are not independent, because a frame always shows the same road.
-`--strips` writes all levels of a frame side by side.
+which a detector misses a line; these counts are not independent, because a frame always shows the same road.
 """
 
 import argparse
@@ -64,7 +63,7 @@ def _without_a_past(detector: PaperDetector | RobustDetector, frame: Frame, pict
 def _pictures(
     frames: Sequence[Frame], kind: type[Effect], amount: float, seeds: int
 ) -> Iterator[tuple[Frame, np.ndarray]]:
-    """The frames changed by an effect, for each seed; only one if the effect is not random."""
+    """The frames changed by an effect, for each seed, or for one if the effect is not random."""
     before = None
     for seed in range(1, seeds + 1):
         made = {model: kind(amount, seed, model) for model in {frame.model for frame in frames}}
@@ -139,10 +138,10 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("truth", type=Path, metavar="TRUTH", help="JSON file with the true lines")
     names = [kind.__name__ for kind in LEVELS]
     parser.add_argument(
-        "--effect", action="append", choices=names, help="these effects alone; may be repeated"
+        "--effect", action="append", choices=names, help="only these effects; can be given several times"
     )
     parser.add_argument("--seeds", type=int, default=SEEDS, help="pictures of each frame and level")
-    parser.add_argument("--csv", type=Path, metavar="FILE", help="keep the counts")
+    parser.add_argument("--csv", type=Path, metavar="FILE", help="write the counts here")
     parser.add_argument("--strips", type=Path, metavar="DIR", help="write pictures of all levels instead")
     return parser.parse_args(arguments)
 

@@ -1,4 +1,4 @@
-"""Finds the two parallel lines that explain the points of possible marks: first votes, then a fit.
+"""Finds the two parallel lines that explain the points of possible marks, by votes and then a fit.
 
 Lines along the road meet in one point of the picture. The car's heading moves it sideways; an error of the
 camera's pitch moves it up or down. `drop` px below the known horizon, a line `y` m beside the camera appears
@@ -23,9 +23,9 @@ SCATTER = 0.005  # share of a line's rows with points by chance, on the cleanest
 AROUND = (
     np.array([[1] * 8 + [0] * 5 + [1] * 8], np.float32) / 16
 )  # bins of y in which a line has no votes itself
-BESIDE = 0.8  # m from a line, where points by chance are counted
+BESIDE = 0.8  # m from a line, up to which points are counted as chance
 ROUNDS = (0.30, 0.20, 0.15, 0.15)  # m from a line, where points are used in each round of the fit
-ALIKE = 10.0  # points with the same error, because neighbours are not independent
+ALIKE = 10.0  # neighbouring points count as one, because they are not independent
 FAINT = 0.02  # share of rows that makes a line probable if there are no other points; a dash is 0.05
 BLUR = 0.5, 0.05  # px and m by which a point can miss its mark
 
@@ -43,20 +43,15 @@ class Pose(NamedTuple):
 
     @property
     def middle(self) -> float:
-        """The lane's middle (m, left positive)."""
         return 0.5 * (self.y_left + self.y_right)
 
     @property
     def width(self) -> float:
-        """The lane's width (m)."""
         return self.y_left - self.y_right
 
 
 class Belief(NamedTuple):
-    """The expected pose, each value with its standard deviation.
-
-    By default the lane is 3.7 m wide and the car well inside it, heading nearly along the road.
-    """
+    """The expected pose, each value with its standard deviation."""
 
     middle: tuple[float, float] = (0.0, 0.8)  # m
     width: tuple[float, float] = (3.7, 0.42)  # m
@@ -151,7 +146,7 @@ class Fitted(NamedTuple):
 def settled(state: np.ndarray, voters: Voters, expected: np.ndarray, believed: np.ndarray) -> Fitted:
     """Move `state` (left, dip, y_left, y_right) by weighted Gauss-Newton steps.
 
-    Points have less weight the further away they are. `expected` (4, 4) times the state should be `believed`.
+    Points further from a line have less weight. `expected` (4, 4) times the state should be `believed`.
     """
     n = len(voters.left)
     terms = np.zeros((5, 2, n))  # derivatives of the error by each unknown, and the error
@@ -174,7 +169,7 @@ def settled(state: np.ndarray, voters: Voters, expected: np.ndarray, believed: n
 
 
 def fit(pose: Pose, voters: Voters, belief: Belief) -> Pose:
-    """Fit `pose` to the points around its lines; `belief` decides what the points leave open."""
+    """Fit `pose` to the points around its lines; `belief` determines what the points do not."""
     means, sigmas = np.array([belief.left, belief.dip, belief.middle, belief.width]).T
     expected = np.array([(1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 0.5, 0.5), (0, 0, 1, -1)]) / sigmas[:, None]
     state, metre, error, count = settled(np.array(pose[:4]), voters, expected, means / sigmas)

@@ -19,7 +19,7 @@ DISPLAY_EVERY = 10  # cycles
 
 
 class BrakeHysteresis:
-    """Prevents brake chatter: different on and off thresholds, small changes ignored."""
+    """Prevents brake chatter with different thresholds for on and off, and by ignoring small changes."""
 
     def __init__(self) -> None:
         self._braking = False
@@ -48,10 +48,7 @@ class CarController:
         self._can = CommandPacker()
 
     def update(self, control: CarControl, car: CarState, frame: int) -> list[CanFrame]:
-        """Return the frames of control cycle `frame`; `car` is the state that the demand is based on.
-
-        A NaN demand is sent as zero.
-        """
+        """Return the frames of control cycle `frame`. A NaN demand is sent as zero."""
         demand = control.actuators
         enabled = control.enabled
         gas = _finite(demand.gas) if enabled else 0.0

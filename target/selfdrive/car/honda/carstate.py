@@ -36,8 +36,8 @@ _BUTTON_NAMES = {
 class CarStateReader:
     """Reads the car bus.
 
-    As in the original, the speed estimate starts at 0 whatever the car's speed, so it overshoots by a tenth
-    in its first half second.
+    As in the original, the speed estimate starts at 0 whatever the car's speed, so it overshoots by 10 % in
+    the first half second.
     """
 
     def __init__(self) -> None:

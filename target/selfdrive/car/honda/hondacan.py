@@ -7,7 +7,7 @@ from selfdrive.messages import CanFrame
 
 
 class CommandPacker:
-    """Packs commands in counts; every message has its own counter."""
+    """Packs commands in counts."""
 
     def __init__(self) -> None:
         messages = load(CAR_DBC)

@@ -92,11 +92,7 @@ class CarInterface:
         return car
 
     def apply(self, control: CarControl, frame: int) -> list[CanFrame]:
-        """Limit and pack the demand of control cycle `frame` (0, 1, ...); return the frames to send.
-
-        Steering is sent every cycle, gas and brake every second cycle, the dashboard every tenth. If
-        `control.enabled` is False, all actuators are sent as zero.
-        """
+        """Limit and pack the demand of control cycle `frame` (0, 1, ...); return the frames to send."""
         return self._controller.update(control, self._car, frame)
 
     def _events(self, car: CarState, previous: CarState) -> list[Event]:

@@ -25,10 +25,9 @@ class RadarInterface:
         self._tracking = False
 
     def update(self, frames: Sequence[CanFrame], t: float) -> RadarData | None:
-        """Process the frames of this step at time `t` (s); return RadarData when a cycle is complete, else
-        None.
+        """Process the frames of the step at `t` (s); return RadarData when a cycle is complete, else None.
 
-        If the radar is silent, this always returns None: the receiver must check the age of the data.
+        A silent radar gives no error, so the receiver must check the age of the data.
         """
         parser = self._parser
         parser.update(frames, t)

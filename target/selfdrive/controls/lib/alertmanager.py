@@ -7,8 +7,8 @@ from selfdrive.controls.lib.alerts import ALERTS, Alert
 
 
 class AlertManager:
-    """An alert lasts for its duration after it was last raised. The alert with the highest priority is shown;
-    of several, the newest."""
+    """An alert lasts for its duration after it was last raised. The newest alert of the highest priority is
+    shown."""
 
     def __init__(self, table: Mapping[str, Alert] = ALERTS) -> None:
         self._table = table
@@ -28,7 +28,6 @@ class AlertManager:
         self._next_change = t
 
     def process(self, t: float) -> None:
-        """Drop expired alerts and select the one to show at time `t` (s)."""
         if t < self._next_change:
             return
         self._raised = {n: t0 for n, t0 in self._raised.items() if t0 + self._table[n].duration > t}

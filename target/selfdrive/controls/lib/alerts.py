@@ -21,7 +21,6 @@ class Alert(NamedTuple):
 
     @property
     def ends(self) -> tuple[float, float, float]:
-        """Seconds until sound, picture and text end, in this order."""
         return self.sound_s, self.visual_s, self.text_s
 
     @property
@@ -48,7 +47,7 @@ _SPECIAL = {
     ),
 }
 
-# Event name: the problem.
+# The problem that each event reports.
 _IMMEDIATE = {
     "can_error": "CAN messages are missing",
     "radar_error": "No data from the radar",

@@ -90,7 +90,6 @@ class CompiledSolver:
         return self._outputs[i]
 
     def buffer(self) -> tuple["Addresses", Callable[[], None]]:
-        """Return the addresses to set, and the function that solves with them."""
         addresses = Addresses(self._daqp, memoryview(self._weights))
         return addresses, partial(self._iterate, addresses.call)
 

@@ -1,4 +1,4 @@
-"""Cruising at the set speed: acceleration limits."""
+"""Acceleration limits for cruising at the set speed."""
 
 from math import sqrt
 
@@ -26,8 +26,8 @@ def is_following(v_ego: float, lead: LeadData) -> bool:
 def cruise_limits(v_ego: float, following: bool, a_lateral: float, slow_down: bool) -> Limits:
     """Return the limits at `v_ego` (m/s) with a lateral acceleration of `a_lateral` (m/s^2).
 
-    Turns leave less acceleration; `slow_down` forces a gentle deceleration. Jerk limits are numerically those
-    of the acceleration on a straight road.
+    Turns leave less acceleration; `slow_down` forces a gentle deceleration. The jerk limits have the same
+    numbers as the acceleration limits on a straight road.
     """
     a_min = interp(v_ego, BREAKPOINTS, A_MIN)
     a_max = interp(v_ego, BREAKPOINTS, A_MAX_FOLLOWING if following else A_MAX)

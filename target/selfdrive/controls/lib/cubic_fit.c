@@ -1,4 +1,4 @@
-/* The coefficients of cubic_fit.py, each the sum of products from the first point on.
+/* The coefficients of cubic_fit.py, each summed in the order of the points.
 
    Stands for: cubic_fit.py, ../../common/ordered.py.
 */

@@ -26,8 +26,7 @@ class CubicFit:
 
 @cache
 def weights(n: int) -> tuple[tuple[float, ...], ...]:
-    """Weights of each of `n` points in each coefficient. Calculated exactly, so that they are the same on
-    every machine."""
+    """Weights of `n` points in each coefficient; exact, so that they are the same on every machine."""
     normal = [[total(x ** (i + j) for x in range(n)) for j in POWERS] for i in POWERS]
     return tuple(
         tuple((((a * x + b) * x + c) * x + d) / divisor for x in range(n))
@@ -36,7 +35,7 @@ def weights(n: int) -> tuple[tuple[float, ...], ...]:
 
 
 def _inverse(matrix: list[list[int]]) -> list[tuple[list[int], int]]:
-    """Exact inverse of a positive definite matrix: its rows, and the divisor of each."""
+    """Exact inverse of a positive definite matrix: rows of integers, and the divisor of each row."""
     n = len(matrix)
     rows = [row + [int(i == j) for j in range(n)] for i, row in enumerate(matrix)]
     before = 1  # the last pivot, which divides all elements (E. H. Bareiss, Math. Comp. 22, 1968)

@@ -39,9 +39,9 @@ class LateralMpc:
     solutions).
 
     A non-finite solution (lanes hundreds of metres away, NaN in the input) gives NaN for both angles; the
-    next update restarts from the measured angle. The previous steering rates are kept, and `unsolved` counts
-    this, if the problem has no solution (a heading or wheel angle too far out of bounds for the steering
-    rate) or is badly conditioned (lanes more than about 20 m from the plan).
+    next update restarts from the measured angle. If the problem has no solution (a heading or wheel angle too
+    far out of bounds for the steering rate) or is badly conditioned (lanes more than about 20 m from the
+    plan), the previous steering rates are kept, and `unsolved` is incremented.
     """
 
     def __init__(self, params: CarParams) -> None:
@@ -74,8 +74,8 @@ class LateralMpc:
         """Plan for `lanes`; return `angle_desired` (rad at the steering wheel).
 
         Speed in m/s; measured steering-wheel angle and its learnt offset in rad; `curvature_factor` in 1/m is
-        the path curvature for a road-wheel angle of 1 rad. As in the original, call it with every model
-        message, engaged or not: the plan starts from its own last angle.
+        the path curvature for a road-wheel angle of 1 rad. Call this with every model message, engaged or
+        not, as the original does: each plan starts from the previous plan's angle.
         """
         ratio = self.params.steer_ratio
         driven = v_ego * self.params.steer_actuator_delay  # m until a command takes effect

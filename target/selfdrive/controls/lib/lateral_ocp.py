@@ -26,7 +26,7 @@ def _ode(z: ca.SX, rate: ca.SX, p: ca.SX) -> ca.SX:
 def _residuals(z: ca.SX, rate: ca.SX, p: ca.SX) -> tuple[ca.SX, ca.SX]:
     """Distance to the path, nearness of both lanes, heading and steering rate (not at the end).
 
-    The path is a mean of the lane's middle and the model's path, weighted by the lines' probability.
+    The path is the mean of the lane's middle and the model's path, weighted by the lines' probability.
     """
     x, y, heading, _ = ca.vertsplit(z)
     v, left_prob, right_prob, width = p[1], p[14], p[15], p[16]

@@ -33,23 +33,22 @@ class LongitudinalMpc:
     this update), `v_plan`, `a_plan`, `x_plan`, `x_lead_plan` (21 nodes, 0..10 s: every 0.2 s to 1 s, then
     every 0.6 s), and `resets` (the number of discarded solutions).
 
-    A solution is discarded if it is not finite or if, for a real lead, it goes 50 m through the lead or
-    backwards. Then `v_mpc` and `a_mpc` are the car's, and the next update restarts with a new lead.
+    A solution is discarded if it is not finite or if, for a real lead, it passes 50 m through the lead or
+    drives backwards. Then `v_mpc` and `a_mpc` are the car's, and the next update restarts with a new lead.
 
-    v >= 0 is required at all nodes except the first, where it may be slightly negative, as in the original at
+    v >= 0 is required at all nodes except the first, where it can be slightly negative, as in the original at
     the end of a stop. Jerk has no limit, so the problem is always feasible. If the solver still fails, the
-    previous jerk is kept (`unsolved` counts this), and the rules above judge the result.
+    previous jerk is kept, `unsolved` is incremented, and the result is checked as above.
     """
 
     def __init__(self, mpc_id: int, solver: Solver | None = None) -> None:
-        """`mpc_id` is 1 or 2, for the log. Instances may share a `solver`, which is stateless."""
+        """`mpc_id` is 1 or 2. Instances can share a `solver`, which is stateless."""
         self.mpc_id = mpc_id
         self.solver = solver or build_longitudinal()
         self._iteration = Iteration(self.solver)
         self.reset()
 
     def reset(self) -> None:
-        """Return to the initial state without rebuilding the solver."""
         self._iteration.restart()
         self._v_start = self._a_start = 0.0
         self._decay = LEAD_DECAY
@@ -96,7 +95,7 @@ class LongitudinalMpc:
         return x, v, a, decay
 
     def _simulate(self, x_lead: float, v_lead: float, a_lead: float, decay: float) -> None:
-        """Guess a first plan for a new lead: the host brakes evenly to the lead's speed over the gap."""
+        """Guess a first plan for a new lead: the host brakes evenly to the lead's speed within the gap."""
         x, v, a = 0.0, self.v_mpc, 0.0
         room = 2 * x_lead + 0.01
         if v > v_lead and room != 0.0:

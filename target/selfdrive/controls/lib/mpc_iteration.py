@@ -32,8 +32,8 @@ class Iteration:
     """Runs a solver on its own buffers and keeps the trajectory between iterations.
 
     The next iteration linearises at the trajectory `guess`; `solution` is the last one computed: the states
-    node by node, then the controls. Both are written in place. `unsolved` counts finite iterations without a
-    solution, which keep the controls.
+    node by node, then the controls. Both are overwritten in place. `unsolved` counts finite iterations
+    without a solution, which keep the controls.
     """
 
     def __init__(self, solver: Solver) -> None:

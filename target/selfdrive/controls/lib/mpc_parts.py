@@ -1,7 +1,7 @@
 """Generates a part of `mpc.c`. Run `python -m selfdrive.controls.lib.mpc_parts` after changing a problem.
 
-The generated part contains what CasADi derives from each optimal control problem, one statement for each
-operation, in order. Tests of `compiled_mpc` show whether `mpc.c` still gives the same bits with a new CasADi.
+The generated part contains what CasADi derives from each optimal control problem, one statement per
+operation, in order. Tests of `compiled_mpc` show whether `mpc.c` gives the same bits as a new CasADi.
 """
 
 from collections.abc import Iterator

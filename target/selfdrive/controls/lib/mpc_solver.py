@@ -1,8 +1,8 @@
 """One real-time iteration of nonlinear model-predictive control, built with CasADi.
 
 As in ACADO's generated code, which the original controller used: multiple shooting with RK4, Gauss-Newton
-Hessian, states eliminated (condensing), one quadratic program, full step. DAQP is set up anew in every call,
-so a solver is stateless.
+Hessian, states eliminated (condensing), one quadratic program, full step. DAQP is set up in every call, so a
+solver is stateless.
 """
 
 import math
@@ -148,7 +148,7 @@ def condense(ocp: Ocp, integrators: dict[int, ca.Function]) -> ca.Function:
     states = ca.vertcat(*z) + ca.vertcat(*change)
     derivative = ca.vertcat(*(ca.horzcat(e, ca.SX(nx, n - k)) for k, e in enumerate(sensitivity)))
     outputs = [ca.triu2symm(ca.horzcat(*columns[::-1])), ca.vertcat(*gradient[::-1]), states, derivative]
-    # no shared places for intermediate values: sharing saves memory but costs a tenth of the time
+    # Intermediate values do not share memory, because sharing costs a tenth of the time.
     return ca.Function("condense", [old, z0, p], outputs, {"live_variables": False})
 
 
@@ -165,7 +165,7 @@ def _solve_program(
     """The minimiser of the quadratic program and 1, or zeros and 0 if there is none.
 
     CasADi's plug-in does not report success inside a graph, so the optimality conditions are tested here. Its
-    input checks would raise on NaN; without them, NaN ends up as not solved.
+    input checks are off, because they would raise on NaN; here, NaN is reported as not solved.
     """
     low, high, x_low, x_high = bounds
     options = {"error_on_fail": False, "inputs_check": False}

@@ -17,7 +17,7 @@ MIN_LANE_PROB = 0.01
 class ModelFit:
     """Fits cubics to the three lines of a model message.
 
-    Two readers request the same message and fitting is slow, so the last result is cached.
+    radard and plannerd both fit each message, and fitting is slow, so the last result is cached.
     """
 
     def __init__(self) -> None:
@@ -52,7 +52,6 @@ class PathPlanner:
         return self.lanes.lane_width
 
     def update(self, v_ego: float, model: ModelData) -> None:
-        """Process a model message at the speed `v_ego` (m/s)."""
         left, right, path = self._fit.polys(model)
         left_prob = model.left_lane.prob
         width_seen = abs(left[3] - right[3])

@@ -57,7 +57,6 @@ class Track:
     def update(
         self, d_rel: float, y_rel: float, v_rel: float, d_path: float, v_ego: float, driver_steers: bool
     ) -> None:
-        """Add a measurement; `v_ego` is the car's speed at that time."""
         a_rel = clip((v_rel - self.v_rel) / DT_MDL, -A_REL_MAX, A_REL_MAX)
         self.a_rel += A_REL_FILTER * (a_rel - self.a_rel)
         # while the driver steers, the distance from the path says nothing about the object
@@ -79,7 +78,7 @@ class Track:
         self.oncoming = self.v_lead < ONCOMING_SPEED
 
     def fuse(self) -> None:
-        """Note that the camera sees the same object. An object seen often enough is not stationary."""
+        """Count a match with the camera. An object that is matched often enough is not stationary."""
         self.fusions += 1
         if self.fusions >= FUSIONS_FOR_MOVING:
             self.stationary = False
@@ -116,7 +115,7 @@ class Cluster:
         return self.d_rel - first.d_rel > SECOND_GAP or abs(self.v_rel - first.v_rel) > SECOND_SPEED
 
     def lead_data(self, radar_offset: float) -> LeadData:
-        """Return the message; its distance is from the bumper reference."""
+        """Return the message; its distance is from the front bumper."""
         mean, tracks = self._mean, self._tracks
         return LeadData(
             status=True,

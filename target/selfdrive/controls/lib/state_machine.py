@@ -40,7 +40,7 @@ class StateMachine:
         return self.state == ENABLED or self.state == SOFT_DISABLING
 
     def update(self, events: Sequence[Event], alerts: AlertManager, t: float) -> bool:
-        """Advance to time `t` (s) and raise the transition's alerts; return True if just engaged."""
+        """Advance to `t` (s) and raise the transition's alerts; return whether the driver just engaged."""
         self._cycles_left = max(0, self._cycles_left - 1)
         if not events and self.state in (DISABLED, ENABLED):
             return False  # the usual case

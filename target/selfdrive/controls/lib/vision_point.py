@@ -19,10 +19,10 @@ MAX_SPEED_DIFF = 10.0  # m/s; cameras estimate speed badly
 
 
 class VisionPoint:
-    """Distance and relative speed of the camera's lead, which never becomes a lead on its own.
+    """Distance and relative speed of the camera's lead, which only confirms radar tracks.
 
-    As in the original, the camera measures from the bumper but tracks are measured from the camera, 2.7 m
-    further back; the match is wide enough for both.
+    As in the original, the camera's distance is from the bumper, a track's from the camera, 2.7 m further
+    back; the limits of the match allow for the difference.
     """
 
     def __init__(self) -> None:
