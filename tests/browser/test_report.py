@@ -152,7 +152,7 @@ def test_a_link_with_an_unknown_filter_value_or_column_is_reported(page: "Page")
     assert page.found == f'0 of {COUNT} experiments. There is no column "speeed" to search'
 
 
-def test_none_is_a_value_of_a_filter_and_of_a_search(page: "Page", rows: list[dict[str, str]]) -> None:
+def test_none_can_be_used_in_filters_and_searches(page: "Page", rows: list[dict[str, str]]) -> None:
     without = sum(row["alerts"] == "" for row in rows)
     for fragment in ("alerts=none", "q=alerts%3Dnone"):
         page.open(fragment)

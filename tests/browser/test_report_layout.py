@@ -82,7 +82,7 @@ def scrolled(page: "Page") -> Iterator["Page"]:
     yield page
 
 
-def test_paper_has_the_filtered_rows(page: "Page") -> None:
+def test_the_printed_page_has_the_filtered_rows(page: "Page") -> None:
     page.page.emulate_media(media="print")
     page.page.evaluate("dispatchEvent(new Event('beforeprint'))")
     assert len(page.column("experiment_id")) == EXPERIMENTS
@@ -94,7 +94,7 @@ def test_paper_has_the_filtered_rows(page: "Page") -> None:
 
 
 @pytest.mark.parametrize("due", ["grid.scrollTop = 310", "grid.style.height = '200px'"])
-def test_paper_has_the_first_rows_after_a_late_redraw(scrolled: "Page", due: str) -> None:
+def test_the_printed_page_has_the_first_rows_after_a_late_redraw(scrolled: "Page", due: str) -> None:
     printing = f"""async () => {{
         const frame = () => new Promise(requestAnimationFrame), grid = document.querySelector('#grid');
         {due};

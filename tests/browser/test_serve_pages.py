@@ -79,7 +79,9 @@ def test_an_experiment_is_rerun_from_its_report(address: str, visit: Visit, fold
 
 
 @pytest.mark.slow
-def test_a_try_and_a_campaign_run_and_jobs_can_be_cancelled(address: str, visit: Visit, folder: Path) -> None:
+def test_a_try_and_a_campaign_can_run_and_jobs_can_be_cancelled(
+    address: str, visit: Visit, folder: Path
+) -> None:
     page = visit(address)
     page.fill("[name=spec]", "sensor/distance")
     page.select_option("[name=variant]", "longer")

@@ -136,7 +136,7 @@ def test_an_invalid_plan_is_refused(cli: Cli, root: Path, words: list[str], said
     assert not Path("p/run.json").exists()
 
 
-def test_run_ends_with_the_table_and_the_report(finished: tuple[Path, Any]) -> None:
+def test_run_prints_the_table_and_the_path_of_the_report(finished: tuple[Path, Any]) -> None:
     root, said = finished
     lines = said.stdout.splitlines()
     assert lines[0].split()[:5] == ["fault", "type", "injected", "activated", "manifested"]
@@ -238,7 +238,7 @@ def test_a_failed_proof_is_at_the_top_of_the_report(
     assert f"FAILED: experiment {wrong['experiment_id']}" in text
 
 
-def test_a_library_for_the_report_can_be_named(cli: Cli, run: Path, root: Path, nowhere: Path) -> None:
+def test_the_library_for_the_report_can_be_given(cli: Cli, run: Path, root: Path, nowhere: Path) -> None:
     assert cli("report", run).code == 0
     assert cli("report", run, "--root", root).code == 0
     answer = cli("report", run, "--root", nowhere / "none")
@@ -321,7 +321,7 @@ def test_rerun_reproduces_the_record_and_leaves_no_files(cli: Cli, run: Path) ->
     assert not (run / "traces" / name).exists()
 
 
-def test_rerun_keeps_a_trace(cli: Cli, run: Path) -> None:
+def test_rerun_stores_a_trace(cli: Cli, run: Path) -> None:
     name = experiment_with(run, "sdc")
     answer = cli("rerun", name, "--trace", "--json").json
     assert answer["same_as_record"] is True
@@ -359,7 +359,7 @@ def test_clean_deletes_only_run_folders(cli: Cli, root: Path) -> None:
 KNOWN = {pattern.partition("/")[0] for pattern in CONTENT}  # names in a run folder
 
 
-def test_clean_deletes_all_that_commands_write_into_a_run(cli: Cli, run: Path, tmp_path: Path) -> None:
+def test_clean_deletes_everything_that_commands_wrote_into_a_run(cli: Cli, run: Path, tmp_path: Path) -> None:
     copy, other = tmp_path / "copy", tmp_path / "other"
     for folder in (copy, other):
         shutil.copytree(run, folder)

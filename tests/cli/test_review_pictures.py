@@ -7,7 +7,7 @@ from typing import Any
 from mutator.workspace import Workspace
 
 
-def test_frames_are_written_and_named(
+def test_written_frames_are_listed(
     cli: Callable[..., Any], root: Path, toy: Workspace, tmp_path: Path, give_eyes: Callable[..., None]
 ) -> None:
     give_eyes(toy, values="[10, 50]")

@@ -131,7 +131,7 @@ def test_long_lines_are_folded(text: str, width: int, lines: list[str]) -> None:
 
 
 @pytest.mark.parametrize(("columns", "width"), [(None, 100), ("60", 60), ("many", 100)])
-def test_a_pipe_gets_lines_of_100_columns(
+def test_output_to_a_pipe_is_folded_at_100_columns(
     columns: str | None, width: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("COLUMNS")
@@ -153,7 +153,9 @@ def test_a_pipe_gets_lines_of_100_columns(
     assert whole[2].split("  ") == [LONG, COMMAND]
 
 
-def test_a_terminal_gets_lines_of_its_width(capsys: pytest.CaptureFixture[str], terminal: None) -> None:
+def test_output_to_a_terminal_is_folded_at_its_width(
+    capsys: pytest.CaptureFixture[str], terminal: None
+) -> None:
     Terminal().say(f"{LONG}; or {COMMAND}")
     lines = ANSI.sub("", capsys.readouterr().out).splitlines()
     assert all(len(line) <= 120 for line in lines)

@@ -161,7 +161,7 @@ def test_damaged_blocks_of_patches_are_reported(cli: Cli, sealed: str) -> None:
     assert cli("verify", "run", "--expect", sealed).code == 0
 
 
-def test_the_page_lists_some_of_many_differences(cli: Cli, sealed: str, root: Path) -> None:
+def test_the_page_lists_only_some_of_many_differences(cli: Cli, sealed: str, root: Path) -> None:
     table = Path("run/results.csv")
     table.write_text("\n" * 60)
     found = cli("verify", "run")

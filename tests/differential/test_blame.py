@@ -403,7 +403,7 @@ def test_a_damaged_probe_is_a_harness_error(blamed: Blamed, mood: str, detail: s
     assert record.detail.startswith(detail)
 
 
-def test_a_damaged_report_costs_one_experiment(blamed: Blamed) -> None:
+def test_a_damaged_report_affects_only_one_experiment(blamed: Blamed) -> None:
     experiments = [blamed.experiment(f) for f in (at_gap("offset", by=1.0), sensed("damage_the_counts"))]
     experiments.append(blamed.experiment(at_gap("offset", by=2.0)))
     for engine in blamed.engines:

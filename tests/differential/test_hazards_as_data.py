@@ -28,7 +28,7 @@ def manifest() -> TargetManifest:
 
 @settings(max_examples=1000, deadline=None)
 @given(steps=STEPS)
-def test_the_manifest_finds_what_the_checker_finds(
+def test_manifest_and_checker_find_the_same_hazards(
     manifest: TargetManifest, steps: list[tuple[float, float, float]]
 ) -> None:
     monitor = HazardMonitor()

@@ -100,7 +100,7 @@ def test_the_whole_plan_decides_the_engine_of_a_shard(
     assert {Session(toy, RunFolder.open(path)).engine for path in runs.values()} == {"fork"}
 
 
-def test_an_approval_that_every_shard_has_is_merged(copies: Runs, tmp_path: Path) -> None:
+def test_an_approval_is_merged_if_every_shard_has_it(copies: Runs, tmp_path: Path) -> None:
     said = {"schema": gate.SCHEMA, "target": "toycar", "groups": [{"group": "0" * 12, "by": "Jane Doe"}]}
     shards = [copies["1/2"], copies["2/2"]]
     gate.write_approvals(shards[0], said)

@@ -176,7 +176,7 @@ def test_one_experiment_can_run_without_a_campaign(toy: Workspace, finished: Pat
         run_single(toy, toy.manifest("toycar"), experiment, tmp_path / "broken")
 
 
-def test_harness_errors_are_run_again(
+def test_experiments_with_harness_errors_are_rerun(
     toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     execute, hit = ReferenceEngine.execute, []

@@ -102,7 +102,7 @@ class Counting:
         self.seconds = time.monotonic() - self._began
 
 
-def test_collecting_50000_experiments_is_cheap(toy: Workspace, tmp_path: Path) -> None:
+def test_collecting_50000_experiments_is_fast(toy: Workspace, tmp_path: Path) -> None:
     """Collecting 2,500 chunks opens neither plan nor target nor library."""
     begun: Any = SimpleNamespace(
         folder=SimpleNamespace(path=tmp_path / "nowhere"),

@@ -95,7 +95,7 @@ def counted(text: str) -> Counter[str]:
 
 
 @pytest.mark.parametrize(("suffix", "most"), [(".py", MOST_GLUE), (".yaml", MOST_YAML)])
-def test_few_lines_are_written_by_hand(example: str, suffix: str, most: int, tmp_path: Path) -> None:
+def test_an_example_needs_few_handwritten_lines(example: str, suffix: str, most: int, tmp_path: Path) -> None:
     mutator.init_library(tmp_path / "new", target=f"installed:{INSTALLED[example]}")
     own = own_lines(EXAMPLES / example, suffix) - own_lines(tmp_path / "new", suffix)
     if suffix == ".yaml":

@@ -153,7 +153,7 @@ def test_an_old_run_is_reported_with_the_same_results(cli: Cli, place: Path, fix
     assert_same_cells(copy / "results.csv", fixture / "small" / "results.csv")
 
 
-def test_show_runs_nothing_in_an_old_run(cli: Cli, place: Path) -> None:
+def test_show_runs_no_experiment_of_an_old_run(cli: Cli, place: Path) -> None:
     code, out, err = cli("show", KEPT, "--run", "small", "--json")
     assert code == 0, err
     shown = json.loads(out)

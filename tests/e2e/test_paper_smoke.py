@@ -11,7 +11,7 @@ from mutator.workspace import Workspace
 pytestmark = pytest.mark.slow
 
 
-def test_one_per_cent_of_the_paper_has_results(tmp_path: Path) -> None:
+def test_one_per_cent_of_the_papers_campaign_completes(tmp_path: Path) -> None:
     workspace, out = Workspace.find(root=Path(__file__).parents[2]), tmp_path / "run"
     summary = run_campaign(workspace, "paper_smoke", out, workers=2)
     assert (summary.exit_code, summary.done, summary.planned) == (0, 113, 113)

@@ -109,7 +109,7 @@ def test_another_python_is_refused(cli: Cli, half: Path) -> None:
 
 
 @pytest.mark.slow
-def test_another_python_can_be_accepted_and_is_noted(
+def test_another_python_can_be_accepted_and_is_recorded(
     cli: Cli, toy: Workspace, driven: list[str], half: Path, tmp_path: Path
 ) -> None:
     before = len(driven)

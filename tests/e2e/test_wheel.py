@@ -120,7 +120,7 @@ def test_the_controller_is_neither_importable_nor_compiled(python: Path, elsewhe
     assert not [*unpacked.rglob("*.pyc"), *unpacked.rglob("__pycache__")]
 
 
-def test_the_first_commands_in_an_empty_folder(python: Path, elsewhere: Path) -> None:
+def test_the_first_commands_work_in_an_empty_folder(python: Path, elsewhere: Path) -> None:
     mutator, workspace = python.with_name("mutator"), Workspace.find(CLONE)
     listed = json.loads(call(mutator, "list", "--json", here=elsewhere))
     assert [spec["name"] for spec in listed["specs"]] == [spec.name for spec in workspace.specs()]

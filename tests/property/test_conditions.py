@@ -36,7 +36,7 @@ OBSERVED = st.fixed_dictionaries({name: st.floats(allow_nan=True, allow_infinity
 
 @settings(max_examples=200, deadline=None)
 @given(CONDITIONS, OBSERVED)
-def test_canonical_text_means_the_same(text: str, values: dict[str, float]) -> None:
+def test_canonical_text_has_the_same_meaning(text: str, values: dict[str, float]) -> None:
     try:
         canonical = check_condition(text)
     except MutatorError as error:

@@ -103,7 +103,7 @@ def test_rendered_numbers_are_exact(value: float) -> None:
 
 
 @given(st.floats(), st.floats(allow_nan=False), st.sampled_from(["float", "np.float64", "np.float32"]))
-def test_a_whole_number_adds_the_same_as_a_float(variable: float, value: float, kind: str) -> None:
+def test_adding_a_whole_number_equals_adding_a_float(variable: float, value: float, kind: str) -> None:
     sign = "-" if math.copysign(1.0, value) < 0 else "+"
     with np.errstate(all="ignore"):
         texts = (f"{kind}(x) {signed(value)}", f"{kind}(x) {sign} {literal(abs(value))}")
@@ -187,7 +187,7 @@ def test_nested_expressions_are_evaluated_or_refused_quickly(nested: str) -> Non
     assert time.process_time() - began < 1.0
 
 
-def test_json_with_too_deep_nesting_is_damaged(tmp_path: Path) -> None:
+def test_too_deeply_nested_json_is_reported_as_damaged(tmp_path: Path) -> None:
     (tmp_path / "x.json").write_text("[" * 100_000)
     with pytest.raises(MutatorError, match=r"x\.json: not JSON"):
         read_json(tmp_path / "x.json", "x/1")

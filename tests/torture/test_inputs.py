@@ -84,7 +84,7 @@ def approve() -> None:
     done("review", "approve", *(group["group"] for group in json.loads(out)), "--by", "nobody")
 
 
-def test_malformed_files_are_read_or_refused_by_name(
+def test_malformed_files_are_read_or_named_in_an_error(
     toy: Workspace,
     tmp_path: Path,
     seeds: Callable[[int], Sequence[int]],

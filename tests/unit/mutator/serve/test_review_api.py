@@ -117,7 +117,7 @@ def test_an_invalid_decision_is_refused(reviewed: tuple[Client, list[str]], toyc
     assert not (toycar.library / "reviews").exists()
 
 
-def test_remarks_are_text(reviewed: tuple[Client, list[str]]) -> None:
+def test_remarks_are_not_markup(reviewed: tuple[Client, list[str]]) -> None:
     client, (first, *_) = reviewed
     assert decided(client, (first, "approve"), by=HOSTILE, text=f"</script>{HOSTILE}").status == 200
     answer = client.get(f"{API}?spec=sensor/*")

@@ -61,7 +61,7 @@ def test_seeds_that_agree_have_no_interval() -> None:
     assert (activated["least"], activated["its"], activated["seeds"]) == (0.0, 3, 3)
 
 
-def test_each_method_and_each_fault_type_has_its_own_lines() -> None:
+def test_each_method_and_fault_type_has_separate_lines() -> None:
     frame = results(
         *seed(1, 2), *seed(2, 3), *seed(1, 8, method="random"), *seed(2, 9, method="random", fault_type="fog")
     )

@@ -19,7 +19,7 @@ def run(alert: float | str = "", hazard: float | str = "", **more: Any) -> dict[
     return {"t_activation": 5.0, "t_alert": alert, "alerts": "fcw" if alert else "", "t_h1": hazard} | more
 
 
-def test_times_count_from_activation() -> None:
+def test_times_are_measured_from_the_activation() -> None:
     found = times.propagation(results(run(7.0, 9.0, t_manifest=5.5), run(6.0, ""), run("", ""), {}))
     assert (found["activation to manifest"].n, found["activation to manifest"].mean) == (1, 0.5)
     assert (found["activation to alert"].n, found["activation to alert"].mean) == (2, 1.5)
@@ -98,7 +98,7 @@ def test_the_orders_of_hazards_are_counted() -> None:
     assert times.hazard_orders(frame) == {"H1": 1, "H1 with H3": 1, "H3 then H1": 1}
 
 
-def test_the_sheets_are_by_method_and_scenario() -> None:
+def test_sheets_have_lines_for_each_method_and_scenario() -> None:
     frame = results(run(8.0, 9.0), run(8.0, "", scenario="S2"), run("", 7.0, method="random"))
     sheets = (
         propagation_sheet(frame, None),

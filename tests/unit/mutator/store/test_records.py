@@ -77,7 +77,7 @@ def test_an_invalid_record_is_reported(tmp_path: Path) -> None:
         read_records(tmp_path)["3"]
 
 
-def test_newer_schema_is_refused(tmp_path: Path) -> None:
+def test_a_newer_schema_is_refused(tmp_path: Path) -> None:
     LineWriter(tmp_path / "records" / "0001-gw0.jsonl", {"schema": "records/99"}).close()
     with pytest.raises(MutatorError, match="newer mutator"):
         read_records(tmp_path)

@@ -43,7 +43,7 @@ def test_a_folder_without_locks_is_a_warning(monkeypatch: pytest.MonkeyPatch) ->
     assert "--out" in finding.remedy
 
 
-def test_a_child_that_cannot_start_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_child_process_that_cannot_start_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(doctor.sys, "executable", "/no/such/python")
     [finding] = [f for f in doctor.examine(NO_LIBRARY) if f.name == "child process"]
     assert finding.level is Level.FAIL

@@ -241,7 +241,7 @@ def test_each_variant_without_its_anchor_is_a_problem(toy: Workspace) -> None:
     )
 
 
-def test_an_anchor_with_two_candidates_lists_both(toy: Workspace) -> None:
+def test_an_ambiguous_anchor_is_reported_with_both_candidates(toy: Workspace) -> None:
     problems = edited(toy, "target/toycar/sensor.py", "gap = truth.gap", "gap = 0\n        gap = truth.gap")
     assert "assignment to 'gap' matches 2 statements in Sensor.measure: lines 14, 15" in problems[0]
 

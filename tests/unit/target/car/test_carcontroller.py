@@ -75,7 +75,7 @@ def test_torque_is_limited_and_truncated_to_counts(rig, steer, taken):
     assert rig.send(steer=steer).steer == pytest.approx(taken / 3840)
 
 
-def test_no_torque_while_steering_is_not_allowed(rig):
+def test_no_torque_is_sent_while_steering_is_not_allowed(rig):
     rig.car = CarState(steer_not_allowed=True)
     assert rig.send(steer=0.5).steer == 0.0
 

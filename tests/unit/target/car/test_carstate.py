@@ -45,7 +45,7 @@ def test_an_ordinary_car_is_ready_to_engage(reader, bench):
     assert state.buttons == ()
 
 
-def test_the_car_is_not_fit_to_engage_before_the_first_frame(reader):
+def test_the_car_is_not_ready_to_engage_before_the_first_frame(reader):
     state = reader.update([], 0.0)
     assert not state.can_valid
     assert state.door_open and state.seatbelt_unlatched and state.esp_disabled and state.steer_error
@@ -130,5 +130,5 @@ def test_the_brake_switch_must_be_on_for_two_frames(reader, bench):
 @pytest.mark.parametrize(
     ("code", "gear"), [(1, "park"), (2, "reverse"), (4, "neutral"), (8, "drive"), (63, "unknown")]
 )
-def test_gears(reader, code, gear):
+def test_gear_codes(reader, code, gear):
     assert reader.update([pack("GEARBOX", 0, GEAR_SHIFTER=code)], 0.0).gear == gear

@@ -40,13 +40,13 @@ def test_can_error_comes_after_the_fifth_invalid_cycle(car, bench):
 
 
 @pytest.mark.parametrize("button", [CruiseButton.DECEL_SET, CruiseButton.RES_ACCEL])
-def test_engaging_happens_on_release(car, bench, button):
+def test_the_car_engages_when_the_button_is_released(car, bench, button):
     update(car, bench)
     assert update(car, bench, button=button).events == ()
     assert kinds(update(car, bench)) == {"button_enable": {"enable"}}
 
 
-def test_cancel_happens_on_press(car, bench):
+def test_the_car_disengages_when_cancel_is_pressed(car, bench):
     update(car, bench)
     assert kinds(update(car, bench, button=CruiseButton.CANCEL)) == {"button_cancel": {"user_disable"}}
     assert update(car, bench).events == ()
@@ -83,9 +83,7 @@ def test_the_brake_pedal_disengages(car, bench):
         ("STANDSTILL", {"BRAKE_ERROR_1": 1}, "brake_unavailable", "immediate_disable"),
     ],
 )
-def test_each_condition_prevents_engaging_and_disengages_in_its_own_way(
-    car, bench, name, signals, event, kind
-):
+def test_each_condition_prevents_engaging_and_disengages(car, bench, name, signals, event, kind):
     update(car, bench)
     raised = kinds(car.update([pack(name, 1, **signals)], 0.01))
     assert {"no_entry", kind} <= raised[event]

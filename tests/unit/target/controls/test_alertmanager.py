@@ -74,7 +74,7 @@ def test_an_alert_raised_again_lasts_its_full_duration() -> None:
     assert alerts.active == ("steer_saturated",)
 
 
-def test_unknown_alert_is_an_error() -> None:
+def test_an_unknown_alert_is_an_error() -> None:
     with pytest.raises(KeyError, match="no alert is named 'nonsense'"):
         AlertManager().add("nonsense", 0.0)
 
@@ -125,7 +125,7 @@ def test_every_alert_can_be_raised() -> None:
         ("driver_distracted", MID, 0.1),
     ],
 )
-def test_priority_and_duration(name: str, priority: int, duration: float) -> None:
+def test_priority_and_duration_of_alerts(name: str, priority: int, duration: float) -> None:
     assert (ALERTS[name].priority, ALERTS[name].duration) == (priority, duration)
 
 

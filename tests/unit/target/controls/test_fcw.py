@@ -34,7 +34,7 @@ def test_the_assumed_braking_of_a_slow_lead_is_limited() -> None:
     )
 
 
-def test_warns_when_all_counters_are_full() -> None:
+def test_a_warning_is_given_when_all_counters_are_full() -> None:
     assert warnings() == [pytest.approx(3.0)]
 
 

@@ -50,7 +50,7 @@ def test_a_compiled_fit_has_the_same_bits(all_compiled: Path) -> None:
         fast([*cases[0][:20], None])  # type: ignore[list-item]
 
 
-def test_slope() -> None:
+def test_slope_of_a_curve() -> None:
     assert slope(CURVE, 20.0) == pytest.approx((value(CURVE, 20.001) - value(CURVE, 19.999)) / 0.002)
 
 

@@ -6,20 +6,20 @@ import pytest
 from selfdrive.controls.lib.predicted_path import distance_to, model_curve, steering_curve
 
 
-def test_straight_path() -> None:
+def test_distance_from_a_straight_path() -> None:
     straight = steering_curve(0.0)
     assert distance_to(straight, 50.0, 1.2) == pytest.approx(1.2)
     assert distance_to(straight, 50.0, -1.2) == pytest.approx(-1.2)
     assert distance_to(straight, 50.0, 0.0) == 0.0
 
 
-def test_slanting_path() -> None:
+def test_distance_from_a_slanting_path() -> None:
     assert distance_to(model_curve((0.0, 0.0, 1.0, 0.0)), 20.0, 0.0) == pytest.approx(-20.0 / 2**0.5)
 
 
 @pytest.mark.parametrize("angle", [0.1, 0.3])
 @pytest.mark.parametrize("offset", [-1.0, 0.5])
-def test_steering_circle(angle: float, offset: float) -> None:
+def test_distance_from_a_steering_circle(angle: float, offset: float) -> None:
     radius = 200.0
     x, y = (radius - offset) * sin(angle), radius - (radius - offset) * cos(angle)
     assert distance_to(steering_curve(1.0 / radius), x, y) == pytest.approx(offset, abs=1e-3)

@@ -36,7 +36,7 @@ def test_an_acceleration_above_its_limit_returns_at_the_jerk_limit() -> None:
     a=st.floats(-1.0, 1.0),
     target=st.floats(0.0, 40.0),
 )
-def test_limits_are_kept_and_the_target_reached(v: float, a: float, target: float) -> None:
+def test_the_target_is_reached_within_the_limits(v: float, a: float, target: float) -> None:
     before, path = a, drive(v, a, target, 1200)
     for _, now in path:
         assert -1.0 - 1e-6 <= now <= 1.0 + 1e-6

@@ -65,7 +65,7 @@ def test_a_refused_engagement_shows_the_reasons() -> None:
         ((ENGAGE, GAS), DOOR, "disabled", "door_open"),
     ],
 )
-def test_disengaging(first: tuple[Event, ...], event: Event, state: str, alert: str) -> None:
+def test_events_that_disengage(first: tuple[Event, ...], event: Event, state: str, alert: str) -> None:
     drive = Drive(first, (event,))
     assert drive.state == state
     assert alert in drive.alerts.active

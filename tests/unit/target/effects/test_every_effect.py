@@ -137,7 +137,7 @@ def test_grey_levels_do_not_wrap_around(effect, camera, moment, level):
 
 
 @every
-def test_bigger_frames_work(effect, moment):
+def test_large_frames_work(effect, moment):
     picture = np.full((HD.rows, HD.width), 95, dtype=np.uint8)
     assert strongest(effect, HD).apply(picture, moment()).shape == picture.shape
 

@@ -81,7 +81,7 @@ def test_the_startup_reminder_is_not_shown_as_an_alert(reel):
     assert (pane_of(sheet, "faulty")[-60:] == pane_of(sheet, "golden")[-60:]).all()
 
 
-def test_the_sheet_marks_the_time_in_which_the_fault_is_active(reel):
+def test_the_sheet_marks_the_time_when_the_fault_is_active(reel):
     events = Events(title="", outcome="sdc", active=(0.05, 0.05), marks=(), names={})
     sheet = Sheet(reel({}, {}, {}), reel({}, {}, {}), events)
     corners = [pane_of(sheet.draw(i), "faulty")[9:11, -100:-10] for i in range(3)]

@@ -42,7 +42,7 @@ def long_cost(jerks, v, a, x_lead, v_lead):
 
 
 @pytest.mark.parametrize(("v", "a", "gap", "v_lead"), [(20.0, -0.3, 45.0, 18.0), (25.0, 0.0, 60.0, 26.0)])
-def test_longitudinal_plan_minimises_its_cost(long_mpc, lead, v, a, gap, v_lead):
+def test_the_longitudinal_plan_minimises_its_cost(long_mpc, lead, v, a, gap, v_lead):
     """The residuals of danger, gap, acceleration and jerk have weights 5, 0.1, 10 and 20."""
     for _ in range(50):
         long_mpc.set_cur_state(v, a)
@@ -102,7 +102,7 @@ def rk4(z, rate):
     return z + 0.05 / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
 
 
-def test_lateral_plan_minimises_its_cost(lateral_mpc):
+def test_the_lateral_plan_minimises_its_cost(lateral_mpc):
     """The residuals of path, both lanes, heading and steering rate have weights 1, 1, 1, 1 and 0.5."""
     for _ in range(60):  # each time from the last solution, not shifted
         lateral_mpc._delta = 0.002

@@ -78,7 +78,7 @@ def test_a_library_with_a_changed_byte_is_not_used(helpers):
 
 
 @pytest.mark.parametrize("folder", ["none", "x" * 300, "empty"])
-def test_a_folder_without_libraries_is_no_error(tmp_path, folder):
+def test_a_folder_without_libraries_is_not_an_error(tmp_path, folder):
     (tmp_path / "empty").mkdir()
     compiled.use(tmp_path / folder)
     assert compiled.library(C_SOURCE) is None

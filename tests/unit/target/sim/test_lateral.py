@@ -80,7 +80,7 @@ def test_the_wheel_returns_by_itself(car):
     assert abs(car.steer_angle) < 0.01 * turned
 
 
-def test_the_wheel_has_a_stop(car):
+def test_the_wheel_turns_no_further_than_its_stop(car):
     run(car, 30.0, 1.0, 0.0)
     assert (car.steer_angle, car.steer_rate) == (8.7, 0.0)
     run(car, 0.01, -1.0, 0.0)

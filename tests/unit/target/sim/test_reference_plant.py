@@ -170,7 +170,7 @@ def test_one_simulator_can_run_both_plants(s1):
         assert values.tobytes() == results[2].trace[name].tobytes(), name
 
 
-def test_lines_are_mirrored(s1):
+def test_the_lane_lines_are_mirrored(s1):
     simulator = Simulator()
     simulator.reset(s1, 0)
     simulator.step()

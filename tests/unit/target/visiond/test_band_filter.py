@@ -54,7 +54,7 @@ def test_brightness_does_not_matter(light):
     assert support(picture, 178, 186) > 0.9 * support(bright, 178, 186)
 
 
-def test_points_on_rough_ground_weigh_little():
+def test_points_on_rough_ground_have_little_weight():
     rough = road(noise=25.0)
     points = mark_points(rough)
     assert points.weight.sum() / ROWS * 7 / COLUMNS < 0.1
