@@ -12,7 +12,7 @@ CLONE = Path(__file__).parents[3]
 
 @pytest.fixture
 def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Set a current folder outside any clone, and clear the environment."""
+    """Change to a folder outside any clone, and clear the environment."""
     for name in ("ROOT", "LIBRARY", "TEMPLATES", "TARGET"):
         monkeypatch.delenv(f"MUTATOR_{name}", raising=False)
     place = tmp_path / "elsewhere"

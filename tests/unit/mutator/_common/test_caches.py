@@ -10,7 +10,7 @@ from mutator._common import caches
 
 @pytest.fixture
 def filled() -> Path:
-    """Passed checks, used last, and three files of a target, used at different times."""
+    """A cache with passed checks, used last, and three files of a target, used at different times."""
     checks = caches.of_checks() / "ab12" / "golden" / "A"
     checks.mkdir(parents=True)
     (checks / "trace.npz").write_bytes(b"1" * 5000)

@@ -1,4 +1,4 @@
-"""Texts shown to the user."""
+"""Hints for operators of other languages."""
 
 import pytest
 

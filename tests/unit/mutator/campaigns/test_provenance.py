@@ -18,7 +18,7 @@ from mutator.workspace import Workspace
 
 @pytest.fixture
 def folder(toycar: Workspace, tmp_path: Path) -> RunFolder:
-    """A planned run, whose checks list `iniconfig` and `hypothesis` as packages that golden runs loaded."""
+    """A planned run whose checks list `iniconfig` and `hypothesis` as packages that golden runs loaded."""
     planned = freeze(make_plan(toycar, "small"), tmp_path / "run", toycar)
     said = {"schema": SCHEMA, "packages": ["hypothesis", "iniconfig"]}
     (planned.path / "checks.json").write_text(json.dumps(said))

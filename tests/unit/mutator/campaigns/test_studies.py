@@ -100,7 +100,7 @@ BAD_CHECKS = {
 
 @pytest.fixture
 def strangers(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Install a package in which every entry point has a different error."""
+    """Install a package whose entry points are broken in different ways."""
     package = tmp_path / "site" / "strange_studies"
     package.mkdir(parents=True)
     (package / "raising.py").write_text("STUDY = 1 / 0")

@@ -250,8 +250,8 @@ def test_stale_bytecode_cannot_run(run: Run, manifest: TargetManifest, tmp_path:
     execution = run({"toycar/world.py": changed, **entry(body)})
     assert execution.detail.startswith("ValueError: 0.06")
     cached = list((tmp_path / "base" / "toycar" / "__pycache__").glob("world.*.pyc"))
-    assert cached, "the pristine tree has bytecode, which the mutant could have loaded"
-    assert int.from_bytes(cached[0].read_bytes()[4:8], "little") == 0b11, "checked by hash"
+    assert cached, "expected bytecode in the pristine tree, which the mutant could load"
+    assert int.from_bytes(cached[0].read_bytes()[4:8], "little") == 0b11, "expected a check by hash"
 
 
 def test_the_users_environment_does_not_reach_a_run(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -70,7 +70,7 @@ def test_the_examples_of_each_model_give_the_expected_code(clone: Workspace, nam
         assert run_example(model, models, example) == example.after
 
 
-def test_the_digest_covers_which_models_raise_on_purpose(folder: Path, clone: Workspace) -> None:
+def test_the_digest_depends_on_which_models_raise_on_purpose(folder: Path, clone: Workspace) -> None:
     """Verdicts depend on which models can raise an exception on purpose."""
     known = clone.fault_models()
     assert [model.name for model in known if model.raises] == sorted(RAISING)

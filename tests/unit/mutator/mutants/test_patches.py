@@ -45,7 +45,7 @@ def test_gnu_patch_applies_and_reverses_a_patch(
     tmp_path: Path, text: str, names: list[str], guard: bool
 ) -> None:
     if shutil.which("patch") is None:
-        pytest.skip("no patch on this machine")
+        pytest.skip("the command patch is not installed")
     data = text.encode("latin-1" if "latin" in text else "utf-8")
     text_patch, mutated = make(data, names, guard)
     source = tmp_path / "pack" / "m.py"

@@ -60,7 +60,7 @@ def test_the_worst_results_come_first(tmp_path: Path) -> None:
     assert [row.experiment_id for row in worst(rows)] == list(WORST_FIRST)
 
 
-def test_ranking_columns_equals_ranking_rows(tmp_path: Path) -> None:
+def test_columns_and_rows_are_ranked_in_the_same_order(tmp_path: Path) -> None:
     draw = random.Random(3)
     choices = list(WORST_FIRST.values())
     lines = [dict(draw.choice(choices)) for _ in range(400)]

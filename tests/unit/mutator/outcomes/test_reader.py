@@ -146,7 +146,7 @@ def test_a_target_without_hazards_has_no_hazard_in_any_row(run: Path, reseal: Ca
     assert {row.checked for row in table.rows()} == {()}
 
 
-def test_exports_and_report_follow_the_target(run: Path, crane: Workspace) -> None:
+def test_exports_and_the_report_use_the_names_of_the_target(run: Path, crane: Workspace) -> None:
     table = Results.up_to_date(run)
     assert export(run, Format.CSV).read_bytes() == table.csv()
     assert export(run, Format.PARQUET).read_bytes() == table.parquet()

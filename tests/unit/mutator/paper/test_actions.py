@@ -46,7 +46,7 @@ def test_braking_is_too_short_if_it_lasts_at_most_half_as_long(
     assert stretch(brake_too_short, given) == shown
 
 
-def test_braking_is_not_too_short_if_golden_does_not_brake() -> None:
+def test_braking_is_not_too_short_if_the_golden_run_does_not_brake() -> None:
     assert brake_too_short(pair({}, {})) is None
 
 

@@ -47,7 +47,7 @@ def runs_of(tally: Tally, **group: str) -> pd.DataFrame:
 
 
 def frame_of(parts: Iterable[pd.DataFrame]) -> pd.DataFrame:
-    """A frame of these runs, each with an id, a partner of the other method, one of 40 faults, and an end."""
+    """A frame of these runs, with ids, pairs of methods, 40 faults and end times."""
     frame = pd.concat(parts, ignore_index=True)
     number = frame.groupby("method").cumcount()
     ids = {"experiment_id": frame.index.astype(str), "seed": number.astype(str)}

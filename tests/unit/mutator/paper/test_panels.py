@@ -1,4 +1,4 @@
-"""The published observations that a run's experiments can decide, in its report."""
+"""The published observations in the report of a run."""
 
 import shutil
 from pathlib import Path

@@ -67,7 +67,7 @@ def test_every_model_and_key_is_described(kind: Format) -> None:
     for name, part in parts.items():
         assert not part["title"].endswith("Model"), f"{name}: give the class a title"
         for key, value in part["properties"].items():
-            assert value["description"].endswith("."), f"{name}.{key}: a sentence"
+            assert value["description"].endswith("."), f"{name}.{key}: expected a sentence"
 
 
 def test_models_are_in_reading_order() -> None:

@@ -113,7 +113,7 @@ def test_exceptions_are_described_with_place_and_causes(
     message: str,
     stacks: list[list[tuple[str, int]]],
 ) -> None:
-    """The tree's lines that an exception passed are listed once each, innermost first."""
+    """Each line of the tree that an exception passed is listed once, innermost first."""
     found = described(name, *arguments)
     assert found["ended"] == "error"
     error = found["error"]

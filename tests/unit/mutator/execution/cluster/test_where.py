@@ -41,7 +41,7 @@ def test_local_is_followed_by_the_number_of_workers() -> None:
         *("http://x:1", "tcp://x", "tcp://x:0", "tcp://x:65536", "tcp://:1", "tls://a b:1", "tcp://u@x:1"),
     ],
 )
-def test_an_invalid_where_is_refused(text: str) -> None:
+def test_an_invalid_value_of_where_is_refused(text: str) -> None:
     with pytest.raises(MutatorError) as caught:
         parse(text)
     assert caught.value.argument == "cluster"

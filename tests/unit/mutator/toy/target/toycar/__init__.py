@@ -1,1 +1,1 @@
-"""A car that follows another one: the smallest target there is."""
+"""A car that follows another one: a minimal target."""

@@ -1,4 +1,4 @@
-"""Decides what was dangerous."""
+"""Decides whether the cars collided."""
 
 
 def collided(truth):

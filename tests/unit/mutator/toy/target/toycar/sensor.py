@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 class Sensor:
-    """Keeps what it sent."""
+    """Keeps the messages that it sent."""
 
     def __init__(self):
         self.sent = []

@@ -1,4 +1,4 @@
-"""The world: two cars on a line, 0.1 s a step."""
+"""The world: two cars on a line, in steps of 0.1 s."""
 
 from collections import namedtuple
 
