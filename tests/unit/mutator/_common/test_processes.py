@@ -16,7 +16,7 @@ def test_results_keep_the_order_of_the_inputs(processes: int) -> None:
         assert list(shared(lambda n: n * n, range(count), processes)) == [n * n for n in range(count)]
 
 
-def test_other_processes_do_the_work() -> None:
+def test_the_work_is_done_in_other_processes() -> None:
     found = list(shared(lambda _: os.getpid(), range(6), 2))
     assert found == found[:2] * 3 and len({*found, os.getpid()}) == 3
 

@@ -27,7 +27,7 @@ def test_a_mutant_has_a_diff_a_patch_and_files(toycar: Workspace, tmp_path: Path
         mutant.write(tree)
 
 
-def test_names_and_records_give_the_same_mutant(toycar: Workspace) -> None:
+def test_the_name_and_the_record_of_a_fault_give_the_same_mutant(toycar: Workspace) -> None:
     [fault, *_] = toycar.faults("sensor/distance/longer")
     by_record = mutator.build_mutant(fault, "near", workspace=toycar)
     assert isinstance(fault.value, int)

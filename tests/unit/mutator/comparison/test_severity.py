@@ -91,7 +91,7 @@ def test_each_change_of_severity_is_listed(found: Comparison) -> None:
     assert (line["delta_v_b"], line["severity_b"]) in {(12.0, "S3"), (5.0, "S2")}
 
 
-def test_a_gate_finds_contacts_that_were_milder_before(found: Comparison) -> None:
+def test_a_gate_finds_new_and_more_severe_contacts(found: Comparison) -> None:
     counts = {gate: len(findings(found, [gate])) for gate in Gate if gate.value.startswith("severity:")}
     distance = sum(p.b.fault.fault_type == "distance" for p in found.pairs)
     harder = sum(p.b.fault.fault_type == "lane" and p.b.method is Method.GUIDED for p in found.pairs)

@@ -242,7 +242,7 @@ def test_a_source_file_that_a_run_adds_to_its_tree_is_a_harness_error(run: Run) 
     assert run(entry(body.replace("left.py", "left.json"))).status is Status.OK
 
 
-def test_stale_bytecode_cannot_run(run: Run, manifest: TargetManifest, tmp_path: Path) -> None:
+def test_stale_bytecode_is_not_run(run: Run, manifest: TargetManifest, tmp_path: Path) -> None:
     """The changed file's size and time equal the original's."""
     pristine = manifest.tree.files["toycar/world.py"].decode()
     changed = pristine.replace("STEP = 0.05", "STEP = 0.06")

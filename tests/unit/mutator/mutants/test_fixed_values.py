@@ -209,7 +209,7 @@ def test_modules_that_import_a_constant_are_found(tmp_path: Path) -> None:
     ]
 
 
-def test_importers_that_cannot_be_set_are_listed(tmp_path: Path) -> None:
+def test_imports_that_cannot_be_changed_are_listed(tmp_path: Path) -> None:
     texts = {
         "limits": "LIMIT = 5\n",
         "a": "from limits import *\n",

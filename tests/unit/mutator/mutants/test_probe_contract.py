@@ -72,7 +72,7 @@ def test_probes_of_two_triggers_differ_only_in_their_settings(clone: Workspace) 
     }
 
 
-def test_holding_a_fault_for_a_time_needs_the_time(clone: Workspace) -> None:
+def test_holding_a_fault_for_a_time_requires_a_duration(clone: Workspace) -> None:
     observation = clone.manifest("openpilot").observation
     with pytest.raises(MutatorError, match="without a time"):
         contract.template_values("m", Trigger(name="x", condition="True"), Hold.FOR, (), observation, 0.1)

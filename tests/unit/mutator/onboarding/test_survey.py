@@ -69,7 +69,7 @@ def test_an_unreadable_file_is_listed_with_its_position(tree: Tree) -> None:
     assert all(why for _, why in found.unread)
 
 
-def test_nothing_is_imported(tree: Tree) -> None:
+def test_the_survey_imports_nothing(tree: Tree) -> None:
     tree(harm_py="raise SystemExit('imported')\n")
     assert look_at(str(tree())).packages == ("harm.py",)
     assert "harm" not in sys.modules

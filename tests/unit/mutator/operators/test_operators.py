@@ -107,7 +107,7 @@ def make(tmp_path: Path, clone: Workspace) -> Make:
 
 
 @pytest.mark.parametrize("operator", CHANGES)
-def test_each_operator_makes_its_changes(operator: str, make: Make) -> None:
+def test_each_operator_makes_the_expected_changes(operator: str, make: Make) -> None:
     for body, expected in CHANGES[operator].items():
         assert [one.text for one in make(body, operator)] == expected, body
 
@@ -125,7 +125,7 @@ def test_mutations_to_equal_code_are_dropped(make: Make) -> None:
     ]
 
 
-def test_first_values_are_kept_in_functions_with_the_same_name(make: Make) -> None:
+def test_first_assignments_are_never_omitted_in_functions_with_the_same_name(make: Make) -> None:
     """A property and its setter have the same name."""
     setter = "@f.setter\n    def f(self, a):\n        c = a\n        self.a = c"
     made = make(

@@ -87,7 +87,7 @@ def test_hazards_that_a_target_does_not_check_are_left_out(tmp_path: Path) -> No
     assert hazard_names(Results(write_table(tmp_path / "results.csv", seen, seen)).texts()) == ("H2",)
 
 
-def test_cells_have_types(tmp_path: Path) -> None:
+def test_cells_are_converted_to_typed_values(tmp_path: Path) -> None:
     line = SEEN | {
         "outcome": "hazard",
         "h1": "1",

@@ -82,7 +82,7 @@ def test_each_value_is_injected_in_each_scenario_and_context(paper: Plan) -> Non
 
 
 @pytest.mark.parametrize("method", Method)
-def test_each_method_alone_has_its_half_of_the_experiments(
+def test_the_campaign_of_each_method_is_half_of_the_paper_campaign(
     library: Workspace, paper: Plan, method: Method
 ) -> None:
     half = make_plan(library, f"paper_{method.value}")
@@ -97,7 +97,7 @@ def test_the_as_coded_campaign_has_the_same_counts(library: Workspace) -> None:
     assert {e.setting for e in coded.experiments} == {("pictures", "coded_detector")}
 
 
-def test_the_sample_is_a_tenth_of_everything(paper: Plan, sample: Plan) -> None:
+def test_the_sample_is_a_tenth_of_the_paper_campaign(paper: Plan, sample: Plan) -> None:
     assert len(sample.experiments) == 1128
     assert {e.id for e in sample.experiments} <= {e.id for e in paper.experiments}
     assert of_method(sample, Method.GUIDED, pair) == of_method(sample, Method.RANDOM, pair)
@@ -115,7 +115,7 @@ def test_the_smoke_campaign_has_every_scenario_and_variant(library: Workspace, p
     assert {(e.scenario, e.method) for e in smoke} == {(s, m) for s in SCENARIOS for m in Method}
 
 
-def test_the_reference_campaign_is_the_paper_as_coded(library: Workspace) -> None:
+def test_the_reference_campaign_uses_the_reading_as_coded(library: Workspace) -> None:
     plan = make_plan(library, "paper_reference")
     assert kinds(plan, Method.GUIDED) == kinds(plan, Method.RANDOM) == INJECTED
     setting = ("pictures", "reference_plant", "coded_detector", "coded_translation")

@@ -34,14 +34,14 @@ def test_every_module_in_the_page_exists() -> None:
     assert sorted(name for name in modules if importlib.util.find_spec(name) is None) == []
 
 
-def test_every_cache_has_a_line() -> None:
+def test_the_page_lists_every_cache() -> None:
     table = PAGE.split("\n## Caches\n")[1].split("\n## ")[0]
     folders = set(re.findall(r"^\| `([^/`]+)/", table, re.MULTILINE))
     kept = {caches.CHECKS, caches.GOLDENS, caches.LINES, caches.PICTURES, caches.RUNS, caches.TARGETS}
     assert folders == kept
 
 
-def test_every_file_of_a_library_has_a_line() -> None:
+def test_the_page_lists_the_schema_of_every_library_file() -> None:
     files = [*(CLONE / "fault_library").rglob("*.yaml"), *(CLONE / "templates").glob("*.yaml")]
     heads = {re.search(rf"^schema: {SCHEMA.pattern}$", file.read_text(), re.MULTILINE) for file in files}
     assert {found and found[1] for found in heads} <= set(IN_PAGE.findall(PAGE))

@@ -75,7 +75,7 @@ def test_models_are_in_reading_order() -> None:
     assert names == ["Spec", "Variant", "Draw", "Sweep", "Reading", "Injection", "At"]
 
 
-def test_every_verb_is_in_a_group() -> None:
+def test_every_command_is_in_a_group() -> None:
     command: Any = get_command(app)
     assert sorted(name for _, names in GROUPS for name in names) == sorted(command.commands)
 
