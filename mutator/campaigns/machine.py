@@ -107,10 +107,16 @@ def required() -> frozenset[str]:
 
 def packages_of(modules: Iterable[str]) -> tuple[str, ...]:
     """Return the packages that provide these top-level modules. Modules without a package are omitted."""
-    providers = metadata.packages_distributions()
+    providers = _providers()
     # the modules of an editable installation can be missing from `providers`; try the module's name
     names = (name for module in modules for name in providers.get(module, [module]))
     return tuple(sorted({canonicalize_name(name) for name in names} & _installed().keys()))
+
+
+@lru_cache(maxsize=1)
+def _providers() -> dict[str, list[str]]:
+    """Return the packages of each top-level module. Slow, because it reads the file list of each package."""
+    return dict(metadata.packages_distributions())
 
 
 def clone_state(folder: Path) -> dict[str, Any] | None:
