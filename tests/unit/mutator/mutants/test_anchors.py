@@ -1,4 +1,4 @@
-"""An anchor finds one statement, or raises an error that lists the candidates."""
+"""Resolving an anchor finds one statement, or raises an error that lists the candidates."""
 
 from pathlib import Path
 

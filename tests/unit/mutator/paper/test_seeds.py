@@ -31,7 +31,7 @@ observations:
 
 
 def seed(number: int, hazards: int, *, alert: bool = False) -> list[dict[str, Any]]:
-    """Twenty activated runs with a seed, of which the first `hazards` have a hazard."""
+    """Twenty activated runs with one seed; the first `hazards` of them have a hazard."""
     ran = {"seed": number, "t_activation": 1.0}
     made = [ran | ({"h1": 1, "t_h1": 2.0} if i < hazards else {}) for i in range(20)]
     return [made[0] | ({"t_alert": 3.0} if alert else {}), *made[1:]]

@@ -1,4 +1,4 @@
-"""Which workers are allowed to join a run, and what is reported about the others."""
+"""Which workers are allowed to join a run, and how workers are reported."""
 
 import pytest
 
