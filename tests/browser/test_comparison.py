@@ -13,7 +13,7 @@ from mutator.model import Experiment, Outcome
 from mutator.workspace import Workspace
 
 HAZARD = {"outcome": Outcome.HAZARD, "hazards": (("H1", 4.0),)}
-COPIES = 8  # of the toy's 24 pairs
+COPIES = 8  # of each of the toy's 24 pairs
 SHOWN = 60
 
 

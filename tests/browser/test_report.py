@@ -23,7 +23,7 @@ LOADED = """async (id) => {
     const channels = series.channels.map((channel) => (
         { ...channel, t: [...channel.t], golden: words(channel.golden), faulty: words(channel.faulty) }));
     return { ...series, channels };
-}"""  # values as their bits
+}"""  # values as integers with the same bits
 
 
 @pytest.fixture(scope="module")

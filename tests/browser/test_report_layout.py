@@ -10,7 +10,7 @@ import pytest
 if TYPE_CHECKING:
     from .conftest import Page
 
-EXPERIMENTS = 24  # of the run
+EXPERIMENTS = 24  # in the run
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
@@ -21,13 +21,12 @@ def test_a_narrow_screen_does_not_scroll_sideways(browser: Any, run: Path, schem
     page.wait_for_selector("html[data-ready]")
     width = "document.documentElement.scrollWidth"
     assert page.evaluate(width) == 400
-    assert page.evaluate("document.querySelector('#grid td').clientWidth") > 150  # room for its text
+    assert page.evaluate("document.querySelector('#grid td').clientWidth") > 150  # wide enough for its text
     page.eval_on_selector_all(
         "#heat .cell", "all => all.forEach((c) => (c.textContent = '123456789/987654321'))"
     )
-    assert (
-        page.evaluate("document.querySelector('#heat th[scope=row]').clientWidth") > 70
-    )  # and the map's rows
+    # wide enough for the names of rows
+    assert page.evaluate("document.querySelector('#heat th[scope=row]').clientWidth") > 70
     assert page.evaluate(width) == 400
     page.click("#grid tr[data-at] >> nth=0")
     page.wait_for_selector("#experiment .diff")
@@ -111,7 +110,7 @@ def test_a_printed_page_has_all_rows_and_the_screen_is_restored(scrolled: "Page"
     others = rows_of(page.pdf(tagged=True))
     page.evaluate("document.querySelector('#grid').hidden = false")
     page.evaluate("document.querySelector('#grid').scrollTop = 310")
-    assert rows_of(page.pdf(tagged=True)) - others == 7  # with the head, and the note on omitted rows
+    assert rows_of(page.pdf(tagged=True)) - others == 7  # includes the heading and the note on omitted rows
     assert page.evaluate(FIRST_ROW) == 2
     assert page.evaluate("document.querySelector('#grid').scrollTop") == 310
 

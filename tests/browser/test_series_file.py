@@ -22,7 +22,7 @@ LOADED = """async (id) => {
     } catch (error) {
         return error.message;
     }
-}"""  # values as their bits
+}"""  # values as integers with the same bits
 
 
 @pytest.fixture

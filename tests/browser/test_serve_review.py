@@ -150,7 +150,7 @@ def test_an_image_effect_has_images(review: Callable[..., Any]) -> None:
     page.wait_for_selector(".pictures figure:nth-child(4)")
     pictures = page.locator(".pictures img")
     for picture in pictures.all():
-        picture.evaluate("image => image.decode()")  # fails for one that cannot be shown
+        picture.evaluate("image => image.decode()")  # fails for an image that cannot be shown
     assert pictures.count() == 4
     captions = page.locator(".pictures figcaption").all_inner_texts()
     assert captions[0] == "before"

@@ -16,7 +16,7 @@ from mutator.workspace import Workspace
 
 ROOT = Path(__file__).parents[2]
 PORT_IN = "127.0.0.1:"
-KEYS = ("a", "r", "af", "rf")  # alternately: approve, reject, either with a flag
+KEYS = ("a", "r", "af", "rf")  # approve, reject, approve and flag, reject and flag
 
 pytestmark = pytest.mark.slow
 
@@ -82,7 +82,7 @@ def test_twenty_marks_survive_reloads_and_killed_servers(browser: Any, root: Pat
         page.keyboard.press("Escape")
         page.click("[data-state=new]")
         marks |= marked(page, 10)
-        page.wait_for_timeout(2000)  # all of them are confirmed by then
+        page.wait_for_timeout(2000)  # the server confirms all marks by then
         page.reload()
         page.wait_for_selector("html[data-ready]", state="attached")
         assert {group: shown(page, group) for group in marks} == marks

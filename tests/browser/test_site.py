@@ -65,7 +65,8 @@ def visited(browser: Any) -> Iterator[Any]:
 
 @pytest.mark.parametrize("width", [WIDE, NARROW])
 def test_every_page_works_when_opened_from_its_file(site: Path, visited: Any, width: int) -> None:
-    pages = sorted(page for page in site.rglob("*.html") if page != site / "index.html")  # which redirects
+    # index.html only redirects
+    pages = sorted(page for page in site.rglob("*.html") if page != site / "index.html")
     assert len(pages) > 60
     visited.set_viewport_size({"width": width, "height": 900})
     wider = {}

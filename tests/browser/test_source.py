@@ -57,7 +57,7 @@ def test_a_mark_lists_its_experiments(
     assert page.found == "2 of 18 experiments"
     page.page.click("#grid tr[data-at]")
     verbs = {one.split()[1] for one in page.texts("#experiment .command code")}
-    assert verbs == {"report", "rerun", "show"}  # no spec has it, for `try`
+    assert verbs == {"report", "rerun", "show"}  # `try` needs a spec, and no spec has this mutant
 
 
 def test_the_source_fits_a_narrow_screen(report: Path, open_report: "Callable[[Path], Page]") -> None:

@@ -47,7 +47,7 @@ def test_the_spec_without_a_mistake_is_valid(cli: Cli, own: Path) -> None:
         ("after_assign: gap", "after_assign: gab", 13, "gap"),  # unknown anchor
         ("toycar/sensing.py, function: Sensor.sense, after_assign: gap",
          "toycar/driver.py, function: Driver.drive, after_assign: wanted", 13, "nth"),  # ambiguous anchor
-        ("toycar/sensing.py", "../../outside.py", 13, "outside"),  # beyond the target's root
+        ("toycar/sensing.py", "../../outside.py", 13, "outside"),  # outside the target's root
         ("toycar/sensing.py", "toycar/world.py", 13, "toycar/world.py"),  # a forbidden location
         ("by_m: error", "by_kph: error", 16, "by_m"),  # a unit of another dimension
         ("error_m: {values", "error_s: {values", 16, "by_m"),  # a draw of another dimension

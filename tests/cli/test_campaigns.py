@@ -376,9 +376,8 @@ def test_clean_deletes_everything_that_commands_wrote_into_a_run(cli: Cli, run: 
     for file in (next((copy / "records").iterdir()), next((copy / "patches").iterdir())):
         file.write_bytes(file.read_bytes()[:-9])
     assert cli("verify", copy, "--repair").code == 1
-    resumed = cli(
-        "run", "toy", "--out", copy, *CHOSEN, "-n", "0", "--engine", "fork"
-    )  # so that there is a proof
+    # only forked runs have a proof
+    resumed = cli("run", "toy", "--out", copy, *CHOSEN, "-n", "0", "--engine", "fork")
     assert resumed.code == 0, resumed.err
     assert {path.name for path in copy.iterdir()} == KNOWN - {"workers", "work"}
     link = tmp_path / "link"

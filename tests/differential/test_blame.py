@@ -172,7 +172,7 @@ examples:
     before: none
     after: none
 """
-MODELS = {  # line of the template, more in the YAML
+MODELS = {  # the template's line and additional YAML
     "raising": ("{{ target }} = [][1]", ""),
     "declared": ("{{ target }} = [][1]", "raises: true"),
     "calling": ("self.sense({{ target }})", ""),

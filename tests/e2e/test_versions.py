@@ -126,7 +126,8 @@ def test_another_python_can_be_accepted_and_is_recorded(
     run = load_run(half)
     by = {e: stretch.python for e in run.records if (stretch := run.experiment(e).stretch)}
     assert sorted(by.values()) == ["CPython 3.11.7"] * 2 + ["CPython 3.12.1"] * 10
-    for version, name in {version: name for name, version in by.items()}.items():  # one of each
+    # one experiment of each version
+    for version, name in {version: name for name, version in by.items()}.items():
         code, out, _ = cli("show", name, "--run", half, "--no-plot")
         assert code == 0 and f"recorded on: {version}, " in out
     assert cli("run", "small", "--out", half, "-n", "0")[0] == 0  # nothing is left to run

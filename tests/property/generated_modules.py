@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from .generated_statements import COMMENTS, GLOBALS, Scope, StatementWriter
 
-MOST_STATEMENTS = 30  # beyond this, only simple ones are made
+MOST_STATEMENTS = 30  # after this number, only simple statements are written
 _UNITS = ("    ", "    ", "    ", "  ", " ", "\t", "  \t", "        ")
 _VARIABLES = ("a", "b", "total", "größe", "µ", "ﬁx", "match", "case", "type", "_", "__own", "max")
 _PLAIN = ('"""Doc."""', "'''Two\n    lines.\n'''", '"a" "b"', r'r"""Raw \."""')
@@ -170,7 +170,7 @@ class ModuleWriter(StatementWriter):
         kinds = self.rng.choice(["ValueError", "(ValueError,\n TypeError)", "Exception"])
         name = self.rng.choice(scope.pool)
         lines += [*self.gap(indent), f"{indent}except{star} {kinds} as {name}:"]
-        if star:  # no statement can leave such a block
+        if star:  # `except*` allows no `break`, `continue` or `return`
             inner = indent + self.rng.choice(_UNITS)
             lines += [*self.assignment(scope.inside(), inner), *self.call(scope, inner)]
         else:

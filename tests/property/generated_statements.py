@@ -30,10 +30,10 @@ _TEXTS = (
 class Scope:
     """The variables that a statement may read (`known`) and set, and what else is allowed at its place."""
 
-    level: int  # of functions
+    level: int  # how deeply functions are nested
     kind: str  # module, class, function, or nested: in a lambda or a comprehension
     known: list[str]
-    pool: Sequence[str]  # its own variables
+    pool: Sequence[str]  # the names that its variables can have
     writable: tuple[str, ...] = ()  # declared global or nonlocal
     is_async: bool = False
     generator: bool = False

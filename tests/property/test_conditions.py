@@ -79,7 +79,8 @@ def test_a_trace_gives_the_same_results_as_its_single_steps(text: str, steps: li
         assert "characters" in str(error)
         return
     columns = {name: np.array([step[name] for step in steps]) for name in VARIABLES}
-    if not {"min", "max"} & set(re.findall(r"\w+", text)):  # their result depends on the place of a NaN
+    # the result of min and max depends on the position of a NaN
+    if not {"min", "max"} & set(re.findall(r"\w+", text)):
         assert holds(canonical, columns).tolist() == [evaluate(canonical, step) for step in steps]
 
 

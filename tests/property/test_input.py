@@ -85,7 +85,7 @@ def test_a_damaged_spec_is_read_or_refused(tmp_path: Path, data: st.DataObject) 
 
 @settings(max_examples=150, deadline=None)
 @given(st.binary(max_size=100) | st.text("def f(x):\n=1#\"'\\ \t;", max_size=80).map(str.encode))
-@example(b"#\x80")  # LibCST has no line for it
+@example(b"#\x80")  # LibCST's error has no line
 def test_any_source_is_read_or_refused(data: bytes) -> None:
     try:
         file = parse_file("x.py", data, Path("root"))

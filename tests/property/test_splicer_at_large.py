@@ -40,7 +40,7 @@ def proved(sources: Iterable[tuple[object, bytes]], run: Run | None, variables: 
     return figures
 
 
-PARTS = 8  # of a slow test, for as many workers
+PARTS = 8  # of a slow test, so that eight workers can share it
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 TARGET = Path(__file__).parents[2] / "target"
-NO_RESULT = (  # draws, compares or trains; and symbols, which CasADi computes in their given order
+NO_RESULT = (  # files that draw, compare or train; CasADi computes symbols in the given order
     "selfdrive/sim/film/*",
     "selfdrive/sim/compare/*",
     "selfdrive/sim/effects/page.py",

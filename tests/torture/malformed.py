@@ -60,7 +60,7 @@ def malform(path: Path, chance: Chance) -> str:
     """Damage a hand-written file, half of the time in a way specific to its kind. Return the way."""
     text = path.read_text(encoding="utf-8")
     ways = [*MALFORMS] if path.suffix == ".yaml" else [*MALFORMS][1:]
-    # reading is mostly about values
+    # readers mostly check values
     how = chance.choice([*DAMAGES, *ways * 4] + ["change_a_value"] * 20 * (path.suffix == ".yaml"))
     if how in MALFORMS:
         path.write_text(MALFORMS[how](text, chance), encoding="utf-8", newline="")

@@ -24,7 +24,7 @@ from .worlds import LAST
 LISTED = Path(__file__).with_name("misdeeds.txt")
 METHODS = ("guided", "random")
 WORKERS = (1, 2)
-MOST = 3  # misdeeds of one campaign
+MOST = 3  # misdeeds in one campaign
 LONGEST_S = 240  # of a command, on a busy machine
 MODULES = (
     *(

@@ -37,7 +37,7 @@ def test_misdeeds_do_not_disturb_ordinary_faults(
         tally.drive(wanted, misbehaving.cases)
     finally:
         resource.setrlimit(resource.RLIMIT_AS, limits)
-        remove_folder(tmp_path / "case")  # pytest would fail at it
+        remove_folder(tmp_path / "case")  # pytest could not delete it
     print_tally(tally)
     print_tally(misbehaving.table())
     assert not tally.wrong

@@ -201,7 +201,8 @@ def test_published_fault_types_alone_add_no_published_numbers(run: Path, workspa
     assert not {"paper", "observation", "study"} & set(re.findall(r"[a-z]+", shown.lower()))
     assert not (run / "report" / "observations.md").exists()
     tables = {path.name for path in (run / "report").glob("tables/*")}
-    assert tables == {"fault_tolerant_times.csv", "fault_tolerant_times.md"}  # from the run's own hazards
+    # computed from the hazards of this run
+    assert tables == {"fault_tolerant_times.csv", "fault_tolerant_times.md"}
 
 
 @pytest.mark.parametrize("workspace", [HERE, None], ids=["library", "no library"])

@@ -77,7 +77,8 @@ class Client:
                 sent["Content-Length"] = str(len(data))
             for name, value in sent.items():
                 connection.putheader(name, value)
-            with suppress(BrokenPipeError, ConnectionResetError):  # refused before all was sent
+            # the server can refuse a request before it has read all of it
+            with suppress(BrokenPipeError, ConnectionResetError):
                 connection.endheaders(data, encode_chunked=chunked)
             answer = connection.getresponse()
             found = Answer(answer.status, {k.lower(): v for k, v in answer.getheaders()}, answer.read())

@@ -31,4 +31,4 @@ def test_an_unknown_path_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.txt").write_text("a")
     tree = read_tree(tmp_path, ["*.py"])
     with pytest.raises(MutatorError, match=r"no file 'a\.txt' in the target"):
-        tree.derived("a.txt", lambda *_: pytest.fail("made"))
+        tree.derived("a.txt", lambda *_: pytest.fail("the value was derived"))

@@ -104,7 +104,7 @@ def rk4(z, rate):
 
 def test_the_lateral_plan_minimises_its_cost(lateral_mpc):
     """The residuals of path, both lanes, heading and steering rate have weights 1, 1, 1, 1 and 0.5."""
-    for _ in range(60):  # each time from the last solution, not shifted
+    for _ in range(60):  # each iteration starts from the last solution, not shifted
         lateral_mpc._delta = 0.002
         lateral_mpc._iteration.guess[:] = lateral_mpc._iteration.solution
         lateral_mpc.update(ROAD, SPEED, 0.0, 0.0, FACTOR)

@@ -25,7 +25,7 @@ def noise(seed=1):
 
 
 def refuse():
-    raise AssertionError("made again")
+    raise AssertionError("built again")
 
 
 def library(**given):
@@ -108,7 +108,7 @@ def test_frames_are_verified_when_they_are_used(tmp_path):
     path.write_bytes(data[:128] + bytes([data[128] ^ 1]) + data[129:])
     frames, sound = cached(tmp_path, DIGEST, SHAPE, refuse), np.stack(list(noise()))
     assert np.array_equal(frames[4], sound[4])
-    with pytest.raises(AssertionError, match="made again"):
+    with pytest.raises(AssertionError, match="built again"):
         frames[0]
 
 

@@ -20,7 +20,7 @@ REPO = Path(__file__).parents[4]
 TRACES = Path(os.environ.get("OPENPILOT_TRACES", REPO.parent / "shared/reference/openpilot_v0.4.2/traces"))
 SCENARIOS = REPO / "fault_library" / "scenarios"
 RECORDED = ("S1", "S3", "S5", "S1_nolead", *(f"O{k:02}" for k in range(1, 11)))
-LOG_DELAY = 1  # delay in steps of the controller's messages in the recordings
+LOG_DELAY = 1  # steps by which the recordings delay the controller's messages
 
 pytestmark = pytest.mark.slow
 

@@ -89,7 +89,7 @@ def test_a_known_image_is_not_analysed_again(look, tmp_path):
     lines = detector.detect(view(look(lateral_offset=0.1)))
 
     def unseen(*_):
-        raise AssertionError("made")
+        raise AssertionError("the pixels were computed")
 
     known = look(lateral_offset=0.1)
     assert detector.detect(view(Picture(known.key, known.shape, unseen))) == lines and looking.asked == 1
