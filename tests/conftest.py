@@ -90,7 +90,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_collection_finish() -> None:
-    """Exempt what exists now from garbage collection: each in-process campaign collects several times."""
+    """Exempt the objects that exist now from garbage collection: each in-process campaign collects several
+    times."""
     gc.collect()
     gc.freeze()
 

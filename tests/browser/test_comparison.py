@@ -23,7 +23,6 @@ def worse(e: Experiment) -> dict[str, Any]:
 
 @pytest.fixture
 def found(toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path]) -> Comparison:
-    """Return the changes of every pair, repeated many times. Some are new hazards."""
     few = compare(write_run(toycar, tmp_path / "before"), write_run(toycar, tmp_path / "after", worse))
     return dataclasses.replace(
         few, matching=dataclasses.replace(few.matching, pairs=few.matching.pairs * COPIES)

@@ -43,7 +43,6 @@ QUIET = {"activation": None, "outcome": Outcome.NOT_ACTIVATED}
 
 
 def became(experiment: Experiment) -> dict[str, Any]:
-    """Lane faults change the gap, distance faults are masked, and silence is never active."""
     return {"lane": CHANGED, "distance": MASKED}.get(experiment.fault.fault_type, QUIET)
 
 

@@ -34,7 +34,6 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @contextmanager
 def serving(root: Path, port: int = 0) -> Iterator[tuple[subprocess.Popen[str], str]]:
-    """Start the server command and return its process and the address that it prints."""
     words = ["serve", str(root / "runs"), "--root", str(root), "--no-browser", "--port", str(port)]
     process = subprocess.Popen([sys.executable, "-m", "mutator", *words], stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None

@@ -51,7 +51,6 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def visited(browser: Any) -> Iterator[Any]:
-    """A page that fails the test on a console error, a failed request or a network request."""
     context = browser.new_context(reduced_motion="reduce")
     page, wrong = context.new_page(), []
     page.on("console", lambda m: wrong.append(m.text) if m.type in ("error", "warning") else None)

@@ -19,7 +19,6 @@ HAZARD = {"outcome": Outcome.HAZARD, "hazards": (("H3", 4.0),), "t_manifest": 2.
 
 
 def became(experiment: Experiment) -> dict[str, Any]:
-    """Permanent mutants cause a hazard, and transient ones are masked."""
     return HAZARD if experiment.trigger.name == "always" else {}
 
 

@@ -18,7 +18,6 @@ LISTED = 10
 
 @pytest.fixture
 def large(run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The run of the other tests, with a page that lists ten of the 24 experiments."""
     shutil.copytree(run, tmp_path / "run")
     monkeypatch.setattr(browse, "LISTED", LISTED)
     monkeypatch.setattr(figures, "drawings", lambda frame: ())

@@ -36,7 +36,6 @@ def mutator(root: Path, *words: object) -> subprocess.CompletedProcess[str]:
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, subprocess.CompletedProcess[str]]:
-    """A root with runs/first, a finished run of twelve experiments, and the output of the command."""
     root = tmp_path_factory.mktemp("finished") / "toy"
     shutil.copytree(TESTS / "toy", root, ignore=shutil.ignore_patterns("__pycache__", "templates", "hostile"))
     shutil.copytree(TESTS.parent / "templates", root / "templates")

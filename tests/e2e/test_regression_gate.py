@@ -17,7 +17,6 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture
 def root(tmp_path: Path) -> Path:
-    """The toy with the page's script, a copy of its controller, and a version that keeps to the right."""
     toy = CLONE / "tests" / "toy"
     ignored = shutil.ignore_patterns("__pycache__", "hostile")
     shutil.copytree(toy / "fault_library", tmp_path / "fault_library", ignore=ignored)

@@ -85,7 +85,7 @@ def driven(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 def other_digits(execute: Execute) -> Execute:
-    """Simulate a machine that computes differently: each output file of the target ends with a blank."""
+    """Simulate a machine that computes differently: each output file of the target ends with a space."""
 
     def run(self: ReferenceEngine, job: Job, folder: Path) -> Execution:
         done = execute(self, job, folder)

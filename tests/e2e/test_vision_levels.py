@@ -23,7 +23,6 @@ def workspace() -> Workspace:
 
 
 def departures(workspace: Workspace, out: Path, detector: str) -> Counter[str]:
-    """Return the number of levels of each fault type at which the car left its lane."""
     summary = run_campaign(workspace, f"vision_levels_{detector}", out, workers=2)
     assert (summary.exit_code, summary.done) == (0, 69)
     rows = list(csv.DictReader((out / "results.csv").open()))

@@ -50,7 +50,6 @@ def alike(draw: st.DrawFn) -> list[tuple[Fault, Trigger]]:
 @settings(max_examples=15, deadline=None)
 @given(st.lists(alike(), min_size=1, max_size=3))
 def test_each_patch_can_be_restored_from_its_shape(families: list[list[tuple[Fault, Trigger]]]) -> None:
-    """The diff with holes, filled with a member's values, is that member's patch."""
     manifest, models, _ = setting()
     made = {}
     for family in families:

@@ -54,7 +54,6 @@ def locations(file: ParsedFile) -> Iterator[FaultLocation]:
 def test_statements_of_the_controller_are_repeated_and_exchanged(
     model: str, files: list[Path], least: int
 ) -> None:
-    """Without the active branch, the file equals the original to `ast`. Refusals have a reason."""
     models, made = Workspace.find(root=CLONE).fault_models(), 0
     for path in files:
         file = parse_file(path.name, path.read_bytes(), TARGET)

@@ -169,7 +169,6 @@ DAMAGES: dict[str, Damage] = {
 
 
 def contents(folder: Path) -> dict[str, bytes | str]:
-    """Return the contents of a folder by name: bytes of files, targets of links."""
     return {
         path.relative_to(folder).as_posix(): str(path.readlink()) if path.is_symlink() else path.read_bytes()
         for path in sorted(folder.rglob("*"))

@@ -80,7 +80,6 @@ def hazardous(run: Path) -> str:
 
 
 def _killed(home: Path, at: Path, words: tuple[str, ...], records: int) -> World:
-    """Return a run that is killed as soon as that many experiments have a record."""
     out = home / "run"
     command = Command(_workspace(), out, "-m", "mutator", "run", *words, "-n", "2", "--out", str(out))
     command.wait_for_records(records)

@@ -83,8 +83,6 @@ class Edits:
 
     @contextmanager
     def _edited(self, kind: str, chance: Chance) -> Iterator[tuple[str, tuple[str, ...]]]:
-        """Apply an edit for the duration of the context. Yield its name and additional words for the
-        command."""
         if kind == "choice":
             words = chance.choice(CHOICES)
             yield words[0], words

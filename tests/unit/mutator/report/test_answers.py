@@ -44,8 +44,6 @@ RUNS = [
 
 @pytest.fixture
 def run(tmp_path: Path) -> ReportedRun:
-    """The experiments of `RUNS`, which took 1, 2, 4, ... s of CPU time. The time of the last one is
-    unknown."""
     make_run(tmp_path, metrics=METRICS)
     columns = [c.name for c in result_columns(("H1",), ("gas",), METRICS)]
     with (tmp_path / "results.csv").open("w", newline="") as file:

@@ -113,7 +113,6 @@ def test_an_unfinished_run_has_no_entry(made: tuple[Workspace, Path], cache: Pat
 def test_space_is_freed_for_the_images_of_the_next_seed(
     made: tuple[Workspace, Path], cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Space is freed after the golden runs, and each time a worker changes to another seed."""
     asked = []
     monkeypatch.setattr(caches, "make_room", asked.append)
     run_campaign(made[0], "small", tmp_path / "run", choices=Choices(limit=4), engine="reference")

@@ -63,7 +63,6 @@ def test_films_have_the_variables(toycar: Workspace, tmp_path: Path) -> None:
     ],
 )
 def test_invalid_variables_are_refused(toycar: Workspace, env: str, said: str) -> None:
-    """A variable that the harness sets is refused unless the value is the same."""
     path = with_env(toycar, env)
     with pytest.raises(MutatorError) as caught:
         toycar.manifest("toycar")

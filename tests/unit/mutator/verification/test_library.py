@@ -97,8 +97,8 @@ def test_values_have_the_expected_ranges_and_signs(faults: dict[str, tuple[Fault
 
 
 def test_faults_have_the_expected_aims_holds_and_changes(faults: dict[str, tuple[Fault, ...]]) -> None:
-    """Faults without a lead vehicle aim at H2; steering, lane and image faults at H3; the others at H1. As
-    described, faults of lost data last to the end of the run; as coded, those of bad images do."""
+    """Faults without a lead vehicle aim at H2, steering, lane and image faults at H3, and the others at
+    H1."""
     for fault in faults["as_described"]:
         seen = fault.module == "vision_input"
         lateral = seen or fault.fault_type in ("steer", "path_model", "camera_unavailable")

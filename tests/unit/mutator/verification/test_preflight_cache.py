@@ -31,7 +31,6 @@ def checked(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar) -
 
 @pytest.fixture
 def cache(checked: tuple[Workspace, RunFolder], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Use a copy of the cache that the checks filled, and return its only entry."""
     copied = shutil.copytree(checked[1].path.parent / "cache", tmp_path / "cache")
     monkeypatch.setenv("XDG_CACHE_HOME", str(copied))
     (entry,) = (tmp_path / "cache" / "mutator" / "checks").iterdir()

@@ -56,7 +56,6 @@ def test_brake_is_quantised_and_limited_to_255_counts(rig):
 
 
 def test_brake_hysteresis():
-    """The brake switches on at 0.02 and off below 0.005. Changes within 0.01 are ignored."""
     hysteresis = BrakeHysteresis()
     assert hysteresis.update(0.019) == 0.0
     assert hysteresis.update(0.021) == pytest.approx(0.011)

@@ -65,7 +65,6 @@ def test_speed_estimate_starts_at_zero_and_overshoots(reader, bench):
     ("wheels", "gearbox", "expected"), [(0.5, 1.0, 1.0), (3.5, 4.5, 4.0), (8.0, 9.0, 8.0)]
 )
 def test_wheel_and_gearbox_speed_are_blended(reader, wheels, gearbox, expected):
-    """Below 1 m/s only the gearbox speed is used, above 6 m/s only the wheel speed."""
     kph = wheels * 3.6
     frames = [
         pack("WHEEL_SPEEDS", 0, **{f"WHEEL_SPEED_{w}": kph for w in ("FL", "FR", "RL", "RR")}),

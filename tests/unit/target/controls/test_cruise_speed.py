@@ -26,10 +26,7 @@ def test_engaging_sets_the_cars_speed_but_at_least_40_kmh(v_ego: float, expected
     ],
 )
 def test_releasing_a_button_sets_a_multiple_of_8(button: str, before: int, after: int) -> None:
-    """RES sets the next multiple of 8.
-
-    SET rounds down to a multiple of 8 and subtracts 8. The range is 8 to 144 km/h.
-    """
+    """SET rounds down to a multiple of 8 and subtracts 8."""
     assert button_v_cruise(before, [ButtonEvent(button, False)]) == after
 
 

@@ -47,7 +47,6 @@ def test_torque_follows_the_gains_per_degree(params: CarParams) -> None:
 
 
 def test_feedforward_grows_with_lateral_acceleration(params: CarParams) -> None:
-    """With the wheel at the desired angle, the torque is 0.00006 per degree and (m/s)^2."""
     for v_ego in (10.0, 30.0):
         lateral, _ = control(params, -2.0)
         car = CarState(v_ego=v_ego, steering_angle=lateral.angle_desired)

@@ -40,9 +40,6 @@ def test_without_lines_the_model_path_is_followed() -> None:
 
 
 def test_two_uncertain_lines_have_a_higher_combined_weight() -> None:
-    """With a probability of 50 % for each line, the middle has a weight of 0.75 and the model's path one of
-    1.
-    """
     planner = planned(model(path=0.7, probs=(0.5, 0.5)))
     assert planner.c_prob == pytest.approx(0.75)
     assert planner.d_poly[3] == pytest.approx(0.7 / 1.75)

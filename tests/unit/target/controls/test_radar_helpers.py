@@ -64,7 +64,6 @@ def test_lead_speed_and_acceleration_follow_the_measurement() -> None:
 
 
 def test_relative_acceleration_is_limited() -> None:
-    """A jump of the speed gives 10 m/s^2 at most, before a low-pass filter."""
     t = track(v_rel=0.0)
     step(t, -5.0)
     assert t.a_rel == pytest.approx(-10.0 * 0.1358, abs=0.01)

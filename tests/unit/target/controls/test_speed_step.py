@@ -33,10 +33,8 @@ class Cycle(NamedTuple):
 
 
 def drive(params: CarParams, v_rel: list[float], gap: float = 60.0, jump: float = 0.0) -> list[Cycle]:
-    """Run radard and planner, not engaged, behind a lead with these relative speeds from the radar.
-
-    `jump` is added to the lead's distance from the first cycle with another speed.
-    """
+    """Run radard and planner, not engaged, behind a lead with these relative speeds. `jump` is added to the
+    lead's distance while the speed differs from the first one."""
     radard, planner = Radard(params, ModelFit()), Planner(params, ModelFit())
     car, controls = CarState(v_ego=V_EGO), ControlsState(v_ego=V_EGO, active=True)
     found, true = [], v_rel[0]
@@ -70,7 +68,6 @@ def test_fusions_pause_while_the_camera_disagrees(params: CarParams) -> None:
 
 
 def test_a_warning_needs_half_a_second_after_the_step(params: CarParams) -> None:
-    """After the step, a short time to collision must last ten cycles. The other counters continue."""
     found = drive(params, [-2.0] * 80 + [-10.0] * 40, gap=30.0)
     assert not any(cycle.new_lead for cycle in found[10:])
     assert [k for k, cycle in enumerate(found) if cycle.fcw] == [89]

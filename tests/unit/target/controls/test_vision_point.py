@@ -31,9 +31,6 @@ def track(d_rel: float = 50.0, y_rel: float = 0.0, v_rel: float = 0.0) -> Track:
     ],
 )
 def test_a_track_must_match_in_place_and_speed(other: Track, matches: bool) -> None:
-    """Half the distance error and twice the lateral error must be below 4 m, and the speed error below 10
-    m/s.
-    """
     assert (seen().best_match([other], ZERO) is other) is matches
 
 

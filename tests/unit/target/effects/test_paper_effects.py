@@ -79,10 +79,6 @@ def test_fog_reduces_contrast_evenly(camera, moment):
 
 
 def test_fog_noise_is_uniform_and_blurred(camera, moment):
-    """Fog of thickness 10 adds noise of 0 to 255 to all pixels.
-
-    Blurring keeps its mean and smooths its grain.
-    """
     fog = PaperFog(10, 0, camera).apply(black(camera), moment()).astype(float)
     assert abs(fog.mean() - 127.5) < 1.0
     # 73.6 / (2 * sqrt(pi) * sigma) for sigma = 7

@@ -9,7 +9,6 @@ from selfdrive.sim.picture import whole
 
 @pytest.fixture
 def glass(camera):
-    """A windscreen in rain with 1,000 drops of 2 mm in a cubic metre."""
     return Windscreen(np.random.default_rng(5), camera, 1000.0, np.full(50, 0.002), shrunk, Gaussian(BLUR))
 
 

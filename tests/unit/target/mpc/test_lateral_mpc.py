@@ -99,7 +99,6 @@ def test_the_plan_continues_from_its_own_angle(lateral_mpc, lanes):
 
 
 def test_speeds_below_5_mps_are_planned_as_5_mps(lateral_mpc, lanes):
-    """Below 5 m/s, the plan is the one for 5 m/s, except for the distance during the actuation delay."""
     drive(lateral_mpc, lanes(0.3), v=0.0)
     assert lateral_mpc._iteration.solution[4] == pytest.approx(5.0 * 0.05, abs=1e-3)
 

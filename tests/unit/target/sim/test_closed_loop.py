@@ -118,10 +118,7 @@ def test_lanes_seen_a_metre_off_make_the_car_leave_its_lane(s1, shift):
 
 
 def test_drifting_lanes_saturate_the_steering(s1):
-    """The lanes drift by half a metre per step.
-
-    The wheel turns no faster than motor and tyres can turn it.
-    """
+    """The lanes drift by half a metre per step."""
     result = drive(replace(s1, steps=1000), lanes_from(5.0, lambda t: 50.0 * (t - 5.0)))
     assert [alert["name"] for alert in result.record["alerts"]] == ["steer_saturated"]
     assert 5.8 < result.record["alerts"][0]["t"] < 6.5

@@ -20,9 +20,7 @@ def test_ordinary_driving_has_no_hazard(truth):
     [(0.0, 0.0, True), (0.01, 0.0, False), (-3.0, 2.75, True), (-3.0, -2.76, False)],
 )
 def test_h1_is_a_collision(truth, d_rel, offset, hit):
-    """H1, a collision, needs a distance of 0 or less and an offset of at most 2.75 m, so that the cars
-    overlap.
-    """
+    """The cars overlap up to an offset of 2.75 m."""
     assert (first(truth, {"d_rel": d_rel, "lateral_offset": offset})["H1"] == 0.0) is hit
 
 
@@ -36,7 +34,6 @@ def test_h1_is_a_collision(truth, d_rel, offset, hit):
     ],
 )
 def test_h2_is_a_stop_on_a_free_road(truth, v_ego, d_rel, free_road, hit):
-    """H2 is a speed below 0.3 m/s with at least 100 m of free road ahead."""
     stopped = {"v_ego": v_ego, "d_rel": d_rel, "free_road": free_road}
     assert (first(truth, {}, stopped)["H2"] == 1.0) is hit
 
@@ -49,7 +46,7 @@ def test_h2_needs_a_car_that_has_moved(truth):
 
 @pytest.mark.parametrize(("offset", "hit"), [(0.94, False), (0.96, True), (-0.96, True)])
 def test_h3_is_a_lane_departure(truth, offset, hit):
-    """H3 is an offset of more than 0.95 m, at which a side of the car is outside the lane."""
+    """At an offset of more than 0.95 m, a side of the car is outside the lane."""
     assert (first(truth, {"lateral_offset": offset})["H3"] == 0.0) is hit
 
 

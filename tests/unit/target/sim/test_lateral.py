@@ -61,10 +61,6 @@ def test_a_steady_turn_agrees_with_the_bicycle_model(car, speed):
 
 
 def test_full_torque_is_limited_by_the_tyres(car):
-    """At 60 mph, full torque turns the wheel at up to 0.5 rad/s.
-
-    The lateral acceleration settles near 2.8 m/s^2.
-    """
     fastest = 0.0
     for _ in range(600):
         car.step(1.0, 26.8, 0.0)
@@ -98,7 +94,6 @@ def test_slow_driving_is_stable(car, speed):
 
 
 def test_a_car_that_goes_straight_leaves_its_lane_in_a_bend(car):
-    """After s metres in a left-hand bend of radius R, the car is s^2 / 2R to the right."""
     run(car, 1.0, 0.0, 20.0, curvature=0.002)
     assert car.offset == pytest.approx(-(20.0**2) / 1000, rel=0.02)
     assert car.heading == pytest.approx(-0.04, rel=0.01)

@@ -25,7 +25,7 @@ def test_coasting_from_60_mph(plant):
 
 
 def test_position_uses_the_old_speed(plant):
-    """A step moves the car by exactly its speed at the start of the step (Euler's method)."""
+    """The plant uses Euler's method."""
     car = plant(10.0)
     car.step(Actuators(brake=1.0), 0.0, 0.0)
     assert car.position == 0.1
@@ -65,7 +65,6 @@ def test_the_car_never_drives_backwards(plant):
 
 
 def test_position_is_measured_along_the_road(plant):
-    """A car at an angle, or on the outside of a bend, covers less distance."""
     straight, askew, outside = plant(20.0), plant(20.0), plant(20.0)
     askew.lateral.heading = 0.5
     outside.lateral.offset = -2.0

@@ -116,10 +116,7 @@ def test_the_lane_offset_is_hidden_from_the_sensors(s1):
     ("speed", "read"), [(0.5, 1.8), (0.29, 0.0), (1.0, 3.6), (3.5, 8.05), (6.0, 6.0), (20.0, 20.0)]
 )
 def test_the_gearbox_speed_has_the_wrong_unit(truth, speed, read):
-    """The gearbox reports km/h as m/s.
-
-    The speed is 3.6 times too high up to 1 m/s, and less so up to 6 m/s.
-    """
+    """The gearbox reports km/h as m/s."""
     sensors, interface = CarSensors(ReferencePlant.gearbox_scale), CarInterface()
     state = interface.update(sensors.measure(truth(v_ego=speed), 0, 0), 0.0)
     assert state.v_ego_raw == pytest.approx(read, abs=0.01)

@@ -98,10 +98,6 @@ def test_a_constant_has_no_lag_and_a_slope_has_lag_zero():
 
 
 def test_crossings_of_a_band():
-    """Each stretch outside the band is a crossing, with its ends and its worst moment.
-
-    A value at the limit is inside the band.
-    """
     seconds = np.arange(8) / 20
     found = crossings(seconds, np.array([0.2, 0.5, 0.6, -0.9, 0.5, 0.0, 0.0, 0.7]), 0.5)
     assert [(one.begin, one.end, one.worst, one.at) for one in found] == [

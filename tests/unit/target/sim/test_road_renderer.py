@@ -96,7 +96,6 @@ def test_far_dashes_do_not_flicker():
 
 
 def test_dashes_have_the_dimensions_of_us_roads():
-    """A dash is 3.05 m long and repeats every 12.2 m, starting where the road starts."""
     renderer = RoadRenderer(CALTECH, replace(BARE, right=replace(FRESH, dashed=True)), 0, periods=1)
     row = CALTECH.rows - 1
     x = CALTECH.distance(row)

@@ -49,7 +49,7 @@ def drive(scenario, script, steps):
 
 
 def test_a_command_acts_in_the_next_step(s1):
-    """A command of step k moves the car in step k + 1. Row k shows the active commands."""
+    """Row k of the trace shows the commands that are active in step k."""
     script = Script(lambda step: (-384, 51, 0) if step == 3 else (0, 0, 0))
     trace = drive(s1, script, 8).result().trace
     assert np.flatnonzero(trace["brake"]).tolist() == [4]

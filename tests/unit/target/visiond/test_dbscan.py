@@ -47,7 +47,6 @@ def test_thin_lines_get_the_labels_of_scikit_learn(eps, min_samples):
 
 
 def test_a_pixel_between_two_clusters_belongs_to_the_first():
-    """A border pixel near two clusters belongs to the lower-numbered one and does not join them."""
     mask = np.array([[1, 1, 1, 0, 0, 0, 1, 1, 1]] * 3, np.uint8)
     mask[1, 4] = 1
     assert labels(mask, 2, 8) == [0, 0, 0, 1, 1, 1, 0, 0, 0, 0, 1, 1, 1, 0, 0, 0, 1, 1, 1]
