@@ -18,7 +18,7 @@ from selfdrive.sim.scenario import load_scenario  # noqa: E402
 from selfdrive.sim.simulator import Simulator  # noqa: E402
 
 STEP, STEP_AT = 0.5, 8.0  # m to the left, s
-CASES = (  # what, scenario, step of the lane in m, disturbance from s, settled within m
+CASES = (  # case, scenario, step of the lane (m), start of the disturbance (s), settling band (m)
     ("start 0.5 m left", "L01", 0.0, 1.31, 0.025),
     ("lane steps 0.5 m left", "L01", STEP, STEP_AT, 0.025),
     ("bend of 500 m", "L02", 0.0, 7.4, 0.025),

@@ -135,7 +135,7 @@ def main() -> int:
     parser.add_argument("--detectors", nargs="+", metavar="NAME", help="measure only these detectors")
     parser.add_argument("--effects", nargs="+", choices=EFFECTS, default=list(EFFECTS), metavar="NAME")
     parser.add_argument("--rounds", type=int, default=10)
-    parser.add_argument("--count", type=int, default=20, help="pictures of a round")
+    parser.add_argument("--count", type=int, default=20, help="pictures per round")
     parser.add_argument("--json", type=Path, metavar="FILE")
     options = parser.parse_args()
     if options.take:
@@ -172,7 +172,7 @@ def _compared(
             lines.add(digest)
         same &= len(lines) == 1
     older, this = map(median, times)
-    told = "" if same else "  other lines"
+    told = "" if same else "  different lines"
     print(
         f"{detector:10}{effect:16}{older:8.2f} ms, now {this:8.2f} ms: ratio {this / older:.2f}{told}",
         flush=True,

@@ -52,16 +52,16 @@ ARMING, LATCHING, REDRAWING, MARKS, RIM = "arming", "latching", "redrawing", "ma
 PLACE, CLUSTERS, MISSING, PATH = "place", "clusters", "missing line", "path"
 MOVE, LABELS = "move", "labels"
 DIFFERENCES = {
-    ARMING: "triggers are armed from the start, not from 1.5 s on",
+    ARMING: "triggers are armed at the start instead of at 1.5 s",
     LATCHING: "an effect stays to the end of the run",
-    REDRAWING: "every picture is drawn anew; without it marks as coded stand still",
+    REDRAWING: "every picture is drawn anew, whereas otherwise marks as coded do not move",
     MARKS: "streaks, fog and flakes as coded",
     RIM: "occlusion by black blobs with a gray rim, instead of soft dark ones",
-    PLACE: "effects are drawn before the picture is moved to where the car is",
+    PLACE: "effects are drawn before the picture is moved to the car's pose",
     CLUSTERS: "the detector as coded: windows, edges and clusters",
     MISSING: "a line that is not seen is sent as 8 m to the left, with full confidence",
     PATH: "the path is straight ahead, with full confidence",
-    MOVE: "the picture moves as a whole, and shows 64 % of the way",
+    MOVE: "the picture is shifted as a whole, by 64 % of the car's offset",
     LABELS: "left and right are swapped in the picture and for the controller",
 }
 ARMED_FROM = 1.5  # s, without ARMING
