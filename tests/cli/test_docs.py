@@ -251,7 +251,7 @@ def test_the_index_names_every_page() -> None:
         for file in INDEX.parent.rglob("*.*")
         if file not in PAGES and file.parent != CLONE / SCHEMAS and not site & {file, *file.parents}
     }
-    assert rest - shown == set(), "no page shows or links these"
+    assert rest - shown == set(), "no page shows or links to these files"
 
 
 def test_page_names_differ_in_more_than_their_suffix() -> None:

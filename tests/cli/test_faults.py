@@ -137,7 +137,9 @@ def test_ids_are_stable(cli: Cli, root: Path) -> None:
         (["--operators", "branches", "--in", "toycar/driver.py", "--all-lines"], "did you mean 'branch'"),
     ],
 )
-def test_generate_refuses_two_sources_or_none(cli: Cli, root: Path, words: list[str], said: str) -> None:
+def test_generate_refuses_an_invalid_selection_of_mutants(
+    cli: Cli, root: Path, words: list[str], said: str
+) -> None:
     answer = cli("generate", *words, "--out", "m")
     assert answer.code == 2
     assert said in answer.err

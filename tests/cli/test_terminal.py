@@ -131,7 +131,7 @@ def test_long_lines_are_folded(text: str, width: int, lines: list[str]) -> None:
 
 
 @pytest.mark.parametrize(("columns", "width"), [(None, 100), ("60", 60), ("many", 100)])
-def test_output_to_a_pipe_is_folded_at_100_columns(
+def test_output_to_a_pipe_is_folded_at_100_columns_by_default(
     columns: str | None, width: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("COLUMNS")

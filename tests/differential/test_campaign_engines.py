@@ -72,7 +72,7 @@ def test_an_equivalence_check_resumes_after_kills(
         process = _begun(toy, out)
         while process.poll() is None and len(_proved(out)) < proved + 4:
             time.sleep(0.02)
-        assert process.poll() is None, "it ended before it could be killed"
+        assert process.poll() is None, "the command ended before it could be killed"
         process.kill()
         process.wait()
         wait_for_workers(out, 15.0)

@@ -244,7 +244,7 @@ class Misbehaving:
             said = command.end(longest_s=longest_s)
         except (subprocess.TimeoutExpired, AssertionError) as err:
             command.kill()
-            return Came(code=-1, said="", left=f"it does not end: {err}")
+            return Came(code=-1, said="", left=f"the command does not end: {err}")
         table = self.at / "run" / "results.csv"
         came = Came(code=command.process.returncode, said=said, left=self._left())
         if table.exists():
@@ -263,7 +263,7 @@ class Misbehaving:
             path for path in (self.at / "run").glob("*") if path.name == "work" or is_half_written(path.name)
         ]
         if left:
-            return f"it leaves {', '.join(map(str, left))}"
+            return f"the command leaves {', '.join(map(str, left))}"
         return "" if contents(self.tree) == self.before else "the user's tree has changed"
 
     def table(self) -> str:

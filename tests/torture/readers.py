@@ -21,12 +21,8 @@ AUDITED = re.compile(
     r"(run|digests|checks|reviewed)\.json|campaign\.yaml|plan\.csv|plan/|golden/|records/|proof/|patches/|"
     r"series/[0-9a-f]{16}\.js$"
 )
-TABLES = (
-    "results.csv",
-    "results.parquet",
-    "propagation.parquet",
-    "timings.parquet",
-)  # verified if they exist
+# verified if they exist
+TABLES = ("results.csv", "results.parquet", "propagation.parquet", "timings.parquet")
 HOW = re.compile(  # the parts of a report with timings
     r"^## (How the experiments were run|Where the time went)$.*?^(?=## )", re.MULTILINE | re.DOTALL
 )

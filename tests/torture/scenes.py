@@ -70,9 +70,8 @@ class Scene:
         return command.process.returncode == 0 or merged
 
     def undisturbed(self) -> Told:
-        if (
-            self.home is None and not self.fresh_cache
-        ):  # fills the cache, so that the checks do not add to the duration
+        # fills the cache, so that the checks do not add to the duration
+        if self.home is None and not self.fresh_cache:
             self._begin()
             self._command().end()
         self._begin()

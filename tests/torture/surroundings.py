@@ -97,7 +97,7 @@ def read_only(chance: Chance, at: Path) -> Iterator[Surrounding]:
     with mounted(place, "ro"):
         yield Surrounding(
             run_in=place if role == "run" else at,
-            how=f"{role} on a disk to read from",
+            how=f"{role} on a read-only disk",
             environment=given,
             ease=lambda: _mount("-o", "remount,rw", str(place)),
         )

@@ -64,10 +64,10 @@ class Edits:
             *(one for one, of in names.items() if kind in of),
         ]
         if end is End.REFUSED and not any(one in told.said for one in said):
-            end, why = End.WRONG, f"says nothing of any of {said}"
+            end, why = End.WRONG, f"names none of {said}"
         again = run(self.place)
         if again.code or again.result != self.right.result:
-            end, why = End.WRONG, f"{why}; undone, {again.result}\n{again.said[-LAST:]}"
+            end, why = End.WRONG, f"{why}; after undoing it: {again.result}\n{again.said[-LAST:]}"
         story = f"{kind}: {what}: {why}\n{told.said[-LAST:]}"
         return [Case(kind=kind, damage=what.split(" of ")[0], reader="run", end=end, story=story)]
 

@@ -52,7 +52,7 @@ class Elsewhere:
                 around.ease()
                 again = run(place)
                 if again.result != self.right.result:
-                    end, why = End.WRONG, f"afterwards {again.said}, {again.result} for {self.right.result}"
+                    end, why = End.WRONG, f"later: {again.said}, {again.result}, not {self.right.result}"
         story = f"{around.how}, -n {workers}: exit code {told.code}, {why}\n{told.said[-LAST:]}"
         return [Case(kind=self.name, damage=f"-n {workers}", reader="run", end=end, story=story)]
 
@@ -75,7 +75,7 @@ class Elsewhere:
         facts, table = self.right.result
         end, why = judged(told, Told(code=0, said="", result=[facts[-1], table]), [""])
         if end is End.REFUSED and around.is_heard and not any(words in told.said for words in REMEDIES):
-            return End.WRONG, "nothing is said of what to do"
+            return End.WRONG, "no remedy is given"
         return end, why
 
 

@@ -80,18 +80,18 @@ class Pair:
             ends.append((End.WRONG, f"left {scratch(self.place.run)}"))
         again = run(self.place)
         if again.code or again.result != self.right.result:
-            ends.append((End.WRONG, f"the folder ends with {again.result}\n{again.said[-LAST:]}"))
+            ends.append((End.WRONG, f"the folder finally has {again.result}\n{again.said[-LAST:]}"))
         end = max((end for end, _ in ends), key=[End.RIGHT, End.REFUSED, End.WRONG].index)
         told = "\n".join(f"{one.process.returncode}: {text[-LAST:]}" for one, text in said.items())
         story = f"{name} beside run: {[why for _, why in ends if why]}\n{told}"
-        return [Case(kind=name, damage=f"{len(both)} to their ends", reader="run", end=end, story=story)]
+        return [Case(kind=name, damage=f"{len(both)} undisturbed", reader="run", end=end, story=story)]
 
     def _judge(self, command: Command, said: str, name: str) -> tuple[End, str]:
         """Return how one of the commands ended. Output about an unfinished run is valid, too."""
         code = command.process.returncode
         end, why = judged(Told(code=code, said=said), Told(code=0, said=""), [""])
         if end is End.REFUSED and name == "verify" and code == 1:
-            return End.WRONG, "an unfinished run is taken for a damaged one"
+            return End.WRONG, "reports an unfinished run as damaged"
         if end is End.REFUSED and name in ("run", "verify --repair") and not any(w in said for w in BUSY):
             known = "not a run folder" in said or "no results" in said
             return (

@@ -98,7 +98,7 @@ def judged(told: Told, right: Told, touched: Iterable[str]) -> tuple[End, str]:
         return End.WRONG, "a traceback"
     if told.code == 0:
         same = told.result == right.result
-        return (End.RIGHT, "") if same else (End.WRONG, f"another result: {_difference(told, right)}")
+        return (End.RIGHT, "") if same else (End.WRONG, f"a different result: {_difference(told, right)}")
     if told.code not in (1, 2, 3):
         return End.WRONG, f"exit code {told.code}"
     if not any(Path(name).name in told.said for name in touched):
@@ -115,7 +115,7 @@ def _difference(told: Told, right: Told) -> str:
     if isinstance(right.result, dict) and isinstance(told.result, dict):
         names = right.result.keys() | told.result.keys()
         return ", ".join(name for name in names if right.result.get(name) != told.result.get(name))
-    return f"{told.result} for {right.result}"[:2000]
+    return f"{told.result} instead of {right.result}"[:2000]
 
 
 def _first(told: object, right: object) -> str:
