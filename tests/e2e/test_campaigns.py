@@ -129,7 +129,7 @@ def test_the_next_command_deletes_half_written_files(toy: Workspace, finished: P
     assert [path.exists() for path in (*left, mine)] == [False, False, False, False, True]
 
 
-@pytest.mark.skipif(shutil.which("patch") is None, reason="needs the program patch")
+@pytest.mark.skipif(shutil.which("patch") is None, reason="needs the program `patch`")
 def test_a_stored_patch_produces_the_mutant(toy: Workspace, finished: Path, tmp_path: Path) -> None:
     row = next(row for row in rows_of(finished) if row["outcome"] == "sdc")
     name = row["experiment_id"]

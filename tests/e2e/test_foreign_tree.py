@@ -47,4 +47,4 @@ def test_both_engines_give_the_same_table(cli: Cli, pole: Workspace, tmp_path: P
     glue = pole.library / "overlays" / "pole" / "glue_parts" / "scenario.py"
     glue.write_text(glue.read_text() + "# changed\n")
     code, _ = cli("rerun", first, "--run", tmp_path / "fork")
-    assert code == 2, "the glue has changed"
+    assert code == 2, "the changed glue was not refused"

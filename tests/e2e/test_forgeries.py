@@ -63,7 +63,7 @@ def hazardous(run: Path) -> tuple[Path, int, dict[str, Any]]:
             record = json.loads(line)
             if record.get("outcome") == "hazard":
                 return path, place, record
-    raise AssertionError("no hazard")
+    raise AssertionError("the run has no hazard")
 
 
 def rewrite(path: Path, place: int, *lines: str) -> None:

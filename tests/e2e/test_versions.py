@@ -237,7 +237,7 @@ def _other_pythons() -> Iterator[str]:
 def test_another_installed_python_resumes_only_if_accepted(toy: Workspace, tmp_path: Path) -> None:
     python = next(_other_pythons(), None)
     if python is None:
-        pytest.skip("there is no second Python")
+        pytest.skip("no second Python is installed")
     home = tmp_path / "environment"
     subprocess.run([python, "-m", "venv", home], check=True)
     install = [home / "bin" / "pip", "install", "-q", "-c", CLONE / "constraints.txt", "-e", CLONE]

@@ -36,7 +36,7 @@ def test_changes_between_runs_are_counted(folder: Path) -> None:
     assert written.runs == 2
     assert "before to after: 1 new hazard, 1 gone, 0 changed otherwise, of 3 shared." in text
     assert f"`mutator compare {folder / 'before'} {folder / 'after'}`" in text
-    assert text.index("| after |") < text.index("| before |"), "the newest run is first"
+    assert text.index("| after |") < text.index("| before |"), "the newest run is not first"
     assert "| 1970-01-01 02:00 | - | 3 of 3 | 1 of 3 activated | - | 1 of 1 |" in text
 
 

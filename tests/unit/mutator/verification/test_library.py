@@ -234,7 +234,7 @@ def edited(toy: Workspace, file: str, old: str, new: str) -> list[str]:
 
 def test_each_variant_without_its_anchor_is_a_problem(toy: Workspace) -> None:
     problems = edited(toy, "target/toycar/sensor.py", "gap = truth.gap", "distance = truth.gap")
-    assert len(problems) == 3, "two variants, one of them in two readings"
+    assert len(problems) == 3, "expected two variants, one of them in two readings"
     assert problems[0].startswith(
         "fault_library/faults/sensor/distance.yaml:14: sensor/distance/longer (as_described): "
         "no assignment to 'gap' in Sensor.measure (toycar/sensor.py:12); expected one of 'distance' (line 14)"

@@ -69,7 +69,7 @@ def compile_effects(folder, *options):
 
 @pytest.fixture
 def both(folder):
-    """Build an effect in Python and in C. Skip the test if OpenCV computes other bits than the C code."""
+    """Build an effect in Python and in C. Skip the test if OpenCV computes different bits from the C code."""
 
     def made(kind, amount, seed, camera):
         compiled.use(None)
@@ -77,7 +77,7 @@ def both(folder):
         compiled.use(folder)
         fast = kind(amount, seed, camera).ready()
         if fast._key == plain._key:
-            pytest.skip("OpenCV computes other bits than the C code")
+            pytest.skip("OpenCV computes different bits from the C code")
         return plain, fast
 
     yield made
@@ -122,7 +122,7 @@ def test_results_do_not_depend_on_wide_vector_instructions(folder, tmp_path, cam
         drawn.append(kind(LEVELS[kind][-1], 1, camera))
     compiled.use(None)
     if any(effect._key[-1] == "" for effect in drawn):
-        pytest.skip("OpenCV computes other bits than the C code")
+        pytest.skip("OpenCV computes different bits from the C code")
     assert drawn[0]._key != drawn[1]._key
     assert np.array_equal(*(effect.apply(noise, moment(3)) for effect in drawn))
 
@@ -143,7 +143,7 @@ def test_compiled_blurs_have_the_same_bits(folder, sigma, size):
     fast, plain, random = build_gaussian(sigma, size), Gaussian(sigma, size), np.random.default_rng(3)
     compiled.use(None)
     if not isinstance(fast, CompiledGaussian):
-        pytest.skip("OpenCV computes other bits than the C code")
+        pytest.skip("OpenCV computes different bits from the C code")
     for shape in [(1, 1), (3, 90), (plain.size // 2 + 1,) * 2, (60, 80), *random.integers(1, 200, (12, 2))]:
         for picture in pictures(random, tuple(shape)):
             assert np.array_equal(fast(picture), plain(picture))

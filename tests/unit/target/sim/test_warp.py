@@ -60,7 +60,7 @@ def test_a_region_equals_that_of_opencvs_whole_image():
 @needs_compiler
 def test_compiled_warps_have_the_same_bits(library):
     if not agrees(library):
-        pytest.skip("OpenCV computes other bits than the C code")
+        pytest.skip("OpenCV computes different bits from the C code")
     random, fast = np.random.default_rng(2), CompiledWarp(library)
     for matrix in moves(random):
         for source in sources(random):
@@ -91,7 +91,7 @@ def test_results_do_not_depend_on_wide_vector_instructions(library, tmp_path, op
 @pytest.mark.parametrize("shape", [(50, 100), (64, 64), (3, 65), (1, 200), (2, 64)])
 def test_pictures_of_any_size_are_warped(library, shape):
     if not agrees(library):
-        pytest.skip("OpenCV computes other bits than the C code")
+        pytest.skip("OpenCV computes different bits from the C code")
     random, fast = np.random.default_rng(3), CompiledWarp(library)
     for _ in range(20):
         source = random.integers(0, 256, shape, np.uint8)

@@ -54,8 +54,8 @@ def test_the_share_of_frames_with_both_lines_is_printed(frames, capsys):
     assert "both lines found in 2 of 2 = 100.0%" in out and "p1_one" in out and "tus_two" in out
     drawn = cv2.imread(str(frames / "drawn" / "robust_p1_one.png"))
     blue, green, red = (drawn[..., i].astype(int) for i in range(3))
-    assert ((green - red > 60) & (green - blue > 60)).sum() > 200, "found lines are green"
-    assert ((red - green > 60) & (red - blue > 60)).sum() > 8, "the truth is red"
+    assert ((green - red > 60) & (green - blue > 60)).sum() > 200, "the found lines are not green"
+    assert ((red - green > 60) & (red - blue > 60)).sum() > 8, "the true lines are not red"
 
 
 def test_a_line_off_by_more_than_the_limit_is_a_miss(frames, capsys):
