@@ -194,7 +194,7 @@ def ends(seed: int) -> None:
         ended, busy, pieces = simulated(folder, some, random.Random(seed))
     last, middle = max(ended), mean(ended)
     print(
-        f"ends: {count:,} experiments, {WORKERS} workers, {pieces} pieces: the last one ends at {last:.1f} s,"
+        f"ends: {count:,} experiments, {WORKERS} workers, {pieces} pieces; last worker ends at {last:.1f} s,"
     )
     after, at_work = 100 * (last / middle - 1), 100 * busy / (last * WORKERS)
     print(f"{after:.1f} % after the mean of all workers; workers are busy {at_work:.1f} % of the time")

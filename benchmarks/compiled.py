@@ -1,4 +1,4 @@
-"""Measure what compiled helpers save in runs of 30 s.
+"""Measure how much time compiled helpers save in runs of 30 s.
 
 `python benchmarks/compiled.py [--rounds N] [--json FILE]`. Runs without and with helpers alternate. Times are
 CPU times of this process in one thread.

@@ -85,7 +85,8 @@ class Bench:
             execution.out.rename(self.folder / "golden" / one.key)
 
     def measure(self, name: str, experiments: Sequence[Experiment]) -> tuple[Measured, float]:
-        """Return an engine's measurements, and the CPU (s) of a first pass: one experiment per golden run."""
+        """Return the measurements, and the CPU time (s) of a first pass over one experiment per golden
+        run."""
         engine = self.engines[name]()
         runner = Runner(
             self.manifest, self.models, engine, Goldens(self.manifest, self.golden), self.workspace.scenario

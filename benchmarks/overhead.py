@@ -133,7 +133,7 @@ def against(clone: Path, options: argparse.Namespace) -> int:
         for part in found["this"][0]
     }
     print(*(f"{part} {ratio:.2f}" for part, ratio in ratios.items()), sep=", ", end="")
-    print(f" of the older version's (goal of all: {GOAL_OF_OLDER})")
+    print(f" of the older version's cost (goal for all: {GOAL_OF_OLDER})")
     if options.json:
         options.json.write_text(json.dumps({"ms": found, "ratios": ratios}, indent=1) + "\n")
     return int(ratios["all"] > GOAL_OF_OLDER)

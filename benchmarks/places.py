@@ -1,4 +1,4 @@
-"""Count the places that make a value, and those that anchors reach: `python benchmarks/places.py`.
+"""Count the places that produce a value, and those that anchors reach: `python benchmarks/places.py`.
 
 The places are in eight modules of third-party packages, chosen before any count (`MODULES` says why), each in
 the version of constraints.txt. They are counted with `ast` alone, not with the harness's own search. A place
@@ -44,7 +44,7 @@ Spot = tuple[int, int, int, int]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Site:
-    """A place that makes a value: its kind, its node, what encloses it, and the name that it binds."""
+    """A place that produces a value: its kind, its node, what encloses it, and the name that it binds."""
 
     kind: str
     node: ast.AST
@@ -211,7 +211,7 @@ class Counting(ast.NodeVisitor):
                 self.inside("f-string", part.value)
 
     def visit_arg(self, node: ast.arg) -> None:
-        """Skip annotations, because they make no value."""
+        """Skip annotations, because they produce no value."""
 
     def visit_Expr(self, node: ast.Expr) -> None:
         if not isinstance(node.value, ast.Constant):
@@ -264,7 +264,7 @@ def _spot(node: ast.AST) -> Spot:
 
 
 def reason(site: Site) -> str:
-    """Return why no anchor leads to a place."""
+    """Return why no anchor reaches a place."""
     if site.within:
         return site.within
     if isinstance(site.node, ast.Starred | ast.GeneratorExp | ast.Yield | ast.YieldFrom | ast.NamedExpr):
@@ -288,7 +288,7 @@ def counted(name: str, models: FaultModels) -> Iterator[tuple[Site, bool]]:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.partition(":")[0] + ".")
-    parser.add_argument("--missed", action="store_true", help="list the places that no anchor leads to")
+    parser.add_argument("--missed", action="store_true", help="list the places that no anchor reaches")
     options = parser.parse_args()
     models = Workspace.find(root=Path(__file__).resolve().parents[1]).fault_models()
     total, hit, why = Counter[str](), Counter[str](), Counter[str]()

@@ -1,8 +1,8 @@
 """Measure the frame rate of an experiment's replay in a headless Chromium without a GPU.
 
 `python benchmarks/replay.py [--seconds N]`. A synthetic run of the shipped target, with its scene and all of
-its channels at 20 samples a second, plays on a narrow, a wide and a very sharp screen. The browser draws at
-most 60 frames a second; the goal is 30.
+its channels at 20 samples a second, plays on screens of several widths and pixel densities. The browser draws
+at most 60 frames a second; the goal is 30.
 """
 
 import argparse

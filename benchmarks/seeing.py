@@ -88,9 +88,7 @@ FRAMES = "SEEING_FRAMES"  # environment variable that names the folder of shared
 
 
 class Row(NamedTuple):
-    """A line of the table: the enabled differences, and the threshold for the coded detector to see
-    a mark.
-    """
+    """A row of the table: the enabled differences, and the coded detector's threshold for a mark."""
 
     name: str
     parts: frozenset[str]
@@ -128,7 +126,7 @@ THEN = [
 
 
 class TrueLabels(ReferencePlant):
-    """The reference plant, without swapping left and right in frames."""
+    """A reference plant that does not swap left and right in frames."""
 
     mirrors = False
 
@@ -182,7 +180,7 @@ def drawing(name: str, level: int, coded: bool, number: int, camera: CameraModel
 
 
 class MixedDetector:
-    """The detector of either reading, with the other's rule for missing lines and the path."""
+    """A lane detector that combines the rules of both readings."""
 
     def __init__(self, row: Row, camera: CameraModel) -> None:
         self._parts = row.parts
@@ -203,7 +201,7 @@ class MixedDetector:
         return LaneLines(left, right, path)
 
     def _unseen(self, side: int, line: RoadLine) -> RoadLine:
-        """Return the line, with zero probability if the detector as coded has no cluster."""
+        """Return the line, with zero probability if the detector as coded has no cluster for it."""
         return line._replace(prob=0.0) if line.y == self._nowhere[side] else line
 
     def _sent(self, lines: list[RoadLine]) -> list[RoadLine]:

@@ -1,10 +1,10 @@
-// A copy button on each code block, cells that keep their width, and a search that works from a file, too.
+// Adds a copy button to each code block, keeps long cells wide, and lets the search work in local files.
 "use strict";
 
-// The excerpts below search results are fetched from the pages, which browsers refuse to do from a file.
+// Excerpts below search results are fetched from the pages; browsers refuse this for local files.
 if (location.protocol === "file:") DOCUMENTATION_OPTIONS.SHOW_SEARCH_SUMMARY = false;
 
-// What the button copies: of a console block the commands alone, without their prompts.
+// The text that the button copies: for a console block, only the commands, without prompts.
 function textOf(block) {
   const text = block.querySelector("pre").textContent;
   if (!block.closest(".highlight-console")) return text;
@@ -32,7 +32,7 @@ document.addEventListener("DOMContentLoaded", () => {
   for (const cell of document.querySelectorAll("td")) {
     cell.classList.toggle("long", cell.textContent.length > 60);
   }
-  // What scrolls can be reached with the keyboard, and captions of the sidebar have a level.
+  // Make scrolling blocks reachable by keyboard, and give captions in the sidebar a heading level.
   for (const scrolled of document.querySelectorAll("pre, .table-wrapper")) scrolled.tabIndex = 0;
   for (const caption of document.querySelectorAll(".caption[role=heading]")) caption.ariaLevel = "2";
   for (const block of document.querySelectorAll("div.highlight")) {
