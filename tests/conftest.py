@@ -336,9 +336,8 @@ def write_run(record: Callable[..., Record]) -> Callable[..., Path]:
 
 @pytest.fixture(scope="session")
 def of_operators() -> Callable[[Workspace, str], Callable[[Plan], Plan]]:
-    """Replace a plan's experiments by operator mutants: each arithmetic operation of a file with its sign
-    changed. Each mutant runs with the scenarios and triggers of the plan's first experiments, but is
-    permanent in the second."""
+    """Replace a plan's experiments by mutants, each of which changes the sign of one arithmetic operation.
+    Each mutant runs like the plan's first experiments, but is permanent in the second."""
 
     def of(workspace: Workspace, path: str, drives: int = 2) -> Callable[[Plan], Plan]:
         def changed(plan: Plan) -> Plan:

@@ -56,8 +56,6 @@ def browser() -> Iterator[Any]:
 
 
 def record(experiment: Experiment, number: int, patch: bytes) -> Record:
-    """Return a synthetic record with this patch. Of ten records, two are not activated, three are hazards,
-    one is a harness error and one a crash."""
     status = {3: Status.HARNESS_ERROR, 4: Status.CRASHED}.get(number, Status.OK)
     active = number % 5 > 0
     hazard = status is Status.OK and number % 10 > 6

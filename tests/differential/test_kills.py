@@ -80,7 +80,6 @@ class Campaign:
         self.longest_s = time.monotonic() - began
 
     def kill_and_resume(self, kills: Sequence[Kill]) -> None:
-        """Run the command in new folders, each with its own checks, until all kills have happened."""
         left, number = list(kills), count()
         while left:
             assert self.finish(self.folder / f"killed{next(number)}", left) == self.results

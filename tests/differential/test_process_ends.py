@@ -39,8 +39,7 @@ def with_trouble(toy: Workspace, folder: Path, trouble: str, head: str, limits: 
 
 @pytest.fixture
 def misbehave(tmp_path: Path, copy_toycar: Callable[[Path], Workspace]) -> Iterator[Misbehave]:
-    """Return a function that runs a mutant on each engine. The mutant executes `trouble`, and the target
-    executes `head` when it is loaded."""
+    """Return a function that runs the mutant of `with_trouble` on each engine."""
     made: list[Engines] = []
 
     def run(

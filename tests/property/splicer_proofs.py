@@ -71,8 +71,8 @@ class _Placed:
 
 
 def prove(data: bytes, figures: Figures, run: Run | None = None, variables: int = 3) -> None:
-    """Splice at every anchor of a source and count the outcomes. Raise Wrong if a mutant violates a property
-    or a refusal is unnecessary. At `variables` randomly drawn anchors, variables are set, too."""
+    """Splice at every anchor of a source, set variables at `variables` random ones, and count the outcomes.
+    Raise Wrong if a mutant violates a property or a refusal is unnecessary."""
     tree = _tree(data)
     try:
         file = parse_file("m.py", data, Path("root"))

@@ -90,8 +90,8 @@ def readable(
 
 
 def check(file: ParsedFile, cases: Sequence[tuple[FixedValue, FaultLocation]], *, run: bool) -> None:
-    """Check that a mutant compiles, un-splices, and equals the module except for the lines that set values.
-    If `run` is set, each value must differ only in an active step and be restored afterwards."""
+    """Check that a mutant compiles, un-splices and differs from the module only in the lines that set values.
+    With `run`, each value must differ only in an active step and be restored afterwards."""
     data = mutant(file, cases)
     tree = ast.parse(data)
     compile(tree, "<mutant>", "exec", dont_inherit=True)

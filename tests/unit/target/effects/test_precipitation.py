@@ -36,7 +36,6 @@ def test_drops_fall_at_their_terminal_speed(camera):
 
 
 def test_flakes_are_slow_and_large(camera):
-    """A flake that melts to a drop of 1 mm falls at about 0.8 m/s and appears 2 to 3 mm wide."""
     sizes, speeds = Snow(1.0, 0, camera).flown(np.array([1.0]))
     assert 0.7 < speeds[0] < 1.1 and 0.002 < sizes[0] < 0.003
 
@@ -58,7 +57,6 @@ def test_particles_ahead_come_nearer(camera, moment):
 
 
 def test_falling_particles_sink(camera, moment):
-    """At rest, a drop at depth z sinks by focal length * speed * time / z."""
     straight = replace(camera, pitch=0.0)
     particles = alone(straight, speed=6.0)
     before, after = (particles.streaks(moment()._replace(position=0.0, t=t), 0.0) for t in (1.0, 1.01))

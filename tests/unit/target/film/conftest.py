@@ -28,8 +28,6 @@ spacing_m: 1.342
 
 @pytest.fixture(scope="session")
 def drive(tmp_path_factory):
-    """Run the first half second of S1 and return its new folder, with the film in film/."""
-
     def go(*arguments, film=True):
         folder = tmp_path_factory.mktemp("run")
         words = ["--scenario", str(SCENARIOS / "S1.yaml"), "--out", str(folder), "--max-steps", "50"]
@@ -42,7 +40,6 @@ def drive(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def seeing(tmp_path_factory):
-    """Return the arguments of a run that uses four frames of a road."""
     folder = tmp_path_factory.mktemp("frames")
     (folder / "camera.yaml").write_text(CALIBRATION)
     road = RoadRenderer(CameraModel(), "solid", 0)

@@ -43,7 +43,6 @@ def long_cost(jerks, v, a, x_lead, v_lead):
 
 @pytest.mark.parametrize(("v", "a", "gap", "v_lead"), [(20.0, -0.3, 45.0, 18.0), (25.0, 0.0, 60.0, 26.0)])
 def test_the_longitudinal_plan_minimises_its_cost(long_mpc, lead, v, a, gap, v_lead):
-    """The residuals of danger, gap, acceleration and jerk have weights 5, 0.1, 10 and 20."""
     for _ in range(50):
         long_mpc.set_cur_state(v, a)
         long_mpc.update(v, a, lead(gap, v_lead))
@@ -103,7 +102,6 @@ def rk4(z, rate):
 
 
 def test_the_lateral_plan_minimises_its_cost(lateral_mpc):
-    """The residuals of path, both lanes, heading and steering rate have weights 1, 1, 1, 1 and 0.5."""
     for _ in range(60):  # each iteration starts from the last solution, not shifted
         lateral_mpc._delta = 0.002
         lateral_mpc._iteration.guess[:] = lateral_mpc._iteration.solution

@@ -50,7 +50,6 @@ def full_problem(ocp, start, param):
 
 
 def first_guess(ocp, start, control):
-    """Put all nodes at the start state, shifted slightly so that they violate the dynamics."""
     nodes = [x + 0.01 * k for k in range(ocp.n_control + 1) for x in start]
     return array("d", nodes + [control] * ocp.n_control)
 

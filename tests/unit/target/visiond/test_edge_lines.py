@@ -15,10 +15,8 @@ TONE = 90
 
 
 def seen(*strips: tuple[float, float, int], slope: float = 0.0):
-    """Return the lines found in an image with strips along the road.
-
-    Each strip has a left and a right edge (m) and a grey level.
-    """
+    """Return the lines found in an image with strips along the road, each (left edge in m, right edge in m,
+    grey level)."""
     row = np.arange(MODEL.rows)[:, np.newaxis]
     column = np.arange(MODEL.width)[np.newaxis]
     picture = np.full((MODEL.rows, MODEL.width), TONE, np.uint8)
