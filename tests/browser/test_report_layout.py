@@ -41,7 +41,7 @@ TITLES = """[...document.querySelectorAll("h1")].filter((h) => h.checkVisibility
     .map((h) => h.textContent)"""
 
 
-@pytest.mark.parametrize("width", [1440, 400])
+@pytest.mark.parametrize("width", [1440, pytest.param(400, marks=pytest.mark.slow)])
 def test_axe_finds_no_serious_fault(
     page: "Page", serious_faults: "Callable[[Any], list[str]]", width: int
 ) -> None:

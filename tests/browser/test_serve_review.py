@@ -266,6 +266,7 @@ def test_marks_survive_a_stopped_server(library: Workspace, serve: Callable[...,
     assert len(load_review(library, "toycar").entries) == 1
 
 
+@pytest.mark.slow
 def test_the_review_page_is_accessible_on_any_screen(
     review: Callable[..., Any], serious_faults: Callable[[Any], list[str]]
 ) -> None:

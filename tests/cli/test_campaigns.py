@@ -174,6 +174,7 @@ def wait_for(folder: Path, files: str) -> None:
         time.sleep(0.05)
 
 
+@pytest.mark.slow
 def test_an_interrupted_run_prints_the_command_that_resumes_it(cli: Cli, root: Path) -> None:
     words = ["run", "toy", "--out", "runs/cut", "-n", "0", "--limit", "6"]
     command = [sys.executable, "-m", "mutator", *words]
@@ -237,6 +238,7 @@ def test_a_failed_proof_is_at_the_top_of_the_report(
     assert f"FAILED: experiment {wrong['experiment_id']}" in text
 
 
+@pytest.mark.slow
 def test_the_library_for_the_report_can_be_given(cli: Cli, run: Path, root: Path, nowhere: Path) -> None:
     assert cli("report", run).code == 0
     assert cli("report", run, "--root", root).code == 0
@@ -358,6 +360,7 @@ def test_clean_deletes_only_run_folders(cli: Cli, root: Path) -> None:
 KNOWN = {pattern.partition("/")[0] for pattern in CONTENT}  # names in a run folder
 
 
+@pytest.mark.slow
 def test_clean_deletes_everything_that_commands_wrote_into_a_run(cli: Cli, run: Path, tmp_path: Path) -> None:
     copy, other = tmp_path / "copy", tmp_path / "other"
     for folder in (copy, other):

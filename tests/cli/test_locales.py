@@ -33,6 +33,7 @@ def place(toy: Workspace) -> Path:
     return root
 
 
+@pytest.mark.slow
 def test_a_campaign_with_non_ascii_names_runs_in_the_c_locale(place: Path) -> None:
     (place / "tree" / "toycar" / "größe.py").write_text("SIZE = 1\n")
     root = place.rename(place.with_name("bücher"))

@@ -98,7 +98,7 @@ def test_files_are_synced_before_the_records_that_refer_to_them(
     assert looks[0] == 1 and max(looks) == 4
 
 
-@pytest.mark.parametrize("rest", ["cut off", "zeros"])
+@pytest.mark.parametrize("rest", ["cut off", pytest.param("zeros", marks=pytest.mark.slow)])
 def test_a_record_without_its_patch_is_refused(cli: Cli, cut: Path, seal: str, rest: str) -> None:
     [path] = (cut / "patches").iterdir()
     data, name = path.read_bytes(), read_blocks(path).blocks[-1].key
@@ -120,6 +120,7 @@ def test_a_record_without_its_patch_is_refused(cli: Cli, cut: Path, seal: str, r
     assert cli("verify", "run").code == 0
 
 
+@pytest.mark.slow
 def test_a_lost_series_is_restored_by_a_rerun(cli: Cli, cut: Path) -> None:
     [path] = segments(cut)
     data = path.read_bytes()

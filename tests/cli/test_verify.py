@@ -95,19 +95,21 @@ def chunks() -> dict[str, str]:
     return {"goldens": f"{goldens}.js", "experiments": f"{experiments}.js", "index": "index.js"}
 
 
-@pytest.mark.parametrize("become", [flip, Path.unlink], ids=["damaged", "missing"])
-@pytest.mark.parametrize("what", ["goldens", "experiments", "index"])
+@pytest.mark.parametrize("damage", [flip, Path.unlink], ids=["damaged", "missing"])
+@pytest.mark.parametrize(
+    "what", ["goldens", *(pytest.param(name, marks=pytest.mark.slow) for name in ("experiments", "index"))]
+)
 def test_rerun_restores_damaged_series(
-    cli: Cli, sealed: str, what: str, become: Callable[[Path], None]
+    cli: Cli, sealed: str, what: str, damage: Callable[[Path], None]
 ) -> None:
     before = {path.name: path.read_bytes() for path in Path("run/series").iterdir()}
     name, *others = packed().entries
-    became = Path("run/series") / chunks()[what]
-    become(became)
+    file = Path("run/series") / chunks()[what]
+    damage(file)
     found = cli("verify", "run")
     assert found.code == 1 and "1 difference" in found.out
     told = " ".join(found.out.split())
-    assert f"- series/{became.name}: " in told and "--repair` sets the file aside" in told
+    assert f"- series/{file.name}: " in told and "--repair` sets the file aside" in told
     assert "`mutator rerun ID --trace" in told
     if what != "index":
         assert f"the series of {name} and {len(others)} more cannot be read" in told
@@ -115,15 +117,15 @@ def test_rerun_restores_damaged_series(
     assert made.code == 0, made.err
     whole = SeriesFolder(Path("run")).read(name)
     assert whole is not None
-    if what != "index" or become is flip:
+    if what != "index" or damage is flip:
         with pytest.raises(MutatorError, match=f"rerun it: `mutator rerun {others[0]} --trace"):
             SeriesFolder(Path("run")).read(others[0])
     repaired = cli("verify", "run", "--repair")
-    assert repaired.code == 1 and f"repaired: series/{became.name}" in repaired.out
+    assert repaired.code == 1 and f"repaired: series/{file.name}" in repaired.out
     if what != "index":  # the rerun experiment's series can be read
         left = f"the series of {others[0]} and {len(others) - 1} more cannot be read"
         assert left in " ".join(repaired.out.split())
-    assert (Path("run/damaged/series") / became.name).exists() == (become is flip)
+    assert (Path("run/damaged/series") / file.name).exists() == (damage is flip)
     assert cli("verify", "run", "--expect", sealed).code == 0
     assert SeriesFolder(Path("run")).read(name) is not None
     if what == "goldens":

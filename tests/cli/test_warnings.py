@@ -56,6 +56,7 @@ def test_a_plan_warns_of_values_without_effect(cli: Cli, root: Path) -> None:
     assert "warning" not in cli(*words, "q").err
 
 
+@pytest.mark.slow
 def test_a_run_warns_of_triggers_that_never_fire(cli: Cli, root: Path) -> None:
     campaign = root / "fault_library" / "campaigns" / "small.yaml"
     text = campaign.read_text().replace("methods: [guided, random]", "methods: [guided]")

@@ -178,9 +178,10 @@ def test_a_run_with_a_killed_worker_exits_with_3_and_can_be_resumed(
     assert results(out) == undisturbed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words",
-    [["-m", "mutator", "run", "small", "-n", "1", "--out"], pytest.param(None, marks=pytest.mark.slow)],
+    [["-m", "mutator", "run", "small", "-n", "1", "--out"], None],
     ids=["mutator", "pytest"],
 )
 def test_a_starting_worker_ends_when_its_command_is_killed(
@@ -203,6 +204,7 @@ def test_a_starting_worker_ends_when_its_command_is_killed(
         command.end()
 
 
+@pytest.mark.slow
 def test_a_second_command_in_a_folder_in_use_is_refused(
     toy: Workspace, tmp_path: Path, undisturbed: Bytes
 ) -> None:

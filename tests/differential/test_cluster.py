@@ -63,6 +63,7 @@ def on(machines: Machines, toy: Workspace, out: Path, **more: object) -> Summary
     return run_campaign(toy, "small", out, engine="fork", distributor=deals, **more)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_two_workers_give_the_same_bytes(
     toy: Workspace, tmp_path: Path, undisturbed: tuple[Bytes, str], two: Machines
 ) -> None:

@@ -77,6 +77,7 @@ def runs(
     return made[0], made[1]
 
 
+@pytest.mark.slow
 def test_shared_runs_give_the_bytes_of_separate_runs(runs: tuple[Path, Path]) -> None:
     shared, apart = runs
     for name in ("results.csv", "results.parquet"):
@@ -87,6 +88,7 @@ def test_shared_runs_give_the_bytes_of_separate_runs(runs: tuple[Path, Path]) ->
     assert sum(row["scenario"] == "C" for row in rows) == 4
 
 
+@pytest.mark.slow
 def test_plan_and_folder_report_the_shared_runs(runs: tuple[Path, Path]) -> None:
     shared, apart = (load_plan(RunFolder.open(run)) for run in runs)
     assert (len(shared.experiments), shared.runs) == (8, 6)
@@ -96,17 +98,20 @@ def test_plan_and_folder_report_the_shared_runs(runs: tuple[Path, Path]) -> None
     assert {e.id for e in shared.experiments} == {e.id for e in apart.experiments}
 
 
+@pytest.mark.slow
 def test_shared_runs_run_once(runs: tuple[Path, Path], driven: dict[str, list[str]]) -> None:
     ids = {e.id for e in load_plan(RunFolder.open(runs[0])).experiments}
     counts = {which: sum(name in ids for name in names) for which, names in driven.items()}
     assert counts == {"shared": 6, "apart": 8}
 
 
+@pytest.mark.slow
 def test_checks_compare_scenarios_declared_equal(runs: tuple[Path, Path]) -> None:
     checks = json.loads((runs[0] / "checks.json").read_text())["results"]
     assert [c["passed"] for c in checks if c["name"] == "same A+C+alone"] == [True]
 
 
+@pytest.mark.slow
 def test_one_experiment_of_a_shared_run_can_run_on_a_cluster(runs: tuple[Path, Path], tmp_path: Path) -> None:
     """A kill or a split of the work can leave a single experiment of a shared run. The worker then runs the
     golden run itself."""

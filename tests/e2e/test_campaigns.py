@@ -201,6 +201,7 @@ def test_experiments_with_harness_errors_are_rerun(
     assert run_campaign(toy, "small", out).ran == 0
 
 
+@pytest.mark.slow
 def test_a_defect_in_a_worker_is_reported(
     toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -219,6 +220,7 @@ def test_a_defect_in_a_worker_is_reported(
     assert "ZeroDivisionError: seven" in summary.problem
 
 
+@pytest.mark.slow
 def test_pytest_settings_of_the_user_do_not_reach_the_campaign(
     toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -230,6 +232,7 @@ def test_pytest_settings_of_the_user_do_not_reach_the_campaign(
     assert {name: os.environ[name] for name in told} == told
 
 
+@pytest.mark.slow
 def test_scenarios_can_be_in_a_subfolder_of_the_library(toy: Workspace, tmp_path: Path) -> None:
     (toy.library / "scenarios" / "more").mkdir()
     shutil.move(toy.scenario("A"), toy.library / "scenarios" / "more" / "A.yaml")

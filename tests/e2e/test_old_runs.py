@@ -87,6 +87,7 @@ def test_an_old_run_opens_and_its_ids_still_follow_from_its_content(place: Path)
     assert len(run.golden("A")) == len(run.experiment(KEPT).traces().faulty) > 100
 
 
+@pytest.mark.slow
 def test_a_fresh_run_has_the_same_plan_and_results(place: Path, fresh: Path) -> None:
     old, new = RunFolder.open(place / "small"), RunFolder.open(fresh)
     assert new.head["plan"] == old.head["plan"]
@@ -115,6 +116,7 @@ def is_old(run: Path) -> bool:
     return json.loads((run / "run.json").read_text())["schema"] == "run/1"
 
 
+@pytest.mark.slow
 def test_an_old_run_compares_with_itself_and_a_fresh_one(cli: Cli, fresh: Path) -> None:
     for one, other in (("small", "small"), ("small", "fresh"), ("fresh", "small")):
         code, out, err = cli("compare", one, other, "--fail-on", "worse,new-hazard,unmatched")

@@ -143,6 +143,7 @@ def test_accepted_versions_must_compute_the_same_results(
     assert contents(half) == before
 
 
+@pytest.mark.slow
 def test_pytest_refuses_and_accepts_versions_like_the_command(
     toy: Workspace, half: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -30,6 +30,7 @@ class Idle:
         session.problem = "no machine answered"
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("kept_checks")
 def test_a_run_resumed_by_another_distributor_has_the_same_results(toycar: Workspace, tmp_path: Path) -> None:
     assert run_campaign(toycar, "small", tmp_path / "local").exit_code == 0

@@ -123,6 +123,7 @@ def test_the_reference_campaign_uses_the_reading_as_coded(library: Workspace) ->
     assert settings == {(setting, "as_coded")}
 
 
+@pytest.mark.slow
 def test_the_plan_is_the_same_in_another_process(sample: Plan) -> None:
     code = (
         "from pathlib import Path; from mutator.campaigns.plans import Choices, make_plan;"

@@ -147,6 +147,7 @@ def threaded(toycar: Workspace, tmp_path: Path) -> Workspace:
     return toycar
 
 
+@pytest.mark.slow
 def test_without_forks_there_is_no_equivalence_check(threaded: Workspace, tmp_path: Path) -> None:
     summary = run_campaign(threaded, "small", tmp_path / "run", engine="fork", choices=Choices(limit=1))
     assert (summary.proof, summary.exit_code) == (None, 0)
@@ -165,7 +166,7 @@ def test_without_forks_there_is_no_equivalence_check(threaded: Workspace, tmp_pa
             "none is needed, because no experiment was forked: "
             "forking pays off only with 40 or more experiments",
         ),
-        ("reference", ""),
+        pytest.param("reference", "", marks=pytest.mark.slow),
     ],
 )
 def test_the_summary_says_that_a_campaign_is_too_small_to_fork(
