@@ -14,8 +14,6 @@ START_STEP = 11
 
 
 class Manager:
-    """The whole controller."""
-
     def __init__(self, car: CarInterface, radar: RadarInterface, visiond: Visiond) -> None:
         self._radar = radar
         self.visiond = visiond

@@ -30,8 +30,6 @@ class ButtonEvent:
 
 @dataclass(slots=True)
 class CarState:
-    """The car's state from its CAN frames, once per control cycle."""
-
     t: float = 0.0  # s, when the frames were read
     can_valid: bool = False
     v_ego: float = 0.0  # m/s, filtered
@@ -65,8 +63,6 @@ class CarState:
 
 @dataclass(slots=True)
 class RadarPoint:
-    """One radar track as read by the radar interface."""
-
     track_id: int
     d_rel: float  # m, from the radar's mounting point
     y_rel: float  # m, left positive

@@ -14,12 +14,12 @@ def half_byte_sum(data: bytes) -> int:
 
 
 def checksum_base(address: int) -> int:
-    """The address's part of the checksum: all half bytes of a frame add up to 8 modulo 16."""
+    """The address's part of the checksum: the half bytes of address and data add up to 8 modulo 16."""
     return 8 - half_byte_sum(address.to_bytes(4, "big"))
 
 
 def encode(fields: Sequence[Field], values: Sequence[float]) -> int:
-    """Return the payload as one big-endian integer. Values are clipped to their fields; NaN is raw 0."""
+    """Return the payload as one big-endian integer. Values are clipped to their fields; NaN becomes 0."""
     word = 0
     for (_, shift, mask, sign_bit, factor, offset), value in zip(fields, values, strict=True):
         scaled = (value - offset) / factor

@@ -53,7 +53,6 @@ class _State:
         self.bad_counters = 0
 
     def accepts(self, data: bytes, word: int) -> bool:
-        """Check size, checksum and counter."""
         if len(data) != self.size or (half_byte_sum(data) - self.checksum_base) & self.checksum_mask:
             return False
         counter = word >> self.counter_shift & self.counter_mask
@@ -66,7 +65,6 @@ class _State:
         return self.bad_counters < MAX_BAD_COUNTERS
 
     def takes(self, data: bytes, word: int) -> bool:
-        """Store an accepted payload; return whether its values are new."""
         body = word & self.body_mask
         new = body != self.body
         if new:
@@ -118,7 +116,6 @@ class CanParser:
 
 
 def decode(fields: Sequence[Field], word: int) -> tuple[float, ...]:
-    """Return the physical values of a payload, given as one big-endian integer."""
     return tuple(
         [
             ((word >> shift & mask ^ sign_bit) - sign_bit) * factor + offset

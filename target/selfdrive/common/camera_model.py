@@ -26,7 +26,6 @@ class CameraModel:
 
     @property
     def horizon(self) -> float:
-        """Row of the horizon of a flat road."""
         return self.cy - self.fy * tan(self.pitch)
 
     def depth(self, row: float) -> float:
@@ -51,7 +50,6 @@ class CameraModel:
         return self.fx * width * cos(self.pitch) / (self.fy * self.height)
 
     def column(self, x: float, y: float) -> float:
-        """Column of the road's point (x, y)."""
         return self.cx - self.fx * y / (x * cos(self.pitch) + self.height * sin(self.pitch))
 
     def project(self, x: float, y: float, z: float) -> tuple[float, float]:

@@ -42,7 +42,6 @@ class Planner:
         self._v_future = 0.0
 
     def take_model(self, v_ego: float, model: ModelData | None) -> bool:
-        """Update the path if the model message is new; return whether it was."""
         if model is None or model is self._model:
             return False
         self._model = model

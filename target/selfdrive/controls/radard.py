@@ -17,8 +17,6 @@ SPEED_HISTORY = 20  # cycles
 
 
 class Radard:
-    """Converts each radar cycle to a RadarState."""
-
     def __init__(self, params: CarParams, fit: ModelFit) -> None:
         self._radar_offset = params.radar_offset
         self._vehicle = VehicleModel(params)
@@ -53,7 +51,6 @@ class Radard:
         self._vision.update(model.lead)
 
     def _likely_path(self, controls: ControlsState) -> Curve:
-        """The planned path while in control, else the path at the current steering angle."""
         if controls.active and not controls.steer_override:
             return model_curve(self._path.d_poly)
         return steering_curve(self._vehicle.curvature(controls.steering_angle, controls.v_ego))

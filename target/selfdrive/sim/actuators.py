@@ -1,4 +1,4 @@
-"""The car's actuators decode the controller's frames."""
+"""The car's actuators, which decode the controller's frames."""
 
 from collections.abc import Sequence
 
@@ -20,7 +20,7 @@ class ActuatorReceiver:
         self._parser = CanParser(load(CAR_DBC), COMMAND_MESSAGES, CAR_BUS)
 
     def update(self, frames: Sequence[CanFrame], t: float) -> Actuators:
-        """Gas and brake in 0..1, steering torque relative to the EPS' full torque, left positive."""
+        """Return gas and brake in 0..1, and steering torque relative to the EPS's maximum, left positive."""
         self._parser.update(frames, t)
         values = self._parser.values
         torque, active = values["STEERING_CONTROL"]

@@ -13,8 +13,6 @@ _AHEAD = tuple(float(x) for x in range(VIEW_LENGTH))
 
 
 class Camera:
-    """Looks along the car: the view of the lane moves as the car drifts or turns, or the road bends."""
-
     def __init__(self, road: Road) -> None:
         self._road = road
 

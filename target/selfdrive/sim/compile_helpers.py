@@ -1,6 +1,6 @@
 """Compiles the slowest calculations: `python -m selfdrive.sim.compile_helpers`.
 
-Installing the harness does the same. The exit code is 2 if there is no C compiler. Needs only Python.
+Installing the harness does the same. The exit code is 2 if there is no C compiler.
 """
 
 import argparse
@@ -20,8 +20,8 @@ from selfdrive.common.errors import ConfigError, writing
 
 PACKAGE = Path(__file__).resolve().parents[1]
 FOLDER = PACKAGE.with_name("compiled")
-# Strict IEEE arithmetic: no fused multiply-add, no reordering. Without symbols, a library has the same bytes
-# wherever it is compiled.
+# Strict IEEE arithmetic: no fused multiply-add, no reordering. Without symbols, a library's bytes do not
+# depend on the folder in which it is compiled.
 OPTIONS = (
     "-O3",
     "-ffp-contract=off",
@@ -38,7 +38,7 @@ EXIT_INPUT = 2
 
 
 def compiler() -> list[str]:
-    """The C compiler and its first options: CC, else cc, else the package ziglang's; [] if none is found."""
+    """The C compiler and its first options: CC, else cc, else that of the package ziglang, else []."""
     if os.environ.get("CC"):
         return shlex.split(os.environ["CC"])
     if shutil.which("cc"):
@@ -49,7 +49,7 @@ def compiler() -> list[str]:
 
 
 def compile_helpers(folder: Path) -> Iterator[Path]:
-    """Compile every C file of the package into `folder` and remove other files. Raises ConfigError."""
+    """Compile every C file of the package into `folder` and remove outdated libraries. Raises ConfigError."""
     with writing(folder, expected="a folder for compiled helpers", remedy="choose another --out"):
         folder.mkdir(parents=True, exist_ok=True)
         sources = {compiled.file_name(source): source for source in sorted(PACKAGE.rglob("*.c"))}
@@ -75,7 +75,7 @@ def _compile(source: Path, made: Path, scratch: str) -> None:
         raise ConfigError(
             f"CC is {os.environ.get('CC', 'not set')!r}: {getattr(error, 'strerror', None) or error}",
             expected="a C compiler",
-            remedy="install one or set CC, or go on without: runs only take longer",
+            remedy="install one or set CC; without one, runs only take longer",
         ) from None
     except subprocess.CalledProcessError as error:
         said = error.stderr.strip().splitlines() or [f"exit status {error.returncode}"]
@@ -83,7 +83,7 @@ def _compile(source: Path, made: Path, scratch: str) -> None:
             f"{words[0]} says {said[0]!r}",
             where=str(source),
             expected="a working C compiler",
-            remedy="set CC to another one, or go on without: runs only take longer",
+            remedy="set CC to another one; without one, runs only take longer",
         ) from None
 
 
@@ -91,7 +91,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         prog="selfdrive.sim.compile_helpers", description="Compile the slowest steps of a run's arithmetic."
     )
-    parser.add_argument("--out", type=Path, default=FOLDER, metavar="DIR", help="where the libraries go")
+    parser.add_argument("--out", type=Path, default=FOLDER, metavar="DIR", help="folder for the libraries")
     try:
         for path in compile_helpers(parser.parse_args().out):
             print(path)

@@ -18,7 +18,7 @@ Warp = Callable[[np.ndarray, np.ndarray, Region], np.ndarray]
 
 
 def build_warp() -> tuple[Warp, str]:
-    """Return a function like `warp`, in C if possible, and the compiled code that it uses, if any."""
+    """Return a function like `warp`, in C if possible, and the digest of its compiled code, if any."""
     library = compiled.library(C_SOURCE)
     if library is None or not agrees(library):
         return warp, ""
@@ -26,7 +26,7 @@ def build_warp() -> tuple[Warp, str]:
 
 
 class CompiledWarp:
-    """Same as `warp`, with compiled `warp.c` as `library`."""
+    """`warp` in the compiled `warp.c`."""
 
     def __init__(self, library: compiled.Library) -> None:
         pointer, number = ctypes.c_void_p, ctypes.c_long
@@ -47,10 +47,7 @@ class CompiledWarp:
 
 @cache
 def agrees(library: compiled.Library) -> bool:
-    """Check that the compiled code gives OpenCV's bits: older versions and those without fused sums differ.
-
-    A noisy picture, large enough for coarse positions, reveals different rounding.
-    """
+    """Whether compiled code gives the installed OpenCV's bits; versions without fused sums differ."""
     noise = (np.arange(48 * 8192) * 40503 % 65521 % 256).astype(np.uint8).reshape(48, 8192)
     matrix = np.array([(1.7, 31.3, 3007.3), (1.3e-3, 0.93, 0.4), (3.1e-5, 1.7e-4, 1.1)])
     return np.array_equal(CompiledWarp(library)(noise, matrix, PROBE), warp(noise, matrix, PROBE))

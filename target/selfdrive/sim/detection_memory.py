@@ -1,8 +1,8 @@
 """Detection results by picture, in a file of fixed size that all runs share.
 
 An entry has the digest of all inputs of a detection, a checksum, and numbers. Processes use the file
-concurrently without a lock: if an entry is damaged, incomplete or overwritten, the reader repeats the work
-and writes the same entry. If the file cannot be created, nothing is stored.
+concurrently without a lock: if an entry is damaged, incomplete or overwritten, the reader repeats the
+detection and writes the entry again. If the file cannot be created, nothing is stored.
 """
 
 import os
@@ -12,7 +12,7 @@ from hashlib import blake2b
 from pathlib import Path
 
 FILE = "detections-1.table"
-MOST = 20  # most numbers in an entry
+MOST = 20  # largest number of values in an entry
 KEY, CHECK = 16, 8  # bytes
 _VALUE = struct.Struct(f"<q{MOST}d")
 ENTRY = KEY + CHECK + _VALUE.size  # 192 bytes
@@ -40,7 +40,7 @@ class DetectionMemory:
         return tuple(numbers[:count])
 
     def keep(self, key: bytes, numbers: Sequence[float]) -> None:
-        """Store at most MOST numbers under a key; in a full bucket they replace another entry."""
+        """Store at most MOST numbers under a key. In a full bucket they replace another entry."""
         if self._file is None:
             return
         bucket = self._bucket(key)

@@ -17,22 +17,22 @@ from selfdrive.sim.yaml_section import Section, read_yaml
 CALIBRATION = "camera.yaml"
 SCHEMA = "camera/1"
 _KEYS = {
-    "schema": f"{SCHEMA!r}, the form of this file",
-    "name": "what the frames are called in a run's record",
-    "files": 'which files are frames, such as "*.png"; they follow each other as their numbers do',
+    "schema": f"{SCHEMA!r}, the format of this file",
+    "name": "the frames' name in a run's record",
+    "files": 'the pattern of the frames\' file names, such as "*.png"; frames are ordered by their numbers',
     "width": "a frame's width in pixels",
     "rows": "a frame's height in pixels",
-    "resize_width": "the width, if another, to which frames are made smaller (height in proportion)",
-    "fx_px": "horizontal focal length",
-    "fy_px": "vertical focal length",
-    "cx_px": "column of the optical axis",
-    "cy_px": "row of the optical axis",
-    "pitch_deg": "how far the camera looks down",
-    "horizon_row": "the row at which a flat road ends, instead of fx_px, fy_px, cx_px, cy_px and pitch_deg",
-    "focal_px": "focal length of the camera with that horizon, whose axis is in the frame's middle",
-    "height_m": "height of the camera above the road",
-    "fps": "frames a second, for frames that follow the time of a run",
-    "spacing_m": "metres from frame to frame, for frames that follow the distance driven",
+    "resize_width": "the width to which frames are reduced, if any (the height in proportion)",
+    "fx_px": "the horizontal focal length",
+    "fy_px": "the vertical focal length",
+    "cx_px": "the column of the optical axis",
+    "cy_px": "the row of the optical axis",
+    "pitch_deg": "the camera's pitch, positive if it looks down",
+    "horizon_row": "the row of a flat road's horizon, instead of fx_px, fy_px, cx_px, cy_px and pitch_deg",
+    "focal_px": "the focal length, with `horizon_row`, if the optical axis is in the frame's middle",
+    "height_m": "the height of the camera above the road",
+    "fps": "the number of frames per second, if frames follow the time of a run",
+    "spacing_m": "the distance between frames in metres, if frames follow the distance driven",
 }
 _LARGEST = 8192  # pixels
 _NUMBER = re.compile(r"(\d+)(?!.*\d)")  # the last number in a file name
@@ -51,7 +51,7 @@ class ImageFolder:
         self._width, self._rows = _size(root)
         self.model = _camera(root)
         if ("fps" in root) == ("spacing_m" in root):
-            root.fail("both or none of fps, spacing_m", "exactly one of them", f"fps are {_KEYS['fps']}")
+            root.fail("both or none of fps, spacing_m", "exactly one of them", f"fps is {_KEYS['fps']}")
         self.fps = root.number("fps", 0.1, 1000.0) if "fps" in root else None
         self.spacing = None if self.fps else root.number("spacing_m", 0.01, 1000.0)
         self.files = _listed(folder, root)
@@ -66,7 +66,7 @@ class ImageFolder:
                 raise ConfigError(
                     "not readable as a picture",
                     where=str(path),
-                    expected="a whole picture such as PNG or JPEG",
+                    expected="an undamaged picture, such as a PNG or JPEG file",
                     remedy="replace it",
                 )
             rows, width = frame.shape
@@ -84,7 +84,7 @@ class ImageFolder:
 
 
 def camera_of(folder: Path) -> CameraModel:
-    """The camera from the calibration in `folder`; no frames are needed."""
+    """The camera from the calibration in `folder`, which need not contain frames."""
     return _camera(_calibration(folder)[1])
 
 
@@ -154,7 +154,7 @@ def _listed(folder: Path, root: Section) -> list[Path]:
     root.check(
         "files",
         not pattern.startswith("/") and ".." not in pattern,
-        "files below the folder",
+        "files in the folder or below it",
         "put them there",
     )
     *folders, name = pattern.split("/")
@@ -166,13 +166,13 @@ def _listed(folder: Path, root: Section) -> list[Path]:
         "correct the pattern",
     )
     files = sorted((path for path in folder.glob(pattern) if path.is_file()), key=_order)
-    root.check("files", bool(files), f"the name of a file in {folder}", "no file is called so")
+    root.check("files", bool(files), f"a pattern that matches files in {folder}", "correct the pattern")
     for missing in _gaps(files):
         raise ConfigError(
             "missing",
             where=str(missing),
-            expected="a frame, as its neighbours are numbered",
-            remedy="put it there, or number the frames anew",
+            expected="a frame, because frames before and after it exist",
+            remedy="put it there, or renumber the frames",
         )
     return files
 
@@ -192,7 +192,7 @@ def _gaps(files: list[Path]) -> Iterator[Path]:
     pairs = [
         (before, after)
         for before, after in pairwise(numbered)
-        if _frame(*before[:2], 0) == _frame(*after[:2], 0)  # same sequence: only the number differs
+        if _frame(*before[:2], 0) == _frame(*after[:2], 0)  # only the number differs
     ]
     step = min((after[2] - before[2] for before, after in pairs), default=1)
     for (path, match, number), after in pairs:

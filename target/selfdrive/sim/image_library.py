@@ -1,8 +1,8 @@
 """The frames of a run, grey and read-only: a rendered road, or a folder of user frames.
 
 Frames are rendered or decoded once and cached in a file named by the digest of all inputs, which processes
-map and share. Files appear atomically, and each frame is checked on first use. Without a writable cache, each
-process makes its own frames.
+map and share. Files appear atomically, and each frame is checked on first use. Without a writable cache,
+each process makes its frames in memory.
 """
 
 from collections.abc import Callable, Iterator
@@ -24,7 +24,7 @@ from selfdrive.sim.road_look import DASH_PERIOD
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.sim.vision import Pictures
 
-FRAMES, PERIODS = 600, 66  # of the rendered road: 805.2 m, then it repeats seamlessly
+FRAMES, PERIODS = 600, 66  # of the rendered road, which repeats seamlessly after 805.2 m
 SPACING = PERIODS * DASH_PERIOD / FRAMES  # m between frames: 1.342, for 20 frames per second at 60 mph
 CHECK = 8  # bytes; the file ends with a check per frame, then a digest of these and the header
 DIGEST = sha256().digest_size
@@ -48,7 +48,6 @@ class ImageLibrary:
     fps: float | None
 
     def frame(self, t: float, position: float) -> Picture:
-        """Return the picture at time `t` (s), after `position` m."""
         passed = t * self.fps if self.spacing is None else position / self.spacing
         number = int(passed + 1e-6) % len(self.frames)
         return Picture(
@@ -60,7 +59,7 @@ class Frames:
     """Frames (rows x width, uint8) by number, read-only; those from a file are verified on first use.
 
     `checks` has one check per frame, joined; it is empty for frames in memory. If a frame is damaged, `mend`
-    recreates all.
+    recreates all frames.
     """
 
     def __init__(
@@ -72,7 +71,6 @@ class Frames:
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """Number, rows, width."""
         return self._frames.shape
 
     def __len__(self) -> int:
@@ -134,8 +132,8 @@ def _own(folder: ImageFolder, cache: Path | None) -> ImageLibrary:
 def cached(cache: Path | None, digest: str, shape: tuple[int, int, int], make: Callable[[], Made]) -> Frames:
     """Return the frames from `make`, of this shape (number, rows, width).
 
-    They are mapped from a cache file, which is created if missing or damaged; processes may do this
-    concurrently. Without a writable cache, the frames are made in memory.
+    They are mapped from a cache file, which is created if missing or damaged, even by several processes at
+    once. Without a writable cache, they are made in memory.
     """
 
     def in_memory() -> Frames:
@@ -146,7 +144,6 @@ def cached(cache: Path | None, digest: str, shape: tuple[int, int, int], make: C
         return Frames(frames)
 
     def anew() -> Frames:
-        """Write a new file; fall back to memory if that file is unreliable."""
         try:
             cache.mkdir(parents=True, exist_ok=True)
             _write(path, shape, make())
@@ -217,7 +214,7 @@ def _weights(shape: tuple[int, int, int]) -> np.ndarray:
 def _check(frame: np.ndarray, weights: np.ndarray) -> bytes:
     """Weighted sum of a frame's words, five times as fast as SHA-256.
 
-    It always detects one changed word, and misses several with a probability of 2^-32.
+    It always detects a single changed word, and misses several changed words with a probability of 2^-32.
     """
     data = frame.reshape(-1)
     if data.size % CHECK:

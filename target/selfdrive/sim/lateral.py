@@ -63,10 +63,7 @@ class LateralDynamics:
         self._turn = DT_CTRL * front * c_front / inertia
 
     def step(self, torque: float, speed: float, curvature: float) -> float:
-        """Advance 10 ms with `torque` (left positive, 1 is full) at `speed` on a road of `curvature`.
-
-        Returns the speed along the road (m/s).
-        """
+        """Advance 10 ms with `torque` (left positive, 1 is full); return the speed along the road (m/s)."""
         self._turn_wheel(torque, speed)
         self._move(speed)
         offset, v_lat = self.offset, self.lateral_speed

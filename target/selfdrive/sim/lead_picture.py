@@ -1,4 +1,4 @@
-"""Draws vehicles into pictures, and tints pictures: for display, and to test detectors."""
+"""Draws vehicles into pictures and tints pictures, for display and to test detectors."""
 
 from math import cos, floor, sin, tan
 
@@ -25,13 +25,12 @@ Tone = float | tuple[float, float, float]
 
 
 def draw_car(picture: np.ndarray, model: CameraModel, car: OtherCar) -> None:
-    """Draw a car, seen from behind, into a grey picture."""
     tone = car.tone
     _draw(picture, model, car, (tone, 0.75 * tone, 0.4 * tone + 20.0, min(255.0, tone + 70.0), 24.0))
 
 
 def draw_lead(picture: np.ndarray, model: CameraModel, lead: float, offset: float, heading: float) -> None:
-    """Draw a car into a BGR picture, in the lane centre, with its rear `lead` m before the front bumper."""
+    """Draw a car into a BGR picture, in the lane centre, with its rear `lead` m ahead of the front bumper."""
     ahead = lead + CAMERA_TO_BUMPER
     if not NEAREST <= ahead <= FURTHEST:
         return
@@ -76,7 +75,7 @@ def _mark_strip(
 
 
 def _draw(picture: np.ndarray, model: CameraModel, car: OtherCar, tones: tuple[Tone, ...]) -> None:
-    """Draw a box with window, lights and wheels; `tones` are of body, side, glass, lights, dark parts."""
+    """Draw a box with window, lights and wheels. `tones`: body, side, glass, lights, dark parts."""
     body, flank, glass, lamps, dark = tones
     left, right, near, far = car.y + 0.5 * car.width, car.y - 0.5 * car.width, car.x, car.x + LENGTH
     waist, floor_z = 0.62 * car.height, 0.17 * car.height

@@ -1,7 +1,7 @@
 """Runs all maneuvers and plots them on one page: `python -m selfdrive.sim.maneuvers --out DIR [NAME...]`.
 
-Writes DIR/index.html, which is self-contained. With --references, traces of the same name from that folder
-are drawn below the runs, and the page says which are within tolerance. Exit code 2 for invalid input.
+Writes DIR/index.html, which is self-contained. With --references, the page also shows reference traces, and
+which runs are within tolerance. Exit code 2 for invalid input.
 """
 
 import argparse
@@ -95,10 +95,10 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         prog="selfdrive.sim.maneuvers", description="Run all maneuvers and plot them on one page."
     )
     add = parser.add_argument
-    add("names", nargs="*", metavar="NAME", help="a scenario, such as S1 or S1_nolead; all, if none")
-    add("--out", type=Path, required=True, metavar="DIR", help="where index.html goes")
+    add("names", nargs="*", metavar="NAME", help="a scenario, such as S1 or S1_nolead (default: all)")
+    add("--out", type=Path, required=True, metavar="DIR", help="folder for index.html")
     add("--plant", choices=PLANTS, default=STANDARD, help="the plant to run on (%(default)s)")
-    add("--references", type=Path, metavar="DIR", help="reference traces as CSV, to lie beneath the runs")
+    add("--references", type=Path, metavar="DIR", help="reference traces as CSV, drawn beneath the runs")
     add("--scenarios", type=Path, default=runs.SCENARIOS, metavar="DIR", help="the scenario files")
     add("--tolerances", type=Path, default=TOLERANCES, metavar="FILE", help="the tolerance table")
     return parser.parse_args(arguments)

@@ -1,8 +1,8 @@
 """The camera's frame as seen from a different place on the road.
 
 Frames are taken in the lane centre, along the road. Seen from `offset` m further left and turned by
-`heading`, the ground moves by a homography, which is exact for everything on the road. Parts above the
-horizon only pan. Outside the frame, its last pixel is repeated.
+`heading`, the ground is transformed by a homography, which is exact for everything on the road. Parts above
+the horizon only move sideways. Outside the frame, its last pixel is repeated.
 """
 
 from math import tan
@@ -68,7 +68,6 @@ class ShiftedView:
         self._pixels_per_metre = 1.0 / model.metres_per_pixel(model.row(SHIFT_DISTANCE))
 
     def seen(self, frame: Picture, offset: float, heading: float) -> Picture:
-        """Return the frame as seen `offset` m further left, turned left by `heading` (rad)."""
         away = offset + SHIFT_DISTANCE * tan(heading)
         return _shifted(frame, round(away * self._pixels_per_metre))
 

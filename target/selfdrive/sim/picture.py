@@ -20,12 +20,10 @@ class Region(NamedTuple):
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Rows, columns."""
         return self.bottom - self.top, self.right - self.left
 
     @property
     def part(self) -> tuple[slice, slice]:
-        """Slices of the region in a picture."""
         return slice(self.top, self.bottom), slice(self.left, self.right)
 
     def around(self, margin: int, shape: tuple[int, int]) -> "Region":
@@ -66,7 +64,6 @@ class Picture(NDArrayOperatorsMixin):
         self._whole: np.ndarray | None = None
 
     def changed(self, by: tuple[Hashable, ...], make: Make) -> "Picture":
-        """Return a picture of the same size, determined by this one and `by`."""
         return Picture((*self.key, by), self.shape, make)
 
     def pixels(self) -> np.ndarray:
@@ -75,7 +72,7 @@ class Picture(NDArrayOperatorsMixin):
         return self._whole
 
     def __getitem__(self, where):
-        """Index as an array; for two slices, only the pixels that they need are calculated. Read-only."""
+        """Index like an array; for two slices, only their pixels are calculated. Read-only."""
         if self._whole is None and isinstance(where, tuple) and len(where) == 2:
             rows, columns = map(_ends, where, self.shape)
             if rows and columns:

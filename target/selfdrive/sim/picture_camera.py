@@ -12,8 +12,7 @@ from selfdrive.sim.vision import GROUND, SHIFT
 class PictureCamera:
     """Takes the view's geometry from `geometry` and its picture from `library`, moved to the car's position.
 
-    `calculated_by` identifies the compiled code that moves frames, if any. `translation` is how frames follow
-    the car: "ground" by the road's homography, "shift" and "as_coded" by shifting sideways.
+    `calculated_by` identifies the compiled code that moves frames, if any. `translation` is as in `Pictures`.
     """
 
     def __init__(self, geometry: Camera, library: ImageLibrary, translation: str) -> None:
@@ -23,7 +22,6 @@ class PictureCamera:
         self.calculated_by = self._move.calculated_by
 
     def look(self, truth: GroundTruth) -> CameraView:
-        """Return the view at this moment."""
         view = self._geometry.look(truth)
         frame = self._library.frame(truth.t, truth.position)
         picture = self._move.seen(frame, truth.lateral_offset, truth.heading)

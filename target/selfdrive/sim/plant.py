@@ -13,7 +13,7 @@ ROLLING_RESISTANCE = 0.01
 DRAG = 0.5 * 1.225 * 0.3  # N s^2/m^2
 PEAK_FORCE = 3.0 * MASS
 PEAK_POWER = 100_000.0  # W
-GAS_SLOPE = 3.33  # of the pedal's full travel
+GAS_SLOPE = 3.33
 BRAKE_FORCE = 10.0 * MASS
 BRAKE_SLOPE = 0.3
 BASE_SPEED = PEAK_POWER / PEAK_FORCE  # m/s; above this, power limits acceleration, not force
@@ -31,11 +31,7 @@ def acceleration(speed: float, gas: float, brake: float, grade: float) -> float:
 
 
 class Plant:
-    """The host car and what its sensors receive.
-
-    `speed` is at least 0; `position` is measured along the road; `lateral` has `offset`, `heading`,
-    `steer_angle` and `steer_rate`; the gearbox reports `gearbox_scale` times the speed.
-    """
+    """The host car. `position` (m) is along the road; the gearbox reports `gearbox_scale` times the speed."""
 
     gearbox_scale = 1.0
     mirrors = False  # whether messages mirror left and right
@@ -64,9 +60,9 @@ class Plant:
         return d_rel / self.speed if self.speed > 0.0 else float("inf")
 
     def shown(self, truth: GroundTruth) -> GroundTruth:
-        """What camera and radar can detect: everything."""
+        """Return what camera and radar can detect: here, everything."""
         return truth
 
     def pictured(self, truth: GroundTruth) -> GroundTruth:
-        """What the camera's pictures show: everything."""
+        """Return what the camera's pictures show: here, everything."""
         return truth

@@ -1,4 +1,4 @@
-"""The forward radar: one track at 20 Hz, in the resolution and range of its CAN frames."""
+"""The forward radar: one track at 20 Hz, with the resolution and range of its CAN frames."""
 
 from math import isfinite, sin
 
@@ -28,8 +28,8 @@ class RadarSensor:
     def measure(self, truth: GroundTruth) -> list[CanFrame]:
         """Return the state and track frames of one cycle.
 
-        Counts are truncated towards zero and wrap around: 256 m reads 0. The original does this too, and
-        measurement errors can reach it.
+        As in the original, counts are truncated towards zero and wrap around: 256 m reads 0. Faults can cause
+        such distances.
         """
         d_rel = truth.d_rel
         v_rel = truth.v_lead - truth.v_ego
@@ -54,5 +54,4 @@ class RadarSensor:
 
 
 def _counts(value: float, per_unit: float) -> int:
-    """Truncate towards zero; non-finite values read 0."""
     return int(value * per_unit) if isfinite(value) else 0

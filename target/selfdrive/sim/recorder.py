@@ -8,8 +8,8 @@ from selfdrive.manager import Manager
 from selfdrive.messages import Actuators, LeadData
 from selfdrive.sim.truth import GroundTruth
 
-# Alerts treated as warnings, in the order of their bits in channel `alert`. The last is a refusal to engage,
-# which the original also shows.
+# Alerts treated as warnings, in the order of their bits in channel `alert`. As in the original, the last one,
+# a refusal to engage, is among them.
 COUNTED_ALERTS = (
     *("steer_saturated", "fcw", "can_error", "radar_error", "model_error"),
     "model_error_no_entry",
@@ -48,7 +48,6 @@ class Recorder:
         self._alert_bits = 0
 
     def append(self, truth: GroundTruth, actuators: Actuators, manager: Manager) -> None:
-        """Append the world, the commands that it received, and the controller's newest messages."""
         state, plan, radar_state = manager.controlsd.state, manager.controlsd.plan, manager.radar_state
         lead = radar_state.lead_one if radar_state else _NO_LEAD
         t, d_rel, v_ego, v_lead = truth.t, truth.d_rel, truth.v_ego, truth.v_lead

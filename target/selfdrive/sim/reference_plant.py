@@ -1,7 +1,6 @@
 """The reference plant: openpilot v0.4.2's own PC simulation with its errors, for comparison with recordings.
 
-Do not draw conclusions about driving from it: its lateral motion and its messages are the original's crude
-model.
+Do not draw conclusions about driving from it: its lateral motion and messages are crude.
 """
 
 from selfdrive.car.params import CarParams
@@ -45,8 +44,8 @@ class ReferencePlant(Plant):
 
     The gearbox sends km/h instead of m/s. Lateral positions are right positive although the controller
     expects left positive, so the left lane is sent as the right one and pictures are mirrored. Without
-    pictures, camera and radar always see a car in mid-lane. Distances end at 0; headway time starts at 30 s
-    and keeps its value at standstill.
+    pictures, camera and radar always see a car in mid-lane. Distances are at least 0; the headway time
+    starts at 30 s and keeps its value at standstill.
     """
 
     gearbox_scale = MS_TO_KPH
@@ -61,15 +60,14 @@ class ReferencePlant(Plant):
         return max(super().distance_to(position), 0.0)
 
     def headway(self, d_rel: float) -> float:
-        """Headway time (s); at standstill, the last value in motion."""
         if self.speed > 0.0:
             self._headway = d_rel / self.speed
         return self._headway
 
     def shown(self, truth: GroundTruth) -> GroundTruth:
-        """Camera and radar do not see the car's drift."""
+        """Hide the car's drift from camera and radar."""
         return truth._replace(lateral_offset=0.0)
 
     def pictured(self, truth: GroundTruth) -> GroundTruth:
-        """The picture mirrors the car's offset."""
+        """Mirror the car's offset."""
         return truth._replace(lateral_offset=-truth.lateral_offset)

@@ -51,10 +51,10 @@ class StatedDetector(LaneDetector, Protocol):
 
 
 class RememberingDetector:
-    """Returns the results of `detector`, without pixels if `memory` has them.
+    """Returns the results of `detector`. If `memory` has a result, no pixels are calculated.
 
-    The detector must be deterministic in picture and state. `made_of` distinguishes detectors of the same
-    code: name, camera.
+    The detector must be deterministic in picture and state. `made_of` (such as name and camera)
+    distinguishes detectors with the same code.
     """
 
     def __init__(self, detector: StatedDetector, made_of: object, memory: DetectionMemory) -> None:
@@ -62,7 +62,7 @@ class RememberingDetector:
         self._seeing = seeing_digest(Path(selfdrive.__path__[0])) + repr(made_of).encode()
 
     def detect(self, view: CameraView) -> LaneLines:
-        """Return the lines in the view's picture. Plain arrays, which have no key, are always examined."""
+        """Return the lines in the picture. Plain arrays, which have no key, are always examined."""
         picture, detector = view.picture, self._detector
         if not isinstance(picture, Picture):
             return detector.detect(view)
@@ -78,7 +78,6 @@ class RememberingDetector:
 
 
 def seeing_digest(root: Path) -> bytes:
-    """Digest of the detection code in the package at `root` and of the libraries that it uses."""
     digest = sha256()
     calculator = sys.version, platform.machine(), cv2.__version__, cv2.getCPUFeaturesLine(), np.__version__
     digest.update(repr(calculator).encode())

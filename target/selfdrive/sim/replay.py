@@ -84,13 +84,13 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         prog="selfdrive.sim.replay", description="Compare runs with reference traces."
     )
     add = parser.add_argument
-    add("names", nargs="*", metavar="NAME", help="a reference, such as S1 or S1_nolead; all, if none")
-    add("--references", type=Path, required=True, metavar="DIR", help="the folder of their CSV files")
+    add("names", nargs="*", metavar="NAME", help="a reference, such as S1 or S1_nolead (default: all)")
+    add("--references", type=Path, required=True, metavar="DIR", help="the references' CSV files")
     add("--scenarios", type=Path, default=runs.SCENARIOS, metavar="DIR", help="the scenario files")
     add("--tolerances", type=Path, default=TOLERANCES, metavar="FILE", help="the tolerance table")
     add("--plant", choices=PLANTS, default=REFERENCE, help="the plant to run on (%(default)s)")
-    add("--runs", type=Path, metavar="DIR", help="take finished runs, DIR/NAME/, and run nothing")
-    add("--long", action="store_true", help="every channel, and every crossing of its tolerance")
+    add("--runs", type=Path, metavar="DIR", help="compare the finished runs DIR/NAME/ instead of running")
+    add("--long", action="store_true", help="print all channels, and all crossings of tolerances")
     add("--update-references", action="store_true", help="write the runs as the new references")
     return parser.parse_args(arguments)
 

@@ -103,7 +103,7 @@ def picture_to_car(model: CameraModel, first: int = 0) -> np.ndarray:
 
 
 def car_to_road(position: float, offset: float, heading: float) -> np.ndarray:
-    """Homography from (x, y, 1) in the car's frame to (along, left of the lane's middle, 1) on the road."""
+    """Homography from (x, y, 1) in the car's frame to (along, left of the lane centre, 1) on the road."""
     c, s = cos(heading), sin(heading)
     return np.array([(c, -s, position), (s, c, offset), (0.0, 0.0, 1.0)])
 
@@ -114,7 +114,6 @@ def pan(model: CameraModel, heading: float) -> int:
 
 
 def _bands(model: CameraModel, strip: Strip) -> tuple[Band, ...]:
-    """The bands below the horizon, from the bottom up, each with a strip as coarse as its middle row."""
     bands = []
     last, top = model.rows, first_road_row(model)
     while last > top:

@@ -16,7 +16,7 @@ from selfdrive.sim.road_look import DASH_PERIOD, Look, Paint
 HALF_WIDTH = 12.0  # m from the lane centre to the strip's edge
 ROWS_PER_PERIOD, COLUMNS = 400, 2400
 ROW_LENGTH, COLUMN_WIDTH = DASH_PERIOD / ROWS_PER_PERIOD, 2.0 * HALF_WIDTH / COLUMNS  # m
-TILE_PERIODS = 3  # the finest texture repeats, which cameras cannot resolve
+TILE_PERIODS = 3  # after which the finest texture, which cameras cannot resolve, repeats
 TRACK_OFFSET, TRACK_WIDTH = 0.8, 0.35  # m: wheel tracks in a lane
 KERB_WIDTH = 0.25  # m
 FLAKE_ROWS, FLAKE_COLUMNS = 3, 3  # typical size of a flake
@@ -180,7 +180,7 @@ def _shade(texels: np.ndarray, look: Look, rng: np.random.Generator) -> None:
     noise += 0.25 * cv2.GaussianBlur(rng.standard_normal(noise.shape, dtype=np.float32), (0, 0), 0.7)
     noise = noise[small[0] : 2 * small[0]]
     limit = np.quantile(noise, 1.0 - look.shadows)
-    # Beyond the strip its edge is repeated, so shadows must not reach it.
+    # Beyond the strip its edge is repeated, so shadows must not reach the edge.
     depth = look.shadow_depth * np.clip(HALF_WIDTH - 0.5 - np.abs(_lateral()), 0.0, 1.0).astype(np.float32)
     for k in range(rows // ROWS_PER_PERIOD):
         part = texels[k * ROWS_PER_PERIOD : (k + 1) * ROWS_PER_PERIOD]

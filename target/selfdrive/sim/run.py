@@ -37,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 class Run:
-    """A run in progress, to step manually. It does the same as the command line, in the same order."""
+    """A run in progress, stepped by the caller. It gives the same bytes as the command line."""
 
     def __init__(self, simulator: Simulator) -> None:
         self._simulator = simulator
@@ -53,7 +53,6 @@ class Run:
         return self._simulator.recorder.newest()
 
     def write(self, folder: Path) -> None:
-        """Write trace and record of all steps so far into `folder`."""
         write(self._simulator.result(), folder)
 
 
@@ -107,25 +106,23 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         prog="selfdrive.sim.run", description="Run one scenario of the simulator."
     )
     parser.add_argument("--scenario", type=Path, required=True, metavar="FILE", help="scenario YAML")
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="where the results go")
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for the results")
     parser.add_argument("--seed", type=_seed, default=0, metavar="N", help="seed of all random numbers")
     parser.add_argument("--no-lead", action="store_true", help="run without the lead vehicle")
     parser.add_argument("--plant", choices=PLANTS, help="plant to drive on, instead of the scenario's")
-    parser.add_argument("--pictures", action="store_true", help="see the road in pictures, not ideally")
+    parser.add_argument("--pictures", action="store_true", help="run with pictures and a lane detector")
     parser.add_argument("--detector", choices=DETECTORS, default=PAPER, help="lane detector for pictures")
     parser.add_argument("--marks", choices=MARKS, default=SOLID, help="the rendered road's right line")
-    parser.add_argument("--frames", type=Path, metavar="DIR", help="pictures of your own, not rendered ones")
+    parser.add_argument("--frames", type=Path, metavar="DIR", help="use your own pictures, not rendered ones")
     parser.add_argument(
         "--translation", choices=TRANSLATIONS, default=GROUND, help="how frames follow the car"
     )
     parser.add_argument(
-        "--cache", type=Path, metavar="DIR", help="keep pictures and detections in this folder"
+        "--cache", type=Path, metavar="DIR", help="cache pictures and detections in this folder"
     )
     parser.add_argument("--compiled", type=Path, metavar="DIR", help="find compiled code in this folder")
-    parser.add_argument(
-        "--forget", action="store_true", help="take no detection from the cache, and no compiled code"
-    )
-    parser.add_argument("--film", type=Path, metavar="DIR", help="keep what the camera shows, to be watched")
+    parser.add_argument("--forget", action="store_true", help="use no cached detections and no compiled code")
+    parser.add_argument("--film", type=Path, metavar="DIR", help="record the camera's frames in this folder")
     parser.add_argument("--max-steps", type=_positive, metavar="N", help="stop after N steps of 10 ms")
     return parser.parse_args(arguments)
 
@@ -149,13 +146,13 @@ def _pictures(options: argparse.Namespace) -> Pictures | None:
 
 def _seed(text: str) -> int:
     if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 0 on")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of 0 or more")
     return int(text)
 
 
 def _positive(text: str) -> int:
     if not text.isdecimal() or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1 on")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of 1 or more")
     return int(text)
 
 

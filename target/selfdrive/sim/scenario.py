@@ -22,7 +22,7 @@ SPEED_UNITS = {"mps": 1.0, "kph": KPH_TO_MS, "mph": MPH_TO_MS}
 
 _ONLY_STRAIGHT = (
     "a straight road and a start in mid-lane for the reference plant",
-    "take the standard plant",
+    "use the standard plant",
 )
 
 FASTEST = 400.0  # in any speed unit
@@ -33,13 +33,13 @@ _SPEED_KEYS = {f"speed_{unit}": f"a speed in {unit}" for unit in SPEED_UNITS}
 KEYS = {
     "schema": f"the format of this file, {SCHEMA}",
     "name": "the scenario's short name",
-    "title": "one line on what happens",
+    "title": "what happens, in one line",
     "duration_s": "the length of the run in seconds, a whole number of 10 ms steps",
     "host": "the controlled car at the start",
-    "lead": "the vehicle ahead; left out: a free road",
+    "lead": "the vehicle ahead; without it, the road is free",
     "buttons": "cruise buttons the driver presses",
-    "plant": "standard (also when left out), or reference: the original's simulator with its errors",
-    "road": "grade and curvature; left out: flat and straight",
+    "plant": "standard (the default), or reference: the original's simulator with its errors",
+    "road": "grade and curvature; by default, the road is flat and straight",
 }
 HOST_KEYS = {**_SPEED_KEYS, "lateral_offset_m": "the distance from the lane's middle in m, left positive"}
 LEAD_KEYS = {
@@ -49,8 +49,8 @@ LEAD_KEYS = {
 }
 BUTTON_KEYS = {
     "button": f"one of {', '.join(BUTTONS)}",
-    "press_s": "when it goes down, in seconds",
-    "release_s": "when it comes up, in seconds",
+    "press_s": "the time of pressing in seconds",
+    "release_s": "the time of release in seconds",
 }
 ROAD_KEYS = {"grade": "slope over time", "curvature": "bends over distance"}
 GRADE_KEYS = {
@@ -95,7 +95,6 @@ class Scenario:
     plant: str = STANDARD
 
     def button(self, frame: int) -> int:
-        """The cruise button held in step `frame`."""
         for press in self.buttons:
             if press.press <= frame < press.release:
                 return press.code
@@ -116,7 +115,6 @@ def load_scenario(path: Path) -> Scenario:
 
 
 def parse_scenario(text: str, where: str, digest: str) -> Scenario:
-    """Parse a scenario; `where` is its source in error messages."""
     root = read_yaml(text, where, KEYS)
     root.text("schema", (SCHEMA,))
     host = root.section("host", HOST_KEYS)
@@ -141,8 +139,7 @@ def parse_scenario(text: str, where: str, digest: str) -> Scenario:
 
 
 def on_plant(scenario: Scenario, plant: str) -> Scenario:
-    """Return the scenario on the plant of that name. Raises ConfigError if the plant does not support its
-    road."""
+    """Return the scenario on the named plant. Raises ConfigError if the plant does not support its road."""
     if not _possible(scenario, plant):
         expected, remedy = _ONLY_STRAIGHT
         raise ConfigError(f"{scenario.name} on the plant {plant!r}", expected=expected, remedy=remedy)
@@ -177,10 +174,10 @@ def _buttons(root: Section) -> tuple[ButtonPress, ...]:
     presses: list[ButtonPress] = []
     for section in root.sections("buttons", BUTTON_KEYS):
         press, release = _step(section, "press_s"), _step(section, "release_s")
-        section.check("release_s", release > press, "a time after press_s", "let go after pressing")
+        section.check("release_s", release > press, "a time after press_s", "release it later")
         if presses:
             ready = press >= presses[-1].release
-            section.check("press_s", ready, "a time after the last release", "one button at a time, in order")
+            section.check("press_s", ready, "a time after the last release", "list presses in order")
         presses.append(
             ButtonPress(code=BUTTONS[section.text("button", tuple(BUTTONS))], press=press, release=release)
         )

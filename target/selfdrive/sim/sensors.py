@@ -9,7 +9,7 @@ from selfdrive.sim.truth import GroundTruth
 
 STANDSTILL_SPEED = 0.3  # m/s; below this the speed reads 0 although the wheels turn
 
-# Constant signals, by period in steps: a closed, belted car in drive, main switch on.
+# Constant signals, by period in steps: doors closed, seat belt fastened, gear in drive, main switch on.
 _CONSTANT = {
     1: {
         "STEER_STATUS": {"STEER_TORQUE_SENSOR": 0, "STEER_STATUS": 0},
@@ -31,10 +31,7 @@ _COUNTERS = 4  # values of the two-bit counter, so a constant message has four f
 
 
 class CarSensors:
-    """Returns the car's frames of each 10 ms step.
-
-    The gearbox reports `gearbox_scale` times the speed.
-    """
+    """Measures the car in each 10 ms step. The gearbox reports `gearbox_scale` times the speed."""
 
     def __init__(self, gearbox_scale: float = 1.0) -> None:
         self._gearbox_scale = gearbox_scale

@@ -50,10 +50,10 @@ class Simulator:
         pictures: Pictures | None = None,
         film: Path | None = None,
     ) -> None:
-        """Rebuild car, controller and recorder. `seed` is that of the pictures, if any.
+        """Rebuild car, controller and recorder. `seed` is for the pictures; `film` is a folder for a film.
 
-        A film is recorded in the folder `film`. Raises ConfigError if that fails, or if pictures are
-        unavailable or do not fit the scenario's road.
+        Raises ConfigError if the film cannot be written, or if pictures are unavailable or do not fit the
+        scenario's road.
         """
         self.frame = 0
         self._scenario, self._seed = scenario, seed

@@ -1,7 +1,7 @@
 """Produces the bytes of trace.npz, like `numpy.savez` but faster.
 
-`savez` copies channels through `zipfile` and its buffers; here they are taken directly from memory. Format:
-PKWARE's APPNOTE 6.3 (stored entries with a ZIP64 extra field each, dated 1980-01-01), and NumPy's .npy 1.0.
+Format: PKWARE's APPNOTE 6.3 (stored entries with a ZIP64 extra field each, dated 1980-01-01), and NumPy's
+.npy 1.0.
 """
 
 from collections.abc import Mapping
@@ -41,7 +41,7 @@ def pieces(trace: Mapping[str, np.ndarray]) -> list[bytes | memoryview]:
 
 
 def _header(values: np.ndarray) -> bytes:
-    """The header of a .npy file: type and shape, padded to a multiple of 64 bytes with room for a row count
+    """The header of a .npy file: type and shape, padded to a multiple of 64 bytes, with space for a row count
     of 21 digits."""
     said = f"{{'descr': {values.dtype.str!r}, 'fortran_order': False, 'shape': {values.shape}, }}"
     said += " " * (_DIGITS - len(str(values.shape[0])))

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 
 class GroundTruth(NamedTuple):
-    """The world after the plant's step that began at `t`. SI units, radians, left positive."""
+    """The world after the step that began at `t`. SI units, radians, left positive."""
 
     t: float  # s
     d_rel: float  # m, bumper to bumper; 200 on a free road

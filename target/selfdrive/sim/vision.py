@@ -1,4 +1,4 @@
-"""How the controller sees in a run: ideal geometry, or pictures with a detector.
+"""What the controller sees in a run: ideal geometry, or pictures with a detector.
 
 Only runs with pictures import picture libraries, which load slowly.
 """
@@ -28,8 +28,8 @@ class Pictures:
     `frames` is a folder of user frames; None: a rendered road with these `marks` (both solid, or the right
     one dashed). `translation` is how frames follow the car's offset and heading: by the ground's homography,
     or by shifting, as in the paper's text or in its authors' code. The folder `cache` stores frames and
-    detections; None: nothing is stored. With `forget`, stored results are not used. Use `forget`, or no
-    cache, for detection code that depends on time; for other code, results are the same with and without.
+    detections; None: nothing is stored. With `forget`, stored detections are not used, as needed for
+    detection code that depends on time.
     """
 
     detector: str = PAPER
@@ -41,8 +41,6 @@ class Pictures:
 
 
 class RoadCamera(Protocol):
-    """A camera of the simulator."""
-
     def look(self, truth: GroundTruth) -> CameraView:
         """Return the view at this moment."""
         ...
@@ -62,10 +60,8 @@ class Vision:
 
 
 def build_vision(pictures: Pictures | None, road: Road, seed: int) -> Vision:
-    """Return camera and detector for a run on `road`.
-
-    Raises ConfigError for unusable frames, and for pictures of a road that is not straight.
-    """
+    """Return camera and detector for a run. Raises ConfigError for unusable frames, and for pictures of a
+    road that is not straight."""
     if pictures is None:
         return Vision(camera=Camera(road), detector=IdealDetector(), description=None, model=CameraModel())
     from selfdrive.sim.image_library import open_library
@@ -74,7 +70,7 @@ def build_vision(pictures: Pictures | None, road: Road, seed: int) -> Vision:
     if road.bend(0.0, 1) is not None:
         raise ConfigError(
             "a road with curvature",
-            expected="a straight road, as pictures show",
+            expected="a straight road for runs with pictures",
             remedy="run it without pictures",
         )
     if pictures.forget:
@@ -96,7 +92,6 @@ def build_vision(pictures: Pictures | None, road: Road, seed: int) -> Vision:
 
 
 def build_detector(name: str, model: CameraModel):
-    """Return the named detector of DETECTORS for one run's pictures."""
     if name == PAPER:
         from selfdrive.visiond.compiled_paper import build_paper_detector
 

@@ -64,7 +64,7 @@ static void plain(const Picture *picture, const float *m, const float *start, lo
 #if defined(__x86_64__)
 #include <immintrin.h>
 #define FAST __attribute__((target("avx2,fma")))
-#ifndef IS_FAST /* a test may ask for either version */
+#ifndef IS_FAST /* tests set this */
 #define IS_FAST (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
 #endif
 
@@ -111,7 +111,7 @@ FAST static void fast(const Picture *picture, const float *m, const float *start
         __m256i inside = _mm256_and_si256(
             _mm256_and_si256(_mm256_cmpgt_epi32(column, none), _mm256_cmpgt_epi32(last, column)),
             _mm256_and_si256(_mm256_cmpgt_epi32(row, none), _mm256_cmpgt_epi32(end, place)));
-        /* Beyond some thousand rows, the product for the position may overflow, so `inside` also tests the row. */
+        /* Beyond some thousand rows, the product for the position can overflow, so `inside` also tests the row. */
         inside = _mm256_and_si256(inside, _mm256_cmpgt_epi32(_mm256_set1_epi32(picture->rows - 1), row));
         __m256 here, beside, under, last_one;
         int32_t first = _mm256_extract_epi32(place, 0);

@@ -9,10 +9,10 @@ VECTOR = 64  # columns; a vector of this length in OpenCV, whatever the row's le
 
 
 def warp(source: np.ndarray, matrix: np.ndarray, region: Region) -> np.ndarray:
-    """Return the region of a picture of the size of `source` (uint8), in which each place shows `source` at
-    `matrix` (3 x 3) times that place. Outside `source`, its last pixels are repeated.
+    """Return a region of the warped picture, which is as large as `source` (uint8).
 
-    To get the same bits as for the whole, rows start at column 0 and have whole vectors of columns.
+    A place in it shows `source` at `matrix` (3 x 3) times that place; outside `source`, its last pixels are
+    repeated. To get the same bits as for the whole, rows start at column 0 and have whole vectors of columns.
     """
     columns = min(-(-region.right // VECTOR) * VECTOR, source.shape[1])
     seen = cv2.warpPerspective(

@@ -20,11 +20,11 @@ def read_yaml(text: str, where: str, keys: dict[str, str]) -> "Section":
         mark = getattr(error, "problem_mark", None)
         problem = getattr(error, "problem", None)
         raise ConfigError(
-            problem or ("bottomless nesting" if isinstance(error, RecursionError) else "unreadable text"),
+            problem or ("nested too deeply" if isinstance(error, RecursionError) else "unreadable text"),
             where=where,
             line=None if mark is None else mark.line + 1,
             expected="valid YAML",
-            remedy="mend the syntax",
+            remedy="correct the syntax",
         ) from None
     if node is None:
         remedy = f"write the keys {', '.join(keys)}"
@@ -33,7 +33,7 @@ def read_yaml(text: str, where: str, keys: dict[str, str]) -> "Section":
 
 
 class Section:
-    """A mapping of the document. `keys` has the allowed keys with their meanings."""
+    """A mapping of the document. `keys` are the allowed keys with their meanings."""
 
     def __init__(self, node: yaml.Node, where: str, keys: dict[str, str]) -> None:
         self._where = where
@@ -56,7 +56,6 @@ class Section:
         return key in self._nodes
 
     def text(self, key: str, allowed: tuple[str, ...] = ()) -> str:
-        """Return a string, one of `allowed` unless that is empty."""
         node = self._node(key)
         good = isinstance(node, yaml.ScalarNode) and node.tag == "tag:yaml.org,2002:str" and node.value
         if not good or (allowed and node.value not in allowed):
@@ -70,11 +69,10 @@ class Section:
         return self._number(self._node(key), key, low, high)
 
     def numbers(self, key: str, low: float, high: float) -> tuple[float, ...]:
-        """Return a list of finite numbers in `low`..`high`, at least one."""
         return tuple(self._number(item, key, low, high) for item in self._items(key))
 
     def ascending(self, key: str, low: float, high: float) -> tuple[float, ...]:
-        """Like `numbers`, in strictly ascending order."""
+        """Like `numbers`, strictly ascending."""
         values = self.numbers(key, low, high)
         for item, before, value in zip(self._items(key)[1:], values, values[1:], strict=False):
             if value <= before:
@@ -89,7 +87,7 @@ class Section:
         if len(found) != 1:
             names = [f"{name}_{unit}" for unit in units]
             got = " and ".join(found) if found else f"no {name}"
-            self.fail(got, f"exactly one of {', '.join(names)}", "the unit stands in the key's name")
+            self.fail(got, f"exactly one of {', '.join(names)}", "give one of these keys")
         return found[0]
 
     def is_list(self, key: str) -> bool:
@@ -107,7 +105,6 @@ class Section:
             self._fail(node, f"{key}: {_shown(node)}", expected, remedy)
 
     def fail(self, got: str, expected: str, remedy: str) -> NoReturn:
-        """Raise ConfigError at the section's line."""
         raise ConfigError(got, where=self._where, line=self.line, expected=expected, remedy=remedy)
 
     def _node(self, key: str) -> yaml.Node:

@@ -1,6 +1,6 @@
 /* Stands for: band_filter.py.
- * The same operations in the same precision as in numpy and OpenCV and, where they round, in the same order, for
- * the same bits. */
+ * The operations have the same precision as in numpy and OpenCV and, where they round, the same order, so that the
+ * bits are the same. */
 
 #include <math.h>
 #include <stdint.h>
@@ -32,7 +32,7 @@ INLINE long mirrored(long place, long size)
     return place < 0 ? -place : place < size ? place : 2 * size - 2 - place;
 }
 
-/* The lowest or highest level of the rows around. */
+/* The lowest or highest level of the rows around each pixel's. */
 INLINE void extreme(const uint8_t *restrict from, long rows, long width, int highest, uint8_t *restrict to)
 {
     for (long y = 0; y < rows; y++) {
@@ -133,7 +133,7 @@ INLINE int is_crest(const float *row, const float *sure, long x, long inner)
     return highest;
 }
 
-/* Numbers and weights of the points with the highest contrast. */
+/* Positions and weights of the crests. */
 INLINE long crests_of(const Bands *b)
 {
     long found = 0, inner = b->width - 2 * EDGE;

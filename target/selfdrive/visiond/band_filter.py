@@ -63,7 +63,6 @@ def crests(road: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def mark_points(road: np.ndarray, find: Crests = crests) -> Points:
-    """Find the crests of bright bands in `road`, a map (uint8, rows x columns)."""
     return points_at(*strongest(*find(road)), road)
 
 

@@ -80,7 +80,7 @@ class CompiledCrests:
 
 @cache
 def maps_alike(library: compiled.Library, model: CameraModel) -> bool:
-    """Whether compiled maps equal this OpenCV's; versions can interpolate differently."""
+    """Whether compiled maps equal the installed OpenCV's; versions can interpolate differently."""
     shape = model.rows, model.width
     noise = (
         (np.arange(model.rows * model.width, dtype=np.uint32) * 40503 >> 7).astype(np.uint8).reshape(shape)
@@ -90,7 +90,7 @@ def maps_alike(library: compiled.Library, model: CameraModel) -> bool:
 
 @cache
 def finds_alike(library: compiled.Library) -> bool:
-    """Whether compiled crests equal this OpenCV's; versions can add in a different order."""
+    """Whether compiled crests equal the installed OpenCV's; versions can add in a different order."""
     number = np.arange(48 * 260)
     road = (60 + number * 40503 % 65521 % 61 + 12 * (number % 260 % 37 < 3)).astype(np.uint8).reshape(48, 260)
     found, wanted = CompiledCrests(library, road.shape)(road), crests(road)
@@ -143,7 +143,7 @@ class CompiledVote:
 
 @cache
 def votes_alike(library: compiled.Library, model: CameraModel) -> bool:
-    """Whether compiled votes equal those with this OpenCV; versions can add in a different order."""
+    """Whether compiled votes equal those with the installed OpenCV; versions can add in a different order."""
     view = RoadView(model)
     number = np.arange(400)
     road = (np.arange(len(view.drop) * len(view.y)) % 251).astype(np.uint8).reshape(len(view.drop), -1)

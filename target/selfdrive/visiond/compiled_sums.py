@@ -11,7 +11,7 @@ from selfdrive.common.array_math import dot
 
 @cache
 def adds_up_alike(library: compiled.Library) -> bool:
-    """Whether the sums of `sums.h` equal this NumPy's; versions can add in a different order."""
+    """Whether the sums of `sums.h` equal the installed NumPy's; versions can add in a different order."""
     values = np.sqrt(np.arange(1.0, 5001.0))
     room = np.empty_like(values)
     product, pointer = library.code.product, ctypes.c_void_p

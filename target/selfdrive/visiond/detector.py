@@ -20,8 +20,6 @@ class RoadLine(NamedTuple):
 
 
 class LaneLines(NamedTuple):
-    """A detector's result for one picture: the ego lane's two lines and the path between them."""
-
     left: RoadLine
     right: RoadLine
     path: RoadLine

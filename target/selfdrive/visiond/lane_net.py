@@ -1,4 +1,4 @@
-"""The neural net that recognises windows with a lane mark: one hidden layer of ten nodes."""
+"""The neural net that recognises windows with a lane mark."""
 
 from math import tanh
 from pathlib import Path

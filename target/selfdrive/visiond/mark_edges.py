@@ -10,11 +10,7 @@ FLOOR = 40.0  # of the Sobel sum, whose weights add up to 4; anything less is gr
 
 
 def tiles_with_mark(marked: np.ndarray, need: int) -> np.ndarray:
-    """Return 16 x 16 pixel tiles (bool) that at least `need` of the marked windows cover.
-
-    `marked` (bool) has the windows' rows and columns; a tile in the inner part of the picture lies in four
-    windows.
-    """
+    """Return the tiles (bool, 16 x 16 pixels each) that at least `need` of the `marked` windows cover."""
     rows, columns = marked.shape
     cover = np.zeros((rows + 1, columns + 1), np.uint8)
     for down in (0, 1):

@@ -183,7 +183,7 @@ INLINE long marked(const Net *net, const uint8_t *picture, uint8_t *windows)
             if (end > x)
                 votes(net, picture, y, x, end);
         }
-    /* A block at the end of a run may use invalid values beyond it, because no window has that block. */
+    /* A block at the end of a run can use invalid values beyond it, because no window has that block. */
     for (long y = 0; y <= down; y++)
         for (long x = 0, end; x <= across; x = end + 1) {
             end = run_end(windows, down, across, y, x);

@@ -61,7 +61,6 @@ class PaperDetector:
 
 
 def lane_between(left: RoadLine | None, right: RoadLine | None) -> LaneLines:
-    """The lane between these lines; a missing line has the expected position."""
     left = left or RoadLine(y=0.5 * LANE_WIDTH, prob=0.0)
     right = right or RoadLine(y=-0.5 * LANE_WIDTH, prob=0.0)
     return LaneLines(left=left, right=right, path=path_between(left, right))

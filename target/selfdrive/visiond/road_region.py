@@ -13,7 +13,7 @@ from selfdrive.common.errors import ConfigError
 from selfdrive.visiond.hog import STRIDE, WINDOW
 
 NEAR, FAR = 4.9, 30.0  # m ahead; the nearest row is always examined, the furthest can be left out
-SIDE = 3.8  # m: a lane's line when the car is almost in the next lane
+SIDE = 3.8  # m; where a lane's line is when the car is almost in the next lane
 TURN = 0.08  # m wider per metre ahead
 
 

@@ -72,7 +72,7 @@ void take_map(const View *view, const uint8_t *picture)
     for (int k = 0; k < LEVELS; k++, rows /= 2, width /= 2) {
         const Level *level = &view->levels[k];
         for (long y = 0; y < level->rows; y++, out += view->columns) {
-            int is_last = k == 0 && level->first + y == rows - 1; /* of an array that may end with its last pixel */
+            int is_last = k == 0 && level->first + y == rows - 1; /* of an array that can end with its last pixel */
             (is_last ? take_row : take)(picture + (level->first + y) * width, level->places + y * view->columns,
                                         view->columns, out);
         }

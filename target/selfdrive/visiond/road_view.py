@@ -63,7 +63,6 @@ class RoadView:
 
 
 def _rows_of(model: CameraModel, level: int) -> list[float]:
-    """The rows of the full picture that are taken from this level."""
     step = 2**level
     finest = BLEND * step / 2 if level else 0.0
     coarsest = BLEND * step if level < LEVELS - 1 else np.inf

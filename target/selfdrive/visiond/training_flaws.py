@@ -50,7 +50,6 @@ class Ground:
 
 
 def bent(model: CameraModel, images: Iterable[np.ndarray], rng: np.random.Generator) -> list[np.ndarray]:
-    """Bend the straight road in the pictures, mostly slightly."""
     bend = rng.uniform(-1.0, 1.0) ** 3 / LEAST_BEND
     rows = np.maximum(np.arange(model.rows), model.horizon + NEAR_HORIZON)
     shift = [0.5 * bend * model.distance(row) ** 2 / model.metres_per_pixel(row) for row in rows]

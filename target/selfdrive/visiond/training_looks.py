@@ -92,5 +92,4 @@ def _either(rng: np.random.Generator, first: tuple[float, float], second: tuple[
 
 
 def _sometimes(rng: np.random.Generator, share: float, least: float, most: float) -> float:
-    """Return 0, or with probability `share` a value from `least` to `most`."""
     return rng.uniform(least, most) if rng.random() < share else 0.0

@@ -1,7 +1,4 @@
-"""Scenes for training the lane detector: rendered roads of all kinds, seen by all kinds of cameras.
-
-All random numbers come from one Generator, so a seed reproduces the scenes.
-"""
+"""Scenes for training the lane detector: rendered roads of all kinds, seen by all kinds of cameras."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

@@ -31,8 +31,6 @@ HEADS = "effect", "level", "amount", "unit", "pictures", *(f"missed_{name}" for 
 
 
 class Row(NamedTuple):
-    """One level of an effect: the number of pictures in which each detector missed a line."""
-
     kind: type[Effect]
     level: int
     amount: float
@@ -63,7 +61,6 @@ def _without_a_past(detector: PaperDetector | RobustDetector, frame: Frame, pict
 def _pictures(
     frames: Sequence[Frame], kind: type[Effect], amount: float, seeds: int
 ) -> Iterator[tuple[Frame, np.ndarray]]:
-    """The frames changed by an effect, for each seed, or for one if the effect is not random."""
     before = None
     for seed in range(1, seeds + 1):
         made = {model: kind(amount, seed, model) for model in {frame.model for frame in frames}}
@@ -75,7 +72,6 @@ def _pictures(
 
 
 def strip(frame: Frame, kind: type[Effect]) -> np.ndarray:
-    """The frame under all levels of an effect, with their amounts (grey)."""
     panels = []
     for level, amount in enumerate(LEVELS[kind], 1):
         seen = kind(amount, 1, frame.model).apply(frame.grey, MOMENT)

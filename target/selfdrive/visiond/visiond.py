@@ -8,13 +8,17 @@ LEAD_STD = 0.1  # m
 
 
 class Visiond:
-    """Runs a detector on each view. `latest` is the newest ModelData, None before the first."""
+    """Runs a detector on each view and publishes the result.
+
+    `latest` is the newest ModelData, None before the first; its `t` gives its age.
+    """
 
     def __init__(self, detector: LaneDetector) -> None:
         self._detector = detector
         self.latest: ModelData | None = None
 
     def update(self, view: CameraView, t: float) -> None:
+        """Compute and publish a road model of the view taken at time `t` (s)."""
         lines = self._detector.detect(view)
         left_lane_y = lines.left.y
         right_lane_y = lines.right.y
@@ -30,6 +34,7 @@ class Visiond:
         self.publish(model)
 
     def publish(self, model: ModelData) -> None:
+        """Make the model visible to the rest of the controller."""
         self.latest = model
 
 

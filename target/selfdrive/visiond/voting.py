@@ -20,12 +20,10 @@ BIN = 0.1  # m, for votes
 SIDEWAYS = 4.0  # m, largest lateral position of lines
 LEFT_STEP, DIP_STEP = 4.0, 6.0  # px between candidates
 SCATTER = 0.005  # share of a line's rows with points by chance, on the cleanest road
-AROUND = (
-    np.array([[1] * 8 + [0] * 5 + [1] * 8], np.float32) / 16
-)  # bins of y in which a line has no votes itself
-BESIDE = 0.8  # m from a line, up to which points are counted as chance
+AROUND = np.array([[1] * 8 + [0] * 5 + [1] * 8], np.float32) / 16  # averages the bins of y around a line
+BESIDE = 0.8  # m from a line, within which points by chance are counted
 ROUNDS = (0.30, 0.20, 0.15, 0.15)  # m from a line, where points are used in each round of the fit
-ALIKE = 10.0  # neighbouring points count as one, because they are not independent
+ALIKE = 10.0  # this many neighbouring points count as one, because they are not independent
 FAINT = 0.02  # share of rows that makes a line probable if there are no other points; a dash is 0.05
 BLUR = 0.5, 0.05  # px and m by which a point can miss its mark
 

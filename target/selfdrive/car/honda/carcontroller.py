@@ -26,7 +26,6 @@ class BrakeHysteresis:
         self._steady = 0.0
 
     def update(self, brake: float) -> float:
-        """Return the brake command for the demand `brake`, both in 0..1."""
         if brake < BRAKE_OFF or (brake < BRAKE_ON and not self._braking):
             brake = 0.0
         self._braking = brake > 0.0

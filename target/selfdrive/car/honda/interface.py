@@ -84,7 +84,6 @@ class CarInterface:
         self._invalid_cycles = 0
 
     def update(self, frames: Sequence[CanFrame], t: float) -> CarState:
-        """Process all frames received since the last call, at time `t` (s); return a new CarState."""
         previous, car = self._car, self._reader.update(frames, t)
         self._invalid_cycles = 0 if car.can_valid else self._invalid_cycles + 1
         car.events = tuple(self._events(car, previous))
@@ -92,7 +91,6 @@ class CarInterface:
         return car
 
     def apply(self, control: CarControl, frame: int) -> list[CanFrame]:
-        """Limit and pack the demand of control cycle `frame` (0, 1, ...); return the frames to send."""
         return self._controller.update(control, self._car, frame)
 
     def _events(self, car: CarState, previous: CarState) -> list[Event]:

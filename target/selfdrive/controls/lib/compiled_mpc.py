@@ -22,8 +22,6 @@ LATERAL_WEIGHTS = (1.0, 1.0, 1.0, 1.0)  # as in `lateral_ocp`, except for the st
 
 
 class Code(NamedTuple):
-    """The library of `mpc.c` and the address of DAQP's function."""
-
     library: ctypes.CDLL
     daqp: ctypes.c_void_p
 
@@ -71,8 +69,6 @@ def _daqp() -> ctypes.c_void_p | None:
 
 
 class CompiledSolver:
-    """Calls the function `iteration` of `mpc.c` through the interface of a CasADi function."""
-
     def __init__(
         self, code: Code, iteration: str, weights: Sequence[float], *, n_state: int, n_param: int
     ) -> None:
@@ -95,8 +91,6 @@ class CompiledSolver:
 
 
 class Addresses:
-    """The arguments of an iteration: addresses of DAQP, weights, arguments and results."""
-
     def __init__(self, daqp: ctypes.c_void_p, weights: memoryview) -> None:
         self.call = (ctypes.c_void_p * 8)(daqp)
         self._held: dict[int, Any] = {}

@@ -18,7 +18,6 @@ ABSENT_DRIVER_A = -0.2  # m/s^2
 
 
 def is_following(v_ego: float, lead: LeadData) -> bool:
-    """Return whether a nearby lead pulls away, so that the car can speed up more."""
     near = lead.status and lead.d_rel < FOLLOWING_DISTANCE
     return near and lead.v_lead_k > v_ego and lead.a_lead_k > 0.0
 

@@ -14,8 +14,6 @@ PERMANENT = "permanent"  # shown as long as it lasts, engaged or not
 
 
 class Event(NamedTuple):
-    """An event of one control cycle, with the reactions that it requests."""
-
     name: str
     kinds: tuple[str, ...]
 

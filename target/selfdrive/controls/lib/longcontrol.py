@@ -75,7 +75,7 @@ class LongControl:
         self.v_pid = plan.v_target
         self._pid.pos_limit = gas_max
         self._pid.neg_limit = -brake_max
-        v_ego = max(car.v_ego, MIN_CAN_SPEED)
+        v_ego = max(car.v_ego, MIN_CAN_SPEED)  # below this the car reports 0
         self.output = self._pid.update(self.v_pid, v_ego, speed=v_ego, feedforward=plan.a_target)
 
     def _stop(self, car: CarState, gas_max: float, brake_max: float) -> None:

@@ -12,7 +12,7 @@ enum { N = 20, SHORT_INTERVALS = 5, STATES = 6, RESIDUALS = 5, ROWS = 2 * N };
 
 static const double FEASIBILITY_TOL = 1e-3, STATIONARITY_TOL = 1e-6, LARGEST = 1e100, LARGEST_GRADIENT = 1e300;
 
-/* DAQPProblem and DAQPResult of DAQP's types.h and api.h; later versions may have more. */
+/* DAQPProblem and DAQPResult of DAQP's types.h and api.h; later versions can have more members. */
 typedef struct {
     int n, m, ms;
     double *h, *f, *a, *upper, *lower;
@@ -736,7 +736,7 @@ static void lateral_mpc_end(const double *zu, const double *p, double *r, double
 
 typedef struct {
     int nx, residuals, end_residuals, bounded, linear, shift;
-    int state[2]; /* those with bounds */
+    int state[2]; /* indices of bounded states */
     double low[2], high[2], control_bound;
     double sixth; /* of the RK4 step, s */
     void (*rk4)(const double *, const double *, const double *, double *, double *, double *, double *);
@@ -753,7 +753,7 @@ typedef double Matrix[STATES][STATES + 1];
 #define INLINE static inline __attribute__((always_inline))
 #define UNROLL _Pragma("GCC unroll 8") /* so that the compiler can omit absent terms */
 
-INLINE double larger(double a, double b) /* b may be NaN */
+INLINE double larger(double a, double b) /* b can be NaN */
 {
     return b > a ? b : a;
 }

@@ -6,8 +6,6 @@ from typing import Protocol
 
 
 class Buffers(Protocol):
-    """The memory of a solver's arguments and results."""
-
     def set_arg(self, i: int, values: memoryview) -> None:
         """Set the doubles that argument `i` is read from."""
 
@@ -16,7 +14,7 @@ class Buffers(Protocol):
 
 
 class Solver(Protocol):
-    """One iteration as a function with three arguments and three results (see `build_solver`)."""
+    """One iteration as a function with three arguments and three results; see `build_solver`."""
 
     def size1_in(self, i: int) -> int:
         """Length of argument `i`."""
@@ -32,8 +30,8 @@ class Iteration:
     """Runs a solver on its own buffers and keeps the trajectory between iterations.
 
     The next iteration linearises at the trajectory `guess`; `solution` is the last one computed: the states
-    node by node, then the controls. Both are overwritten in place. `unsolved` counts finite iterations
-    without a solution, which keep the controls.
+    node by node, then the controls. `unsolved` counts finite iterations without a solution, which keep the
+    controls.
     """
 
     def __init__(self, solver: Solver) -> None:

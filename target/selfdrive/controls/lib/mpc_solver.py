@@ -112,7 +112,6 @@ def _linearise(
 
 
 def integrators_of(ocp: Ocp) -> dict[int, ca.Function]:
-    """The integrator of each kind of interval, by its number of steps."""
     step = rk4(ocp)
     return {n: _integrator(ocp, step, n) for n in dict.fromkeys(n for n, _ in ocp.intervals)}
 
@@ -121,8 +120,8 @@ def condense(ocp: Ocp, integrators: dict[int, ca.Function]) -> ca.Function:
     """(trajectory, first state, p) -> the quadratic program in the change of the controls.
 
     Returns its Hessian and gradient, the states of all nodes for unchanged controls, and their derivative by
-    all controls. A column of the Hessian is calculated from that derivative at its node and the second
-    derivatives of all later costs, which avoids products of large matrices.
+    all controls. Each column of the Hessian comes from that derivative at its node and the second derivatives
+    of all later costs, which avoids products of large matrices.
     """
     n, nx = ocp.n_control, ocp.n_state
     old, z0, p = ca.SX.sym("old", ocp.n_trajectory), ca.SX.sym("z0", nx), ca.SX.sym("p", ocp.n_param)

@@ -36,8 +36,6 @@ class ModelFit:
 
 
 class PathPlanner:
-    """Tracks the lane's width and, after each model message, the lanes and the path to follow."""
-
     def __init__(self, fit: ModelFit) -> None:
         self.lanes = Lanes(ZERO, ZERO, ZERO, 0.0, 0.0, 3.7)
         self.d_poly = ZERO  # path to follow

@@ -59,7 +59,7 @@ class Track:
     ) -> None:
         a_rel = clip((v_rel - self.v_rel) / DT_MDL, -A_REL_MAX, A_REL_MAX)
         self.a_rel += A_REL_FILTER * (a_rel - self.a_rel)
-        # while the driver steers, the distance from the path says nothing about the object
+        # while the driver steers, the distance from the path does not show the object's motion
         v_lat = 0.0 if driver_steers else (d_path - self.d_path) / DT_MDL
         self.v_lat += LAT_FILTER * (v_lat - self.v_lat)
         self.filter.update(v_rel + v_ego)

@@ -18,7 +18,7 @@ _NOTHING = Limits()
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Crossing:
-    """An interval (s) with the difference outside the band; `worst` is the largest difference, at `at` s."""
+    """An interval (s) with differences outside the band; `worst` is the largest, at `at` s."""
 
     begin: float
     end: float
@@ -68,8 +68,6 @@ class FigureResult:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Comparison:
-    """The comparison of all channels and key figures with one reference."""
-
     name: str
     channels: tuple[ChannelResult, ...]
     figures: tuple[FigureResult, ...]
@@ -109,9 +107,9 @@ def _same_time(reference: Reference, steps: int) -> None:
     if not last < steps <= last + period:
         end, run_end = last / STEPS_PER_SECOND, (steps - 1) / STEPS_PER_SECOND
         raise ConfigError(
-            f"the last row is of {end:g} s",
+            f"the last row is at {end:g} s",
             where=str(reference.path),
-            expected=f"one that ends with the run, at {run_end:g} s",
+            expected=f"a trace that ends with the run, at {run_end:g} s",
             remedy="compare whole runs of the same scenario",
         )
 
@@ -127,15 +125,15 @@ def _complete(reference: Reference, tolerances: Tolerances) -> None:
                     f"{'no' if values is None else 'nothing in'} column {BY_CHANNEL[channel].name!r}",
                     where=str(reference.path),
                     line=1,
-                    expected=f"what {limited} is made of, as it has a tolerance",
-                    remedy="record it, or take the tolerance away",
+                    expected=f"its values, because {limited} has a tolerance",
+                    remedy="record it, or remove the tolerance",
                 )
 
 
 def _figures(
     reference: Reference, ours: dict[str, np.ndarray], limits: dict[str, float]
 ) -> tuple[FigureResult, ...]:
-    """Figures of reference and run use the reference's rows; only our time of engaging uses every step."""
+    """Use the reference's rows for both; only our time of engaging uses every step."""
     theirs = figures.key_figures(reference.steps, reference.channels)
     rows = {name: values[reference.steps] for name, values in ours.items()}
     mine = figures.key_figures(reference.steps, rows)
@@ -178,7 +176,7 @@ def _both_see_a_lead(reference: Reference, ours: dict[str, np.ndarray]) -> np.nd
 def _differences(column: Column, theirs: np.ndarray, channel: np.ndarray, steps: np.ndarray) -> np.ndarray:
     """Ours at `steps` minus the reference: 0 or 1 for exclusive values, infinite if ours is NaN.
 
-    Only the headway may be infinite, at standstill; then it is not compared.
+    Only the headway can be infinite, at standstill; then it is not compared.
     """
     ours = channel[np.maximum(steps, 0)]
     if column.exclusive:
@@ -192,7 +190,6 @@ def _rms(differences: np.ndarray) -> float:
 
 
 def crossings(seconds: np.ndarray, differences: np.ndarray, band: float) -> tuple[Crossing, ...]:
-    """The intervals of rows with a difference outside `band`."""
     outside = np.abs(differences) > band + 1e-9
     edges = np.flatnonzero(np.diff(np.concatenate(([0], outside.astype(int), [0]))))
     found = []

@@ -8,10 +8,10 @@ from selfdrive.common.conversions import MS_TO_KPH
 from selfdrive.sim.compare.trace_csv import STEPS_PER_SECOND
 
 FIGURES = {
-    "engaged_s": "the time of engaging in s; of a trace with gaps, the span in which it lies",
-    "set_speeds_kph": "the set speeds while engaged in km/h, in their order",
-    "min_hwt_s": "the least time headway while moving, in s",
-    "min_d_rel_m": "the least distance to the lead in m",
+    "engaged_s": "the time of engaging in s; for a trace with gaps, the span that contains it",
+    "set_speeds_kph": "the set speeds while engaged in km/h, in order",
+    "min_hwt_s": "the smallest headway time while moving, in s",
+    "min_d_rel_m": "the smallest distance to the lead in m",
     "max_brake": "the hardest braking command",
 }
 
@@ -29,7 +29,7 @@ Value = float | tuple[float, ...] | None
 
 
 def key_figures(steps: np.ndarray, channels: dict[str, np.ndarray]) -> dict[str, Value]:
-    """The key figures (`FIGURES`) of channels with rows at `steps`; None for events that did not happen."""
+    """The key figures (`FIGURES`) of channels with rows at `steps`; None for missing events."""
     read = {
         "engaged_s": lambda engaged: _engaging(steps, engaged),
         "set_speeds_kph": _set_speeds,

@@ -51,17 +51,15 @@ _PANELS = (
 _TITLES = {
     "engaged_s": "engaged [s]",
     "set_speeds_kph": "set speeds [km/h]",
-    "min_hwt_s": "least HWT [s]",
-    "min_d_rel_m": "least d_rel [m]",
-    "max_brake": "most brake",
+    "min_hwt_s": "smallest HWT [s]",
+    "min_d_rel_m": "smallest d_rel [m]",
+    "max_brake": "strongest braking",
 }
 _LEAD_ESTIMATES = ("lead_v_lead_k", "lead_a_lead_k")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Maneuver:
-    """A run, with its reference and comparison, if any."""
-
     run: Run
     reference: Reference | None
     comparison: Comparison | None
@@ -74,7 +72,7 @@ def page(maneuvers: list[Maneuver], plant: str) -> str:
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width,initial-scale=1">'
         f"<title>Maneuvers</title><style>{_STYLE}</style></head><body><h1>Maneuvers</h1>"
-        f"<p>{len(maneuvers)} fault-free runs on the {escape(plant)} plant. Thin lines are the runs, broad "
+        f"<p>Fault-free runs on the {escape(plant)} plant: {len(maneuvers)}. Thin lines are the runs, broad "
         "pale lines beneath them the references; time in seconds. Dashed: engaging.</p>"
         f'<div class="scroll"><table><tr><th class="t">run</th><th class="t">what happens</th>'
         f'<th class="t">reference</th><th class="t">hazards and alerts</th>{head}</tr>'
@@ -139,7 +137,7 @@ def _comparison_table(comparison: Comparison | None) -> str:
     limits = "".join(f"<td>{'-' if limit is None else f'{limit:g}'}</td>" for *_, limit, _ in rows)
     return (
         f'<div class="scroll"><table><tr><th></th>{head}</tr><tr><td class="t">run</td>{ours}</tr>'
-        f'<tr><td class="t">reference</td>{theirs}</tr><tr><td class="t">may differ by</td>{limits}</tr>'
+        f'<tr><td class="t">reference</td>{theirs}</tr><tr><td class="t">tolerance</td>{limits}</tr>'
         "</table></div>"
     )
 

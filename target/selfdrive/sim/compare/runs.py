@@ -38,7 +38,7 @@ def find(name: str, scenarios: Path) -> Scenario:
             f"no scenario for {name!r}",
             where=str(path),
             expected="a scenario file of that name",
-            remedy="name it, or choose another --scenarios",
+            remedy="correct the name, or choose another --scenarios",
         )
     scenario = load_scenario(path)
     if name.endswith(NO_LEAD):
@@ -52,7 +52,7 @@ def drive(name: str, scenario: Scenario) -> Run:
 
 
 def load(folder: Path, plant: str) -> Run:
-    """Load a finished run's folder. Raises ConfigError if it is not one, or of a different run or plant."""
+    """Load a finished run. Raises ConfigError if it is missing, or of another scenario or plant."""
     try:
         record = json.loads((folder / "record.json").read_text(encoding="utf-8"))
         with np.load(folder / "trace.npz", allow_pickle=False) as arrays:
@@ -65,10 +65,10 @@ def load(folder: Path, plant: str) -> Run:
             str(reason),
             where=str(folder),
             expected="record.json and trace.npz of a finished run",
-            remedy="run the scenario with --out there",
+            remedy="run the scenario with this folder as --out",
         ) from None
     if got != (wanted := f"a run of {folder.name} on the {plant} plant"):
         raise ConfigError(
-            got, where=str(folder), expected=wanted, remedy="run that with --out there, or give its --plant"
+            got, where=str(folder), expected=wanted, remedy="run that with this --out, or correct --plant"
         )
     return Run(name=name, title=record["scenario"], record=record, trace=trace)

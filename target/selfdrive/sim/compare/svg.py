@@ -34,15 +34,12 @@ class Mark(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Panel:
-    """One plot; its lines have the same unit."""
-
     title: str
     unit: str
     lines: tuple[Line, ...]
 
 
 def draw(panel: Panel, marks: tuple[Mark, ...], end: float) -> str:
-    """The panel as an <svg> from time 0 to `end` (s), reference lines at the bottom."""
     low, high, step = _scale(panel.lines)
     parts = [
         f'<svg viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img"><title>{escape(panel.title)}</title>',

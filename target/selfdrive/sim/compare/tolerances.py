@@ -1,4 +1,4 @@
-"""The tolerance table: the allowed distance of a trace from its reference."""
+"""The tolerance table: the allowed differences between a trace and its reference."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +18,7 @@ _KEYS = {
 _LIMIT_KEYS = {
     "rms": "the root mean square of the difference, in the channel's unit",
     "max": "the largest difference, in the channel's unit",
-    "lag_s": "the time by which one trace follows the other, in seconds",
+    "lag_s": "the delay between the traces in seconds",
 }
 
 
@@ -38,8 +38,6 @@ class Limits:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tolerances:
-    """Limits by channel, and the allowed differences of key figures by name."""
-
     channels: dict[str, Limits]
     figures: dict[str, float]
 
@@ -71,6 +69,6 @@ def _limits(section: Section) -> Limits:
     )
     if rms is None and largest is None and lag is None:
         section.fail(
-            "no limit", f"one at least of {', '.join(_LIMIT_KEYS)}", "give one, or leave out the channel"
+            "no limit", f"at least one of {', '.join(_LIMIT_KEYS)}", "give one, or leave out the channel"
         )
     return Limits(rms=rms, max=largest, lag=lag)

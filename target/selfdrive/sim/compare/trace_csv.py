@@ -1,4 +1,4 @@
-"""Reference traces as CSV: a header, then a row for each time; cells without a published value are empty.
+"""Reference traces as CSV: a header, then a row for each time; cells without a value are empty.
 
 Row `time` = t is the state after the simulation step that began at t. Any multiple of 10 ms is accepted.
 """
@@ -23,7 +23,7 @@ _FCW_BIT = 1 << COUNTED_ALERTS.index("fcw")
 
 
 class Column(NamedTuple):
-    """One column. `factor` converts its numbers to SI; `words` are the names in a column without numbers."""
+    """One column. `factor` converts its numbers to SI; a column with `words` has these instead of numbers."""
 
     name: str
     channel: str
@@ -90,22 +90,22 @@ def channels_of(trace: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def read_reference(path: Path) -> Reference:
-    """Read a file. Raises ConfigError, with the line, if it is not such a trace."""
+    """Read a reference. Raises ConfigError, with the line, if it is invalid."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:  # some files begin with a byte order mark
             rows = csv.reader(file)
             names = _header(next(rows, []), path)
             lines = [(rows.line_num, row) for row in rows]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        reason = error.strerror if isinstance(error, OSError) else "not a text of comma-separated values"
+        reason = error.strerror if isinstance(error, OSError) else "not comma-separated text"
         raise ConfigError(
             str(reason), where=str(path), expected="a readable CSV trace", remedy="check the path"
         ) from None
     if len(lines) < 2:
-        _fail(path, 1, f"{len(lines)} rows", "a row for each time", "record the run again")
+        _fail(path, 1, "fewer than two rows", "a row for each time", "record the run again")
     for line, row in lines:
         if len(row) != len(names):
-            _fail(path, line, f"{len(row)} cells", f"{len(names)}, as in the header", "mend the row")
+            _fail(path, line, f"cells: {len(row)}", f"{len(names)}, as in the header", "correct the row")
     channels = {
         column.channel: np.array([_cell(column, row[at], path, line) for line, row in lines])
         for at, column in enumerate(map(_BY_NAME.get, names))
@@ -146,7 +146,7 @@ def _header(names: list[str], path: Path) -> list[str]:
             _fail(path, 1, f"column {name!r} twice", "each column once", "remove one of them")
     if "time" not in names or not any(name in _BY_NAME for name in names):
         got = f"the header {','.join(names)[:60]!r}"
-        _fail(path, 1, got, "columns `time` and one at least of a channel", "begin the file with its header")
+        _fail(path, 1, got, "`time` and at least one channel", "begin the file with its header")
     return names
 
 
@@ -158,7 +158,7 @@ def _cell(column: Column, text: str, path: Path, line: int) -> float:
     expected = f"one of {', '.join(column.words)}" if column.words else "a finite number or nothing"
     value = nan if column.words else _number(text)
     if not isfinite(value):
-        _fail(path, line, f"{column.name}: {text!r}", expected, "mend the cell")
+        _fail(path, line, f"{column.name}: {text!r}", expected, "correct the cell")
     return value * column.factor
 
 

@@ -1,8 +1,8 @@
 """Light on its way through air: attenuation and airlight.
 
-Koschmieder's law: after a distance d through air of extinction b, a share exp(-b * d) of an object's light is
-left; airlight, with the level of the horizon, replaces the rest. At the visibility distance, 5 % of the
-contrast is left: b = -ln(0.05) / visibility (meteorological optical range, WMO No. 8).
+Koschmieder's law: after a distance d through air of extinction b, a share exp(-b * d) of an object's light
+remains; airlight, with the level of the horizon, replaces the rest. At the visibility distance, 5 % of the
+contrast remains: b = -ln(0.05) / visibility (meteorological optical range, WMO No. 8).
 """
 
 from math import cos, exp, log, sin

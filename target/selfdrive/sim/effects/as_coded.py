@@ -1,7 +1,7 @@
 """Rain, fog, snow and occlusion as the paper's authors coded them, which differs from their text.
 
-Every picture is drawn anew from the seed and its number, so streaks, flakes, droplets and blobs do not move
-but jump. Contrast, brightness and blur are those in `tone`. Gaussians end at two sigma, MATLAB's default.
+Every picture is drawn from the seed and its number, so streaks, flakes, droplets and blobs do not move but
+jump. Gaussians end at two sigma, MATLAB's default.
 """
 
 from abc import abstractmethod
@@ -38,7 +38,7 @@ COVERED = 150  # grey level of the blurred mask; below it, the mask hides the ro
 
 
 class _AsCoded(Effect):
-    """A level from 1 to 10, drawn anew in every picture."""
+    """An effect with levels 1 to 10, drawn anew in every picture."""
 
     UNIT: ClassVar[str] = "level"
     LEAST, MOST, WHOLE = 1, 10, True
@@ -139,7 +139,7 @@ class CodedSnow(_Hazed):
 
 
 class CodedOcclusion(_AsCoded):
-    """One blob per level in the lower half of the picture: a black core and a gray rim with a hard edge."""
+    """One blob per level in the lower half of the picture: a black core and a grey rim with a hard edge."""
 
     def _build(self) -> str:
         self._blur = _gaussian(BLOB_BLUR)

@@ -10,8 +10,7 @@ from selfdrive.sim.picture import Picture, Region
 def splat(picture: np.ndarray, columns: np.ndarray, rows: np.ndarray, weights: np.ndarray) -> None:
     """Add each point's weight to the four nearest pixels of `picture` (float32, contiguous).
 
-    Points are in pixels; integers are pixel centres. Points beyond the border wrap around, so the picture's
-    sum grows by that of the weights.
+    Points are in pixels; integers are pixel centres. Points beyond the border wrap around.
     """
     height, width = picture.shape
     left, top = np.floor(columns), np.floor(rows)
@@ -56,14 +55,13 @@ def filtered(
 
 
 class Tile:
-    """A grey picture that repeats in both directions, seen through a window of its own size."""
+    """A grey picture that repeats in both directions, seen through a window of its size."""
 
     def __init__(self, levels: np.ndarray) -> None:
         self._rows, self._width = levels.shape
         self._four = np.tile(levels, (2, 2))
 
     def moved(self, right: float, down: float, region: Region) -> np.ndarray:
-        """A region of the window after moving the tile's content by the nearest whole pixels; a read-only
-        view."""
+        """A region of the window, after moving the content by the nearest whole pixels; read-only."""
         left, top = -round(right) % self._width, -round(down) % self._rows
         return self._four[top + region.top : top + region.bottom, left + region.left : left + region.right]

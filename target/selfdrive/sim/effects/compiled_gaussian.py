@@ -23,7 +23,7 @@ def build_gaussian(sigma: float, size: int = 0) -> Gaussian:
 
 
 class CompiledGaussian(Gaussian):
-    """Gaussian that calls `library`, compiled `gaussian.c`."""
+    """Gaussian that calls the compiled `gaussian.c`."""
 
     def __init__(self, library: compiled.Library, sigma: float, size: int) -> None:
         super().__init__(sigma, size)
@@ -49,9 +49,9 @@ class CompiledGaussian(Gaussian):
 
 
 def weights(sigma: float, size: int) -> np.ndarray:
-    """Integer weights with the sum ONE, rounded like OpenCV's: each passes its rounding error to the next.
+    """Integer weights with the sum ONE, from the kernel's edge to its middle; the other half is the same.
 
-    From the kernel's edge to its middle; the other half is the same.
+    They are rounded like OpenCV's: each passes its rounding error to the next.
     """
     of_edge, lost, middle = [], 0.0, ONE
     for weight in cv2.getGaussianKernel(size, sigma, cv2.CV_64F)[: size // 2, 0].tolist():
@@ -64,8 +64,7 @@ def weights(sigma: float, size: int) -> np.ndarray:
 
 @cache
 def agrees(library: compiled.Library, sigma: float, size: int) -> bool:
-    """Whether compiled code gives OpenCV's bits with this kernel; other OpenCV versions can round
-    differently."""
+    """Whether compiled code gives the installed OpenCV's bits with this kernel; versions can differ."""
     fast, plain = CompiledGaussian(library, sigma, size), Gaussian(sigma, size)
     noise = (np.arange(48 * 72) * 40503 % 65521 % 256).astype(np.uint8).reshape(48, 72)
     return all(np.array_equal(fast(one), plain(one)) for one in (noise, (noise > 127) * np.uint8(255)))

@@ -28,8 +28,6 @@ _POINTER, _LONG, _FLOAT = ctypes.c_void_p, ctypes.c_long, ctypes.c_float
 
 
 class Parts(NamedTuple):
-    """The implementations that precipitation uses."""
-
     particles: Callable[..., Particles]
     cover: Callable[[CameraModel], Cover]
     veiled: Callable[[np.ndarray, np.ndarray, np.ndarray, float], np.ndarray]
@@ -40,7 +38,7 @@ PLAIN = Parts(Particles, Cover, veiled, shrunk)
 
 
 def build_parts(camera: CameraModel) -> tuple[Parts, str]:
-    """The parts for a camera, in C if possible, and the compiled code that they use, if any."""
+    """The parts for a camera, in C if possible, and the digest of their compiled code, if any."""
     library = compiled.library(C_SOURCE)
     # NumPy's scalars, unlike Python's, change arrays to double precision.
     numbers = all(type(number) in (int, float) for number in astuple(camera))
@@ -54,7 +52,7 @@ def _compiled(library: compiled.Library) -> Parts:
 
 
 class CompiledParticles(Particles):
-    """Particles that calls `library`, compiled `precipitation.c`. The next call overwrites its streaks."""
+    """Particles that calls the compiled `precipitation.c`. The next call overwrites its streaks."""
 
     def __init__(self, library: compiled.Library, *of) -> None:
         super().__init__(*of)
@@ -87,8 +85,6 @@ class CompiledParticles(Particles):
 
 
 class CompiledCover(Cover):
-    """Cover in compiled C."""
-
     def __init__(self, library: compiled.Library, camera: CameraModel) -> None:
         super().__init__(camera)
         self._taken = library.code.taken
@@ -141,7 +137,7 @@ def _rows(picture: np.ndarray) -> np.ndarray:
 
 @cache
 def agrees(library: compiled.Library) -> bool:
-    """Whether compiled code gives OpenCV's bits, which a version without fused sums does not."""
+    """Whether compiled code gives the installed OpenCV's bits; versions without fused sums differ."""
     number = np.arange(120)
     places = np.stack([number * 37 % 92 - 2.0, number * 53 % 68 - 2.0]).astype(np.float32)
     ways = np.stack([number % 7 * 0.83 - 2.4, number % 5 * 1.37]).astype(np.float32)

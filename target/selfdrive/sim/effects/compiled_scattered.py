@@ -30,7 +30,7 @@ PLAIN = Scattered(scattered.streak_light, scattered.flake_light, scattered.dropl
 
 
 def build_scattered() -> tuple[Scattered, str]:
-    """The functions, in C if possible, and the compiled code that they use, if any."""
+    """The functions, in C if possible, and the digest of their compiled code, if any."""
     library = compiled.library(C_SOURCE)
     if library is None or not agrees(library):
         return PLAIN, ""

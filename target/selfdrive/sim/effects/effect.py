@@ -18,8 +18,6 @@ WHITE = 255
 
 
 class Scene(Protocol):
-    """The world as an effect sees it, such as the simulator's ground truth."""
-
     @property
     def t(self) -> float:
         """Time (s)."""
@@ -92,7 +90,7 @@ class Effect(ABC):
         return self
 
     def _seen(self, picture: np.ndarray | Picture, region: Region, moment: Moment | None) -> np.ndarray:
-        """The changed region. Preparation happens only here, because many pictures are never examined."""
+        """Return the changed region. Prepare only here, because many pictures are never examined."""
         return self.ready()._affect(picture, region, moment)
 
     @property
@@ -101,7 +99,7 @@ class Effect(ABC):
         return (self.amount - self.LEAST) / (self.MOST - self.LEAST)
 
     def _build(self) -> str:
-        """Choose the implementations; return the compiled code that they use, if any."""
+        """Choose the implementations; return the digest of their compiled code, if any."""
         return ""
 
     @abstractmethod

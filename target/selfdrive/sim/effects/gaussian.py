@@ -18,5 +18,4 @@ class Gaussian:
         self._sigma = sigma
 
     def __call__(self, picture: np.ndarray) -> np.ndarray:
-        """Return the blurred picture; it is mirrored at its borders."""
         return cv2.GaussianBlur(picture, (self.size, self.size), self._sigma)

@@ -32,7 +32,7 @@ class PaperOcclusion(_OnLens):
     """Dark, blurred, round blobs in random places below the horizon, with radii of 5 to 50 pixels; the amount
     is their number.
 
-    The paper's text allows any place, but blobs on the sky would hide nothing of importance.
+    The paper's text allows any place, but blobs on the sky would hide nothing important.
     """
 
     UNIT, LEAST, MOST, WHOLE = "blobs", 1, 10, True

@@ -118,8 +118,6 @@ PRESETS = (
 
 
 class Row(NamedTuple):
-    """One level's measurements."""
-
     amount: float
     severity: Severity
     covered: float
@@ -128,8 +126,6 @@ class Row(NamedTuple):
 
 
 class Studio:
-    """A piece of road that is driven repeatedly, under different effects."""
-
     def __init__(self) -> None:
         self.model = CameraModel()
         renderer = RoadRenderer(self.model, "solid", SEEDS[0])

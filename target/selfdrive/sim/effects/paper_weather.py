@@ -1,11 +1,9 @@
 """Rain, fog and snow as in the paper, by `thickness` from 1 to 10.
 
 Numbers are from the paper's table of effects and its text. Where the paper gives a range, thickness 1 is the
-mild end and 10 the strong end. What the paper leaves open follows from the weather in `visibility`: a streak
-is as long as a drop falls during the exposure, and a block is a flake that looks at least as large. Streaks
+mild end and 10 the strong end. What the paper leaves open follows from the weather in `visibility`. Streaks
 and flakes lie in layers; in farther layers, they are shorter and slower. They fall across the picture, faster
-when the car drives faster, and wrap around, so their number is constant and each can be followed from picture
-to picture.
+when the car drives faster, and wrap around, so their number is constant.
 """
 
 from math import cos, radians, sin
@@ -30,8 +28,8 @@ STREAK_LEAN = radians(8.0)
 RAIN_SPEED = 1.0 / EXPOSURE, 5.0  # streak lengths per second, and per metre driven
 BLOCKS = 100  # of snow per thickness; with it, levels 1 to 10 are light to heavy snow
 FLAKE_SPEEDS = 1.0, 1.5, 2.0, 3.0, 4.0
-SNOW_SPEED = 40.0, 4.0  # px per second, and per metre driven, times the above
-FOG_SPEED = 6.0, 2.0  # px, likewise
+SNOW_SPEED = 40.0, 4.0  # px per second, and per metre driven, times the layer's FLAKE_SPEEDS
+FOG_SPEED = 6.0, 2.0  # px per second, and per metre driven
 
 
 class _PaperWeather(Effect):

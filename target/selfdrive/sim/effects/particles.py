@@ -1,9 +1,8 @@
 """Particles in the air ahead of the camera, moved by the car and their fall.
 
 A box of air, just large enough for the camera's view up to its far end, repeats in all three directions of
-the camera's axes (x right, y down, z ahead along the optical axis). Particles that leave at one side enter at
-the other. Positions are shares of the box. Boxes of different depths overlap: shallow ones hold particles too
-small to be visible far away.
+the camera's axes (x right, y down, z ahead along the optical axis). Positions are shares of the box. Boxes of
+different depths overlap: shallow ones hold particles too small to be visible far away.
 """
 
 from math import cos, inf, sin
@@ -41,8 +40,6 @@ class Streaks(NamedTuple):
 
 
 class Particles:
-    """The particles of several boxes."""
-
     def __init__(self, random: np.random.Generator, camera: CameraModel, boxes: list[Box]) -> None:
         self._camera = camera
         self._reaches = np.array([box.reach for box in boxes])
@@ -79,10 +76,8 @@ class Particles:
         return Streaks(start[:, chosen], end[:, chosen], width[chosen])
 
     def _moved(self, first: np.ndarray, scene: Scene, tall: float, along: float, fall: float) -> np.ndarray:
-        """Positions, as shares of boxes `tall` times as long as their reach, after the particles moved.
-
-        They move by `along` per metre driven and by `fall` per metre fallen.
-        """
+        """Positions, as shares of boxes `tall` times as long as their reach, after the particles moved by
+        `along` per metre driven and by `fall` per metre fallen."""
         moved = self._speed * float(fall / tall * scene.t) / self._reach
         moved += first
         moved += np.repeat(self._driven(scene, tall, along), self._counts)
@@ -94,7 +89,7 @@ class Particles:
 
 
 class Cover:
-    """The share of each pixel's light that streaks take; memory is reused between pictures.
+    """The share of each pixel's light that streaks take.
 
     Wide particles are drawn on coarser grids and enlarged, which makes them soft. All grids are on one sheet,
     the coarse ones side by side below the full one.
@@ -154,7 +149,7 @@ class Cover:
 
 
 def windows(region: Region, sizes: list[tuple[int, int]]) -> tuple[Region, Region, Region]:
-    """The parts of the full, half and quarter grids (of these sizes) that determine a region."""
+    """The parts of the full, half and quarter grids that determine a region."""
     full = Region(*(end + MARGIN for end in region))
     half = _seen_through(full, sizes[1])
     return full, half, _seen_through(half, sizes[2])

@@ -14,7 +14,7 @@
 #define FAST
 #define IS_FAST 0
 #endif
-#ifndef IS_FAST /* a test may ask for either version */
+#ifndef IS_FAST /* tests set this */
 #define IS_FAST (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
 #endif
 

@@ -1,8 +1,7 @@
 """Rain and snow of a given rate, in mm of water per hour: single drops near the camera, a veil beyond.
 
 Drops and flakes scatter the sky's light from all directions into the camera (K. Garg and S. Nayar, 2007), so
-they are visible against the road but not against the sky. Exposures are short in daylight, so streaks are
-short and faint, and the veil of particles too small or too far away to be seen is just as important.
+they are visible against the road but not against the sky.
 """
 
 from abc import abstractmethod
@@ -26,8 +25,8 @@ ON_GLASS = 1000  # number of diameters to choose from
 class _Precipitation(Effect):
     """Particles whose numbers fall exponentially with their (melted) diameter.
 
-    `REACHES` is the distance (m) up to which particles from a diameter (mm) on are drawn individually; beyond
-    it they would be invisible. In dense air only the nearest `IN_BOX` are drawn, of which a third is in view.
+    `REACHES` pairs a least diameter (mm) with the distance (m) up to which such particles are visible and
+    drawn individually. In dense air only the nearest `IN_BOX` are drawn, of which a third is in view.
     """
 
     UNIT = "mm/h"
@@ -80,7 +79,7 @@ class _Precipitation(Effect):
 
     @abstractmethod
     def flown(self, melted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Visible diameters (m) and fall speeds (m/s)."""
+        """Visible diameters (m) and fall speeds (m/s) for melted diameters (mm)."""
 
     @abstractmethod
     def extinction(self) -> float:

@@ -9,7 +9,7 @@ typedef struct {
 } Pixel;
 
 /* Add passes of `count` streaks each to a region of a canvas, as levels. `chances` are the starts of streaks as
- * shares of the canvas' `size`; the region begins at `first`. A streak has `length` pixels and ends at `way`
+ * shares of the canvas's `size`; the region begins at `first`. A streak has `length` pixels and ends at `way`
  * relative to its start. A pass lights a pixel at most once. `light` and `passed` are initially zero, and as large
  * as the region with a `margin` around it. */
 void streaks(const float *chances, long passes, long count, const Pixel *size, const Pixel *first, const Pixel *pixels,

@@ -20,8 +20,8 @@ def streak_light(
 ) -> np.ndarray:
     """Grey levels (uint8) of streaks in a region, of this `shape`, of a canvas.
 
-    `chances` (passes, n, 2), float32, are the starts of streaks as shares of the canvas' columns and rows.
-    `box` has the canvas' size, then the region's start. Each pass adds its level (uint8).
+    `chances` (passes, n, 2), float32, are the starts of streaks as shares of the canvas's columns and rows.
+    `box` has the canvas's size, then the region's start. Each pass adds its level (uint8).
     """
     rows, columns = shape
     margin = reach(streak)

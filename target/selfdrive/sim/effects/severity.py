@@ -17,8 +17,6 @@ WEAKEST = 32.0  # Sobel value of a step of 8 grey levels; anything less is no ed
 
 
 class Severity(NamedTuple):
-    """Remaining quality of a picture."""
-
     psnr: float  # dB relative to the clean picture; infinite if equal
     contrast: float  # grey levels, between marks and the road beside them
     false_edges: float  # share of the lane's inside with an edge as strong as a mark's
@@ -52,8 +50,8 @@ class RoadGauge:
         )
 
     def covered(self, seen: np.ndarray) -> float:
-        """Share of the lane's inside that is covered in a uniform grey picture `seen` through an effect:
-        where it noticeably differs from the median. Valid up to about one half."""
+        """Share of the lane's inside where a uniform grey picture, `seen` through an effect, noticeably
+        differs from the median. Valid up to about one half."""
         levels = seen[self._rows][self._inside].astype(float)
         return float((np.abs(levels - np.median(levels)) >= NOTICED).mean())
 

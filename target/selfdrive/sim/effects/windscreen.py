@@ -27,7 +27,7 @@ WIDE = 0.9  # share of the picture that a drop shows, upside down like a strong 
 
 
 class Pixels(NamedTuple):
-    """Pixels of drops in the order in which they land; drop k has those from ends[k] to ends[k + 1]."""
+    """Pixels of drops in the order of landing; drop k has those from ends[k] to ends[k + 1]."""
 
     places: np.ndarray  # in the picture
     sources: np.ndarray  # pixel of the reduced picture seen there
@@ -36,7 +36,6 @@ class Pixels(NamedTuple):
 
     @classmethod
     def of(cls, drops: list[np.ndarray]) -> "Pixels":
-        """Combine an array of places, sources and shares for each drop."""
         places, sources, shares = np.concatenate(drops, axis=1)
         ends = np.concatenate([[0], np.cumsum([drop.shape[1] for drop in drops])])
         return cls(places, sources, shares.astype(np.int16), ends)
@@ -104,7 +103,6 @@ class Windscreen:
 
 
 def shrunk(picture: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """The picture reduced to `size` (columns, rows) by averaging."""
     return cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
 
 
@@ -143,5 +141,5 @@ def _across(middle: float, radius: float, size: int) -> tuple[np.ndarray, slice]
 
 
 def _source(turned: np.ndarray, size: int) -> np.ndarray:
-    """Which of `size` pixels a drop shows at a position between -1 and 1: from the opposite end."""
+    """The pixel, of `size`, that a drop shows at a position from -1 to 1: at the opposite end."""
     return np.clip(np.rint(0.5 * size * (1.0 - WIDE * turned)), 0, size - 1).astype(np.intp)

@@ -47,7 +47,7 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--out", type=Path, required=True, metavar="FILE", help=".mp4 or .gif; .png or .jpg with --at"
     )
-    parser.add_argument("--at", type=float, metavar="T", help="one still picture, of this time in s")
+    parser.add_argument("--at", type=float, metavar="T", help="write one still, at this time in s")
     return parser.parse_args(arguments)
 
 

@@ -1,4 +1,4 @@
-"""The road from above, driving to the right: car and lead, and where the controller sees them."""
+"""The road from above, driving to the right: car and lead, and what the controller sees."""
 
 from math import copysign, cos, sin
 

@@ -22,8 +22,6 @@ WRONG_DISTANCE = 2.0  # m; a larger error of the camera's message is drawn
 
 
 class CameraPane:
-    """Draws frames of one camera into panes of `width` x `height` pixels."""
-
     def __init__(self, model: CameraModel, width: int, height: int) -> None:
         self._model, self._width = model, width
         self._scale = width / model.width

@@ -68,10 +68,7 @@ def _write_mp4(pictures: Iterable[np.ndarray], path: Path) -> None:
 
 
 def _write_gif(pictures: Iterable[np.ndarray], path: Path) -> None:
-    """Write fewer pictures with one palette, to limit the size.
-
-    The palette has the sheet's own colours, then those of the middle picture.
-    """
+    """Write fewer pictures with one palette: the sheet's own colours, then those of the middle picture."""
     small = []
     for index, picture in enumerate(pictures):
         if index % GIF_EVERY == 0:

@@ -22,7 +22,7 @@ class Mark:
 class Events:
     """Data on the faulty run. Times in s; `active` spans its activations, if any.
 
-    `names` are short hazard names by id. `end` is the end of the drive; the run may continue.
+    `names` are short hazard names by id. `end` is the end of the drive; the run can continue after it.
     """
 
     title: str
@@ -49,5 +49,5 @@ def read_events(path: Path) -> Events:
         )
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise ConfigError(
-            f"no events ({error})", where=str(path), expected=f"a {SCHEMA} file", remedy="correct --events"
+            f"unreadable ({error})", where=str(path), expected=f"a {SCHEMA} file", remedy="correct --events"
         ) from None

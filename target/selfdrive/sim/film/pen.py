@@ -59,7 +59,6 @@ def width(text: str, size: float = NORMAL, *, bold: bool = False) -> int:
 
 
 def shortened(text: str, room: int, size: float = NORMAL, *, bold: bool = False) -> str:
-    """The text, shortened at its end to fit into `room` pixels."""
     if width(text, size, bold=bold) <= room:
         return text
     while text and width(text + "...", size, bold=bold) > room:

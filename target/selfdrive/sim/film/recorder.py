@@ -1,8 +1,7 @@
 """Records camera frames and the controller's view of them.
 
 A film is a folder: `film.jsonl`, with a heading and a line for each picture, and the pictures as JPEG files.
-It is written during the run, so an aborted run has a film up to that point. Recording does not change the
-run's bytes.
+It is written during the run, so an aborted run has a film up to that point.
 """
 
 import json
@@ -26,10 +25,7 @@ JPEG_QUALITY = 95  # high, to preserve noise from effects
 
 
 class Film:
-    """A film being recorded in `folder`, which is created if needed. Raises ConfigError if that fails.
-
-    If recording fails later, for example on a full disk, the run ends with ConfigError.
-    """
+    """A film being recorded in `folder`. If recording fails, the run ends with ConfigError."""
 
     def __init__(self, folder: Path, camera: CameraModel) -> None:
         self._folder = folder
@@ -41,7 +37,6 @@ class Film:
     def take(
         self, truth: GroundTruth, view: CameraView, manager: Manager, hazards: Mapping[str, float | None]
     ) -> None:
-        """Record a step with a picture: `view`, and what the controller published by the end of the step."""
         state, radar = manager.controlsd.state, manager.radar_state
         lead = radar.lead_one if radar else None
         entry = {

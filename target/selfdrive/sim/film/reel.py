@@ -23,7 +23,7 @@ class SeenLine:
 
     @property
     def drawable(self) -> bool:
-        """Whether the line was seen and is finite somewhere (faults can produce any line)."""
+        """Whether the line was seen and is finite; faults can produce any numbers."""
         return self.prob > 0.0 and isfinite(self.prob) and all(isfinite(y) for y in self.y)
 
 
@@ -60,7 +60,7 @@ class Frame:
         image = cv2.imread(str(self.picture), cv2.IMREAD_GRAYSCALE)
         if image is None:
             raise ConfigError(
-                "no picture", where=str(self.picture), expected="a JPEG file", remedy="take the film again"
+                "unreadable", where=str(self.picture), expected="a JPEG file", remedy="record the film again"
             )
         return image
 
@@ -87,7 +87,10 @@ def read_reel(folder: Path) -> Reel:
         return Reel(camera=CameraModel(**head["camera"]), frames=frames)
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise ConfigError(
-            f"no film ({error})", where=str(index), expected=f"a {SCHEMA} file", remedy="take the film again"
+            f"unreadable ({error})",
+            where=str(index),
+            expected=f"a {SCHEMA} file",
+            remedy="record the film again",
         ) from None
 
 

@@ -23,8 +23,6 @@ OUTCOMES = {"hazard": pen.HAZARD, "sdc": pen.ALERT, "masked": pen.MANIFESTED}
 
 
 class Sheet:
-    """Draws the sheet of two films at any time."""
-
     def __init__(self, golden: Reel, faulty: Reel, events: Events) -> None:
         self._events = events
         panes = {reel.camera: CameraPane(reel.camera, *PANE) for reel in (golden, faulty)}
@@ -64,8 +62,6 @@ class Sheet:
 
 
 class _Side:
-    """One run's half of the sheet: picture, caption, bird's-eye strip."""
-
     def __init__(self, reel: Reel, name: str, colour: pen.Colour, events: Events, pane: CameraPane) -> None:
         self._reel, self._name, self._colour, self._events = reel, name, colour, events
         self._pane = pane

@@ -23,12 +23,10 @@ GAP = 6  # pixels between plots and between labels
 TICKS = (1.0, 2.0, 5.0, 10.0, 20.0, 60.0)  # s
 MOST_TICKS = 16
 LEAST_OFFSET, MOST_OFFSET = 0.3, 4.0  # m; limits of the plot's range
-LEAST_DISTANCE, LEAST_GAP = 10.0, -10.0  # m; the range includes the first, and ends at the second
+LEAST_DISTANCE, LEAST_GAP = 10.0, -10.0  # m; the plot reaches at least the first, and not below the second
 
 
 class Timeline:
-    """The plots are drawn once; `draw` adds the cursor."""
-
     def __init__(self, width: int, height: int, golden: Reel, faulty: Reel, events: Events) -> None:
         self._size = width, height
         self._end = max(reel.frames[-1].t for reel in (golden, faulty)) or 1.0

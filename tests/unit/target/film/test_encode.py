@@ -83,7 +83,7 @@ def test_invalid_input_gives_code_2_and_one_line_of_error(tmp_path, capsys):
     words = ["--golden", folder, "--faulty", folder, "--events", folder, "--out", f"{folder}/a.mp4"]
     assert main(words) == 2
     error = capsys.readouterr().err
-    assert "film.jsonl: no film" in error
+    assert "film.jsonl: unreadable" in error
     assert error.count("\n") == 1
 
 

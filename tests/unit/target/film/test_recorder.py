@@ -92,5 +92,5 @@ def test_a_full_disk_ends_the_run_with_an_error(tmp_path, seeing, capsys):
 @pytest.mark.parametrize("text", ["", "{}\n", '{"schema": "film/1", "camera": {}}\n', "not JSON\n"])
 def test_an_invalid_film_file_is_an_error(tmp_path, text):
     (tmp_path / "film.jsonl").write_text(text)
-    with pytest.raises(ConfigError, match=r"film\.jsonl: no film"):
+    with pytest.raises(ConfigError, match=r"film\.jsonl: unreadable"):
         read_reel(tmp_path)

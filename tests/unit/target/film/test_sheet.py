@@ -154,5 +154,5 @@ def test_events_are_read_and_other_content_is_refused(tmp_path):
     events = read_events(path)
     assert (events.active, events.marks) == ((1.0, 2.0), (Mark(**mark),))
     path.write_text("{}")
-    with pytest.raises(ConfigError, match=r"events\.json: no events"):
+    with pytest.raises(ConfigError, match=r"events\.json: unreadable"):
         read_events(path)

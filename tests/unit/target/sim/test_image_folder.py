@@ -114,7 +114,7 @@ def test_the_error_names_a_truncated_frame(folder):
         (folder / "7.png").write_bytes(whole)
         assert len(list(ImageFolder(folder).read())) == 12
         (folder / "7.png").write_bytes(whole[: len(whole) // 2])
-        assert error(folder).startswith(f"{folder}/7.png: not readable as a picture, expected a whole ")
+        assert error(folder).startswith(f"{folder}/7.png: not readable as a picture, expected an undamaged ")
 
 
 def test_the_error_names_a_frame_too_large_to_be_read(folder):
@@ -175,8 +175,8 @@ def test_several_sequences_follow_each_other(folder):
             "pitch_deg, expected horizon_row, focal_px and height_m",
         ),
         ("horizon_row: 20", "horizon_row: 47", "camera.yaml:6: horizon_row: '47'"),
-        ("*.png", "*.tif", "expected the name of a file in"),
-        ("*.png", "../*.png", "expected files below the folder"),
+        ("*.png", "*.tif", "expected a pattern that matches files in"),
+        ("*.png", "../*.png", "expected files in the folder or below it"),
         ("*.png", "**.png", "camera.yaml:3: files: '**.png', expected a pattern such as *.png"),
         ("width: 64", "width: 64.5", "camera.yaml:4: width: '64.5', expected a whole number of pixels"),
         ("rows: 48", "rows: many", "camera.yaml:5: rows: 'many'"),

@@ -134,8 +134,8 @@ def test_a_scenario_can_select_the_plant(scenarios):
     ("text", "line", "remedy"),
     [
         (TEXT.replace("reference", "referenz"), 6, "plant is standard"),
-        (TEXT.replace("20}", "20, lateral_offset_m: 0.5}"), 6, "take the standard plant"),
-        (TEXT + "road: {curvature: {at_m: [0], per_m: [0.001]}}\n", 6, "take the standard plant"),
+        (TEXT.replace("20}", "20, lateral_offset_m: 0.5}"), 6, "use the standard plant"),
+        (TEXT + "road: {curvature: {at_m: [0], per_m: [0.001]}}\n", 6, "use the standard plant"),
     ],
 )
 def test_unsupported_scenarios_are_refused(text, line, remedy):

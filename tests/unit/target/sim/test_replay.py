@@ -230,7 +230,7 @@ def test_without_finished_runs_the_scenario_is_simulated(tmp_path, scenarios):
     [
         (1, "speed,", "sped,", "unknown column 'sped'"),
         (1, "speed,", "d_rel,", "column 'd_rel' twice"),
-        (1, "time,", "", "columns `time`"),
+        (1, "time,", "", "`time` and at least one channel"),
         (2, "20,", "fast,", "speed: 'fast'"),
         (2, "20,", "nan,", "speed: 'nan'"),
         (2, "20,", "", "cells"),
@@ -262,7 +262,7 @@ def test_a_reference_saved_by_a_spreadsheet_is_read(reference, finished):
 def test_a_reference_of_another_length_is_refused(trace, reference):
     for steps in (STEPS - 100, STEPS + 100):
         cut = {name: np.resize(values, steps) for name, values in trace.items()}
-        with pytest.raises(ConfigError, match="the last row is of"):
+        with pytest.raises(ConfigError, match="the last row is at"):
             compare(reference, cut, NO_LIMITS)
 
 

@@ -73,9 +73,9 @@ def test_optional_keys_can_be_left_out():
             edit("speed_mph: 60", "speed_mph: 60\n  speed_kph: 96"),
             6,
             "speed_kph and speed_mph",
-            "unit stands",
+            "one of these keys",
         ),
-        (edit("  speed_mph: 60\n", ""), 6, "no speed", "unit stands"),
+        (edit("  speed_mph: 60\n", ""), 6, "no speed", "one of these keys"),
         (edit("speed_mph: 60", "speed_mph: fast"), 6, "speed_mph: 'fast'", "a speed in mph"),
         (edit("speed_mph: 60", "speed_mph: .nan"), 6, "speed_mph: '.nan'", "a speed in mph"),
         (edit("speed_mph: 60", "speed_mph: -1"), 6, "speed_mph: '-1'", "a speed in mph"),
@@ -98,13 +98,13 @@ def test_optional_keys_can_be_left_out():
         (edit("[36, 72]", "[]"), 10, "speed_kph: a list", "[a, b, ...]"),
         (edit("  at_s: [0, 10]\n", ""), 9, "no 'at_s'", "times of the speeds"),
         (edit("button: decel_set", "button: decelset"), 13, "button: 'decelset'", "decel_set"),
-        (edit("release_s: 1.3", "release_s: 1.1"), 13, "release_s: '1.1'", "after pressing"),
+        (edit("release_s: 1.3", "release_s: 1.1"), 13, "release_s: '1.1'", "release it later"),
         (edit("press_s: 5,", "press_s: 1.25,"), 14, "press_s: '1.25'", "in order"),
         (edit("mps2: [0, 1]", "mps2: [0, 1, 2]"), 16, "at_s: a list", "one for each value"),
         (edit("per_m: [0, 0.002]", "per_m: [0, 2]"), 17, "per_m: '2'", "curvature in 1/m"),
         (edit("host:", "host: 3\nhosts:"), 6, "unknown key 'hosts'", "did you mean 'host'?"),
         (edit("host:\n  speed_mph: 60\n  lateral_offset_m: -0.4\n", "host: 3\n"), 5, "'3'", "give the keys"),
-        (edit("name: T1", "name: [T1"), 3, "", "mend the syntax"),
+        (edit("name: T1", "name: [T1"), 3, "", "correct the syntax"),
         ("", 1, "an empty file", "write the keys"),
         ("- a\n", 1, "a list", "give the keys"),
     ],
@@ -126,7 +126,7 @@ def test_numbers_have_their_usual_meaning():
 
 def test_unreadable_files_are_refused(tmp_path):
     (tmp_path / "deep.yaml").write_text("a: " + 5000 * "[")
-    with pytest.raises(ConfigError, match=r"deep\.yaml: bottomless nesting, expected valid YAML"):
+    with pytest.raises(ConfigError, match=r"deep\.yaml: nested too deeply, expected valid YAML"):
         load_scenario(tmp_path / "deep.yaml")
     with pytest.raises(ConfigError, match=r"no\.yaml: No such file"):
         load_scenario(tmp_path / "no.yaml")
