@@ -1,6 +1,6 @@
 """Measure campaigns on a cluster.
 
-`python benchmarks/cluster.py [overhead] [intake] [ends] [--campaign NAME]`. Without a name, it measures all
+`python benchmarks/cluster.py [overhead] [intake] [ends] [--campaign NAME]`. By default, it measures all
 three. `overhead` is the CPU time of all processes for a campaign on two Dask workers of this machine and on
 two local workers, alternately and with warm caches. `intake` is the number of results a second that the
 command accepts from two workers whose runs take no time. `ends` simulates 64 workers that run 10,000

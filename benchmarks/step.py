@@ -172,7 +172,7 @@ def against(clone: Path, scenario: Path, rounds: int) -> bool:
         goal = GOALS.get(key)
         print(
             f"{key:8} older {older:.4f} s, this {this:.4f} s: ratio {this / older:.2f}"
-            + f" of {goal}" * bool(goal)
+            + f" (goal {goal})" * bool(goal)
         )
         reached &= goal is None or this / older <= goal
     return reached
