@@ -15,7 +15,7 @@ RING = np.ones((7, 7), np.uint8)  # neighbourhood for comparison with paint
 
 
 def labelled_windows(scenes: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Return features (windows x 1764, float32) and labels (bool) from `scenes` scenes, in equal parts."""
+    """Return features (windows x 1764, float32) and labels (bool), about half with a mark."""
     features = np.empty((2 * EACH * VIEWS * scenes, FEATURES), np.float32)
     labels = np.empty(len(features), bool)
     used = 0

@@ -147,7 +147,7 @@ def settled(state: np.ndarray, voters: Voters, expected: np.ndarray, believed: n
     Points further from a line have less weight. `expected` (4, 4) times the state should be `believed`.
     """
     n = len(voters.left)
-    terms = np.zeros((5, 2, n))  # derivatives of the error by each unknown, and the error
+    terms = np.zeros((5, 2, n))  # negative derivatives of the error for each unknown, and the error
     terms[0] = 1.0
     prior = product(expected.T, expected)
     for near in ROUNDS:

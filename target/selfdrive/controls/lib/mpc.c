@@ -758,9 +758,9 @@ INLINE double larger(double a, double b) /* b can be NaN */
     return b > a ? b : a;
 }
 
-/* Rows `r` of column `j` of a step's derivative, by state and control, that are not always 0: from `first` until
-   before `behind`. The others are left out, because 0 times infinity is NaN. The longitudinal problem's states 3 to
-   5 are the lead's and do not depend on the host's. */
+/* The rows of column `j` of a step's Jacobian (with respect to state and control) that are not always 0 start at
+   `first` and end before `behind`. The others are left out, because 0 times infinity is NaN. The longitudinal
+   problem's states 3 to 5 are the lead's and do not depend on the host's. */
 INLINE int first(const Model model, int j)
 {
     return model.linear && j >= 3 && j < 6 ? 3 : 0;
@@ -776,8 +776,8 @@ INLINE int width(const Model model, int i) /* end of the state columns in row `i
     return model.linear && i < 3 ? 3 : model.nx;
 }
 
-/* RK4 steps: the next state, and its derivative by state and control; `over` has the factors of `sixth` in the last
-   step's derivative by the state.
+/* RK4 steps: the next state, and its Jacobian with respect to state and control; `over` has the factors of `sixth` in
+   the last step's Jacobian with respect to the state.
 
    CasADi multiplies constants first: c * (sixth * x) becomes (c * sixth) * x. */
 INLINE void integrate(
@@ -814,28 +814,29 @@ INLINE void integrate(
     }
 }
 
-/* Residuals of a node, and their derivative by its state and control. For elements 0.1 * x of the derivative, `over`
-   has x; for elements 1 / x and -1 / x, `under` has x and -x. */
+/* Residuals of a node, and their Jacobian with respect to its state and control. For elements 0.1 * x of the
+   Jacobian, `over` has x; for elements 1 / x and -1 / x, `under` has x and -x. */
 typedef struct {
     double r[RESIDUALS], c[RESIDUALS * (STATES + 1)], over[RESIDUALS * (STATES + 1)], under[RESIDUALS * (STATES + 1)];
 } Cost;
 
-/* A number times an element of the derivative: CasADi calculates y / x for y * (1 / x). */
+/* A number times an element of the Jacobian: CasADi calculates y / x for y * (1 / x). */
 INLINE double by(const Model model, const Cost *cost, int k, int i, double y)
 {
     const int place = k * (model.nx + 1) + i, quotient = model.linear && k == 1 && (i == 0 || i == 3);
     return quotient ? y / cost->under[place] : y * cost->c[place];
 }
 
-/* A weight times an element of the derivative: CasADi multiplies constants first. */
+/* A weight times an element of the Jacobian: CasADi multiplies constants first. */
 INLINE double weighed(const Model model, const Cost *cost, int k, int i, double weight)
 {
     const int product = model.linear && k >= 2 && i == 1;
     return product ? weight * 0.1 * cost->over[k * (model.nx + 1) + i] : by(model, cost, k, i, weight);
 }
 
-/* Hessian (of a stage its upper half) and gradient of a cost by state and control, the gradient after a change of
-   the state. Only a stage's last residual depends on the control; the others are left out, because 0 * NaN is NaN. */
+/* Hessian (for a stage, its upper half) and gradient of a cost with respect to state and control; the gradient is the
+   one after a change of the state. Only a stage's last residual depends on the control; the others are left out,
+   because 0 * NaN is NaN. */
 INLINE void gauss_newton(
     const Model model, int stage, const Cost *cost, const double *weights, const double *change,
     double hess[STATES + 1][STATES + 1], double *slope)

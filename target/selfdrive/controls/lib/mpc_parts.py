@@ -74,7 +74,7 @@ def _under(c: ca.SX) -> ca.SX:
 
 
 def _function(name: str, of: ca.Function, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> str:
-    """A C function. Matrices are row-major; elements that are always 0 are not written."""
+    """Return a C function. Matrices are row-major; elements that are always 0 are not written."""
     words = [f"const double *{word}" for word in inputs] + [f"double *{word}" for word in outputs]
     lines = [f"static void {name}({', '.join(words)})", "{"]
     now: list[str] = [""] * of.sz_w()  # current variable of each place of the work vector

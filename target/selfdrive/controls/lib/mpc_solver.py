@@ -51,7 +51,7 @@ class Ocp:
 
 
 def rk4(ocp: Ocp) -> ca.Function:
-    """One RK4 step: (state, control, p) -> (next state, its derivatives by state and control)."""
+    """One RK4 step: (state, control, p) -> (next state, its Jacobians for state and control)."""
     z, u, p, h = ca.SX.sym("z", ocp.n_state), ca.SX.sym("u"), ca.SX.sym("p", ocp.n_param), ocp.rk4_step
     k1 = ocp.ode(z, u, p)
     k2 = ocp.ode(z + h / 2 * k1, u, p)
@@ -62,7 +62,7 @@ def rk4(ocp: Ocp) -> ca.Function:
 
 
 def _integrator(ocp: Ocp, step: ca.Function, n_steps: int) -> ca.Function:
-    """`n_steps` RK4 steps: (state and control, p) -> (next state, its derivative by both)."""
+    """`n_steps` RK4 steps: (state and control, p) -> (next state, its Jacobian)."""
     zu, p = ca.SX.sym("zu", ocp.n_state + 1), ca.SX.sym("p", ocp.n_param)
     end, m = zu[:-1], ca.SX.eye(ocp.n_state + 1)[:-1, :]
     for _ in range(n_steps):
@@ -73,18 +73,18 @@ def _integrator(ocp: Ocp, step: ca.Function, n_steps: int) -> ca.Function:
 
 
 def _gauss_newton(r: ca.SX, zu: ca.SX, change: ca.SX, weights: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Hessian and gradient of a cost by state and control, the gradient after `change` of the state."""
+    """Hessian and gradient of a cost for state and control; the gradient is after `change` of the state."""
     c = ca.jacobian(r, zu)
     cw = c.T @ ca.diag(weights)
     return cw @ c, cw @ (r + c[:, :-1] @ change)
 
 
 def _backward(ocp: Ocp) -> tuple[ca.Function, ca.Function]:
-    """Hessian and gradient of the costs from a node on, by that node's state: at the end, and one node back.
+    """Two functions for the Hessian and gradient of all costs from a node on, with respect to its state.
 
-    End: (state, p, change of the state) -> (Hessian, gradient). One node back: (Hessian and gradient of the
-    next node, derivative of the next state by state and control, state and control, p, change, factor on the
-    weights) -> (Hessian, gradient, second derivatives by control and all, derivative by the control).
+    At the last node: (state, p, change of the state) -> (Hessian, gradient). At an earlier node: (Hessian and
+    gradient of the next node, Jacobian of the next state, state and control, p, change, factor on the
+    weights) -> (Hessian, gradient, the control's column of the Hessian, the control's gradient).
     """
     nx = ocp.n_state
     zu, p, change = ca.SX.sym("zu", nx + 1), ca.SX.sym("p", ocp.n_param), ca.SX.sym("change", nx)
@@ -119,9 +119,9 @@ def integrators_of(ocp: Ocp) -> dict[int, ca.Function]:
 def condense(ocp: Ocp, integrators: dict[int, ca.Function]) -> ca.Function:
     """(trajectory, first state, p) -> the quadratic program in the change of the controls.
 
-    Returns its Hessian and gradient, the states of all nodes for unchanged controls, and their derivative by
-    all controls. Each column of the Hessian comes from that derivative at its node and the second derivatives
-    of all later costs, which avoids products of large matrices.
+    Returns its Hessian and gradient, the states of all nodes for unchanged controls, and their Jacobian with
+    respect to all controls. Each column of the Hessian comes from that Jacobian at its node and the second
+    derivatives of all later costs, which avoids products of large matrices.
     """
     n, nx = ocp.n_control, ocp.n_state
     old, z0, p = ca.SX.sym("old", ocp.n_trajectory), ca.SX.sym("z0", nx), ca.SX.sym("p", ocp.n_param)

@@ -23,7 +23,7 @@ ON_GLASS = 1000  # number of diameters to choose from
 
 
 class _Precipitation(Effect):
-    """Particles whose numbers fall exponentially with their (melted) diameter.
+    """Particles whose numbers decrease exponentially with their (melted) diameter.
 
     `REACHES` pairs a least diameter (mm) with the distance (m) up to which such particles are visible and
     drawn individually. In dense air only the nearest `IN_BOX` are drawn, of which a third is in view.
