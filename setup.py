@@ -1,4 +1,4 @@
-"""Compile the C of the target, and put the shipped library, templates and target into the wheel."""
+"""Compile the target's C code, and put the shipped library, templates and target into the wheel."""
 
 import shutil
 import sys
@@ -49,7 +49,7 @@ class WheelOfOneMachine(bdist_wheel):
 
 
 def write_archive(path: Path) -> None:
-    """Write the same bytes for the same files: sorted, undated, uncompressed (the wheel compresses it)."""
+    """Write an archive whose bytes depend only on its files. The wheel compresses it."""
     with ZipFile(path, "w") as archive:
         for file in sorted(file for folder in SHIPPED for file in (CLONE / folder).rglob("*")):
             name = file.relative_to(CLONE)

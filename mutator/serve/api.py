@@ -84,7 +84,7 @@ def asked(reviews: Reviews, request: Request) -> Selection:
         raise MutatorError(f"{len(given)} parameters in the address", expected=f"at most {_MOST_WORDS}")
     if strange := [name for name, _ in given if name not in ("campaign", "spec", "run")]:
         raise MutatorError(
-            f"unknown parameter '{strange[0]}' in the address", expected="one campaign, or specs"
+            f"unknown parameter '{strange[0]}' in the address", expected="'campaign' or 'spec'"
         )
     campaigns = [value for name, value in given if name == "campaign"]
     specs = [value for name, value in given if name == "spec"]

@@ -92,7 +92,7 @@ def _series(run: Path, name: str) -> bytes:
             return data
     except MutatorError:
         pass
-    raise Absent("no such file", expected="series in the form that runs write")
+    raise Absent("no such file", expected="series as a run writes them")
 
 
 def _read(descriptor: int) -> bytes:

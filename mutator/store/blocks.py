@@ -34,7 +34,7 @@ class Block:
 class Blocks:
     """The content of a block file.
 
-    An incomplete last block, which a killed process leaves, is not damage.
+    An incomplete last block is not damage: a killed process can leave one.
     """
 
     path: Path

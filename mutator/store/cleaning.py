@@ -64,7 +64,10 @@ def _delete(path: Path, files: Iterable[Path]) -> None:
 
 
 def check(path: Path) -> list[Path]:
-    """List the files of a run folder; MutatorError for a link, another folder, or unknown content."""
+    """List the files of a run folder.
+
+    MutatorError if the path is a link or not a run folder, or if it contains files that no run writes.
+    """
     if path.is_symlink():
         raise MutatorError(
             f"a link to {path.readlink()}",

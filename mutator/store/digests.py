@@ -145,7 +145,7 @@ def read(run: Path) -> Ledger:
             finished=data["finished"],
         )
     except (KeyError, TypeError, AttributeError) as err:
-        raise MutatorError(f"not a ledger ({err})", where=path, remedy=remedy) from None
+        raise MutatorError(f"not a list of digests ({err})", where=path, remedy=remedy) from None
 
 
 def write(run: Path, ledger: Ledger) -> None:
@@ -185,7 +185,7 @@ def rewrite(run: Path, name: str, data: bytes) -> None:
 
 
 def settled(run: Path) -> Ledger:
-    """Return the ledger without announcements. Files that a killed command left are accepted."""
+    """Return the ledger without announcements. Files are accepted as a killed command left them."""
     known = read(run)
     files = dict(known.files)
     for name, coming in known.rewriting.items():
@@ -200,7 +200,7 @@ def settled(run: Path) -> Ledger:
 def close_segments(run: Path, *, finished: bool | None = None) -> None:
     """Cut a torn last line off each new segment, and add the segment's digest to the ledger.
 
-    `finished`: whether the run is now finished; None: as before. MutatorError for a damaged line.
+    `finished`: whether the run is now finished (None: unchanged). MutatorError for a damaged line.
     """
     before = settled(run)
     files = dict(before.files)

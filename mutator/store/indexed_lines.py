@@ -17,7 +17,7 @@ from mutator.errors import MutatorError
 from mutator.store.lines import bare_segment, verified_lines
 
 _OPEN = 16  # the most files to keep open
-_ID = re.compile(rb'"experiment_id":"([^"\\]+)"')  # canonical JSON has this nowhere else in a line
+_ID = re.compile(rb'"experiment_id":"([^"\\]+)"')  # matches once in a line of canonical JSON
 
 T = TypeVar("T")
 
@@ -25,8 +25,8 @@ T = TypeVar("T")
 class IndexedLines(Mapping[str, T], Generic[T]):
     """Map each experiment to the object that `made` creates from its line, in order of first appearance.
 
-    `replaces(line, known)` decides whether a second line of an experiment replaces the first, and can raise.
-    MutatorError for a damaged line or unexpected content.
+    `replaces(line, known)` decides whether a second line of an experiment replaces the first, or raises an
+    error. MutatorError for a damaged line or unexpected content.
     """
 
     def __init__(
@@ -41,7 +41,7 @@ class IndexedLines(Mapping[str, T], Generic[T]):
         self._made, self._checksums = made, checksums
         self._files = Files(list(paths))
         self._index: dict[str, int] = {}
-        self._last: tuple[str, T] | None = None  # kept, because some callers read it twice
+        self._last: tuple[str, T] | None = None  # because some callers read an experiment twice in a row
         self._file, self._number, self._offset, self._length = (array(code) for code in "HLQL")
         for file, path in enumerate(self._files.paths):
             self._read(file, path, schema, replaces)
@@ -103,7 +103,7 @@ class Line:
         """Return the object on the line; ValueError if the line is not a JSON object."""
         value = from_json(self.data)
         if not isinstance(value, dict):
-            raise ValueError("no object")
+            raise ValueError("not an object")
         value.pop("sum", None)
         return value
 
@@ -112,7 +112,7 @@ def _name(data: bytes) -> str | None:
     if found := _ID.search(data):
         return found[1].decode()
     try:
-        return str(json.loads(data)["experiment_id"])  # older folders use spaces in other places
+        return str(json.loads(data)["experiment_id"])  # the JSON of older folders has spaces
     except (KeyError, TypeError, ValueError, RecursionError):
         return None
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from mutator._common.files import is_half_written
 from mutator._common.hashing import digest
+from mutator._common.text import counted
 from mutator.errors import MutatorError
 from mutator.store import digests, plan_file, verified_runs
 from mutator.store.digests import Digest, Ledger
@@ -67,9 +68,9 @@ def problems(
 
 
 def content_key(run: Path) -> str:
-    """Return a key of everything in a finished run folder that is verified (`verified_runs`).
+    """Return the key of a finished run folder's verified content in the cache `verified_runs`.
 
-    It is empty if the run is not finished or does not match its digests.
+    The key is empty if the run is not finished or does not match its digests.
     """
     ledger = digests.read(run)
     found = digests_of(run, ledger)
@@ -104,7 +105,7 @@ def share(run: Path, head: Head, shard: Shard | None) -> dict[str, int]:
     counts = [count for _, _, count in head["chunks"]]
     if sum(counts) != len(places):
         raise MutatorError(
-            f"{len(places)} experiments",
+            counted(len(places), "experiment"),
             where=path,
             expected=f"{sum(counts)}, the total of the chunks in {HEAD}",
             remedy=_remedy(run, HEAD),
@@ -140,7 +141,7 @@ def _changed(run: Path, name: str, known: Digest, found: Digest) -> Iterator[Mut
         if segment.damaged:
             yield from map(segment.problem, segment.damaged)
             return
-        got = f"{len(segment.lines)} lines, all with their checksums"
+        got = f"{counted(len(segment.lines), 'line')}, all with their checksums"
         yield MutatorError(
             got, where=path, line=len(segment.lines), expected=_told(known), remedy=_remedy(run, name)
         )
@@ -155,14 +156,14 @@ def _changed(run: Path, name: str, known: Digest, found: Digest) -> Iterator[Mut
 
 
 def _told(one: Digest) -> str:
-    lines = "" if one.lines is None else f"{one.lines} lines, "
+    lines = "" if one.lines is None else f"{counted(one.lines, 'line')}, "
     return f"{lines}{one.size} bytes with SHA-256 {one.sha256[:16]}"
 
 
 def _remedy(run: Path, name: str) -> str:
     if name in WHOLE:
         return "restore it from a copy of the run folder, or use a new folder"
-    return f"`mutator verify {run} --repair` sets damage aside; the same `mutator run` then fills the gap"
+    return f"set the damage aside with `mutator verify {run} --repair`, then fill the gap with `mutator run`"
 
 
 def _open_segments(run: Path, ledger: Ledger) -> Iterator[MutatorError]:
@@ -279,7 +280,7 @@ def patch_problems(
     found = "" if data is None else digest(data)
     if found != known:
         yield MutatorError(
-            f"not the patch of {experiment_id} that was run: SHA-256 {found[:16]}"
+            f"the patch of {experiment_id} is not the one that was run: SHA-256 {found[:16]}"
             if found
             else f"no patch of {experiment_id}",
             where=patches.file(experiment_id, worker),

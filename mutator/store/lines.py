@@ -102,7 +102,7 @@ class Segment:
 
     def problem(self, number: int) -> MutatorError:
         run = self.path.parent.parent
-        mend = f"`mutator verify {run} --repair` sets it aside; the same `mutator run` then fills the gap"
+        mend = f"set it aside with `mutator verify {run} --repair`, then fill the gap with `mutator run`"
         return MutatorError(
             "a damaged line",
             where=self.path,
@@ -157,9 +157,9 @@ class Segment:
 
 
 def read_segment(path: Path, data: bytes | None = None, *, checksums: bool = True) -> Segment:
-    """Verify the lines of a file, whose bytes are `data` if already read.
+    """Verify the lines of a file. `data` has its bytes, if they were already read.
 
-    Without `checksums` (an old run folder), every complete line is intact. MutatorError if the file is
+    Without `checksums` (an old run folder), every complete line is accepted. MutatorError if the file is
     missing.
     """
     data = _read(path) if data is None else data

@@ -14,6 +14,7 @@ from typing import Any, Protocol, TypeVar, overload
 
 from mutator._common.files import no_pipe, raising_disk_full, writing_atomic
 from mutator._common.hashing import added_values, canonical, content_id, plain
+from mutator._common.text import counted
 from mutator.errors import MutatorError
 from mutator.model import (
     AfterHazard,
@@ -132,7 +133,8 @@ def read_chunk(run: Path, chunk: Sequence[int], faults: Mapping[str, Fault]) -> 
     path, count = run / EXPERIMENTS, chunk[2]
     found = tuple(_experiments(path, ((None, line) for line in chunk_lines(run, chunk)), faults))
     if len(found) != count:
-        raise MutatorError(f"{len(found)} experiments in a chunk of {count}", where=path, remedy=_REMEDY)
+        got = f"{counted(len(found), 'experiment')} in a chunk of {count}"
+        raise MutatorError(got, where=path, remedy=_REMEDY)
     return found
 
 
@@ -207,7 +209,7 @@ def ids(run: Path) -> Iterator[str]:
 
 
 def problems(run: Path) -> Iterator[MutatorError]:
-    """Yield every line that does not match its id."""
+    """Yield a problem for each line that is damaged or does not match its id, and for each unused fault."""
     planned, defined = run / EXPERIMENTS, run / FAULTS
     found = list(_tried(defined, _lines(defined), fault_from))
     faults = {fault.id: fault for fault in found if isinstance(fault, Fault)}

@@ -59,5 +59,5 @@ def _setting(text: bytes) -> tuple[str, ...]:
 def _trigger(text: bytes) -> Trigger:
     data = json.loads(text)
     if data.keys() != _FIELDS:
-        raise ValueError("another version's")
+        raise ValueError("unknown fields")
     return Trigger(**{**data, "hold": Hold(data["hold"])})

@@ -73,7 +73,7 @@ _ONCE = (b'"experiment_id":', _OUTCOME, b'"patch":', b'"status":')
 def ending_on(line: bytes) -> Ending:
     """Read the ending from a record's line, ten times as fast as the whole record.
 
-    Raises ValueError, and the errors that `json.loads` and missing keys raise.
+    An invalid line raises the errors of `json.loads`, KeyError, TypeError or AttributeError.
     """
     begin = line.find(_NAME) + len(_NAME)
     found = _END.match(line, line.find(_OUTCOME))
@@ -100,10 +100,10 @@ def endings(records: Mapping[str, Record]) -> Iterator[Ending]:
 
 
 def read_records(run: Path, folder: str = "records", *, checksums: bool = True) -> IndexedLines[Record]:
-    """Return the final record of each experiment that has one; a torn last line is skipped.
+    """Return the record of each experiment that has one; a torn last line is skipped.
 
-    Any other record supersedes a harness error. MutatorError for a damaged line and for a second record of
-    one experiment; CheckFailed if the two differ.
+    A harness error is replaced by any other record of its experiment. MutatorError for a damaged line, and
+    for a second final record of an experiment; CheckFailed if the two differ.
     """
     paths = sorted((run / folder).glob("*.jsonl"))
     return IndexedLines(paths, SCHEMA, record_from, _replaces, checksums=checksums)

@@ -1,4 +1,4 @@
-"""The run folder: everything a campaign was given, and everything it produced.
+"""The run folder, which holds a campaign's inputs and results.
 
 docs/reference/run-folder.md describes its files.
 """
@@ -120,7 +120,7 @@ class RunFolder:
         if not self.verifiable:
             stray = (self.path / digests.FILE).exists()
             downgraded = MutatorError(
-                f"{self.head['schema']} in a folder with {digests.FILE}", where=self.path / HEAD
+                f"schema {self.head['schema']} in a folder with {digests.FILE}", where=self.path / HEAD
             )
             found = [downgraded] if stray else []
             return [*found, *integrity.problems(self.path, self.head, None, self.shard)]
@@ -179,7 +179,7 @@ class RunFolder:
     @property
     def shard(self) -> Shard | None:
         """The share of the plan that runs in this folder; None: all of it."""
-        text = self.head["choices"].get("shard")  # runs from before shards do not have this key
+        text = self.head["choices"].get("shard")  # older runs do not have this key
         return Shard.parse(text) if text else None
 
     @property
@@ -234,7 +234,7 @@ class RunFolder:
         return Patches(self.path)
 
     def read_patch(self, experiment_id: str, record: Record | None) -> bytes | None:
-        """Return the stored diff of an experiment with that record; None if it has not run, or had no mutant.
+        """Return the stored diff of an experiment with this record; None if it has not run, or had no mutant.
 
         MutatorError if the diff is missing or does not match the record.
         """

@@ -70,7 +70,7 @@ class Head(dict[str, Any]):
         self.path = path
 
     def __missing__(self, key: str) -> Any:
-        raise MutatorError(f"no '{key}'", where=self.path, expected="all keys of a run", remedy=REMEDY)
+        raise MutatorError(f"no key '{key}'", where=self.path, expected="a complete run.json", remedy=REMEDY)
 
 
 def read_head(run: Path) -> Head:

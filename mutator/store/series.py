@@ -117,12 +117,12 @@ class SeriesFolder:
         try:
             return self._read(experiment_id)
         except MutatorError as err:
-            remedy = f"rerun it: {making_again(self.path.parent, experiment_id)}"
+            remedy = f"rerun the experiment: {making_again(self.path.parent, experiment_id)}"
             where = err.where or self.path
             raise MutatorError(err.got, where=where, expected=err.expected, remedy=remedy) from None
 
     def _read(self, experiment_id: str) -> tuple[Series, Series] | None:
-        if (path := self.kept(experiment_id)).exists():  # of a rerun; the packed series can be damaged
+        if (path := self.kept(experiment_id)).exists():  # from a rerun; the packed series might be damaged
             return read_kept(path)
         index = self.index
         if index is None or experiment_id not in index.entries:
@@ -190,7 +190,7 @@ def write_kept(path: Path, golden: bytes, faulty: bytes) -> None:
 
 
 def read_kept(path: Path) -> tuple[Series, Series]:
-    """Read (golden, faulty) of a rerun; MutatorError if the file is damaged."""
+    """Read the golden and the faulty series of a rerun; MutatorError if the file is damaged."""
     data = read_script(path)
     try:
         (length,) = _LENGTH.unpack_from(data)

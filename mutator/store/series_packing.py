@@ -1,6 +1,6 @@
-"""Pack the series that workers appended into a run's chunks, the most valuable first, up to the budget.
+"""Pack the workers' series into chunks, the most valuable series first, up to the run's budget.
 
-The packed files do not depend on the workers or their order.
+The packed files do not depend on the number of workers or their order.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -217,7 +217,7 @@ def _written(folder: Path, plan: str, found: _Found, worth: Worth, budget_mb: in
 def _kept(found: _Found, worth: Worth, budget: int) -> list[str]:
     """Return the experiments, best first, that fit into `budget` bytes together with their golden runs.
 
-    An experiment that does not fit now will not fit in a later session.
+    The others would not fit in a later session, either, so they can be dropped.
     """
     there = [name for name in found.experiments if name in worth]
     kept: list[str] = []

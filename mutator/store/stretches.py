@@ -35,7 +35,7 @@ class Stretch:
 
 
 def read_stretches(head: Mapping[str, Any]) -> tuple[Stretch, ...]:
-    """Return the stretches of work in a run.json, oldest first. Old files have one, that of the planning."""
+    """Return the stretches of work in a run.json, oldest first. Old files have only the one that planned."""
     if "stretches" not in head:
         planned = head["provenance"]
         return (Stretch(python=planned["python"], packages=planned["packages"], platform=planned["machine"]),)
@@ -50,7 +50,7 @@ def read_stretches(head: Mapping[str, Any]) -> tuple[Stretch, ...]:
 
 
 def differences(before: Stretch, python: str, packages: Mapping[str, str | None]) -> tuple[str, ...]:
-    """List the differences between a stretch and this Python and packages: `numpy 1.26.4, here 2.1.0`."""
+    """List the differences between a stretch and the current versions: `numpy 1.26.4, here 2.1.0`."""
     found = [] if before.python == python else [f"{before.python}, here {python}"]
     for name in sorted(before.packages.keys() | packages):
         old, new = before.packages.get(name), packages.get(name)

@@ -1,6 +1,6 @@
 """A cache of finished runs that this machine has verified, keyed by their bytes.
 
-An entry's name is a digest of the SHA-256 of every verified file and of the verifying version. A run with any
+An entry's name is a digest of mutator's version and the SHA-256 of every verified file. A run with any
 changed byte is therefore verified in full, even if its digests were recomputed.
 """
 

@@ -41,7 +41,7 @@ class VariableModel(StrictModel, title="A variable"):
 
     about: str = Field(description="What the variable means.")
     observed: str | None = Field(
-        description="The observed variable that represents it in triggers; `null` if there is none."
+        description="The observed variable that represents this one in triggers; `null` if there is none."
     )
 
 
@@ -190,7 +190,7 @@ def _known(source: Source, keys: Keys, what: str, name: str, known: Collection[s
         raise source.error(
             keys,
             f"{what} '{name}'",
-            expected=f"one of {', '.join(known) or 'none'}",
+            expected=f"one of {', '.join(known)}" if known else f"a {what}, but there is none",
             remedy="correct the name" + suggestion(name, list(known)),
         )
 
@@ -219,7 +219,7 @@ def _check_grid(structure: StructureModel, source: Source) -> None:
             raise source.error(
                 ("components", name, "drawn"),
                 f"'{name}' drawn at {component.drawn}" + (f", where '{other}' is" if other else ""),
-                expected=f"row, column and width up to {_WIDEST}, a width from 1, and no overlap",
+                expected=f"row, column and width of at most {_WIDEST}, a width of at least 1, no overlap",
             )
         taken.update(dict.fromkeys(fields, name))
 

@@ -49,7 +49,7 @@ def _hazards(analysis: Analysis) -> Iterator[MutatorError]:
             yield source.error(
                 ("hazards", hazard),
                 f"hazard '{hazard}' follows from no unsafe control action",
-                remedy=f"name it in {analysis.unsafe_source.path.name}, or leave it out",
+                remedy=f"name it in {analysis.unsafe_source.path.name}, or delete it",
             )
     led_to = {accident for names in analysis.hazards.leads_to.values() for accident in names}
     for accident in analysis.hazards.accidents:
@@ -72,7 +72,7 @@ def _unobserved(analysis: Analysis, manifest: TargetManifest) -> Iterator[Mutato
             yield manifest.source.error(
                 ("channels", channel.name, "component"),
                 f"component '{channel.component}'",
-                expected=f"one of the control structure: {', '.join(components)}",
+                expected=f"a component of the control structure: {', '.join(components)}",
                 remedy="correct the name" + suggestion(channel.component, list(components)),
             )
 
@@ -148,8 +148,9 @@ def _unjudged(analysis: Analysis) -> Iterator[MutatorError]:
                     if hazard and (f"{table.name}/{row.id}", action, category, hazard) not in known:
                         yield table.source.error(
                             ("contexts", row.id, "actions", action, category.value),
-                            f"{hazard} by {action} {category} in '{row.id}' is not an unsafe control action",
-                            remedy=f"add it to {analysis.unsafe_source.path.name}, or write null",
+                            f"context '{row.id}' lists {hazard} for '{action}' {category}, "
+                            "which matches no unsafe control action",
+                            remedy=f"add one to {analysis.unsafe_source.path.name}, or write null here",
                         )
 
 
@@ -159,7 +160,7 @@ def _row(analysis: Analysis, context: str) -> ContextRow:
 
 
 def _judged(row: ContextRow, action: UnsafeActionModel) -> set[str]:
-    """The row's hazards for an action of that category; for wrong timing or duration, those of both
+    """The hazards that a row names for the category of `action`; for wrong timing or duration, those of both
     columns."""
     verdicts = row.actions.get(action.action)
     if verdicts is None:
@@ -238,7 +239,7 @@ def _misplaced(analysis: Analysis, keys: Keys, factor: FactorModel, specs: Specs
         yield analysis.factors_source.error(
             (*keys, "at"),
             f"{keys[1]} at {', '.join(factor.at) or 'no place'}",
-            expected=f"where its faults are injected: {', '.join(sorted(actual))}",
+            expected=f"the places where its faults are injected: {', '.join(sorted(actual))}",
             remedy="correct the places or the faults",
         )
 

@@ -104,7 +104,7 @@ class _RowModel(StrictModel, title="A context"):
     )
     about: str = Field(description="A description.")
     actions: dict[str, _VerdictsModel] = Field(
-        description="Control action -> verdict. Every row must judge the same actions."
+        description="Control action -> verdict. All contexts must judge the same actions."
     )
 
 
@@ -141,7 +141,9 @@ def load_context_table(path: Path, variables: Collection[str] | None = None) -> 
     for name in model.constants:
         if not _CONSTANT.match(name) or name == TIME:
             raise source.error(
-                ("constants", name), f"constant '{name}'", expected="an unused name in lowercase letters"
+                ("constants", name),
+                f"constant '{name}'",
+                expected=f"a name of lowercase letters, digits and _ that begins with a letter, not '{TIME}'",
             )
     rows = tuple(
         ContextRow(
@@ -176,8 +178,8 @@ def _check_names(rows: Iterable[ContextRow], variables: Collection[str], source:
             raise source.error(
                 ("contexts", row.id, "when"),
                 f"unknown name '{unknown[0]}' in '{row.condition}'",
-                expected=f"what the target observes: {', '.join(variables)}",
-                remedy="correct it, or add it to `observation` in the target's manifest",
+                expected=f"a value that the target observes: {', '.join(variables)}",
+                remedy="correct the name, or add it to `observation` in the target's manifest",
             )
 
 
@@ -186,8 +188,8 @@ def _check_actions(rows: tuple[ContextRow, ...], source: Source) -> None:
         if row.actions.keys() != rows[0].actions.keys():
             raise source.error(
                 ("contexts", row.id, "actions"),
-                f"the actions {', '.join(row.actions) or 'none'} in context '{row.id}'",
-                expected=f"those of '{rows[0].id}': {', '.join(rows[0].actions) or 'none'}",
+                f"actions {', '.join(row.actions) or '(none)'} in context '{row.id}'",
+                expected=f"the actions of '{rows[0].id}': {', '.join(rows[0].actions) or '(none)'}",
                 remedy="judge every control action in every context",
             )
 

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise, product
 
+from mutator._common.text import counted
 from mutator.triggers.conditions import evaluate
 
 MAX_TESTS = 400_000  # most tests: contexts times cells
@@ -46,11 +47,11 @@ def measure_coverage(conditions: Mapping[str, str]) -> Coverage:
     try:
         cuts = _cuts(conditions.values())
     except _BeyondError as error:
-        return Coverage(beyond=f"{error} is not a comparison of one variable with a constant")
+        return Coverage(beyond=f"{error}; only comparisons of one variable with a constant can be tested")
     lines = [_cells(name, sorted(values)) for name, values in cuts.items()]
     total = math.prod(len(line) for line in lines)
     if total * len(conditions) > MAX_TESTS:
-        found = f"{total} cells for {len(conditions)} contexts"
+        found = f"{counted(total, 'cell')} for {counted(len(conditions), 'context')}"
         return Coverage(beyond=f"its constants yield {found}, too many to test")
     for place in product(*lines):
         values = {name: cell.value for name, cell in zip(cuts, place, strict=True)}
@@ -77,7 +78,7 @@ def _cut(left: ast.expr, right: ast.expr) -> tuple[str, float]:
         value = _constant(constant)
         if isinstance(variable, ast.Name) and value is not None:
             return variable.id, value
-    raise _BeyondError(f"'{ast.unparse(left)}' with '{ast.unparse(right)}'")
+    raise _BeyondError(f"a condition compares '{ast.unparse(left)}' with '{ast.unparse(right)}'")
 
 
 def _constant(node: ast.expr) -> float | None:

@@ -16,7 +16,7 @@ GAP = 88  # distance between adjacent boxes
 MARGIN = 110  # margin left of the first column, for arrows around the rows
 EDGE = 20
 BOX_HEIGHT = 46
-LINE = 17  # one more line of text in a box
+LINE = 17  # height of each further line of text in a box
 TRACK = 44
 CHANNEL = 64  # height of a channel without tracks
 APART = 24  # distance between parallel arrows
@@ -178,8 +178,8 @@ def _spread(
 
 
 def _apart(x: float, toward: float, box: Box, others: list[float]) -> float:
-    """The place on the box's edge that is nearest to `x` and keeps its distance from `others`, to which it is
-    added.
+    """The place on the box's edge that is nearest to `x` and at least `APART` from `others`. It is added to
+    `others`.
 
     The side towards the other end, `toward`, is tried first, because this saves a crossing.
     """

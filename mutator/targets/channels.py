@@ -72,7 +72,7 @@ class ChannelModel(StrictModel, title="A channel"):
         ge=0.0,
         allow_inf_nan=False,
         description="Differences from the golden run up to this value are ignored. If an actuator differs by "
-        "more, the fault has manifested; if a channel of a component does, the fault has reached it. "
+        "more, the fault has manifested; if a component's channel does, the fault has reached the component. "
         f"Default: 0 for actuators; for other channels {ROUNDING:g} of the unit, to ignore rounding.",
     )
     about: str = Field("", description="What the channel contains.")
@@ -111,8 +111,8 @@ def read_channels(models: dict[str, ChannelModel], trace: TraceModel, source: So
         raise source.error(
             ("trace", "file"),
             f"'{trace.file}'",
-            expected=f"a bare file name, made in {{out}}, that ends in {', '.join(SUFFIXES)}",
-            remedy="have the run write one of these, and name it",
+            expected=f"a bare file name (of a file in {{out}}) that ends in {', '.join(SUFFIXES)}",
+            remedy="have the run write such a file, and name it here",
         )
     if not any(model.role is Role.ACTUATOR for model in models.values()):
         raise source.error(
@@ -146,7 +146,7 @@ def _channel(name: str, model: ChannelModel, trace: TraceModel, source: Source) 
         raise source.error(
             (*keys, "time"),
             f"'{model.time}'",
-            expected="none: each message has its time",
+            expected="no `time` for an .mcap file, in which each message has its own",
             remedy="leave it out",
         )
     plain = model.model_dump(exclude={"from_", "tolerance"})

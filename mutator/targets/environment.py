@@ -29,7 +29,7 @@ def check_environment(env: Mapping[str, str], source: Source) -> None:
         if not _NAME.match(name):
             raise source.error(("env", name), f"'{name}'", expected="a name of letters, digits and _")
         if name in _OWN or name.startswith(_PREFIXES):
-            fixed = f" to '{FIXED[name]}'" if name in FIXED else ""
+            fixed = f" (it sets {name} to '{FIXED[name]}')" if name in FIXED else ""
             raise source.error(
                 ("env", name),
                 f"variable {name}",

@@ -1,4 +1,4 @@
-"""Hazards, which a run must avoid, and metrics, which measure how bad it was."""
+"""Hazards, which a run must avoid, and metrics, which measure how bad a run was."""
 
 import ast
 from collections.abc import Collection
@@ -95,7 +95,7 @@ class HazardModel(StrictModel, title="A hazard"):
     )
     margin: str | None = Field(
         None,
-        description="The distance of a step from the hazard, in `unit`; negative if it holds. If `when` "
+        description="The distance of a step from the hazard, in `unit`; negative if `when` holds. If `when` "
         "is a single comparison, the default is the difference of its two sides.",
     )
     unit: str = Field("-", description="The unit of the margin.")
@@ -217,7 +217,7 @@ def _metric(name: str, model: MetricModel, known: Collection[str], source: Sourc
             keys,
             f"metric '{name}' with {' and '.join(given) or 'no aggregate'}",
             expected=f"one of {', '.join(_AGGREGATES)}",
-            remedy="make a metric of each",
+            remedy="give each metric exactly one aggregate",
         )
     (aggregate,) = given
     check = condition if aggregate == "duration" else formula

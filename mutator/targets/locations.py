@@ -28,7 +28,7 @@ def check_file(manifest: TargetManifest, named: str) -> None:
         )
     if matches(path, manifest.forbid):
         raise MutatorError(
-            f"file '{path}' is forbidden to faults",
+            f"no fault may be injected into file '{path}'",
             expected=f"a file that `forbid` of {manifest.path.name} does not match",
             remedy="inject somewhere else",
         )

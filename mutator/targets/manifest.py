@@ -163,7 +163,7 @@ class TargetManifest:
                 raise MutatorError(
                     f"change '{change}'",
                     where=self.path,
-                    expected=f"one of {', '.join(self.changes) or 'none'}",
+                    expected=f"one of {', '.join(self.changes)}" if self.changes else "no change",
                     remedy="add it to the manifest's `changes`, or correct the spec",
                 )
             extra += self.changes[change]

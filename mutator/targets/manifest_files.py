@@ -187,7 +187,7 @@ def _check_record(model: ManifestModel, source: Source) -> None:
         raise source.error(
             ("record",),
             f"'{model.record}'",
-            expected="a bare file name, made in {out}",
+            expected="a bare file name (of a file in {out})",
             remedy="leave out the folder",
         )
 

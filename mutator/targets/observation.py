@@ -114,7 +114,7 @@ def read_observation(model: ObservationModel, source: Source) -> Observation:
     if location.anchor.kind in VALUE_ANCHORS | FIXED_ANCHORS:
         raise source.error(
             ("observation", "at", location.anchor.kind.value),
-            f"an observation at a {location.anchor.kind.value}",
+            f"an observation at `{location.anchor.kind.value}`",
             expected="a statement, such as `after_assign: gap`",
         )
     with source.placing(("observation", "at", "file")):

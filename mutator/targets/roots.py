@@ -57,7 +57,7 @@ def read_packages(package: str | None, packages: Sequence[str] | None, source: S
             ("packages",),
             "neither `package` nor `packages`" if package is None else "both `package` and `packages`",
             expected="one of them",
-            remedy="name the import package under `package`; several, and modules, under `packages`",
+            remedy="list several packages or modules under `packages`, or name a single package as `package`",
         )
     if package is not None:
         if not package.isidentifier():
@@ -77,7 +77,7 @@ def read_packages(package: str | None, packages: Sequence[str] | None, source: S
                 ("packages", i),
                 f"'{name}'",
                 expected=f"a package, or a module's file such as drive.py, each once, and not {PROBE_NAME}",
-                remedy="correct it; leave out what is inside a package",
+                remedy="correct the name; do not list modules that are inside a package",
             )
         seen.add(stem)
     return names

@@ -45,8 +45,8 @@ class Line:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
-    """What can be drawn of a drive. `follow` is the actor that the view follows ('': none). `speed` is a
-    formula for the speed (m/s) at which the origin moves along x."""
+    """The actors and lines of a drawing of the drive. `follow` is the actor that the view follows ('': none).
+    `speed` is a formula for the speed (m/s) at which the origin moves along x."""
 
     actors: tuple[Actor, ...]
     lines: tuple[Line, ...]

@@ -36,8 +36,8 @@ class Contact:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scale:
-    """The classes of delta-v: (name, least delta-v in m/s, meaning), the mildest first, from 0; `source`
-    cites the bounds."""
+    """The classes of delta-v: (name, least delta-v in m/s, meaning), the mildest first, beginning at 0.
+    `source` cites the bounds."""
 
     name: str
     about: str
@@ -128,9 +128,9 @@ def load_scale(path: Path) -> Scale:
     if tuple(model.classes) != CLASSES:
         raise source.error(
             ("classes",),
-            f"the classes {', '.join(model.classes) or 'none'}",
+            f"the classes {', '.join(model.classes)}" if model.classes else "no classes",
             expected=f"{', '.join(CLASSES)}, in this order",
-            remedy="name each of them once",
+            remedy="define each of these classes once",
         )
     least = [one.from_kph for one in model.classes.values()]
     for i, name in enumerate(CLASSES):

@@ -76,7 +76,8 @@ def _digest(entries: Mapping[str, str]) -> str:
 
 
 def read_tree(root: Path, globs: Iterable[str], overlay: Path | None = None) -> SourceTree:
-    """Read the files of `root` that match and all of `overlay`, except bytecode. Links are followed.
+    """Read the files of `root` that match `globs` and all files of `overlay`, except bytecode. Links are
+    followed.
 
     MutatorError for a dangling link, and for a path that is in both folders.
     """

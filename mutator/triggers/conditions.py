@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Collection, Mapping
 from functools import lru_cache
 
-from mutator._common.text import operator_hint
+from mutator._common.text import counted, operator_hint
 from mutator.errors import MutatorError
 
 TIME = "t"  # s; every target has it
@@ -67,7 +67,7 @@ def _checked(
         else:
             _function(canonical, names_in(canonical), number)
     except (SyntaxError, RecursionError, MemoryError):
-        raise _refuse("too much in one expression", text, variables, "write it shorter") from None
+        raise _refuse("too many nested operations", text, variables, "simplify it") from None
     return canonical
 
 
@@ -206,7 +206,7 @@ class _Writer:
         except OverflowError:
             number = math.inf
         if not math.isfinite(number):
-            raise self._refuse("a number too large")
+            raise self._refuse("a number that is too large")
         return repr(number)
 
     def _name(self, name: str) -> str:
@@ -228,7 +228,7 @@ class _Writer:
             raise self._refuse(f"a call of '{name}'")
         least, most = _ARGUMENTS.get(name, (2, math.inf))
         if not least <= len(node.args) <= most:
-            raise self._refuse(f"{name} with {len(node.args)} arguments")
+            raise self._refuse(f"{name} with {counted(len(node.args), 'argument')}")
         return f"{self.written.get(name, name)}({', '.join(self._term(a) for a in node.args)})"
 
     def _refuse(self, what: str, remedy: str = "rewrite it") -> MutatorError:

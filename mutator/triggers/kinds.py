@@ -25,7 +25,7 @@ def at_time(time_s: float, *, name: str = "random", hold_s: float | None = None)
     It stays active for `hold_s`, or to the end of the run.
     """
     if not math.isfinite(time_s):
-        raise MutatorError(f"time {time_s}", expected="a number of seconds")
+        raise MutatorError(f"time {time_s}", expected="a finite number of seconds")
     hold = Hold.TO_END if hold_s is None else Hold.FOR
     return Trigger(name=name, condition=f"t >= {float(time_s)!r}", hold=hold, hold_s=hold_s)
 
@@ -46,7 +46,8 @@ def draw_time(seed: int, key: str, *, first_s: float, last_s: float, step_s: flo
     """
     first, last = round(first_s / step_s), round(last_s / step_s)
     if last < first:
-        raise MutatorError(f"random times from {first_s} s to {last_s} s", expected="an interval")
+        got = f"random times from {first_s:g} s to {last_s:g} s"
+        raise MutatorError(got, expected="an end that is not before the beginning")
     frame = first + int(generator(seed, key).random() * (last - first + 1))
     return round(frame * step_s, 9)
 

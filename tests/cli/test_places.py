@@ -31,7 +31,7 @@ def test_places_are_listed_with_line_anchor_and_models(cli: Cli, toy: Workspace)
     ("where", "words"),
     [
         ("toycar/sensin.py", "no Python file 'toycar/sensin.py' in target toycar"),
-        ("toycar/world.py", "is forbidden to faults"),
+        ("toycar/world.py", "no fault may be injected into file"),
         ("toycar/sensing.py::Sensor.sens", "no function 'Sensor.sens'"),
     ],
 )

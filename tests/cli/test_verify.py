@@ -118,7 +118,7 @@ def test_rerun_restores_damaged_series(
     whole = SeriesFolder(Path("run")).read(name)
     assert whole is not None
     if what != "index" or damage is flip:
-        with pytest.raises(MutatorError, match=f"rerun it: `mutator rerun {others[0]} --trace"):
+        with pytest.raises(MutatorError, match=f"rerun the experiment: `mutator rerun {others[0]} --trace"):
             SeriesFolder(Path("run")).read(others[0])
     repaired = cli("verify", "run", "--repair")
     assert repaired.code == 1 and f"repaired: series/{file.name}" in repaired.out

@@ -263,7 +263,7 @@ def edited(workspace: Workspace, old: str, new: str) -> str:
         ("file: toycar/sensor.py", "file: /etc/passwd", "14: path '/etc/passwd' leads out"),
         ("file: toycar/sensor.py", "file: toycar/none.py", "14: no Python file 'toycar/none.py'"),
         ("file: toycar/sensor.py", "file: ./toycar/sensor.py", "no Python file './toycar/sensor.py'"),
-        ("file: toycar/sensor.py", "file: toycar/judge.py", "file 'toycar/judge.py' is forbidden to faults"),
+        ("file: toycar/sensor.py", "file: toycar/judge.py", "into file 'toycar/judge.py'"),
         ("after_assign: gap", "after_assign: 'gap = 1'", "14: 'gap = 1'; expected a name as in the source"),
         ("after_assign: gap", "after_assign: _fi", "14: '_fi'; expected a name as in the source"),
         ("after_assign: gap", "afterassign: gap", "14: unknown key 'afterassign'; expected one of file"),

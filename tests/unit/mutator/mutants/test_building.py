@@ -157,7 +157,7 @@ def test_faults_are_active_once_their_trigger_fires(toy: Workspace, tmp_path: Pa
     ("location", "said"),
     [
         ({"path": "../toycar/sensor.py"}, "leads out of the target"),
-        ({"path": "toycar/judge.py"}, "is forbidden to faults"),
+        ({"path": "toycar/judge.py"}, "no fault may be injected into file"),
         ({"function": "Sensor.mesure"}, "did you mean 'Sensor.measure'?"),
         ({"anchor": Anchor(kind=AnchorKind.AFTER_ASSIGN, name="rate", nth=2)}, "matches 1 statement "),
         (

@@ -71,7 +71,7 @@ def test_a_forged_ledger_is_refused(run: Path) -> None:
     """The checksum is valid, but the content is not that of a ledger."""
     data = {"schema": digests.SCHEMA, "finished": True, "files": [], "rewriting": {}}
     files.write_json(run / digests.FILE, data | {"sum": digests.digest(data)})
-    with pytest.raises(MutatorError, match="not a ledger"):
+    with pytest.raises(MutatorError, match="not a list of digests"):
         digests.read(run)
 
 

@@ -223,7 +223,7 @@ def test_an_invalid_value_in_an_old_run_json_is_reported_by_key(run: Path, key: 
         assert f"run.json: damaged at '{key}'" in str(problem(run))
     del data[key]
     (run / "run.json").write_text(json.dumps(data))
-    with pytest.raises(MutatorError, match=rf"run\.json: no '{key}'"):
+    with pytest.raises(MutatorError, match=rf"run\.json: no key '{key}'"):
         _ = RunFolder.unverified(run).head[key]
 
 

@@ -80,7 +80,7 @@ def test_a_change_after_verification_is_found(made: tuple[Workspace, Path], cach
     try:
         name = next(iter(kept))
         rewrite_patches(path, [*(kept | {name: kept[name] + b"\n"}).items()])
-        with pytest.raises(MutatorError, match=f"not the patch of {name} that was run"):
+        with pytest.raises(MutatorError, match=f"the patch of {name} is not the one that was run"):
             RunFolder.open(run)
     finally:
         path.write_bytes(before)
