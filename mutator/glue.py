@@ -225,7 +225,7 @@ def _number(what: str, value: Any) -> float:
 def _length(what: str, value: Any) -> float:
     number = _number(what, value)
     if not 0 < number < math.inf:
-        raise GlueError(f"{what} is {number:g}; expected more than 0 s")
+        raise GlueError(f"{what} is {number:g}; expected a finite time above 0 s")
     return number
 
 

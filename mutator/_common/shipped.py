@@ -110,7 +110,7 @@ def _unpack(archive: Path, folder: Path) -> None:
             f"cannot unpack the files that ship with mutator ({err.strerror})",
             where=folder,
             expected="a data folder that you can write to",
-            remedy="set XDG_DATA_HOME to one, or work in a clone",
+            remedy="set XDG_DATA_HOME to a writable folder, or work in a clone",
         ) from None
 
 

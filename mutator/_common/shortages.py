@@ -39,7 +39,7 @@ def shortage(err: BaseException | None) -> Shortage | None:
             )
         if number == errno.EAGAIN or _PROCESSES in str(err):
             return Shortage(
-                "no more processes or threads",
+                "no more processes or threads can be started",
                 expected="fewer processes and threads on this machine, or a higher limit (`ulimit -u`)",
                 remedy=f"end other programs, raise the limit, or use fewer workers; then {_AGAIN}",
             )

@@ -39,7 +39,7 @@ def run(
     * `workers`: number of processes; 0: only this one.
     * `engine`: a name from `mutator.engines.kinds`; None: the fastest that is worthwhile.
     * `reviewed`: refuse to run mutants without an approval.
-    * `accept_versions`: resume although versions of Python or packages have changed, and record the change.
+    * `accept_versions`: resume even if versions of Python or packages have changed, and record the change.
     * `cluster`: the address of a Dask scheduler, its scheduler file, `local:N`, or a cluster file. Its
       workers run the experiments; `workers` then applies only to the checks before the campaign.
     * `insecure_network`: accept a scheduler that others on the network can reach.

@@ -31,9 +31,9 @@ from mutator.workspace import Workspace
 def init_library(folder: str | Path, *, target: str | PathLike[str] | None = None) -> Path:
     """Write an editable fault library into a new or empty folder, and return the folder.
 
-    `target` is a controller's source folder or `installed:NAME`. With it, write a first library for that
-    controller: manifest, entry, scenario, fault and campaign, with places to fill in. The source is read,
-    never imported. Without it, copy the library and templates that ship with mutator.
+    `target` is a controller's source folder or `installed:NAME`. With `target`, write a first library for
+    that controller: manifest, entry, scenario, fault and campaign, with places to fill in. The source is
+    read, never imported. Without `target`, copy the library and templates that ship with mutator.
 
     MutatorError for a folder that is not empty and for a missing target; MutatorWarning if nothing in the
     target looks like a controller.

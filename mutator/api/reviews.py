@@ -62,7 +62,7 @@ class ReviewedGroups:
             hits = [group for group in self.groups if group.id.startswith(start)]
             if len(hits) != 1 or not start:
                 raise MutatorError(
-                    f"several groups ({len(hits)}) start with '{start}'" if hits else f"no group '{start}'",
+                    f"several ids ({len(hits)}) start with '{start}'" if hits else f"no group '{start}'",
                     expected="an id from `mutator review`, or the start of only one id",
                     remedy="give more digits of the id" if hits else "choose the group's campaign or spec",
                 )

@@ -142,7 +142,7 @@ class Run(RunContents):
     def golden(
         self, scenario: str, changes: tuple[str, ...] | None = None, *, seed: int | None = None
     ) -> "pd.DataFrame":
-        """Return the golden run of a scenario: one column per channel, by time in s.
+        """Return the golden run of a scenario: one column per channel, indexed by time in s.
 
         `changes` chooses a variant of the scenario, e.g. `("alone",)`; default: the most frequent. `seed`
         chooses one of several seeds; default: the first. MutatorError if there is no such run.

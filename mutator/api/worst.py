@@ -37,5 +37,5 @@ def _value(name: str, text: str) -> object:
         return text
     try:
         return float(text)
-    except ValueError:  # a fault's value may be text
+    except ValueError:  # a fault's value can be text
         return text

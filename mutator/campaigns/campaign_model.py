@@ -92,7 +92,7 @@ class _LimitsModel(StrictModel, title="Limits"):
         default=1024,
         ge=1,
         le=MOST,
-        description="MiB in the run's output folder and TMPDIR together. It also limits each file.",
+        description="MiB in the run's output folder and TMPDIR together; also the limit for each file.",
     )
 
 

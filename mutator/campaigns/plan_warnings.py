@@ -30,7 +30,7 @@ class IdleValues:
         if labels := list(dict.fromkeys(self._labels)):
             more = f" and {len(labels) - _NAMED} more" if len(labels) > _NAMED else ""
             warnings.warn(
-                f"value that changes nothing, in {self._count} of {counted(self._of, 'experiment')}: "
+                f"the value changes nothing in {self._count} of {counted(self._of, 'experiment')}: "
                 f"{', '.join(labels[:_NAMED])}{more}",
                 MutatorWarning,
                 stacklevel=2,

@@ -54,7 +54,7 @@ class Choices:
     only: str | None = None  #: filter: keep the experiments that match
     exclude: str | None = None  #: filter: drop the experiments that match
     limit: int | None = None  #: how many experiments to keep, spread like a sample
-    shard: str | None = None  #: the share of the plan to run, `k/n`
+    shard: str | None = None  #: the shard to run, `k/n`
     series_mb: int | None = None  #: the budget of the series in MiB; 0: no series
 
     def __post_init__(self) -> None:

@@ -142,7 +142,7 @@ def _by_reason(found: dict[str, str]) -> dict[str, list[str]]:
 
 
 def _cost_line(cost: "Cost") -> str:
-    source = "measured in this folder" if cost.measured else "estimated from a default rate"
+    source = "measured in this folder" if cost.measured else "estimated with a default time per run"
     time, disk = duration(cost.wall_s), cost.disk_bytes / 1e6
     who = counted(cost.workers, "worker")
     return f"{time} with {who} ({duration(cost.cpu_s)} of CPU), {disk:.0f} MB of disk; {source}"
@@ -280,7 +280,7 @@ def _print_end(
         terminal.say(f"seal: {summary.seal}")
     if summary.harness_errors:
         terminal.say(
-            f"harness errors: {len(summary.harness_errors)} (left out of rates; the same command retries)"
+            f"harness errors: {len(summary.harness_errors)} (not in rates; the same command retries them)"
         )
         for name, detail in summary.harness_errors[:5]:
             terminal.say(f"  {name}: {detail}", style="red")

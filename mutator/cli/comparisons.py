@@ -70,7 +70,8 @@ def compare(
     """Compare two runs, experiment by experiment.
 
     Matches experiments by fault, value, scenario and trigger; target, reading and settings may differ.
-    Reports what got better, worse or newly hazardous, with paired statistics. Writes HTML, Markdown and CSV.
+    Reports which experiments became better, worse or hazardous, with paired statistics. Writes HTML, Markdown
+    and CSV.
     """
     terminal = Terminal(as_json)
     gates = _gates(fail_on or [])

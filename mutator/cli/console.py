@@ -57,7 +57,7 @@ class Terminal:
         return _console(stderr=True)
 
     def say(self, text: str = "", style: str | None = None, *, whole: bool = False) -> None:
-        """Print text, folded; with `whole`, unfolded, e.g. for a command to copy."""
+        """Print text; fold it unless `whole` is set, as for a command to copy."""
         if not self.as_json:
             _print(self.out, text, style, whole=whole)
 

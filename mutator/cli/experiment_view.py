@@ -149,7 +149,7 @@ def print_path(terminal: Terminal, found: "RunExperiment") -> None:
 
 
 def _stage(stage: "Stage") -> str:
-    """Return e.g. `brakes: reached at 3.50 s`; for a component with an injection, no time."""
+    """Return a line such as `brakes: reached at 3.50 s`; for an injected component, without a time."""
     what = f"{stage.component}: {stage.state.value}"
     if stage.state.value == "injected":
         return what

@@ -150,7 +150,7 @@ def _film(terminal: Terminal, found: "RunExperiment", video: Path | None, stills
 
 
 def _still(text: str, found: "RunExperiment") -> "mutator.Shot":
-    """Parse `T=FILE` or `T`. With `T` alone, the file is one next to the plots, where the report finds it."""
+    """Parse `T=FILE` or `T`. With `T` alone, the file goes next to the plots, where the report finds it."""
     t, named, name = text.partition("=")
     try:
         time = float(t)

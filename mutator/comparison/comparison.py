@@ -40,9 +40,9 @@ class Gate(StrEnum):
     OTHER_HAZARD = Change.OTHER_HAZARD.value
     HIGHER_SEVERITY = (
         Change.HIGHER_SEVERITY.value
-    )  #: a contact of a higher class, or one where there was none
+    )  #: a contact of a higher class, or a contact although the first run has none
     EARLIER_HAZARD = Change.EARLIER_HAZARD.value  #: less time from activation to the first hazard
-    LOST_ALERT = Change.LOST_ALERT.value  #: an alert of the first run is missing
+    LOST_ALERT = Change.LOST_ALERT.value  #: no alert, although the first run has one
     WORSE = Change.WORSE.value  #: a worse outcome, in the order no effect, sdc, hazard; includes a new hazard
     NEW_CRASH = Change.NEW_CRASH.value  #: the controller crashes or does not finish
     HARNESS_ERROR = Change.HARNESS_ERROR.value  #: the second run has no result, although the first has one
@@ -133,9 +133,9 @@ class Comparison:
         groups: tuple[tuple[str, Sequence[Experiment]], ...] = (
             (f"only in {names.a}", m.only_a),
             (f"only in {names.b}", m.only_b),
-            (f"no result in {names.a}", m.no_result_a),
-            (f"no result in {names.b}", m.no_result_b),
-            ("several with the same fault, scenario and trigger in one run", m.ambiguous),
+            (f"without a result in {names.a}", m.no_result_a),
+            (f"without a result in {names.b}", m.no_result_b),
+            ("with the same fault, scenario and trigger as another experiment of their run", m.ambiguous),
         )
         return tuple((why, experiment) for why, group in groups for experiment in group)
 
@@ -163,8 +163,8 @@ def compare(
     matching = match(a, b)
     if not matching.pairs:
         raise MutatorError(
-            f"no experiment of {a.name} ({len(a.rows)} with a result) has a partner in {b.name} "
-            f"({len(b.rows)})",
+            f"no experiment of {a.name} has a partner in {b.name} (experiments with a result: {len(a.rows)} "
+            f"and {len(b.rows)})",
             where=run_b,
             argument="only",
             expected="runs of the same faults, scenarios and triggers",

@@ -39,7 +39,7 @@ class Files:
 
 
 def facts(a: Side, b: Side) -> tuple[Fact, ...]:
-    """Everything that the runs' results depend on, then the packages that differ."""
+    """Everything that the runs' results depend on, with packages last."""
     heads = [_facts(side) for side in (a, b)]
     names = dict.fromkeys(name for head in heads for name in head)
     if not all("stretches" in side.folder.head for side in (a, b)):  # older runs list all installed packages
@@ -83,13 +83,13 @@ def _files(head: Mapping[str, Any]) -> dict[str, str] | None:
 def remarks(a: Side, b: Side, matching: Matching) -> tuple[str, ...]:
     """Remarks on runs that cannot be verified, and on the number of pairs that differ in each input."""
     told: tuple[tuple[str, Callable[[Pair], bool]], ...] = (
-        ("have different injections", lambda p: p.a.fault.injections != p.b.fault.injections),
-        ("have different trigger conditions", lambda p: p.a.trigger.condition != p.b.trigger.condition),
-        ("have different holds or trigger times", lambda p: _hold(p.a) != _hold(p.b)),
-        ("have scenarios with different texts", lambda p: p.a.scenario_digest != p.b.scenario_digest),
-        ("have different seeds", lambda p: p.a.seed != p.b.seed),
+        ("with different injections", lambda p: p.a.fault.injections != p.b.fault.injections),
+        ("with different trigger conditions", lambda p: p.a.trigger.condition != p.b.trigger.condition),
+        ("with different holds or trigger times", lambda p: _hold(p.a) != _hold(p.b)),
+        ("with different scenario files", lambda p: p.a.scenario_digest != p.b.scenario_digest),
+        ("with different seeds", lambda p: p.a.seed != p.b.seed),
         (
-            "end at the first terminal hazard in only one run, where later hazards and alerts are missing",
+            "that end at a terminal hazard in only one run, where later hazards and alerts are missing",
             lambda p: p.a.after_hazard != p.b.after_hazard,
         ),
     )
@@ -97,7 +97,7 @@ def remarks(a: Side, b: Side, matching: Matching) -> tuple[str, ...]:
     counts = ((_count(matching.pairs, differs), what) for what, differs in told)
     return (
         *(f"The content of {side.name} is {not_verifiable(side.folder)}." for side in old),
-        *(f"{n} of {len(matching.pairs)} pairs {what}." for n, what in counts if n),
+        *(f"Pairs {what}: {n} of {len(matching.pairs)}." for n, what in counts if n),
     )
 
 
@@ -120,10 +120,10 @@ def severity_remarks(a: Side, b: Side) -> tuple[str, ...]:
     scales = [side.folder.scale for side in (a, b)]
     if None in scales:
         (without,) = [s for s, scale in zip((a, b), scales, strict=True) if not scale][:1]
-        return (f"Severity is not compared: {without.name} has no classes.",) if any(scales) else ()
+        return (f"Severity is not compared: {without.name} has no severity classes.",) if any(scales) else ()
     if scales[0] == scales[1]:
         return ()
-    return (f"The runs have different severity scales; both use the classes of {b.name}.",)
+    return (f"The runs have different severity scales; only that of {b.name} is used.",)
 
 
 def _hold(experiment: Any) -> tuple[object, ...]:

@@ -1,6 +1,6 @@
 "use strict";
-/* Filters the table of changed experiments by text and change, and shows the first matches. The URL fragment has the
-   chosen filters. */
+/* Filters the table of changed experiments by text and change, and shows the first matches. The URL fragment contains
+   the chosen filters. */
 (() => {
   const place = document.getElementById("changed");
   if (!place) return;

@@ -62,8 +62,8 @@ def summary(comparison: Comparison) -> str:
     else:
         text += "None of them changed."
     if unusable := sum(not p.usable for p in c.pairs):
-        text += f" In {unusable} of the experiments, a run has a harness error or an invalid mutant, so they "
-        text += "are not in the rates."
+        text += " Left out of the rates, because a run has a harness error or an invalid mutant: "
+        text += f"{unusable}."
     if c.unmatched:
         text += " Not compared: " + ", ".join(f"{n} {why}" for why, n in reasons(c)) + "."
     return text

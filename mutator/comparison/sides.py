@@ -16,8 +16,8 @@ from mutator.verification import equivalence
 
 
 class Key(NamedTuple):
-    """Identifies an experiment across runs, independently of target, reading, setting and seed. Ids cannot,
-    because they depend on drawn times, reading, setting and the scenario's text."""
+    """Identifies an experiment across runs, independently of target, reading, setting and seed. Ids can
+    differ across runs, because they depend on drawn times, reading, setting and the scenario's text."""
 
     spec: str  # with the variant: sensor/bias/distance
     value: Value

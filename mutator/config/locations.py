@@ -76,8 +76,8 @@ class AtModel(StrictModel, title="A place"):
     nth: int | None = Field(
         None,
         ge=1,
-        description="Which of several matches, counted from 1. Heads of blocks are counted after all "
-        "statements.",
+        description="Which of several matches, counted from 1. Lines that open a block (`if x:`) are counted "
+        "after all other statements.",
     )
 
     def location(self, source: Source, keys: Keys) -> FaultLocation:

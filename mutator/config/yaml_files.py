@@ -223,7 +223,7 @@ def _scalar(kind: str, text: str) -> Any:
 def read(
     path: Path, model: type[M], schema: str, older: Mapping[str, Callable[[Source], Source]] | None = None
 ) -> tuple[M, Source]:
-    """Parse `path`, check its `schema: name/version` key against `schema`, validate the rest as `model`.
+    """Parse `path`, check its key `schema: name/version` against `schema`, and validate the rest as `model`.
 
     `older` maps older schemas to functions that convert a file to `schema`. MutatorError for an invalid file
     or a newer version.

@@ -17,7 +17,7 @@ from mutator.mutants.probe import decision_in
 from mutator.triggers.over_time import ARITHMETIC, COMPARE
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)  # hashed by identity, as hashing all values is slow
+@dataclass(frozen=True, kw_only=True, eq=False)  # hashed by identity, because hashing all values is slow
 class Observed:
     """What a probe observes in a golden run.
 
@@ -79,7 +79,7 @@ def _first_active(armed_t: float, condition: str, seen: Observed) -> Start | Non
 
 
 def _holds(function: ast.FunctionDef, values: dict[str, Any]) -> Any:
-    """Evaluate a condition for each observation. Arithmetic on numpy's doubles gives Python's results."""
+    """Evaluate a condition for each observation. numpy doubles give the same results as Python floats."""
     with np.errstate(all="ignore"):
         for node in function.body:
             if isinstance(node, ast.Assign):

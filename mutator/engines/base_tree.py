@@ -1,4 +1,4 @@
-"""The pristine tree. Runs link to its files, because copying takes up to a tenth of a run's time."""
+"""A target's pristine tree. Runs link to its files, because copying takes up to a tenth of a run's time."""
 
 import os
 import shutil
@@ -12,8 +12,8 @@ _Stamp = tuple[int, int, int, int]
 class BaseTree:
     """The pristine tree in `folder`, made by `prepare_base`.
 
-    A run can write through its links and so change this tree. The engine then restores the tree, and repeats,
-    on a copy without links, each run made meanwhile.
+    A run can write through its links and so change this tree. The engine then restores the tree, and repeats
+    each run that was made in the meantime, on a copy without links.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -47,7 +47,7 @@ class BaseTree:
             return False
 
     def _mend(self, path: Path) -> None:
-        """Replace the file atomically, because another process can be linking it."""
+        """Replace the file atomically, because another process can be linking to it."""
         whole = self._folder.with_name(f"{self._folder.name}-mended.{os.getpid()}")
         whole.write_bytes(self._files[path])
         whole.chmod(self._stamps[path][0])

@@ -1,7 +1,7 @@
 """Write trees with bytecode that cannot be stale: imports compare each .pyc with the hash of its source.
 
-An ordinary .pyc is trusted if the source's size and modification time match, so for a changed
-file of equal size, the pristine code could run.
+An ordinary .pyc is trusted if the source's size and modification time match, so the pristine code could run
+after a change that keeps the file's size.
 """
 
 from collections.abc import Mapping

@@ -1,6 +1,6 @@
 """Find the functions of a loaded program that a mutant changes, and check whether their code can be swapped.
 
-No function of the target is active between two steps of a run, so code can be swapped there. Until the
+No function of the target is running between two steps, so code can be swapped at that point. Until the
 trigger first holds, the changed program acts like the pristine one, because the probe guards every inserted
 statement.
 """
@@ -57,7 +57,7 @@ class CodeSwap:
 def plan_swap(manifest: TargetManifest, files: Mapping[str, bytes], tree: str) -> CodeSwap:
     """Return what turns the pristine program, loaded from the folder `tree`, into the mutant with `files`.
 
-    Raises NotSwappable if the result could differ from a mutant that is started alone.
+    Raises NotSwappable if the result could differ from that mutant in a fresh interpreter.
     """
     functions: list[FunctionSwap] = []
     settings: list[tuple[str, CodeType]] = []
@@ -85,7 +85,7 @@ def plan_swap(manifest: TargetManifest, files: Mapping[str, bytes], tree: str) -
     )
 
 
-@lru_cache(maxsize=256)  # cached, because every mutant changes the observing file, mostly in the same way
+@lru_cache(maxsize=256)  # cached, because all mutants change the observation's file, mostly in the same way
 def _in_file(
     path: str, pristine: bytes, mutated: bytes, filename: str
 ) -> tuple[tuple[FunctionSwap, ...], tuple[str, ...]]:
@@ -137,7 +137,7 @@ def _guarded_imports(path: str, lines: list[bytes]) -> tuple[str, ...]:
         if tag and tag.of_fault and tag.was is None and not tag.sets:
             indent = len(tag.code) - len(tag.code.lstrip())
             if tag.id == before and indent == margin and tag.opens_original:
-                before = ""  # the next injected lines must ask again
+                before = ""  # the next injected lines must ask the probe again
                 continue
             if tag.id != before or indent <= margin:
                 margin = indent

@@ -120,7 +120,7 @@ class ForkEngine:
         if self._warm:
             return self._from_the_start(job, folder, swap)
         seen = self._observed(job, job.golden)
-        if job.stop and job.golden_ends:  # the run can stop before the fault is active, where no fork is made
+        if job.stop and job.golden_ends:  # the run can stop before the fault is active, and so before a fork
             return self._from_the_start(job, folder, swap)
         start = first_active(swap.own, seen)
         if start is None:
@@ -221,7 +221,7 @@ class ForkEngine:
         )
 
     def _check(self, job: Job, report: dict[str, Any]) -> None:
-        """Raise Refused if another program ran, or if threads are left."""
+        """Raise Refused if the child did not run the mutant's code, or if threads are left."""
         if report["ended"] == "swap refused":
             raise Refused(str(report.get("why")))
         if report["outside"]:

@@ -23,10 +23,9 @@ from mutator.engines.threads import too_many, turned_off
 from mutator.targets.manifest import TargetManifest
 
 _SERVER = Path(__file__).parent / "in_target" / "fork_server.py"
-_MOST = 8  # waiting processes, of about 20 MB each
-# steps; a process at most this far behind is advanced, not copied, because its old state is quickly remade
-_NEAR = 100
-_LOOK_UP_S = 0.5  # interval of the check that the parent is alive
+_MOST = 8  # maximum number of waiting processes, because each takes about 20 MB
+_NEAR = 100  # in steps: a process at most this far behind is advanced, not copied: its state is soon remade
+_LOOK_UP_S = 0.5  # interval between two checks that the parent is alive
 _START_S = 120.0
 
 

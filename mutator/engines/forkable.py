@@ -1,4 +1,4 @@
-"""What a forking engine can run: loadable targets, and faults whose code fits a loaded program."""
+"""What a forking engine can run: loadable targets, and faults whose code can be put into a loaded program."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -15,10 +15,10 @@ from mutator.triggers.kinds import always
 
 
 def unfit(manifest: TargetManifest) -> Refused | None:
-    """Return why the target cannot be forked here, as far as known without loading it."""
+    """Return why the target cannot be forked here, as far as that is known without loading it."""
     why = not_forkable(manifest)
     stepwise = (
-        "" if manifest.stepwise else f"in {manifest.path.name}, name a function that makes a run in steps"
+        "" if manifest.stepwise else f"in {manifest.path.name}, name a function that makes stepwise runs"
     )
     return Refused(why, stepwise) if why else None
 
@@ -40,7 +40,7 @@ def not_loadable(manifest: TargetManifest, base: Path, home: Path) -> Refused | 
 
 
 def not_forked(manifest: TargetManifest, models: FaultModels, faults: Iterable[Fault]) -> dict[str, str]:
-    """Return the variants that only the reference engine can run, with the reason. Tests a fault of each."""
+    """Return the variants that only the reference engine can run, with reasons; test one fault of each."""
     variants = {fault.spec: fault for fault in faults}
     if why := not_forkable(manifest):
         return dict.fromkeys(variants, why)

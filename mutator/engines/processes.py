@@ -46,7 +46,7 @@ class Ended:
 def check_limits(limits: Limits) -> None:
     """Raise MutatorError if this process's own limits are lower than the campaign's.
 
-    With lower limits, a run could be stopped that finishes elsewhere.
+    With lower limits, a run that finishes on other machines could be stopped here.
     """
     wanted = (
         (resource.RLIMIT_AS, "memory_mb", limits.memory_mb << 20, "ulimit -v"),
@@ -113,7 +113,7 @@ def raised_in(report: dict[str, Any]) -> Raised | None:
 
 
 def environment(hash_seed: int, folder: Path, more: Mapping[str, str] | None = None) -> dict[str, str]:
-    """Return the environment of a run. It takes from the user's only the variables that Python needs."""
+    """Return the environment of a run. Of the user's variables, it has only those that Python needs."""
     kept = {name: os.environ[name] for name in KEPT if name in os.environ}
     own = {**FIXED, "PYTHONHASHSEED": str(hash_seed), "TMPDIR": str(folder)}
     return {**kept, **(more or {}), **own}

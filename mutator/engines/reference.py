@@ -39,15 +39,15 @@ from mutator.targets.manifest import TargetManifest
 from mutator.targets.stopping import stop_source
 
 _CHILD = Path(__file__).parent / "in_target" / "run_once.py"
-_LOOK_UP_S = 0.5  # interval of the check that the parent is alive
-_LONGEST = 4096  # size of the guard's report, in bytes
+_LOOK_UP_S = 0.5  # interval between two checks that the parent is alive
+_LONGEST = 4096  # maximum size of the guard's report, in bytes
 
 
 class ReferenceEngine:
     """Runs each job in a fresh interpreter on its own tree.
 
-    Parameters as in `Setting`. If the manifest supports it, runs of an `independent` engine use no data left
-    by other runs. The same holds for mutants that change a file in the manifest's `reads_itself`.
+    The parameters are those of `Setting`. If the manifest supports it, runs of an `independent` engine use no
+    data left by other runs. The same holds for mutants that change a file in the manifest's `reads_itself`.
     """
 
     def __init__(
@@ -207,7 +207,7 @@ class ReferenceEngine:
         if report["outside"]:
             return f"the target was also imported from {', '.join(report['outside'])}"
         expected = self._pristine | {path: digest(data) for path, data in job.files.items()}
-        # a data cache can leave other files there
+        # a data cache can leave other files in the tree
         more = {path for path in report["files"] if path.endswith(".py")}
         for path in sorted(expected.keys() | more):
             if report["files"].get(path) != expected.get(path):

@@ -236,7 +236,7 @@ class Runner:
 
     def _failed(self, experiment: Experiment, built: Mutant, execution: Execution) -> Record:
         status, detail = assign_blame(execution, built.files, self._raising(experiment, built))
-        # the number of activations before a crash is reproducible; before a time-out it is not
+        # the number of activations before a crash is reproducible; before a timeout it is not
         activation = activation_of(execution.probe or {}) if status is Status.CRASHED else None
         bare = _bare(experiment, status, detail, built, activation)
         return replace(bare, error=error_of(execution.raised))
@@ -247,7 +247,7 @@ def _problem_of(err: BadOutput) -> str:
 
 
 def _not_by_the_fault(t_first: float | None, activation: Activation | None) -> str:
-    """Return why the fault cannot have caused a difference from golden; empty if it can."""
+    """Return why the fault cannot have caused a difference from the golden run; empty if it can."""
     if t_first is None or (activation is not None and t_first >= activation.first):
         return ""
     when = "although the fault was never active" if activation is None else f"before {activation.first} s"

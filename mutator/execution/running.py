@@ -1,4 +1,4 @@
-"""Run a campaign: plan if needed, check, run experiments without a record, build the table.
+"""Run a campaign: plan if needed, check, run experiments without a record, build the table of results.
 
 `mutator run` and `pytest --campaign FILE --campaign-out DIR -n N` differ only in what starts pytest.
 """

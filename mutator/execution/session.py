@@ -77,7 +77,7 @@ class Summary:
 
     @property
     def exit_code(self) -> int:
-        """0: fine; 3: harness errors, or experiments left to run; 130: interrupted."""
+        """0: success; 3: harness errors, or experiments left to run; 130: interrupted."""
         if self.interrupted:
             return EXIT_INTERRUPTED
         whole = self.done == self.planned and (self.proof is None or self.proof.whole)
@@ -105,7 +105,7 @@ class Session:
         self.pending: tuple[Pending, ...] = ()
         self.proof: tuple[equivalence.Sample, ...] = ()
         self.manifest = workspace.manifest(folder.head["target"])
-        # for the whole plan, so that all shards and an unsharded run agree on whether a proof is needed
+        # count the whole plan, so that all shards and an unsharded run agree on whether a proof is needed
         experiments = folder.head["experiments"]
         self.engine = choose_engine(engine, self.manifest, experiments)
         self._not_forked = "" if engine else not_worth_forking(self.manifest, experiments)

@@ -79,7 +79,7 @@ class Traces:
         return sampled_traces(*found, self.manifest.time_channel)
 
     def is_kept(self, experiment_id: str) -> bool:
-        """Return whether a faulty trace is stored that matches the record."""
+        """Return whether a stored faulty trace matches the record."""
         faulty = self.folder.path / "traces" / experiment_id / "faulty"
         if not (faulty / self.manifest.trace_file).is_file():
             return False

@@ -14,7 +14,7 @@ class Format(StrEnum):
 
 
 class Table(StrEnum):
-    """The tables of a run folder."""
+    """The tables that can be exported."""
 
     RESULTS = "results"
     PROPAGATION = "propagation"

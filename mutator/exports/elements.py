@@ -137,7 +137,7 @@ def verdict(experiments: Sequence[Experiment], records: Mapping[str, Record]) ->
         names = sorted({name for e in hazardous for name, _ in known[e].hazards})
         status, reason = "Killed", f"{', '.join(names)} in {len(hazardous)} of {drives}"
     elif not known:
-        status, reason = "Pending", f"none of {drives} has run"
+        status, reason = "Pending", f"not run yet: {drives}"
     elif of[Status.INVALID_MUTANT]:
         status, reason = "CompileError", of[Status.INVALID_MUTANT][0].detail
     elif of[Status.CRASHED]:
@@ -150,7 +150,7 @@ def verdict(experiments: Sequence[Experiment], records: Mapping[str, Record]) ->
         differing = sum(r.outcome is Outcome.SDC for r in of[Status.OK])
         status, reason = "Survived", f"no hazard; an actuator output differed in {differing} of {drives}"
     else:
-        status, reason = "NoCoverage", f"active in none of {drives}"
+        status, reason = "NoCoverage", f"never active in {drives}"
     return {
         "status": status,
         "statusReason": reason,

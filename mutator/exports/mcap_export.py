@@ -1,4 +1,4 @@
-"""Write experiments as MCAP files: golden and faulty run as two sets of topics, and events as messages.
+"""Write experiments as MCAP files: the golden and the faulty run as two sets of topics, events as messages.
 
 Each experiment has a file: `/golden/CHANNEL` and `/faulty/CHANNEL` with a message for each stored value, and
 `/events`. Messages are JSON with schemas; log times are simulated time in ns. Log times cannot be negative:
@@ -69,8 +69,9 @@ def write_experiments(
     if len(found) < len(wanted):
         missing = next(name for name in wanted if name not in found)
         warnings.warn(
-            f"{len(wanted) - len(found)} of {counted(len(wanted), 'experiment')} have no series and are left "
-            f"out, for example {missing}: {remedy.replace(wanted[0], missing)}",
+            f"left out for lack of series: {len(wanted) - len(found)} of "
+            f"{counted(len(wanted), 'experiment')}, for example {missing}; "
+            f"{remedy.replace(wanted[0], missing)}",
             MutatorWarning,
             stacklevel=2,
         )

@@ -16,8 +16,8 @@ FILES = {Format.MUTATION_ELEMENTS: "mutation-elements.json", Format.JUNIT: "juni
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parts:
-    """The part of a run to write: the outcomes that JUnit reports as failures, a filter over results columns
-    for MCAP, the table for CSV and Parquet.
+    """The part of a run to write: the outcomes that JUnit reports as failures, a filter over the columns of
+    the results for MCAP, the table for CSV and Parquet.
     """
 
     failures: Sequence[str] = ()

@@ -43,7 +43,7 @@ def draw_values(draw: Draw, seed: int) -> tuple[int | float, ...]:
     """Return the values of `draw` for `seed`, in the draw's unit: one from each range, or the list unchanged.
 
     The value from a range depends only on seed, key, position and earlier values. Duplicates are drawn again,
-    because equal faults have the same id. A real 0 is drawn again, because it changes nothing.
+    because equal faults have the same id. A 0 among `reals` is drawn again, because it changes nothing.
     """
     if draw.kind == "list":
         return draw.values

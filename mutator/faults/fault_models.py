@@ -131,7 +131,7 @@ class FaultModels:
     folder: Path
     models: Mapping[str, FaultModel]
     probe: str
-    digest: str  # of everything that determines a mutant's text, and which models raise
+    digest: str  # of everything that determines a mutant's text, and of which models raise
 
     def __iter__(self) -> Iterator[FaultModel]:
         return iter(self.models.values())

@@ -26,7 +26,7 @@ def resolve(
     seed: int = 0,
     key: str = "",
 ) -> Injection:
-    """Return the injection with `value`, drawn from `draw`, inserted.
+    """Insert `value`, which was drawn from `draw`, and return the injection.
 
     Parameters are sorted by name, and numbers are in the unit that the template expects. A missing `target`
     defaults to the name that the anchor assigns. A `seed` parameter is drawn from (seed, key). MutatorError
@@ -178,7 +178,7 @@ class _Resolver:
         """Return the value; MutatorError for a text that resembles the draw's name, a likely typo."""
         assert not isinstance(param.value, Drawn)
         if isinstance(param.value, str) and self.draw and suggestion(param.value, [self.draw.name]):
-            raise self._wrong(param, f"'{self.draw.name}', the draw, or a text less similar to it")
+            raise self._wrong(param, f"'{self.draw.name}', the draw, or a text that is less similar")
         return param.value
 
     def _number(self, param: ParamSpec, schema: ParamSchema) -> float:

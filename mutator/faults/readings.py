@@ -1,4 +1,4 @@
-"""Readings: a library's different interpretations of the same faults, e.g. as described and as coded."""
+"""Readings: a library's interpretations of the same faults, such as `as_described` and `as_coded`."""
 
 import re
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Fault specs: YAML files that describe the faults of one module, before values are drawn."""
+"""Fault specs: YAML files that each describe one fault type of a module, before values are drawn."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -207,7 +207,7 @@ class SpecModel(StrictModel, title="The file"):
 
 @cache
 def spec_model(readings: Readings) -> type[SpecModel]:
-    """Make the schema of a library's spec files. Its variants have one key for each reading."""
+    """Make the schema of a library's spec files. A variant has one key for each reading."""
     keys: dict[str, Any] = {}
     for name, about in zip(readings.names, readings.about, strict=True):
         required = name == readings.default
@@ -296,7 +296,7 @@ def _draw(default_key: str, models: dict[str, _DrawModel], source: Source, keys:
         raise source.error((*place, "integers_from"), "a range with fractions", expected="whole numbers")
     if model.decimals is not None and kind != "reals":
         raise source.error(
-            (*place, "decimals"), f"{model.decimals} decimals", expected="`decimals` only with reals_from"
+            (*place, "decimals"), f"decimals: {model.decimals}", expected="`decimals` only with reals_from"
         )
     return Draw(
         key=model.key or default_key,

@@ -1,1 +1,1 @@
-"""Draw figures of results and runs from frames or traces. No statistics, no run folders."""
+"""Draw figures of results and runs from frames or traces. This package does not read run folders."""

@@ -51,7 +51,7 @@ def write_drawings(made: Sequence[Drawing], out: Path) -> None:
         paths = [out / drawing.link(suffix) for suffix in ("svg", "png")]
         if drawing.figure is not None:
             save(drawing.figure, paths)
-        else:  # an earlier report with other results may have written them
+        else:  # an earlier report with other results might have written them
             for path in paths:
                 path.unlink(missing_ok=True)
 

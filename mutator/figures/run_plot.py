@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-GOLDEN_COLOUR = "#0072b2"  # blue and vermilion differ in grey and for colour-blind people
+GOLDEN_COLOUR = "#0072b2"  # blue and vermilion are distinct in greyscale and to colour-blind people
 FAULTY_COLOUR = "#d55e00"
 LATER_COLOUR = "#999999"  # for data after the end of the drive
 PANEL_HEIGHT = 1.1  # inches
@@ -115,7 +115,7 @@ def _figure_type() -> type["Figure"]:
 def _panel(
     axis: "Axes", channel: Channel, golden: tuple[Any, Any], faulty: tuple[Any, Any], end: float
 ) -> None:
-    """Draw one channel: a wide golden line below a narrow faulty line, so that equal lines show both."""
+    """Draw one channel: a wide golden line below a narrow faulty line, so that both show if equal."""
     looks = ((golden, GOLDEN_COLOUR, 2.4, 0.55, "golden"), (faulty, FAULTY_COLOUR, 1.1, 1.0, "faulty"))
     axis.margins(x=0.01, y=0.12)
     for (time, values), colour, width, alpha, label in looks:
@@ -177,6 +177,6 @@ def save(figure: "Figure", paths: Sequence[Path]) -> None:
 
 
 def finite(values: Any) -> Any:
-    """Replace infinities, e.g. of time headway at standstill, with gaps."""
+    """Replace infinities, such as the headway time at standstill, with gaps."""
     array = np.asarray(values, dtype=float)
     return np.where(np.isfinite(array), array, np.nan)

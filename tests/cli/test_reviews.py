@@ -55,7 +55,7 @@ def test_groups_are_found_by_filter_or_id_prefix(cli: Cli, root: Path, known: di
     only = 'model == "omission" and match(trigger, "*time*") and not flagged'
     assert ids(cli, "--only", only, "--exclude", "faults > 7") == [silent]
     assert cli("review", "show", silent[:8], "--json").json[0]["group"] == silent
-    for word, said in (("zz", "no group 'zz'"), ("", "several groups (5) start with ''")):
+    for word, said in (("zz", "no group 'zz'"), ("", "several ids (5) start with ''")):
         answer = cli("review", "show", word)
         assert (answer.code, said in answer.err) == (2, True)
     assert "unknown column `color`" in cli("review", "--only", "color == 1").err

@@ -51,7 +51,7 @@ def test_a_plan_warns_of_values_without_effect(cli: Cli, root: Path) -> None:
     words = ("plan", "toy", "--only", 'fault_type == "lane"', "--out")
     answer = cli(*words, "p")
     assert answer.code == 0
-    assert "warning: value that changes nothing, in 3 of 6 experiments: sensor/lane/shifted 0 m" in answer.err
+    assert "warning: the value changes nothing in 3 of 6 experiments: sensor/lane/shifted 0 m" in answer.err
     spec.write_text(spec.read_text().replace("{by_m: offset}", "{by_m: offset, low_m: 0}"))
     assert "warning" not in cli(*words, "q").err
 

@@ -38,7 +38,7 @@ def main(connection: int, start_file: str) -> int:
     try:
         serve_first(connection, marshal.loads(Path(start_file).read_bytes()))
     finally:
-        os._exit(0)  # exit handlers registered before this belong to the server, not to the target's runs
+        os._exit(0)  # skip exit handlers, which belong to the server, not to the target's runs
 
 
 def serve_first(connection: int, start: dict[str, Any]) -> None:
@@ -176,7 +176,7 @@ class Process:
         return {**ended, "threads": [], "touched": self.touched()}
 
     def become(self, job: dict[str, Any]) -> NoReturn:
-        """In a new child: continue the run so far as a mutant to its end, and report."""
+        """In a new child: continue the run to its end as a mutant, and report."""
         self.connection.close()
         log = os.open(job["log"], os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o644)
         os.dup2(log, 1)
@@ -212,7 +212,7 @@ class Process:
             swap.run_settings(job["settings"], probe)
             probe.limit(job["steps"])
             child.note_activation(probe, job["inactive"])
-            # the state of a probe that observed from the start
+            # give the probe the state that it would have if it had observed from the start
             holder, state = job["probe_state"]
             for name, value in state.items():
                 setattr(getattr(probe, holder), name, value)

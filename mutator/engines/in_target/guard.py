@@ -1,7 +1,7 @@
 """Run code in a separate process within limits, and end everything it started. Standard library only.
 
-The waiting process is a subreaper: it adopts and kills the processes that its descendants leave, in any
-session. As a script, `guard.py PARENT PROGRAM WORDS...` becomes that program, but dies with its parent.
+The waiting process is a subreaper: it adopts and kills the processes that its descendants leave behind, in
+any session. As a script, `guard.py PARENT PROGRAM WORDS...` becomes that program, but dies with its parent.
 """
 
 import ctypes
@@ -44,7 +44,7 @@ def fork(
     """Fork. Return None in the child, which leads its own session and dies with its parent.
 
     The parent waits until the child ends, a limit stops it, or the other end of `caller` (a pipe or socket)
-    is closed. The parent then kills everything that the child left. If the caller closes its end, the
+    is closed. The parent then kills everything that the child left running. If the caller closes its end, the
     child has `patience_s` to end by itself. The parent returns `code` (negative for a signal), `cpu_s`,
     `wall_s`, and `stopped`: WALL, DISK, ABANDONED or "".
     """

@@ -15,7 +15,7 @@ _TOOL = 1  # the tool id that `sys.monitoring` reserves for coverage
 
 
 class Lines:
-    """Notes the lines that run in the tree `tree`, beginning with the first in `since` of the file `path`.
+    """Notes the lines of the tree `tree` that run, beginning when a line in `since` of the file `path` runs.
 
     A fault cannot act in lines that run only before that.
     """

@@ -24,8 +24,8 @@ from pathlib import Path
 from typing import Any
 
 _NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
-_LONGEST = 2000  # the most characters stored of an exception
-_MOST_ERRORS = 50  # the most exceptions stored: the one raised, its causes and those that it groups
+_LONGEST = 2000  # maximum length of a stored exception message, in characters
+_MOST_ERRORS = 50  # maximum number of stored exceptions: the one raised, its causes and those that it groups
 
 
 def beside(name: str) -> Any:

@@ -19,7 +19,7 @@ class SwapRefused(Exception):
 
 
 def install(name: str, parts: Sequence[types.CodeType]) -> Any:
-    """Load the probe module `name` from its code in parts, as an import would."""
+    """Load the probe module `name` from the parts of its code, as an import would."""
     package, _, own = name.rpartition(".")
     module = types.ModuleType(name)
     module.__file__, module.__package__ = parts[0].co_filename, package

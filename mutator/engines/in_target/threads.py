@@ -13,7 +13,7 @@ def others() -> list[str]:
     """Return the names of all threads but the main one, even those of libraries; "" for an unnamed thread."""
     threading: Any = sys.modules.get("threading")
     known = {one.native_id: one.name for one in threading.enumerate()} if threading else {}
-    try:  # not from the folder's link count, which some kernels do not keep up to date
+    try:  # list the threads, because some kernels do not keep the folder's link count up to date
         numbers = [int(task.name) for task in _TASKS.iterdir() if task.name != str(os.getpid())]
     except FileNotFoundError:  # not on Linux
         return sorted(name for name in known.values() if name != threading.main_thread().name)

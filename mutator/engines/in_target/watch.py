@@ -1,4 +1,5 @@
-"""Note lines of a tree that read a clock, draw random numbers without a seed, or start a thread.
+"""Note lines of a tree that read a clock, draw random numbers without a seed, start a thread, or use a value
+that differs between processes.
 
 Standard library and numpy only. Functions are replaced before the target imports them, so results of watched
 runs are not used. The noted line is the innermost one of the tree on the stack, even if a library made the

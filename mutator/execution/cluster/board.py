@@ -94,8 +94,8 @@ class Board:
     def take(self, worker: str, *, ahead: bool = False) -> Piece | None:
         """Return the next piece for a worker, or None.
 
-        With `ahead`, the piece waits at the worker while another piece runs there; None near the end of the
-        work.
+        With `ahead`, the piece waits at the worker while another piece runs there; near the end of the work,
+        the result is then None.
         """
         if ahead and self._waiting * self._mean_s(Kind.RUN) < 2 * self._at_once * LEAST_S:
             return None
@@ -134,7 +134,7 @@ class Board:
     def died(self, piece: Piece, worker: str, at: str = "") -> Piece | None:
         """Note that a worker or its process died during a piece, perhaps in the experiment `at`.
 
-        The piece is put back for other workers, with `at` in a piece of its own. After two deaths, a piece is
+        The piece is put back for other workers, with `at` in a separate piece. After two deaths, a piece is
         split; if it has only one experiment, it is returned, and the caller must give it up.
         """
         if (out := self._out.get(piece.number)) is None:

@@ -1,4 +1,4 @@
-"""The bundle: everything that a worker needs of a campaign, except the plan.
+"""The bundle: everything that a worker needs for a campaign, except the plan.
 
 * meta.json: engine, limits, digests of the golden runs, version of mutator
 * manifest/NAME: the target's manifest
@@ -6,7 +6,7 @@
 * templates/: the fault models
 * scenarios/: the scenario files of the golden runs
 
-Each machine makes the golden runs itself; their digests show whether its results are the same.
+Each machine makes the golden runs itself; their digests show whether its results equal those of the campaign.
 """
 
 import json
@@ -41,7 +41,7 @@ class Bundle:
 
     @classmethod
     def of(cls, workspace: Workspace, folder: RunFolder, engine: str) -> "Bundle":
-        """Pack what workers need of a run that passed its checks."""
+        """Pack what workers need for a run that has passed its checks."""
         data = pack(dict(_parts(workspace, folder, engine)))
         return cls(data, sha256(data).hexdigest())
 

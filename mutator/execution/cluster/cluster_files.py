@@ -152,7 +152,7 @@ class ClusterFile:
         if processes != self.model.options.get("cores"):
             raise self._error(
                 ("options", "processes"),
-                f"{processes} processes on {self.model.options.get('cores')} cores",
+                f"processes: {processes}, cores: {self.model.options.get('cores')}",
                 expected="one process per core, because a worker has one thread",
                 remedy="remove `processes`",
             )

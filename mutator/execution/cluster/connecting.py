@@ -44,7 +44,7 @@ def checked_address(address: str, *, where: Path | None = None) -> str:
 
 
 def is_closed(address: str) -> bool:
-    """Return whether TLS, or an address on this machine, prevents others from connecting and listening in.
+    """Return whether TLS, or an address on this machine, prevents others from connecting or eavesdropping.
 
     Host names except `localhost` are not looked up.
     """
@@ -62,7 +62,7 @@ def is_loopback(host: str) -> bool:
 def refused(what: str, *, where: Path | None = None, line: int | None = None) -> MutatorError:
     """Make the error for a network on which others can reach the scheduler."""
     return MutatorError(
-        f"{what}, which is neither encrypted nor on the loopback interface",
+        f"{what} is neither encrypted nor on the loopback interface",
         where=where,
         line=line,
         argument="cluster",

@@ -46,7 +46,7 @@ class Crew:
     def objection(self, facts: Mapping[str, Any]) -> str:
         """Return why a worker is refused; empty if it is admitted.
 
-        For the same reasons, the run could not be resumed on its machine.
+        The same reasons would prevent resuming the run on the worker's machine.
         """
         if facts["mutator"] != VERSION:
             return f"mutator {facts['mutator']}, here {VERSION}"
@@ -58,7 +58,7 @@ class Crew:
             self._present[name].finished.append((self._now(), count))
 
     def told(self) -> str:
-        """Return a summary: `3 workers on alpha 2.4 a second, beta 0.9 a second`."""
+        """Return a summary: `3 workers on alpha (2.4 a second), beta (0.9 a second)`."""
         hosts: dict[str, list[float | None]] = {}
         for member in self._present.values():
             hosts.setdefault(member.host, []).append(self._per_s(member))
@@ -86,4 +86,4 @@ def describe(name: str, facts: Mapping[str, Any]) -> str:
 
 def _told(host: str, rates: Iterable[float | None]) -> str:
     known = [rate for rate in rates if rate is not None]
-    return f"{host} {sum(known):.1f} a second" if known else host
+    return f"{host} ({sum(known):.1f} a second)" if known else host

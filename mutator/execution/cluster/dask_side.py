@@ -1,8 +1,8 @@
 """Functions that the command submits to Dask workers by reference.
 
 For each run, the task `attend` runs on every worker, outside the thread pool, for as long as the run lasts.
-When it ends, the run's processes on this worker are killed and its files deleted. Each piece is a separate
-task.
+When it ends, the run's processes on that worker are killed, and its files are deleted. Each piece is a
+separate task.
 """
 
 import platform
@@ -59,7 +59,7 @@ def attend(run: str) -> None:
         host.attend(wanted)
     finally:
         with _arrived:
-            if _hosts.get(run) is host:  # unless the run has been delivered again
+            if _hosts.get(run) is host:  # unless the bundle has been delivered again
                 del _hosts[run]
 
 

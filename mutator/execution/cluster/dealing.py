@@ -50,7 +50,7 @@ class _Tended:
     task: "asyncio.Task[None] | None" = None
     has: dict[int, Piece] = field(default_factory=dict)
     is_cut: bool = False  # the scheduler dropped its tasks, so it must be admitted again
-    failures: int = 0  # since its last finished piece
+    failures: int = 0  # since the worker's last finished piece
     ailment: str = ""  # reason for the last failure
     facts: Mapping[str, Any] = field(default_factory=dict)  # empty once they are in run.json
 

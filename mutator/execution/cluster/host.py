@@ -102,7 +102,7 @@ class Host:
 
     @classmethod
     def lay_out(cls, data: bytes, place: str, name: str) -> "Host":
-        """Make a host for the bundle `data` in a new folder of `place`; MutatorError for a damaged bundle."""
+        """Make a host for the bundle `data` in a new folder in `place`; MutatorError for a damaged bundle."""
         with raising_disk_full(Path(place)):
             Path(place).mkdir(parents=True, exist_ok=True)
             folder = Path(tempfile.mkdtemp(prefix="mutator-", dir=place)).resolve()

@@ -40,7 +40,7 @@ class Intake:
         names = [json.loads(line)["experiment_id"] for line in result.records]
         if sorted(names) != sorted(piece.lines):
             raise MutatorError(
-                f"a worker sent {len(names)} records for a piece of {len(piece.lines)} experiments",
+                f"a worker's records ({len(names)}) do not match its piece (experiments: {len(piece.lines)})",
                 where=self._folder.path,
                 expected="one record per experiment",
                 remedy="this is a defect of the harness; please report it",

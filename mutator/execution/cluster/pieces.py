@@ -23,7 +23,7 @@ class Ending(StrEnum):
 
     DONE = "done"
     UNLIKE = "unlike"  # the worker's golden run differs from the campaign's
-    UNFIT = "unfit"  # the worker lacks disk space, memory, files, processes, or a requirement of the target
+    UNFIT = "unfit"  # the worker lacks disk space, memory, another resource, or a requirement of the target
     DIED = "died"  # the process that ran the piece ended
     FAILED = "failed"  # a defect of the harness
 
@@ -74,8 +74,9 @@ class Piece:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Result:
-    """The result of a piece. If it is not done, `text` says why, and `at` is the experiment that was running.
+    """The result of a piece.
 
+    If the piece is not done, `text` says why, and `at` is the experiment that was running.
     `records` and `timings` are lines for the run folder, without checksums. `patches` and `series` are blocks
     for its block files.
     """

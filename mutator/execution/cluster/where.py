@@ -97,7 +97,7 @@ class Scheduler:
         async with connected(self.address, where=self.file) as client:
             listens = str(client.scheduler_info()["address"])
             if not insecure and not is_closed(listens):
-                raise refused(f"{self.address}, a scheduler that listens at {listens}", where=self.file)
+                raise refused(f"{self.address} (a scheduler that listens at {listens})", where=self.file)
             yield client
 
 

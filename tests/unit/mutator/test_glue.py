@@ -103,7 +103,7 @@ def test_flags_replace_keys_of_the_scenario(arguments: list[str], flags: list[st
         (["--seed", "-1"], "--seed -1; expected a whole number"),
         (["--seed"], "no --seed"),
         (["--duration_s", "0.01"], "at least one step"),
-        (["--duration_s", "0"], "duration_s is 0; expected more than 0 s"),
+        (["--duration_s", "0"], "duration_s is 0; expected a finite time above 0 s"),
         (["--duration_s", "long"], "duration_s is 'long'; expected a number"),
     ],
 )

@@ -65,7 +65,8 @@ def test_pairs_in_which_one_run_stops_get_a_remark(found: Comparison) -> None:
     first, *rest = found.pairs
     stopped = replace(first, b=replace(first.b, after_hazard=AfterHazard.STOP))
     (remark,) = remarks(found.a, found.b, replace(found.matching, pairs=(stopped, *rest)))
-    assert remark.startswith(f"1 of {len(found.pairs)} pairs end at the first terminal hazard in only one")
+    assert remark.startswith("Pairs that end at a terminal hazard in only one run, where")
+    assert remark.endswith(f": 1 of {len(found.pairs)}.")
 
 
 def test_runs_without_a_list_of_files_can_be_compared(
@@ -164,7 +165,7 @@ def test_missing_results_do_not_affect_rates(toycar: Workspace, tmp_path: Path, 
     found = compare(a, b)
     kinds = [e.fault.fault_type for e in found.b.experiments]
     assert found.incomplete == kinds.count("lane") + kinds.count("silence") > 0
-    assert dict(pages.reasons(found)) == {"no result in b": kinds.count("silence")}
+    assert dict(pages.reasons(found)) == {"without a result in b": kinds.count("silence")}
     assert len(findings(found, [Gate.HARNESS_ERROR])) == kinds.count("lane")
     rates = found.sheets[2]
     assert {line[1] for line in rates.lines} == {kinds.count("distance")}

@@ -126,7 +126,7 @@ def test_the_scale_of_the_second_run_applies_to_both_runs(runs: tuple[Path, ...]
     found = compare(runs[0], runs[2])
     assert found.changed == ()
     assert {p.row_a.severity for p in found.pairs} == {"", "S2"}
-    assert found.remarks[-1] == "The runs have different severity scales; both use the classes of strict."
+    assert found.remarks[-1] == "The runs have different severity scales; only that of strict is used."
     assert [fact.name for fact in found.facts if fact.differs] == ["scale of severity"]
 
 
@@ -136,6 +136,6 @@ def test_without_severity_classes_no_change_of_severity_is_reported(
 ) -> None:
     found = compare(*(runs[i] for i in order))
     assert not found.having(Change.HIGHER_SEVERITY) + found.having(Change.LOWER_SEVERITY)
-    assert "Severity is not compared: without has no classes." in found.remarks
+    assert "Severity is not compared: without has no severity classes." in found.remarks
     with pytest.raises(MutatorError, match="without has no severity classes"):
         findings(found, [Gate.SEVERITY_S1])

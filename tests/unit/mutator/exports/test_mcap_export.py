@@ -173,7 +173,7 @@ def test_the_same_run_gives_the_same_bytes(run: Path, tmp_path: Path) -> None:
 def test_experiments_without_a_series_are_reported(run: Path, tmp_path: Path) -> None:
     left = 8 - len(hazardous(run))
     with pytest.warns(
-        MutatorWarning, match=f"{left} of 8 experiments have no series.*mutator rerun .* --trace"
+        MutatorWarning, match=f"lack of series: {left} of 8 experiments.*mutator rerun .* --trace"
     ):
         out = export(run, Format.MCAP, tmp_path / "out")
     assert len(list(out.iterdir())) == len(hazardous(run))

@@ -212,7 +212,7 @@ def edited(workspace: Workspace, old: str, new: str) -> str:
         (
             "model: offset\n          unit: m\n          params: {by_m: error}",
             "model: stuck\n          unit: '1'\n          params: {value: -errror}",
-            "17: '-errror' for 'value'; expected 'error', the draw, or a text less similar to it",
+            "17: '-errror' for 'value'; expected 'error', the draw, or a text that is less similar",
         ),
         (
             "model: offset\n          unit: m\n          params: {by_m: error}",
@@ -288,7 +288,7 @@ def edited(workspace: Workspace, old: str, new: str) -> str:
         ),
         ("integers_from", "integers_form", "11: unknown key 'integers_form'; expected one of integers_"),
         ("first: [10, 19], step: 10", "first: [10.5, 19.5], step: 0.5", "a range with fractions"),
-        ("error_m:\n", "error_m:\n        decimals: 1\n", "11: 1 decimals; expected `decimals` only with"),
+        ("error_m:\n", "error_m:\n        decimals: 1\n", "11: decimals: 1; expected `decimals` only with"),
         ("error_m:\n", "error_m:\n        values: [1]\n", "10: 2 ways to draw"),
         ("error_m:\n", "other_m: {values: [1]}\n      error_m:\n", "9: 2 draws; expected one"),
         ("module: sensor", "module: Sensor", "2: 'Sensor'; expected lowercase letters"),

@@ -55,7 +55,7 @@ def with_slurm(folder: Path, monkeypatch: pytest.MonkeyPatch, sbatch: str) -> No
             "  cores: 2\n  security: cert.pem",
             r"some.yaml:6: security: 'cert.pem'; expected true",
         ),
-        ("  cores: 2", "  cores: 2\n  processes: 1", r"some.yaml:6: 1 processes on 2 cores"),
+        ("  cores: 2", "  cores: 2\n  processes: 1", r"some.yaml:6: processes: 1, cores: 2"),
         ("{host: 127.0.0.1}", "127.0.0.1\n  security: true", r"some.yaml:4: "),
         ("1 GB", "much", r"some.yaml:4: Could not interpret 'much'"),
         ("  cores: 2\n", "", r"some.yaml:4: .*cores and memory"),

@@ -49,7 +49,7 @@ def test_the_rate_of_each_machine_is_reported() -> None:
         crew.finished("a", 4)
         crew.finished("b", 2)
     crew.refuse("d", "numpy 1.0")
-    assert crew.told() == "3 workers on alpha 3.0 a second, beta; 1 refused"
+    assert crew.told() == "3 workers on alpha (3.0 a second), beta; 1 refused"
     crew.leave("c")
     assert crew.told().startswith("2 workers on alpha")
 

@@ -63,7 +63,7 @@ def test_the_address_is_read_from_a_scheduler_file(tmp_path: Path) -> None:
     file.write_text(json.dumps({"type": "Scheduler", "address": "tcp://10.0.0.1:8786", "workers": {}}))
     found = parse(str(file))
     assert found == Scheduler(address="tcp://10.0.0.1:8786", file=file)
-    with pytest.raises(MutatorError, match=r"scheduler.json: tcp://10.0.0.1:8786, which is neither"):
+    with pytest.raises(MutatorError, match=r"scheduler.json: tcp://10.0.0.1:8786 is neither"):
         run(opened(found))
 
 
@@ -114,7 +114,7 @@ def test_a_loopback_address_of_a_scheduler_that_listens_elsewhere_is_refused(
         yield SimpleNamespace(scheduler_info=lambda: {"address": "tcp://10.0.0.5:8786"})
 
     monkeypatch.setattr(where, "connected", found)
-    with pytest.raises(MutatorError, match=r"127.0.0.1:8786, a scheduler that listens at tcp://10.0.0.5"):
+    with pytest.raises(MutatorError, match=r"127.0.0.1:8786 \(a scheduler that listens at tcp://10.0.0.5"):
         run(opened(parse("tcp://127.0.0.1:8786")))
     run(opened(parse("tcp://127.0.0.1:8786"), insecure=True))
 
