@@ -19,7 +19,7 @@ LIMITS = Limits(cpu_s=20, wall_s=60, memory_mb=1024, steps=500)
 
 
 class Fork:
-    """A fork engine that is created on first use, so that a test can edit the toy's files before."""
+    """A fork engine that is created on first use, so that a test can edit the toy's files first."""
 
     def __init__(self, toy: Workspace, folder: Path) -> None:
         self.toy = toy
@@ -78,7 +78,7 @@ class Fork:
         return pool
 
     def processes(self) -> list[int]:
-        """Return the process ids of the server and all its descendants."""
+        """Return the ids of the processes whose command lines name this engine's folder."""
         return sorted(int(path.name) for path in Path("/proc").glob("[0-9]*") if self._is_ours(path))
 
     def _is_ours(self, path: Path) -> bool:

@@ -47,5 +47,5 @@ def test_the_label_of_an_experiment_names_its_fault_scenario_and_trigger(
 
 
 def test_no_module_strips_a_placeholder_unit() -> None:
-    """Only `fault_label` makes labels; otherwise, labels of the same fault could differ between tables."""
+    """Only `fault_label` combines a value with its unit, so that a fault has one label in all tables."""
     assert [path for path in SOURCES.rglob("*.py") if '(" -")' in path.read_text()] == []

@@ -94,7 +94,7 @@ def test_a_name_cannot_lead_out_of_the_library(toy: Workspace) -> None:
 
 
 def test_the_path_of_a_spec_file_must_match_its_module_and_fault_type(toy: Workspace) -> None:
-    """The names of specs are therefore unique."""
+    """This keeps the names of specs unique."""
     path = toy.library / "faults" / "sensor" / "distance.yaml"
     path.write_text(path.read_text().replace("fault_type: distance", "fault_type: speed"))
     with pytest.raises(MutatorError, match=r"distance.yaml:2: .*faults/sensor/speed.yaml"):

@@ -10,7 +10,7 @@ from mutator._common import caches
 
 @pytest.fixture
 def filled() -> Path:
-    """A cache with passed checks, used last, and three files of a target, used at different times."""
+    """A cache with three files of a target, used one after another, and checks that were used last."""
     checks = caches.of_checks() / "ab12" / "golden" / "A"
     checks.mkdir(parents=True)
     (checks / "trace.npz").write_bytes(b"1" * 5000)
@@ -47,7 +47,7 @@ def test_without_a_home_folder_the_cache_is_empty(monkeypatch: pytest.MonkeyPatc
 
 
 @pytest.mark.parametrize("name", ["..", "a/b", "/", ".hidden", "plain"])
-def test_each_target_has_its_own_cache_folder(name: str) -> None:
+def test_any_target_name_gives_a_folder_directly_below_targets(name: str) -> None:
     place = caches.of_target(name)
     assert place.resolve().parent == (caches.folder() / "targets").resolve()
 

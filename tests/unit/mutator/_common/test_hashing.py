@@ -93,7 +93,7 @@ def test_values_of_different_types_have_different_digests() -> None:
     ["[1.5, -0.0, 1e-7]", "NaN", "[Infinity, -1e999]", "18446744073709551615", '"\\ud800"', "-0"],
 )
 def test_json_is_read_as_the_standard_library_reads_it(text: str) -> None:
-    """The faster JSON reader refuses NaN, infinities and lone surrogates."""
+    """By itself, the faster JSON reader refuses NaN, infinities and lone surrogates."""
     assert repr(from_json(text.encode())) == repr(json.loads(text))
 
 

@@ -39,7 +39,7 @@ def test_a_given_value_replaces_the_drawn_values(toycar: Workspace, tmp_path: Pa
     assert trial.trigger.condition == "hwt <= 2.0"
 
 
-def test_any_fault_record_can_be_tried(toycar: Workspace) -> None:
+def test_a_fault_record_can_be_tried_but_only_without_a_value(toycar: Workspace) -> None:
     [fault] = toycar.faults("hostile/crash")
     trial = mutator.try_fault(fault, "A", workspace=toycar)
     assert trial.fault is fault

@@ -22,7 +22,7 @@ ENTRY = "  - {operators: [arithmetic, branch], in: ['toycar/driver.py::Driver.*'
 
 @pytest.fixture(autouse=True)
 def lines(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pretend that golden runs execute lines 1 to 16 of the driver, so that nothing is run."""
+    """Pretend that golden runs execute lines 1 to 16 of the driver, instead of running them."""
 
     def known(manifest: TargetManifest, drives: Sequence[GoldenDrive], limits: Limits) -> list[Executed]:
         return [{"toycar/driver.py": frozenset(range(1, 17))} for _ in drives]

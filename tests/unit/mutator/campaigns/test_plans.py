@@ -260,5 +260,7 @@ def test_the_run_schema_does_not_affect_the_plan_digest(
 ) -> None:
     before = make_plan(toycar, "small").digest
     monkeypatch.setattr("mutator.store.run_head.SCHEMA", "run/9")
-    monkeypatch.setattr("mutator.campaigns.plans.SCHEMA", "run/9", raising=False)  # where it is imported
+    monkeypatch.setattr(
+        "mutator.campaigns.plans.SCHEMA", "run/9", raising=False
+    )  # the module that imports it
     assert make_plan(toycar, "small").digest == before

@@ -90,7 +90,7 @@ def test_a_plan_written_in_parts_equals_the_one_in_memory(
     assert (read.tally, read.goldens()) == (plan.tally, plan.goldens())
 
 
-def test_a_large_plan_loads_experiments_when_accessed(
+def test_planned_experiments_can_be_read_by_position(
     toycar: Workspace, campaign: Callable[..., Path], tmp_path: Path
 ) -> None:
     folder = freeze(Planning(toycar, campaign()), tmp_path / "run", toycar)

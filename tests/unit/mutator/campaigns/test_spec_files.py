@@ -46,7 +46,7 @@ def test_a_missing_spec_file_is_reported(toycar: Workspace, mine: Path) -> None:
 
 
 def test_two_specs_with_the_same_name_are_refused(toycar: Workspace, mine: Path) -> None:
-    """Tables could not distinguish their faults."""
+    """Otherwise, tables could not distinguish their faults."""
     file = mine.parent / "specs" / "drifting.yaml"
     file.write_text(file.read_text().replace("fault_type: drifting", "fault_type: lane"))
     with pytest.raises(MutatorError, match="has the name of a spec in the library, sensor/lane"):

@@ -37,7 +37,8 @@ def lane_is_left(e: Experiment) -> dict[str, Any]:
 def runs(
     tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace], write_run: Write
 ) -> tuple[Path, Path]:
-    """Two runs. In `before`, every fault is masked. `after` has a changed target and worse results."""
+    """The runs `before`, in which every fault is masked, and `after`, with a changed target and worse
+    results."""
     place = tmp_path_factory.mktemp("runs")
     toycar = copy_toycar(place)
     before = write_run(toycar, place / "before")

@@ -36,7 +36,7 @@ def row(experiment_id: str = "e", **given: Any) -> Row:
 
 
 def side(*experiments: Experiment, without: tuple[Experiment, ...] = ()) -> Side:
-    """Return a run of these experiments, in which those in `without` have not run."""
+    """Return a run with these experiments; those in `without` have not run."""
     rows = {e.id: row(e.id) for e in experiments if e not in without}
     return Side(folder=RunFolder(Path("run")), experiments=experiments, rows=rows)
 

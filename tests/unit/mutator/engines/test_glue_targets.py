@@ -69,7 +69,7 @@ def test_both_engines_give_the_same_bytes(glued: Fork) -> None:
 
 
 def test_a_run_imports_the_glue_of_the_harness_that_started_it(glued: Fork) -> None:
-    """Another version of mutator can be installed."""
+    """Otherwise, a run could import another installed version of mutator."""
     plain = glued.engine.reference.execute(glued.job(at_time(2.0)), glued.folder / "plain")
     assert Path(plain.log.strip()) == Path(mutator.__file__)
     assert "mutator" not in plain.modules

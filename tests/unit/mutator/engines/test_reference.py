@@ -280,7 +280,7 @@ def test_grandchildren_end_with_the_run(run: Run, tmp_path: Path) -> None:
 
 
 def ended(pid: int) -> bool:
-    """Return whether the process ends within a few seconds. A zombie process has ended."""
+    """Return whether the process ends, or becomes a zombie, within a few seconds."""
     deadline = time.monotonic() + 5.0
     while time.monotonic() < deadline:
         try:

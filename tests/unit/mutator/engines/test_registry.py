@@ -10,7 +10,7 @@ from mutator.errors import MutatorError
 from mutator.workspace import Workspace
 
 
-def test_each_engine_in_the_list_can_be_created() -> None:
+def test_each_listed_engine_has_a_description_and_a_factory() -> None:
     for name, kind in ENGINES.items():
         assert kind.name == name and kind.about
         assert callable(resolve_name(kind.factory))

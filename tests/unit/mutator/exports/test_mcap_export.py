@@ -199,7 +199,7 @@ def test_an_option_that_a_format_does_not_use_is_refused(
         export(run, format, tmp_path / "x", parts=parts)
 
 
-def test_other_tables_are_exported(run: Path, tmp_path: Path) -> None:
+def test_the_tables_of_propagation_and_timings_are_exported(run: Path, tmp_path: Path) -> None:
     parts = Parts(table=Table.PROPAGATION)
     written = export(run, Format.CSV, tmp_path / "p.csv", parts=parts)
     rows = pd.read_csv(written)

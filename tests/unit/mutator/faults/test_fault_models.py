@@ -1,4 +1,4 @@
-"""Fault models: their templates, their schema, and their examples, which are tests."""
+"""Fault models: their templates, their schema, and their examples, which serve as tests."""
 
 import shutil
 from pathlib import Path

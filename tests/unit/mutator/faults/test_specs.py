@@ -62,7 +62,7 @@ def test_both_readings_share_their_draws(toy: Workspace) -> None:
     assert of(coded, "longer")[0].injections == of(described, "longer")[0].injections
 
 
-def test_hold_and_changes_belong_to_the_fault(toy: Workspace) -> None:
+def test_a_fault_has_the_hold_and_the_changes_of_its_variant(toy: Workspace) -> None:
     (silent,) = of(faults(toy), "silent")
     assert silent.hold is Hold.TO_END
     assert silent.changes == ("alone",)

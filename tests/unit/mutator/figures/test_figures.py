@@ -54,7 +54,7 @@ def test_the_heat_map_shows_hazards_per_activated_fault(frame: pd.DataFrame) -> 
     assert cells.mask.tolist() == [[False, True], [True, True]]
 
 
-def test_a_time_panel_has_a_bar_only_for_runs_with_both_events(frame: pd.DataFrame) -> None:
+def test_time_panels_include_only_runs_with_both_events(frame: pd.DataFrame) -> None:
     panels = {axis.get_title(loc="left"): axis for axis in propagation.draw(frame).axes}
     assert [t.get_text() for t in panels["activation to manifest"].texts] == ["3", "1"]
     assert [t.get_text() for t in panels["alert to hazard"].texts] == ["2", "1"]
@@ -81,7 +81,7 @@ def test_a_single_fault_type_or_scenario_is_not_compared(frame: pd.DataFrame) ->
     assert [d.name for d in drawings(frame.assign(kind="a/b"))] == ["propagation_by_scenario"]
 
 
-def test_runs_without_any_hazard_or_time_are_drawn(frame: pd.DataFrame, tmp_path: Path) -> None:
+def test_runs_without_hazards_or_times_are_drawn(frame: pd.DataFrame, tmp_path: Path) -> None:
     nothing = results({}, BLUR | {"scenario": "S2"})
     write_drawings(drawings(nothing), tmp_path)
     assert len(list((tmp_path / "figures").iterdir())) == 6

@@ -80,7 +80,7 @@ def test_a_plot_drawn_again_has_the_same_bytes(tmp_path: Path, manifest: SimpleN
     assert (tmp_path / "a.svg").read_bytes() == (tmp_path / "b.svg").read_bytes()
 
 
-def test_the_suffix_of_a_file_determines_its_format(tmp_path: Path, manifest: SimpleNamespace) -> None:
+def test_a_file_with_the_suffix_png_is_a_png_image(tmp_path: Path, manifest: SimpleNamespace) -> None:
     save(draw_run(trace(), trace(), manifest, title="x"), [tmp_path / "p.png"])
     assert (tmp_path / "p.png").read_bytes().startswith(b"\x89PNG")
 

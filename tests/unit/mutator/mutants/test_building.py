@@ -36,7 +36,7 @@ def build(toy: Workspace, fault: Fault | None, trigger: Trigger = CLOSING) -> Mu
 
 
 def one(**location: object) -> Fault:
-    """A handwritten fault, `gap = 3.0`, at a given location."""
+    """Return a handwritten fault, `gap = 3.0`, at the given location."""
     anchor = Anchor(kind=AnchorKind.AFTER_ASSIGN, name="gap")
     values = {"path": "toycar/sensor.py", "function": "Sensor.measure", "anchor": anchor, **location}
     params = (("target", "gap"), ("value", 3.0))
@@ -169,7 +169,7 @@ def test_faults_are_active_once_their_trigger_fires(toy: Workspace, tmp_path: Pa
 def test_locations_of_handwritten_faults_are_checked(
     toy: Workspace, location: dict[str, object], said: str
 ) -> None:
-    """Locations in specs are checked when the spec is expanded."""
+    """Locations in a spec are checked earlier, when the spec is expanded."""
     with pytest.raises(MutatorError) as caught:
         build(toy, one(**location))
     assert said in str(caught.value)

@@ -174,7 +174,7 @@ def test_a_tuple_is_changed_as_a_whole(value: str, kept: str) -> None:
 
 
 def test_a_huge_number_has_no_anchor() -> None:
-    """Python cannot write a number with thousands of digits."""
+    """Python refuses to convert a number with thousands of digits to text."""
     source = f"def f(a):\n    b = g(0x{'f' * 5000})\n    return a\n"
     assert 'return (0 if _fi.active("a0") else a)' in changed(
         source, (location("return_value", "a", function="f"), "0")

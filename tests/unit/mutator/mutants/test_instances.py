@@ -79,13 +79,13 @@ def drive(clone: Workspace, data: bytes, times: tuple[float, ...]) -> tuple[list
 def test_a_fault_can_be_limited_to_instances_and_executions(
     clone: Workspace, anchor: Anchor, given: dict[str, Any], active: list[list[int]], count: int
 ) -> None:
-    """Only executions that meet the condition are numbered, beginning with the activation."""
+    """Only executions that meet the condition are numbered, starting at the activation."""
     seen, told = drive(clone, mutant(clone, anchor, **given), (0.0, 1.0, 2.0, 3.0))
     assert seen == [[1, 2, 3], *active, [1, 2, 3]]
     assert told["count"] == count
 
 
-def test_executions_are_counted_anew_in_each_active_period(clone: Workspace) -> None:
+def test_executions_are_counted_anew_in_each_run(clone: Workspace) -> None:
     seen, told = drive(clone, mutant(clone, AFTER, call=2), (0.0, 1.0, 3.0, 0.0, 1.0, 2.0))
     assert [step[1] for step in seen] == [2, 12, 2, 2, 12, 2]
     assert told["count"] == 1, "only the last run is counted"
@@ -138,13 +138,12 @@ def test_lines_with_a_selection_are_recognized_as_checking_the_probe(clone: Work
         "",
     ],
 )
-def test_a_condition_that_calls_calculates_or_assigns_is_refused(text: str) -> None:
+def test_an_invalid_instance_condition_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match=r".*"):
         instance_condition(text)
 
 
-def test_unknown_names_and_models_with_lasting_effects_are_refused(clone: Workspace) -> None:
-    """A lasting effect would outlive the active time of the fault."""
+def test_an_unknown_name_or_an_unsuitable_model_is_refused(clone: Workspace) -> None:
     with pytest.raises(MutatorError, match=r"m.py:3: 'side' in `where` is not known in drive; .*index"):
         mutant(clone, AFTER, where="side == 'left'")
     params = (("per_step", 1.0), ("stays", True), ("target", "gap"))

@@ -99,7 +99,7 @@ def test_each_listed_anchor_finds_its_own_line(listed: list[ListedPlace]) -> Non
     assert max(Counter(one.location for one in listed).values()) == 1
 
 
-def test_models_can_be_injected_only_at_the_places_that_list_them(
+def test_each_model_can_be_injected_at_the_places_that_list_it(
     shipped: Workspace, listed: list[ListedPlace]
 ) -> None:
     file, models, tried = parse_file("m.py", SOURCE, Path("x")), shipped.fault_models(), Counter[bool]()

@@ -299,7 +299,7 @@ def test_contradicting_parameters_are_refused(
     ("value", "index"), [(b"ab", 2), (b"ab", -3), (b"", 0), ("ab", 0), (3, 0), (bytearray(), 0)]
 )
 def test_a_missing_byte_is_an_error(toy: Make, value: Any, index: int) -> None:
-    """Otherwise the value would silently stay unchanged."""
+    """Otherwise, the value would silently stay unchanged."""
     made = toy(
         "def f(x):\n    return x\n", AnchorKind.RETURN_VALUE, "", "byte_corruption", index=index, mask=1
     )

@@ -22,7 +22,7 @@ from mutator.workspace import Workspace
 def probe(
     clone: Workspace, condition: str = "rs > 0", observation: Observation | None = None, **more: Any
 ) -> Any:
-    """A new probe module with two injections, `a` and `b`."""
+    """Return a new probe module with two injections, `a` and `b`."""
     observation = observation or clone.manifest("openpilot").observation
     trigger = Trigger(name="test", condition=check_condition(condition))
     values = contract.template_values("m1", trigger, Hold.WHILE, ("a", "b"), observation, 0.1) | more

@@ -107,7 +107,7 @@ def test_a_metric_with_an_existing_column_is_refused(toy: Workspace, metrics: li
 
 
 @pytest.mark.parametrize("name", ["h1", "H2", "too_fast"])
-def test_other_hazard_names_are_valid(toy: Workspace, name: str) -> None:
+def test_hazard_names_without_an_existing_column_are_valid(toy: Workspace, name: str) -> None:
     path = toy.library / "targets" / "toy.yaml"
     path.write_text(path.read_text().replace("hazards: [H1]", f"hazards: [{name}]"))
     assert toy.manifest("toy").hazards == (name,)

@@ -18,7 +18,7 @@ def manifest() -> TargetManifest:
 
 
 def driven(manifest: TargetManifest, gaps: list[float], offsets: list[float]) -> Judged:
-    """A drive at 10 m/s behind a vehicle at 8 m/s, in steps of one second."""
+    """Judge a drive at 10 m/s behind a vehicle at 8 m/s, in steps of one second."""
     trace = {channel.name: np.zeros(len(gaps)) for channel in manifest.judged}
     trace |= {"t": np.arange(len(gaps), dtype=float), "d_rel": np.array(gaps), "hwt": np.array(gaps) / 10}
     trace |= {"v_ego": np.full(len(gaps), 10.0), "v_lead": np.full(len(gaps), 8.0)}
@@ -31,7 +31,7 @@ OF_THE_GAP = ("margin_h1", "smallest_gap", "smallest_hwt", "smallest_ttc", "larg
 @pytest.mark.parametrize(
     ("gaps", "offsets", "values"),
     [
-        # the car leaves its lane behind the other one, passes it, and returns in front of the next one
+        # the car leaves its lane behind a vehicle, passes it, and returns behind the next one
         ([10, 6, 2, -3, -40, 30], [0, 2.75, BESIDE, 3, -BESIDE, -2.75], [6, 6, 0.6, 3, 4 / 12, None]),
         ([10, 4, -1, -3], [0, 1, 2, 2], [-1, -1, -0.1, 2, 4 / 8, 2]),  # contact at 2 s, overlap until 3 s
         ([3, 1, -1], [BESIDE, 3, 9], [None] * 6),  # the car is never behind the vehicle

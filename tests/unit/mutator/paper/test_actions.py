@@ -14,18 +14,18 @@ NONE = np.zeros_like(T)
 
 
 def during(begin: float, end: float) -> np.ndarray:
-    """Half of full gas or brake from `begin` until just before `end` (in s), and none otherwise."""
+    """Return half of full gas or brake from `begin` until just before `end` (in s), and zero otherwise."""
     return np.where((begin - 0.01 < T) & (end - 0.01 > T), 0.5, 0.0)
 
 
 def pair(golden: dict[str, np.ndarray], faulty: dict[str, np.ndarray]) -> Pair:
-    """The record of a fault that is active at 2 s, with an alert at 4 s and the given events until 8 s."""
+    """Return two runs, with the activation at 2 s, an alert at 4 s and a hazard at 8 s."""
     none = {"gas": NONE, "brake": NONE}
     return Pair(t=T, golden=none | golden, faulty=none | faulty, step_s=0.1, start=2.0, end=8.0, alert=4.0)
 
 
 def stretch(look: Look, given: Pair) -> tuple[float, float] | None:
-    """The times of the first and last step that show the action."""
+    """Return the times of the first and last step that show the action."""
     steps = look(given)
     return None if steps is None else (round(T[steps][0], 1), round(T[steps][-1], 1))
 

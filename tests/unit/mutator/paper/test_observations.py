@@ -31,7 +31,7 @@ EVENTS = {  # the events of a run, by the count that includes it
 
 
 def runs_of(tally: Tally, **group: str) -> pd.DataFrame:
-    """Runs with the given counts of events."""
+    """Return runs with the given counts of events."""
     warned = tally.hazards - (tally.hazards_no_alerts or 0)
     kinds = [
         (warned, ("manifested", "alerts", "hazards")),
@@ -47,7 +47,7 @@ def runs_of(tally: Tally, **group: str) -> pd.DataFrame:
 
 
 def frame_of(parts: Iterable[pd.DataFrame]) -> pd.DataFrame:
-    """A frame of these runs, with ids, pairs of methods, 40 faults and end times."""
+    """Return a frame of these runs, with ids, pairs of methods, 40 faults and end times."""
     frame = pd.concat(parts, ignore_index=True)
     number = frame.groupby("method").cumcount()
     ids = {"experiment_id": frame.index.astype(str), "seed": number.astype(str)}
@@ -55,7 +55,8 @@ def frame_of(parts: Iterable[pd.DataFrame]) -> pd.DataFrame:
 
 
 def of_rows(*rows: dict[str, Any]) -> pd.DataFrame:
-    """A frame of guided chaff runs in S1, each given by its differences from a run without activation."""
+    """Return a frame of guided chaff runs in S1, each given by its differences from a run without
+    activation."""
     return frame_of([results(*rows)])
 
 

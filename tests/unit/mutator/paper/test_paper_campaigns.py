@@ -1,4 +1,4 @@
-"""The paper's campaigns have the counts of its table III."""
+"""The paper campaigns have the counts of the paper's table III."""
 
 import os
 import subprocess

@@ -102,7 +102,7 @@ def test_contradictory_counts_are_reported_with_their_line(tmp_path: Path) -> No
         load_paper(tmp_path)
 
 
-def test_within_fault_types_guided_is_ahead_only_per_activated_fault(paper: Paper) -> None:
+def test_within_fault_types_guided_faults_are_ahead_only_per_activated_fault(paper: Paper) -> None:
     activated, injected = (
         contrasts.mantel_haenszel(contrasts.strata(paper.coverage, whole)) for whole in contrasts.WHOLES
     )

@@ -31,15 +31,15 @@ observations:
 
 
 def seed(number: int, hazards: int, *, alert: bool = False) -> list[dict[str, Any]]:
-    """Twenty activated runs with one seed; the first `hazards` of them have a hazard."""
+    """Return twenty activated runs with one seed; the first `hazards` of them have a hazard."""
     ran = {"seed": number, "t_activation": 1.0}
     made = [ran | ({"h1": 1, "t_h1": 2.0} if i < hazards else {}) for i in range(20)]
     return [made[0] | ({"t_alert": 3.0} if alert else {}), *made[1:]]
 
 
 def frame() -> pd.DataFrame:
-    """Seed 3 shows the first observation, seed 1 contradicts it, and two seeds are undecided. All seeds
-    except 12 show the other observation."""
+    """Return runs in which seed 3 shows the first observation, seed 1 contradicts it, and two seeds are
+    undecided. All seeds except 12 show the second observation."""
     return results(*seed(11, 11, alert=True), *seed(3, 20, alert=True), *seed(1, 0, alert=True), *seed(12, 9))
 
 
@@ -57,7 +57,7 @@ def test_seeds_that_show_each_observation_are_counted(tmp_path: Path) -> None:
     assert len(lines) == 8 and lines[2][:4] == (3, 1, "holds", "1.1")
 
 
-def test_a_seed_without_some_fault_types_is_judged_by_its_own_runs(tmp_path: Path) -> None:
+def test_a_claim_about_all_faults_is_undecided_for_a_seed_without_all_fault_types(tmp_path: Path) -> None:
     file = tmp_path / "observations.yaml"
     file.write_text(OBSERVATIONS)
     found = judge_by_seed(file, frame(), lambda runs: ["a type"] if set(runs["seed"]) == {"3"} else [])

@@ -30,7 +30,7 @@ def study_forms(run: Path) -> tuple[str, str]:
     return (report / "STUDY.md").read_text(), " ".join(Page((report / "study.html").read_text()).texts)
 
 
-def test_the_observations_have_their_own_files(run: Path) -> None:
+def test_tables_of_the_study_are_not_in_the_main_report(run: Path) -> None:
     forms = study_forms(run)
     cell = "35.6 % (154/432; 31.3 to 40.3)"
     files = [run / "report" / "tables" / f"coverage_guided.{kind}" for kind in ("md", "csv")]

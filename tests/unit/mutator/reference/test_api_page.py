@@ -20,7 +20,7 @@ def test_every_public_name_is_documented() -> None:
 
 
 def test_the_page_describes_every_public_name() -> None:
-    """The version is left out, because it is not an object."""
+    """The version is left out, because it is a plain string."""
     page = python_api(Workspace.find(CLONE))
     headings = re.findall(r"^### (?:mutator\.)?(\w+)$", page, re.MULTILINE)
     assert sorted(headings) == sorted(set(mutator.__all__) - {"__version__"})

@@ -16,7 +16,7 @@ def rows(heading: str) -> list[list[str]]:
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[2:]]
 
 
-def test_each_model_has_its_row(clone: Workspace) -> None:
+def test_each_model_has_one_row(clone: Workspace) -> None:
     found = [name for first, *_ in rows("The models") for name in _MODEL.findall(first)]
     assert all(name == section for name, section in found)
     assert sorted(name for name, _ in found) == sorted(clone.fault_models().models)

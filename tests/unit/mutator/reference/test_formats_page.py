@@ -14,7 +14,7 @@ IN_PAGE = re.compile(rf"`{SCHEMA.pattern}`")
 
 
 def in_code() -> set[str]:
-    """Every `name/number` string literal in the harness or the shipped target."""
+    """Return every `name/number` string literal in the harness or the shipped target."""
     files = [*(CLONE / "mutator").rglob("*.py"), *(CLONE / "target").rglob("*.py")]
     assert len(files) > 250
     return {name for file in files for name in IN_CODE.findall(file.read_text(encoding="utf-8"))}

@@ -113,7 +113,7 @@ def test_exceptions_are_described_with_place_and_causes(
     message: str,
     stacks: list[list[tuple[str, int]]],
 ) -> None:
-    """Each line of the tree that an exception passed is listed once, innermost first."""
+    """Each line of the tree that an exception passed through is listed once, innermost first."""
     found = described(name, *arguments)
     assert found["ended"] == "error"
     error = found["error"]
@@ -127,10 +127,9 @@ def test_members_of_an_exception_group_are_examined(described: Callable[..., dic
     assert [("a.py", 3), ("a.py", 15)] in [[at[:2] for at in stack] for stack in error["stacks"]]
 
 
-def test_only_the_probes_own_limit_exception_is_the_step_limit(
+def test_the_probes_limit_exception_is_reported_as_the_step_limit(
     described: Callable[..., dict[str, Any]],
 ) -> None:
-    """The target can have a class with the same name."""
     assert described("stop") == {"ended": "steps"}
 
 

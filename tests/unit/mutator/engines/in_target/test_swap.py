@@ -105,7 +105,7 @@ def functions(old: str, new: str) -> list[tuple[str, tuple[str, ...], types.Code
 def test_functions_of_every_form_run_the_new_code(
     loaded: types.ModuleType, word: str, call: Callable[[types.ModuleType], str]
 ) -> None:
-    """The new code runs even after many calls of the old code."""
+    """The new code runs even after many calls to the old code."""
     kept = call
     for _ in range(200):
         if word != "cached":

@@ -1,4 +1,4 @@
-"""An event loop in a separate thread, because the tests' own thread can already run the loop of a browser."""
+"""An event loop in a separate thread, because the tests' own thread may already be running one."""
 
 import asyncio
 from collections.abc import Coroutine

@@ -21,7 +21,7 @@ CLONE = Path(__file__).parents[5]
 
 
 class Clock:
-    """A clock that tests set."""
+    """A clock whose time is set by the tests."""
 
     now = 0.0
 
@@ -47,7 +47,8 @@ def ids(folder: RunFolder) -> list[str]:
 
 
 def board(folder: RunFolder, clock: Clock, proof: tuple[str, ...] = ()) -> Board:
-    """A board for two workers, with the whole plan and a proof that reruns the experiments in `proof`."""
+    """Return a board for two workers, with the whole plan and a proof that reruns the experiments in
+    `proof`."""
     samples = [Sample(number, name) for number, name in enumerate(proof)]
     made = Board(folder, pending(folder, {}), samples, now=clock)
     for name in ("alpha", "beta"):

@@ -1,4 +1,4 @@
-"""Which workers are allowed to join a run, and how workers are reported."""
+"""Which workers can join a run, and how they are described."""
 
 import pytest
 
@@ -54,7 +54,7 @@ def test_the_rate_of_each_machine_is_reported() -> None:
     assert crew.told().startswith("2 workers on alpha")
 
 
-def test_a_worker_reports_its_machine_and_versions() -> None:
+def test_a_worker_is_described_by_its_machine_and_versions() -> None:
     assert describe("w", FACTS) == (
         f"w (alpha, AMD EPYC, CPython 3.11.7, mutator {VERSION}, openblas 0.3.31 (Zen))"
     )

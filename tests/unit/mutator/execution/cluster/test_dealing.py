@@ -80,7 +80,7 @@ class Workers:
 
     def __init__(self, **workers: Work) -> None:
         self.workers, self.scheduler, self.address = workers, self, "here"
-        self.seconds: dict[str, float] = {}  # how long a worker takes for a piece
+        self.seconds: dict[str, float] = {}  # how long each worker takes for a piece
         self.began: list[str] = []  # the worker of each piece that began
         self.cut_at = -1  # once this many pieces have begun, the scheduler forgets this client's tasks
         self._open: list[asyncio.Future[Any]] = []

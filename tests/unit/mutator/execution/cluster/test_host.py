@@ -107,7 +107,7 @@ def test_if_the_process_does_not_start_no_piece_is_blamed(host: Host, sent: tupl
     assert "meta.json" in result.text
 
 
-def test_a_cancelled_piece_ends_within_a_second(host: Host, sent: tuple[Bundle, Piece]) -> None:
+def test_the_process_of_a_cancelled_piece_ends(host: Host, sent: tuple[Bundle, Piece]) -> None:
     asked: list[float] = []
 
     def wanted() -> bool:
