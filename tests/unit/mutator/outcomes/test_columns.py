@@ -34,7 +34,7 @@ def test_another_target_has_its_own_columns() -> None:
     assert not {"h1", "t_h1", "max_dev_gas", "max_dev_brake", "max_dev_steer"} & {*made}
 
 
-def test_a_target_can_have_no_hazards() -> None:
+def test_a_target_need_not_have_hazards() -> None:
     made = names([], [])
     assert hazards_in(made) == ()
     assert not [name for name in made if name.startswith("max_dev_")]

@@ -36,7 +36,7 @@ def stretch(look: Look, given: Pair) -> tuple[float, float] | None:
         (2.0, None),  # no significant braking after the activation
         (3.0, (3.0, 5.9)),  # 1 s of 4 s
         (4.5, None),  # 2.5 s of 4 s
-        (6.0, None),  # as long as required
+        (6.0, None),  # as long as in the golden run
     ],
 )
 def test_braking_is_too_short_if_it_lasts_at_most_half_as_long(
@@ -57,10 +57,10 @@ def test_braking_is_not_too_short_if_the_golden_run_does_not_brake() -> None:
         (5.0, 5.4, None),  # only for a moment
         (0.5, 1.9, None),  # before the activation
         (8.1, 9.9, None),  # after the hazard
-        (3.0, 4.0, None),  # the golden run gives gas, too
+        (3.0, 4.0, None),  # the golden run applies gas, too
     ],
 )
-def test_gas_that_the_golden_run_does_not_give_is_at_a_wrong_time(
+def test_gas_that_the_golden_run_does_not_apply_is_at_a_wrong_time(
     begin: float, end: float, shown: tuple[float, float] | None
 ) -> None:
     given = pair({"gas": during(3, 4)}, {"gas": during(begin, end)})
@@ -76,7 +76,7 @@ BOTH = {"gas": during(5, 7), "brake": during(1, 6)}
     [
         (BOTH, 4.5, (4.5, 9.9)),
         (BOTH, 5.5, None),  # more than 1 s after the alert
-        ({"brake": during(1, 6)}, 4.5, None),  # the golden run gives no gas
+        ({"brake": during(1, 6)}, 4.5, None),  # the golden run applies no gas
     ],
 )
 def test_gas_and_brake_are_unavailable_if_they_end_soon_after_the_alert(
