@@ -1,6 +1,6 @@
 """Resolves anchors, such as an assignment in a function, to lines of a source file."""
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -21,7 +21,7 @@ from mutator.targets.source_tree import SourceTree
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Site:
-    """A resolved anchor. The statement is on lines `first` to `last` (exclusive, from 0).
+    """A resolved anchor. The statement is on lines `first` to `last` (from 0, `last` exclusive).
 
     An `entry` has no statement: `first` equals `last`.
     """
@@ -43,7 +43,7 @@ class ParsedFile:
     encoding: str
     newline: bytes
     indent_unit: bytes
-    import_line: int  # imports are inserted before it
+    import_line: int  # the import of the probe is inserted before this line
     functions: Mapping[str, tuple[Function, ...]]
     places: frozenset[Place]  # according to `ast`
     expressions: Mapping[str, tuple[Expression, ...]]  # by function
@@ -97,7 +97,7 @@ class ParsedFile:
 
 
 def parsed(tree: SourceTree, path: str) -> ParsedFile:
-    """Parse the file, cached; MutatorError if it is not a Python file of the target."""
+    """Parse the file only once; MutatorError if it is not a Python file of the target."""
     return tree.derived(path, parse_file)
 
 
@@ -175,10 +175,10 @@ def _inside(file: ParsedFile, first: int, names: frozenset[str]) -> Site:
 def _check_place(file: ParsedFile, place: Place | None) -> None:
     if place is not None and place.in_bytes(file.lines, file.encoding) not in file.places:
         raise MutatorError(
-            "LibCST and Python's own parser see this statement in different places",
+            "LibCST and Python's own parser give different positions for this statement",
             where=file.where,
             line=place.start[0],
-            expected="one place for both",
+            expected="the same position from both",
             remedy="anchor at another statement, or reformat the target",
         )
 
@@ -192,11 +192,12 @@ def _entry(file: ParsedFile, location: FaultLocation, functions: tuple[Function,
     if (len(functions) > 1) if nth is None else (nth > len(functions)):
         places = ", ".join(f"line {f.line + 1}" for f in functions)
         raise MutatorError(
-            f"{len(functions)} functions '{location.function}', nth {nth}",
+            f"{counted(len(functions), 'function')} named '{location.function}'"
+            + (f", but `nth` is {nth}" if nth else ""),
             where=file.where,
             line=functions[0].line + 1,
-            expected=f"one of those at {places}",
-            remedy=f"give `nth`, from 1 to {len(functions)}",
+            expected=f"one of those at {places}" if len(functions) > 1 else f"the one at {places}",
+            remedy=f"give `nth`, {_range(functions)}",
         )
     function = functions[(nth or 1) - 1]
     if function.entry is None:
@@ -254,7 +255,7 @@ def _no_single_hit(
     what, place = _what(verb, anchor.name), f"in {location.function}"
     if hits:
         lines = ", ".join(str(s.first + 1) for _, s in hits)
-        take = f"from 1 to {len(hits)}" if len(hits) > 1 else "1, or leave it out"
+        take = _range(hits)
         found = counted(len(hits), "statement")
         got = f"{what} matches {found} {place}: {'lines' if len(hits) > 1 else 'line'} {lines}"
         remedy = f"give `nth`, {take}" if anchor.nth is None else f"`nth` is {anchor.nth}: give {take}"
@@ -270,6 +271,10 @@ def _no_single_hit(
     return MutatorError(got, where=file.where, line=line + 1, expected=expected, remedy=remedy)
 
 
+def _range(hits: Sequence[object]) -> str:
+    return f"from 1 to {len(hits)}" if len(hits) > 1 else "1, or leave it out"
+
+
 def _what(verb: str, name: str) -> str:
     words = {"assign": "assignment to", "call": "call of", "return": "return of"}
     return f"{words[verb]} '{name}'" if name else "return"
@@ -283,7 +288,7 @@ def _candidates(functions: tuple[Function, ...], verb: str) -> str:
         if s.reason is None
         for name in s.names(verb)
     ]
-    return f"one of {', '.join(found)}" if found else "another anchor: there is none of this kind"
+    return f"one of {', '.join(found)}" if found else "another kind of anchor: there is none of this kind"
 
 
 def _refuse_awkward(file: ParsedFile, anchor: Anchor, statement: Statement) -> None:

@@ -55,7 +55,7 @@ class Mutant:
     files: dict[str, bytes]  # full new content by path, including the probe
     patch: str  # git style, a/ and b/ prefixes; applies with `patch -p1` at the root
     tree_digest: str  # of the whole mutated tree
-    injections: tuple[str, ...]  # the ids in tags and in the probe's report, in the fault's order
+    injections: tuple[str, ...]  # ids used in tags and in the probe's report, in the fault's order
 
     @cached_property
     def patch_bytes(self) -> bytes:
@@ -138,7 +138,7 @@ def _probe(
         raise MutatorError(
             f"the target has a file {taken[0]}",
             where=manifest.root,
-            expected="no file of this name, which the probe needs",
+            expected="no file of this name, because the probe uses it",
             remedy="rename the target's file, or point the manifest at the original tree",
         )
     observation, step_s = manifest.observation, manifest.step_s
@@ -175,7 +175,7 @@ class _Splicer:
         data = joined(pieces)
         if unsplice(data) != file.data:
             raise InvalidMutant(
-                "the mutated file does not un-splice to the original",
+                "removing the injected lines from the mutated file does not restore the original",
                 where=file.where,
                 remedy="anchor at another statement",
             )
@@ -197,7 +197,7 @@ class _ReusingSplicer(_Splicer):
         key = reuse_key(file, edits, ids)
         if key in known:
             found = known[key]
-            if isinstance(found, Change):  # only now, because most changes of an expression occur once
+            if isinstance(found, Change):  # only on reuse: most changes of values are used once
                 found = known[key] = ReusableChange.of(found)
             return found.filled(inserted_lines(edits))
         if compile_changed(file, edits, key):

@@ -11,7 +11,7 @@ from mutator.mutants.splicing import Edit, Rank, apply_edits, in_order, joined
 
 
 def compile_changed(file: ParsedFile, edits: Iterable[Edit], key: ReuseKey) -> bool:
-    """Return whether the file certainly compiles with these edits and with all others of the same key.
+    """Return whether the file certainly compiles with these edits and with all others that have this key.
 
     True if the changed functions compile, both with these edits and with normalized ones, and the file
     compiles with the import of the probe. False is inconclusive.
@@ -29,7 +29,7 @@ def _all_compile(file: ParsedFile, edits: Iterable[Edit]) -> bool:
     outside: list[Edit] = []
     for edit in edits:
         function = file.outer_function(edit.index - 1 if edit.rank is Rank.AFTER else edit.index)
-        if function is None or edit.rank is Rank.AFTER_WHOLE:  # AFTER_WHOLE is between functions
+        if function is None or edit.rank is Rank.AFTER_WHOLE:  # such lines are between functions
             outside.append(edit)
         else:
             functions[function].append(edit)
@@ -39,7 +39,7 @@ def _all_compile(file: ParsedFile, edits: Iterable[Edit]) -> bool:
 
 
 def _compile_with(file: ParsedFile, outside: tuple[Edit, ...]) -> bool:
-    """Return whether the file compiles with edits outside functions, such as the probe's import; cached."""
+    """Return whether the file compiles with `outside`, and `outside` has at most the probe's import."""
     if len(outside) > 1 or any(edit.index != file.import_line for edit in outside):
         return False
     if outside not in file.sound:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from difflib import get_close_matches
 from pathlib import Path
 
+from mutator._common.text import counted
 from mutator.errors import MutatorError
 from mutator.model import Anchor, AnchorKind, FaultLocation
 from mutator.mutants.expressions import Expression
@@ -38,7 +39,8 @@ def choose_expression(
         lines = ", ".join(str(one.start[0] + 1) for one in hits)
         take = f"from 1 to {len(hits)}" if len(hits) > 1 else "1, or leave it out"
         raise MutatorError(
-            f"{what} names {len(hits)} expressions in {location.function}: lines {lines}",
+            f"{what} names {counted(len(hits), 'expression')} in {location.function}: "
+            f"{'lines' if len(hits) > 1 else 'line'} {lines}",
             where=where,
             line=hits[0].start[0] + 1,
             expected="exactly one",
@@ -54,18 +56,18 @@ def choose_expression(
 
 
 def _which(anchor: Anchor) -> str:
-    return f"which {anchor.which}" if anchor.which else ""
+    return f"with `which: {anchor.which}`" if anchor.which else ""
 
 
 def _candidates(known: Sequence[Expression], kind: AnchorKind, name: str) -> str:
-    """List the anchors of this kind: those of this name if there are any, otherwise the most similar ones."""
+    """List the anchors of this kind that have this name or, if none has, the most similar names."""
     roles = [(called, place, one) for one in known for own, called, place in one.roles if own is kind]
     roles = [role for role in roles if role[0] == name] or roles
     if len(roles) > _MOST:
         near = get_close_matches(name, [called for called, *_ in roles], n=_MOST, cutoff=0.0)
         roles = [role for role in roles if role[0] in near][:_MOST]
     told = [
-        f"`{called}`" + (f" which {place}" if place else "") + f" (line {one.start[0] + 1})"
+        f"`{called}`" + (f" with `which: {place}`" if place else "") + f" (line {one.start[0] + 1})"
         for called, place, one in roles
     ]
-    return f"one of {', '.join(told)}" if told else "another anchor: there is none of this kind"
+    return f"one of {', '.join(told)}" if told else "another kind of anchor: there is none of this kind"

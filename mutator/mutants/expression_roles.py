@@ -24,7 +24,7 @@ def source_of(node: ast.AST) -> str:
 
 
 def expressions_in(tree: ast.Module) -> Iterator[Found]:
-    """Yield each expression in a function's body, with the function's qualified name and its roles."""
+    """Yield function name, expression and roles for each expression in a function's body."""
     yield from _of_scope(tree.body, (), inside=False)
 
 
@@ -117,7 +117,7 @@ def _base(node: ast.expr) -> _Pairs:
 
 def _of(node: ast.expr, *roles: Role) -> _Pairs:
     if isinstance(node, ast.JoinedStr):
-        yield node, roles  # expressions in it have positions only in Python 3.12 and later
+        yield node, roles  # before Python 3.12, the expressions inside it have no positions
         return
     if isinstance(node, ast.Call):
         roles = (*roles, (AnchorKind.RESULT, source_of(node.func), None))

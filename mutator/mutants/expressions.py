@@ -25,9 +25,10 @@ _ATOMS = ast.Name | ast.Attribute | ast.Call | ast.Subscript | ast.Constant | as
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Expression:
-    """An expression of a function, from `start` to before `end`.
+    """An expression in a function, from `start` to `end` (exclusive).
 
-    `roles` are the anchors that match it: kind, name, `which`. The last is always VALUE, named by the text.
+    Each of its `roles` is an anchor that matches it: kind, name, `which`. In the last role, the kind is VALUE
+    and the name is the expression's text.
     """
 
     function: str
@@ -44,7 +45,7 @@ class Expression:
         return self.roles[-1][1]
 
     def answers(self, kind: AnchorKind, name: str, which: str | None) -> bool:
-        """Return whether an anchor matches. An empty name or no `which` matches any."""
+        """Return whether an anchor matches. An empty name matches any name; None as `which`, any position."""
         return any(
             kind is own and name in (called, "") and which in (place, None)
             for own, called, place in self.roles
@@ -110,7 +111,7 @@ def _extent(lines: Sequence[str], node: ast.expr) -> tuple[_Point, _Point]:
 
 
 def _known_by(node: ast.expr) -> Iterator[ast.expr]:
-    """Yield the nodes that LibCST must also find: for a tuple its elements, without its parentheses."""
+    """Yield the nodes that LibCST must also find: this node or, if it is a tuple, its elements."""
     if isinstance(node, ast.Tuple):
         for element in node.elts:
             yield from _known_by(element)
@@ -140,7 +141,7 @@ def _brackets(tokens: Iterable[tokenize.TokenInfo]) -> dict[_Point, _Point]:
 def _untaggable(data: bytes, tokens: Iterable[tokenize.TokenInfo]) -> frozenset[int]:
     """Return the lines (from 0) that cannot end in a comment."""
     found = {i for i, line in enumerate(data.splitlines()) if line.endswith(b"\\")}
-    begun: list[int] = []  # lines where unfinished f-strings began
+    begun: list[int] = []  # first lines of the f-strings that are still open
     for token in tokens:
         kind = tokenize.tok_name[token.type]
         if kind == "FSTRING_START":

@@ -1,6 +1,6 @@
 """Finds fixed values: constants of modules and classes, and defaults of parameters.
 
-The program computes them once, when it loads the module and no fault is active. So the probe sets them while
+Python computes them once, when it loads the module, before any fault is active. So the probe sets them while
 the fault is active, and restores them afterwards. A tagged line after the statement tells the probe where
 the values are.
 """
@@ -27,7 +27,7 @@ _Owner = ast.stmt | None
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FixedValue:
-    """A constant or a default, on lines `first` to `last` (exclusive, from 0)."""
+    """A constant or a default, on lines `first` to `last` (from 0, `last` exclusive)."""
 
     kind: AnchorKind
     function: str
@@ -43,7 +43,7 @@ class FixedValue:
 def find_fixed(data: bytes, tree: ast.Module) -> tuple[FixedValue, ...]:
     """Return all fixed values of a file, in source order.
 
-    Of several assignments of one constant, the last is used.
+    If a constant is assigned several times, the last assignment is used.
     """
     found: dict[tuple[AnchorKind, str, str], tuple[FixedValue, _Owner]] = {}
     for one, owner in _Finder(data).of_body(tree.body, ()):
@@ -51,11 +51,11 @@ def find_fixed(data: bytes, tree: ast.Module) -> tuple[FixedValue, ...]:
         _, before = found.pop(key, (None, owner))
         if before is not owner:
             what = "functions" if one.kind is AnchorKind.DEFAULT else "classes"
-            one = replace(one, reason=f"there are several {what} of this name")
+            one = replace(one, reason=f"several {what} have the same name")
         found[key] = one, owner
     rebound = set_by_functions(data)
     return tuple(
-        replace(one, reason="a function sets it, too")
+        replace(one, reason="a function also sets it")
         if one.kind is AnchorKind.CONSTANT and one.path in rebound
         else one
         for one, _ in found.values()
@@ -177,7 +177,7 @@ def _not_a_constant(owner: ast.ClassDef, value: ast.expr) -> str | None:
     for base in owner.bases:
         name = ast.unparse(base)
         if name.endswith(_MADE_OTHERWISE):
-            return f"its class derives from {name}, which prevents it from being set"
+            return f"its class derives from {name}, which does not allow a new value"
     if isinstance(value, ast.Call) and ast.unparse(value.func).endswith("field"):
         given = {keyword.arg for keyword in value.keywords}
         if "default_factory" in given or not ({"default", None} & given or value.args):
@@ -202,7 +202,9 @@ def choose_fixed(known: Sequence[FixedValue], location: FaultLocation, where: Pa
         raise MutatorError(
             f"no {what}",
             where=where,
-            expected=f"one of {', '.join(names)}" if names else "another anchor: there is none of this kind",
+            expected=f"one of {', '.join(names)}"
+            if names
+            else "another kind of anchor: there is none of this kind",
             remedy="write the name exactly as in the source" + suggestion(name, names),
         )
     if found.reason:

@@ -16,7 +16,7 @@ def outer_functions(tree: ast.AST) -> Iterator[range]:
 
 
 def compiled_alone(lines: Sequence[bytes], encoding: str) -> CodeType | None:
-    """Return the code of a module with only these lines of a function, or None if they do not compile.
+    """Return the code of a module that contains only these lines, or None if they do not compile.
 
     An outermost function compiles alone if and only if it compiles in its file.
     """

@@ -32,14 +32,14 @@ class _Imports:
     module: str
     names: tuple[_Import, ...]
     set: frozenset[str]
-    exported: frozenset[str] | None = None  # content of `__all__`, if literal
+    exported: frozenset[str] | None = None  # the names in `__all__`, if they are literal strings
 
 
 def importers(tree: SourceTree, path: str, name: str) -> tuple[str, ...]:
-    """Return `module.NAME` for each place that imports the constant `name` of the module at `path`.
+    """Return `module.NAME` for each import of the constant `name` from the module at `path`.
 
-    MutatorError with the places where the constant cannot be set: star imports, imports into a class, and
-    modules that also set the name in another way.
+    MutatorError if an import prevents setting the constant: a star import, an import into a class, or one in
+    a module that also sets the name in another way.
     """
     files = [tree.derived(file, _imports) for file in tree.files if file.endswith(".py")]
     exported = {file.module: file.exported for file in files}
@@ -71,7 +71,7 @@ def _refused(one: _Import, file: _Imports, name: str, exported: frozenset[str] |
         return "imports *" if meant else None
     if one.inside:
         return "imports it into a class"
-    return f"imports it, and sets {one.known} in another way" if one.known in file.set else None
+    return f"imports it, and also sets {one.known} in another way" if one.known in file.set else None
 
 
 def module_name(path: str) -> str:
@@ -97,7 +97,7 @@ def _imports(path: str, data: bytes, root: Path) -> _Imports:
 
 
 def _exported(tree: ast.Module) -> frozenset[str] | None:
-    """Return the names in `__all__`, if it is assigned once, with literal texts."""
+    """Return the names in `__all__` if it is assigned once, as a list or tuple of literal strings."""
     made = [node for node in ast.walk(tree) if isinstance(node, ast.Name) and node.id == "__all__"]
     for node in tree.body:
         if (
@@ -111,7 +111,7 @@ def _exported(tree: ast.Module) -> frozenset[str] | None:
 
 
 def _of_body(body: Iterable[ast.stmt], path: str, *, inside: bool) -> Iterator[_Import]:
-    """Yield imports of a module or its classes, not of functions, where imports last for one call only."""
+    """Yield the imports of a module and its classes. Imports in functions last for one call: skip them."""
     for statement in body:
         match statement:
             case ast.ImportFrom(module=module, names=names, level=level, lineno=line):

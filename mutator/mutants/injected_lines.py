@@ -1,4 +1,4 @@
-"""The syntax of injected lines: tags, calls of the probe, and how to find them in files and patches.
+"""The syntax of injected lines: tags, calls to the probe, and how to find them in files and patches.
 
 Code inside a target's process cannot import this module, so engines pass the needed values to that code.
 """
@@ -59,7 +59,7 @@ class Tag:
 
     @property
     def of_fault(self) -> bool:
-        """Whether the line belongs to a fault; other lines are in every mutant."""
+        """Whether the line belongs to a fault; other tagged lines are in every mutant."""
         return self.id not in (IMPORT_TAG, OBSERVE_TAG)
 
     @property
@@ -87,7 +87,7 @@ class Tag:
 
 
 def changed_parts(source: bytes) -> Iterator[tuple[str, int, int, int]]:
-    """Yield injection id, line, start and end column of each changed value and instance check in a file.
+    """Yield the injection id, line, start column and end column of each changed value and its instance check.
 
     Lines are counted from 1, columns in bytes of UTF-8, as in tracebacks.
     """
@@ -113,7 +113,7 @@ def tag_of(line: bytes) -> Tag | None:
 
 
 def tagged(code: str, tag: str, guarded: int = 0) -> str:
-    """Add a tag to `code`. Every line of a guard has the number of lines that it guards."""
+    """Add a tag to `code`. The tag of a guard's line includes the number of lines that the guard wraps."""
     return f"{code}  {_MARK}{tag}" + (f" guard:{guarded}" if guarded else "")
 
 
@@ -190,7 +190,7 @@ def instrumented_line(data: bytes) -> int | None:
 
 
 def tagged_additions(patch: str, begin: int, end: int) -> Iterator[tuple[int, int]]:
-    """Yield begin and end of each tagged line that the patch adds between `begin` and `end`, without `+`."""
+    """Yield start and end, without the `+`, of each tagged line that `patch[begin:end]` adds."""
     for line in _TAGGED_ADDITION.finditer(patch, begin, end):
         yield line.start() + 1, line.end()
 

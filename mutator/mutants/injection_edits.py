@@ -105,13 +105,13 @@ def _set_within(node: ast.AST) -> set[str]:
 
 def _needs_more(file: ParsedFile, model: FaultModel, line: int) -> MutatorError:
     wanted = {
-        None: f"an expression that has {', '.join(sorted(model.parts))}",
+        None: f"an expression with these parts: {', '.join(sorted(model.parts))}",
         Needs.CALL: "a call: an anchor `result`, or another anchor whose expression is a call",
         Needs.STATEMENT: "a statement, or an expression in a function",
         Needs.NEXT_STATEMENT: "a statement, and another one after it",
     }
     return MutatorError(
-        f"model {model.name} needs more than this anchor has",
+        f"model {model.name} does not fit this anchor",
         where=file.where,
         line=line + 1,
         expected=wanted[model.needs],
@@ -128,7 +128,7 @@ def _setting(
     for param in model.params:
         if param.type == "variable" and params.get(param.name) is not None:
             raise MutatorError(
-                f"'{params[param.name]}' for `{param.name}` at a {value.kind.value}",
+                f"`{param.name}` is '{params[param.name]}', but the anchor is a {value.kind.value}",
                 where=file.where,
                 line=value.first + 1,
                 expected="no variable, because a constant or default is set outside functions",

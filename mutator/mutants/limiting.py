@@ -21,7 +21,7 @@ def check_instance(file: ParsedFile, names: frozenset[str], first: int, injectio
 
 
 def limited(code: tuple[str, ...], injection: Injection, name: str, model: FaultModel) -> tuple[str, ...]:
-    """Add a check for the instance or executions that the injection selects, if any, to the snippet."""
+    """Add to the snippet a check for the instance or executions that the injection selects, if any."""
     plain, asked = asks(name), asks_for(name, injection)
     if asked == plain:
         return code

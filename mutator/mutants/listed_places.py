@@ -1,4 +1,4 @@
-"""Lists every place of a file where a fault can be injected, with the fault models that fit."""
+"""Lists every place in a file where a fault can be injected, with the fault models that fit."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence

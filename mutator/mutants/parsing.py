@@ -20,7 +20,7 @@ _LONE_CR = re.compile(rb"\r(?!\n)")
 def refuse_unfit(data: bytes, where: Path) -> None:
     if found := _LONE_CR.search(data):
         raise MutatorError(
-            "line ends of CR alone",
+            "a line ends in CR alone",
             where=where,
             line=data[: found.start()].count(b"\n") + 1,
             expected="LF or CRLF",
@@ -29,11 +29,11 @@ def refuse_unfit(data: bytes, where: Path) -> None:
     line = instrumented_line(data)
     if line is not None:
         raise MutatorError(
-            "the name _fi or a `# fi:` tag is in use",
+            "the target uses the name `_fi` or a `# fi:` tag",
             where=where,
             line=line + 1,
             expected="a tree without injected lines",
-            remedy="point the manifest at the original tree, or rename the name in the target",
+            remedy="point the manifest at the original tree, or rename `_fi` in the target",
         )
 
 
@@ -57,19 +57,19 @@ def reading(where: Path) -> Iterator[None]:
         message, line = str(error), None
         if isinstance(error, cst.ParserSyntaxError):
             message = error.message.partition(": expected")[0]
-            # the tokenizer counts lines within a part of the file
+            # the tokenizer counts lines from the start of a part of the file
             line = None if message.startswith("tokenizer") else error.raw_line
         raise MutatorError(
-            f"LibCST cannot read it: {message}",
+            f"LibCST cannot parse this file: {message}",
             where=where,
             line=line,
             expected="Python that LibCST can parse, not nested too deeply",
-            remedy="rewrite it, or inject into another file",
+            remedy="rewrite the code, or inject into another file",
         ) from None
 
 
 def libcst_module(data: bytes, where: Path) -> tuple[cst.Module, Positions]:
-    """Parse the file with LibCST; MutatorError unless that reproduces the file's bytes."""
+    """Parse the file with LibCST; MutatorError unless LibCST reproduces the file's bytes."""
     module = cst.parse_module(data)
     given = module.bytes
     if given != data:
@@ -81,13 +81,13 @@ def libcst_module(data: bytes, where: Path) -> tuple[cst.Module, Positions]:
             where=where,
             line=line + 1,
             expected="no line with only a backslash, no form feed before code",
-            remedy="rewrite it, or inject into another file",
+            remedy="rewrite the code, or inject into another file",
         )
     return module, MetadataWrapper(module, unsafe_skip_copy=True).resolve(PositionProvider)
 
 
 def import_line(module: cst.Module, positions: Positions) -> int:
-    """Return the index of the line before which to insert an import: after docstring and `__future__`."""
+    """Return the index of the line before which to insert imports: after docstring and `__future__`."""
     after = None
     for i, node in enumerate(module.body):
         if not isinstance(node, cst.SimpleStatementLine):

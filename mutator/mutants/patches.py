@@ -1,4 +1,4 @@
-"""Writes patches from the edits: unified diffs in git's style, for `patch -p1`."""
+"""Writes patches: unified diffs in git's style, for `patch -p1`."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -40,7 +40,7 @@ def new_file(path: str, text: str) -> str:
 
 
 def _hunks(pieces: Sequence[Piece]) -> Iterator[_Hunk]:
-    """Yield changes with three lines of context; those at most six lines apart share a hunk."""
+    """Yield changes with three lines of context; changes at most six lines apart share a hunk."""
     hunk = _Hunk(0, 0)
     old = new = 0
     for i, piece in enumerate(pieces):

@@ -1,4 +1,4 @@
-"""Finds positions of functions and statements in both LibCST and `ast`, to compare them.
+"""Finds the positions of functions and statements according to LibCST and `ast`, to compare them.
 
 If a parser drops a line, all positions below it shift. A mutant made with such positions would compile and
 un-splice, but its fault would be on the wrong line.

@@ -56,7 +56,7 @@ def template_values(
     MutatorError for a missing hold time, and for a condition on unobserved values.
     """
     if hold is Hold.FOR and trigger.hold_s is None:
-        raise MutatorError(f"trigger '{trigger.name}' has the hold `for` without a time", expected="hold_s")
+        raise MutatorError(f"trigger '{trigger.name}' has the hold `for` without a time", expected="`hold_s`")
     names = [value.name for value in observation.values]
     return {
         "mutant": mutant,
@@ -103,17 +103,17 @@ def decision(probe: CodeType) -> tuple[float, Callable[..., bool]]:
 
 
 def decision_in(own: str) -> tuple[float, str]:
-    """Like `decision`, but from the source of a probe's own part. The condition is source, too."""
+    """Like `decision`, but from the source of a probe's own part, and with the condition as source."""
     armed = _ARMED.search(own)
     assert armed is not None
     return float(armed[1]) - float(armed[2]), own[own.index("def _condition(") :]
 
 
 def state_after(observed: int, began: float | None, t: float | None) -> tuple[str, dict[str, object]]:
-    """Return the name of the probe's object that holds its observations, and its attributes.
+    """Return the name of the object in which a probe keeps its observations, and that object's attributes.
 
     The first of `observed` observations was at time `began` (s), the last at `t`. A probe that replaces
-    another one gets these attributes.
+    another probe gets these attributes.
     """
     return "_run", {"observed": observed, "began": began, "t": t} if observed else {}
 
@@ -122,7 +122,7 @@ def state_after(observed: int, began: float | None, t: float | None) -> tuple[st
 
 
 def silent_report(mutant: str | None) -> dict[str, Any]:
-    """Return the report of a mutant whose trigger never holds, with only the parts that are read."""
+    """Return the report of a mutant whose trigger never holds, limited to the entries that are read."""
     return {"mutant": mutant, "triggered": None, "injections": {}}
 
 

@@ -1,4 +1,4 @@
-"""Renders a fault model's template and its parameters to lines of Python.
+"""Renders a fault model's template with parameters as lines of Python.
 
 Templates run in Jinja2's sandbox, where an undefined name is an error. Every printed value is a Python
 literal or a checked name, so it cannot become other code.
@@ -36,7 +36,7 @@ _ARGUMENT = re.compile(r"(?P<keyword>\w+=)?(?P<value>.*)", re.DOTALL)  # as `ast
 
 
 def literal(value: object) -> str:
-    """Return a value as Python source, numbers exactly; names are unchanged."""
+    """Return a value as Python source. Numbers keep their exact value; names are unchanged."""
     if value is None or isinstance(value, bool):
         return repr(value)
     if isinstance(value, float):
@@ -66,7 +66,7 @@ def exchanged(arguments: Sequence[str], first: int, second: int) -> list[str]:
         part = parts[place - 1] if 0 < place <= len(parts) else None
         if part is None or first == second or part["value"].startswith("*"):
             raise MutatorError(
-                f"arguments {first} and {second} of {len(parts)}: {', '.join(arguments) or 'none'}",
+                f"arguments {first} and {second} of ({', '.join(arguments)}) cannot be exchanged",
                 expected="two different arguments, counted from 1, without stars",
                 remedy="correct the numbers",
             )
@@ -81,7 +81,7 @@ def taken_for(written: str, read: str) -> float:
     if one.dimension != other.dimension or one == other:
         raise MutatorError(
             f"written in {written}, read as {read}",
-            expected=f"two units of {one.dimension}",
+            expected=f"two different units of {one.dimension}",
             remedy="correct one of them",
         )
     return units.convert(1.0, other, one)
@@ -98,7 +98,7 @@ class _Sandbox(ImmutableSandboxedEnvironment):
     intercepted_binops = frozenset({"**"})
 
     def call_binop(self, context: Context, operator: str, left: Any, right: Any) -> Any:
-        raise SecurityError(f"{operator} in a template")
+        raise SecurityError(f"{operator} is not allowed in a template")
 
 
 _ENVIRONMENT = _Sandbox(
@@ -120,7 +120,7 @@ def snippet(
     """Return the model's lines for these parameters, untagged, indented by 4 spaces a level.
 
     `fi` is the injection's id; `statements` are the source texts that the model needs. MutatorError if the
-    template fails or its result is not whole lines of Python.
+    template fails or its result does not consist of whole lines of Python.
     """
     if model.kind is SnippetKind.VALUE:
         target = str(_checked(next(param for param in model.params if param.name == "target"), params))
@@ -152,7 +152,7 @@ def changed_value(
         raise MutatorError(
             f"model {model.name} cannot change the value of an expression",
             where=model.source.path,
-            expected="a model of kind value, or one with `expression`",
+            expected="a model of kind `value`, or one with an `expression`",
             remedy="anchor at a statement, or use another model",
         )
     names: dict[str, object] = {
@@ -192,7 +192,7 @@ def _holds_together(text: str) -> bool:
 
 
 def _checked(param: ParamSchema, params: Mapping[str, Value]) -> Value:
-    """Return the template's value for this parameter; MutatorError if the type is wrong.
+    """Return the value that the template gets for this parameter; MutatorError if its type is wrong.
 
     A constant that is not a number is passed as Python source, so that None differs from a missing value.
     """
@@ -215,7 +215,7 @@ def _checked(param: ParamSchema, params: Mapping[str, Value]) -> Value:
 
 
 def render(template: str, names: Mapping[str, object], where: Path) -> str:
-    """Render one template; MutatorError with its line, if known."""
+    """Render one template; MutatorError with the template's line, if known."""
     try:
         return _compiled(template).render(names)
     except TemplateSyntaxError as error:
@@ -281,7 +281,7 @@ def _check_lines(text: str, kind: SnippetKind, where: Path) -> None:
     lines = text.split("\n")[:-1]
     if any(isinstance(node, ast.Yield | ast.YieldFrom) for node in ast.walk(tree)):
         raise MutatorError(
-            f"the template yields: {text!r}",
+            f"the template contains `yield`: {text!r}",
             where=where,
             expected="lines without `yield`, which would turn the function into a generator",
             remedy="correct the template",

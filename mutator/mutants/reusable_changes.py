@@ -1,7 +1,6 @@
-"""Reusable changes: changed files without their inserted lines. Other mutants insert their own lines.
+"""Reuses a changed file for all mutants whose inserted lines differ only in numbers and ids.
 
-Many mutants insert the same lines except for numbers and ids. Only the first mutant of such a group is
-spliced and compiled.
+Only the first of these mutants is spliced and compiled. The others insert their own lines instead.
 """
 
 from collections.abc import Sequence
@@ -51,7 +50,7 @@ class ReusableChange:
 
 
 def known_changes(tree: SourceTree, path: str) -> dict[ReuseKey, ReusableChange | Change]:
-    """Return the known changes of a file, in a dictionary of the tree that callers extend."""
+    """Return the changes of this file that are already known. Callers add new ones to the dictionary."""
     return tree.derived(path, _none_yet)
 
 
@@ -72,9 +71,9 @@ def inserted_lines(edits: Sequence[Edit]) -> list[bytes]:
 
 
 def always_compiles(file: ParsedFile, change: ReusableChange, key: ReuseKey) -> bool:
-    """Return whether the change compiles with any lines that have this key: the normalized lines are tried.
+    """Return whether the change compiles with normalized lines, and so for every mutant with this key.
 
-    The change then also un-splices, because that depends only on the tags, which are part of the key.
+    Un-splicing needs no check: it depends only on the tags, which are part of the key.
     """
     texts = (text.rstrip("\r\n") for *_, text in key)  # the file's last line can lack a line end
     lines = "\n".join(texts).encode(file.encoding).splitlines()

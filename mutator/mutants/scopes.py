@@ -1,6 +1,6 @@
-"""What names mean in the functions of a source file, according to the compiler.
+"""Finds out whether names in functions are local, nonlocal or global, from the compiler's symbol tables.
 
-An assignment anywhere in a function makes the name local to the whole function, even if it never runs.
+An assignment makes a name local to the whole function, even if the assignment never runs.
 """
 
 import unicodedata
@@ -28,7 +28,7 @@ def function_names(data: bytes) -> FunctionNames:
 
 
 def _function_names(table: SymbolTable, private: str) -> Iterator[tuple[tuple[int, str], frozenset[str]]]:
-    """Like `function_names`; `private` is the compiler's prefix of private names (`__x`) in a class."""
+    """Like `function_names`; `private` is the compiler's prefix for private names (`__x`) in a class."""
     if table.get_type() == "class":
         name = table.get_name().lstrip("_")
         private = f"_{name}__" if name else ""
@@ -83,7 +83,7 @@ def _moved(before: SymbolTable, after: SymbolTable, inserted: Container[int]) ->
 def _home(symbol: Symbol) -> str:
     if symbol.is_local():
         return "local"
-    return "of an enclosing function" if symbol.is_free() else "global or built-in"
+    return "nonlocal" if symbol.is_free() else "global or built-in"
 
 
 def _table(data: bytes) -> SymbolTable:

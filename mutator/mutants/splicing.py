@@ -1,8 +1,8 @@
 """The splicer: inserts tagged lines between the lines of a source file, and removes them again.
 
-Edits are whole lines, so everything else keeps its bytes, such as line ends, tabs and comments. A guard also
-indents the statement it wraps; its tag has the number of these lines. A line with a changed expression is
-replaced by one that keeps the old line in its tag.
+Edits are whole lines, so all other bytes stay unchanged, such as line ends, tabs and comments. A guard also
+indents the statement that it wraps; its tag states the number of indented lines. A line with a changed
+expression is replaced by one that keeps the old line in its tag.
 """
 
 from codecs import BOM_UTF8
@@ -22,9 +22,9 @@ from mutator.mutants.injected_lines import asks, changed_value, import_statement
 class Rank(IntEnum):
     """The order of edits at one line index."""
 
-    AFTER = 0  # lines after the line above
-    AFTER_WHOLE = 1  # lines after a whole statement that ends above
-    BEFORE = 2  # lines before the line itself
+    AFTER = 0  # lines inserted after the previous line
+    AFTER_WHOLE = 1  # lines inserted after a whole statement that ends on the previous line
+    BEFORE = 2  # lines inserted before the line itself
     GUARD = 3  # a guard around the line
     INSTEAD = 4  # a replacement of the line
 
@@ -66,7 +66,7 @@ class Piece:
 
 
 def insertion(file: ParsedFile, site: Site, code: Sequence[str], tag: str) -> Edit:
-    """Return the edit that inserts `code` (4 spaces an indentation level) at `site`, each line tagged."""
+    """Return the edit that inserts `code` (4 spaces per indentation level) at `site`, each line tagged."""
     lines = _lines(file, site, code, tag)
     index, rank = (site.last, Rank.AFTER) if site.after else (site.first, Rank.BEFORE)
     return Edit(index=index, rank=rank, lines=lines)
@@ -151,7 +151,7 @@ def probe_import(file: ParsedFile, package: str | None) -> Edit:
             "a byte order mark right before the first statement",
             where=file.where,
             line=1,
-            expected="a comment or docstring there, or no mark",
+            expected="a comment or docstring after the mark, or no mark",
             remedy="save the file without a byte order mark",
         )
     line = import_statement(package).encode(file.encoding)
@@ -180,7 +180,7 @@ def _encoded(file: ParsedFile, text: str, line: int) -> bytes:
         return text.encode(file.encoding)
     except UnicodeEncodeError:
         raise MutatorError(
-            f"{text!r} cannot be written in {file.encoding}",
+            f"{text!r} cannot be encoded in {file.encoding}",
             where=file.where,
             line=line + 1,
             expected="characters that the file's encoding has",
@@ -250,7 +250,7 @@ def _margin(line: bytes) -> bytes:
 
 
 def _end_of_file(pieces: list[Piece], added: list[bytes], newline: bytes) -> list[bytes]:
-    """If the file lacks a newline at its end, keep it so: move the last added line's to the old last line."""
+    """If the file does not end in a newline, move the newline of the last added line to the old last line."""
     last = pieces[-1]
     if last.lines[-1].endswith((b"\n", b"\r")):
         return added

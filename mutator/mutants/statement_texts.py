@@ -18,7 +18,7 @@ _BLOCKS = ("body", "orelse", "finalbody")
 
 
 def written_out(file: ParsedFile, site: Site, needs: Needs) -> tuple[Site, dict[str, str]]:
-    """Return the site, and the statements' texts by their names in templates, each on one line.
+    """Return the site, and the text of each statement on one line, by its name in templates.
 
     If the model needs the next statement, the site covers both. MutatorError if there is no such statement,
     or if its lines cannot be moved.
@@ -72,7 +72,7 @@ def _unfit(file: ParsedFile, site: Site, what: str) -> MutatorError:
 
 @lru_cache(maxsize=32)
 def _small_statements(data: bytes) -> Mapping[int, tuple[ast.stmt, ast.stmt | None]]:
-    """Return the small statements that begin a line (from 0), each with the next one in its block.
+    """Map line numbers (from 0) to the small statement that begins there and the next one in its block.
 
     The next one is None if it is missing or shares its lines with another.
     """

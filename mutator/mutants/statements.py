@@ -1,4 +1,4 @@
-"""What a function's statements assign, call and return, and their lines."""
+"""Collects what each statement of a function assigns, calls and returns, and its lines."""
 
 import ast
 from collections.abc import Iterator, Sequence
@@ -13,10 +13,10 @@ from mutator.mutants.scopes import FunctionNames, as_compiled
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Statement:
-    """A small statement, or another construct that binds a name or calls; `reason` describes the latter.
+    """A small statement, or another construct that binds a name or calls a function.
 
     Lines are counted from 0, `last` is exclusive. Names are dotted, as written. A statement that returns also
-    has the empty name in `returns`, which matches any return. `place` is None if there is a reason.
+    has the empty name in `returns`, which matches any return. Only small statements have a `place`.
     """
 
     first: int
@@ -29,7 +29,7 @@ class Statement:
     last_in_line: bool = True
     one_line_suite: bool = False
     spanning_string: bool = False
-    reason: str | None = None
+    reason: str | None = None  # why nothing can be anchored at this construct
     opens: int | None = None  # for a binding in the head of a block: the block's first line
 
     def names(self, verb: str) -> tuple[str, ...]:
@@ -48,8 +48,8 @@ class Statement:
 class Function:
     """A function. Its statements do not include those of nested functions and classes.
 
-    `entry` is the index of the line to insert before, and of the line whose indentation to use; None for a
-    one-line body.
+    `entry` is the index of the line before which to insert, and of the line whose indentation to use; None
+    if nothing can be inserted there.
     """
 
     line: int
@@ -176,7 +176,7 @@ class _Collector(cst.CSTVisitor):
             )
 
     def _add_head(self, target: cst.CSTNode, body: cst.BaseSuite, reason: str) -> None:
-        """Add what the head of a block binds. The snippet goes into the block if it has separate lines."""
+        """Add what the head of a block binds. Snippets go into the block, if the block has its own lines."""
         self.heads.add(id(target))
         statements, names = self.open[-1] if self.open else None, _targets(target)
         if statements is None or not names:
@@ -239,7 +239,7 @@ def _effects(
 def _that_stay(names: Sequence[str]) -> Iterator[str]:
     """Yield the assigned names without duplicates, and without items whose index is assigned later.
 
-    In `a[i], i = 1, 2`, `a[i]` names another item afterwards.
+    After `a[i], i = 1, 2`, `a[i]` names a different item.
     """
     unique = list(dict.fromkeys(names))
     for place, name in enumerate(unique, 1):
@@ -268,7 +268,7 @@ def _inner_calls(small: cst.BaseSmallStatement, outer: cst.Call | None) -> Itera
 
 
 def _spanning_string(small: cst.BaseSmallStatement, positions: Positions) -> bool:
-    """Return whether a string literal spans lines, which must then not be indented."""
+    """Return whether a string literal spans several lines, which must then not be indented."""
     stack: list[cst.CSTNode] = [small]
     while stack:
         node = stack.pop()

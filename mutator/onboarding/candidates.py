@@ -1,4 +1,4 @@
-"""Guesses from names, state and calls which functions of a tree are steps of the loop."""
+"""Guesses from names, state and calls which functions are steps of the control loop."""
 
 import ast
 import re
@@ -20,7 +20,7 @@ _WORDS = {  # names of step functions; a higher number is more certain
 _STEP = {word: score for score, words in _WORDS.items() for word in words.split()}
 _CONTROLLER = re.compile("control|pid|pilot|planner|agent|driver|regulator|tracker|cruise|mpc")
 _WORLD = re.compile("env|sim|plant|world|render|viewer|logger|graphics|mixin|wrapper|test")
-_MOST_STATE = _MOST_VALUES = 6  # more attributes or values than this do not add certainty
+_MOST_STATE = _MOST_VALUES = 6  # further attributes or values do not add points
 _IN_CONTROLLER = 3  # points if the file name suggests a controller
 _NO_HINT = -6  # points if neither the name nor calls suggest a step
 _NUMBERS = re.compile("abs|min|max|float|int|round|clip|interp|hypot|sum|dot|norm")  # these return numbers

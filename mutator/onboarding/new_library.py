@@ -17,7 +17,7 @@ from mutator.onboarding.candidates import LoopCandidate, loop_candidates
 from mutator.onboarding.marks import MARK
 from mutator.onboarding.survey import Survey
 
-MOST_SHOWN = 5  # at most this many candidates for the loop, and values of each
+MOST_SHOWN = 5  # maximum number of candidates for the step, and of values of each
 _TIME_STEPS = ("dt", "delta_t", "time_step", "timestep")
 _FILES = {
     "README.md": "README.md",
@@ -30,7 +30,7 @@ _FILES = {
 
 
 def write_library_for(found: Survey, folder: Path) -> None:
-    """Write the files into a new or empty folder. MutatorError if the folder has content.
+    """Write the files into a new or empty folder. MutatorError if the folder is not empty.
 
     MutatorWarning if no function in the source looks like a controller's step.
     """
@@ -86,7 +86,7 @@ def _words(found: Survey, folder: Path) -> dict[str, Any]:
         "where": f"the installed package {found.installed}" if found.installed else f"`{found.root.name}`",
         "package": only if not only.endswith(".py") else "",
         "packages": found.packages,
-        "count": counted(len(found.modules), "file") + " of Python",
+        "count": counted(len(found.modules), "Python file"),
         "unread": found.unread[:MOST_SHOWN],
         "mark": MARK,
         "candidates": candidates,

@@ -34,7 +34,7 @@ class Module:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Survey:
-    """A source tree, described in a manifest's terms."""
+    """A source tree, described in the terms of a manifest."""
 
     root: Path  # the folder for `sys.path`
     packages: tuple[str, ...]  # import packages and flat modules (`drive.py`)

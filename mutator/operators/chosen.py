@@ -54,7 +54,7 @@ def find_mutations(
     places: Sequence[str],
     executed: Lines | None = None,
 ) -> Found:
-    """Return the operators' mutations at these places, by file and line.
+    """Return the operators' mutations at these places, sorted by file and line.
 
     A place is `PATH` or `PATH::FUNCTION`; `*` is a wildcard, and `**` also matches across folders. `executed`
     limits the mutations to these lines. MutatorError if a place matches nothing.
@@ -147,7 +147,7 @@ def _may_be_mutated(manifest: TargetManifest, path: str) -> bool:
 
 
 def sampled(found: Found, count: int | None, seed: int) -> tuple[Mutation, ...]:
-    """Sample `count` mutations, stratified by operator and function, in their original order.
+    """Sample `count` mutations, stratified by operator and function. They keep their order.
 
     The sample is systematic over a seeded order, so each mutation has the same chance.
     """

@@ -26,7 +26,7 @@ Executed = dict[str, frozenset[int]]  # lines (from 1) by file
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GoldenDrive:
-    """What determines a golden run."""
+    """The inputs that determine a golden run."""
 
     scenario: Path
     changes: tuple[str, ...]
@@ -53,7 +53,7 @@ def _measured(engine: ReferenceEngine, drive: GoldenDrive, folder: Path) -> Exec
     execution = engine.execute(job, folder)
     if execution.status is not Status.OK:
         raise MutatorError(
-            f"no executed lines: the golden run of {drive.scenario.stem} failed: {execution.detail}",
+            f"cannot find executed lines: the golden run of {drive.scenario.stem} failed: {execution.detail}",
             where=engine.manifest.path,
             expected="a fault-free run that succeeds",
             remedy="run `mutator check --drive`",

@@ -1,4 +1,4 @@
-"""What operators need to know about a file's statements, from `ast`."""
+"""Collects the facts about a file's statements that operators need, using `ast`."""
 
 import ast
 from collections.abc import Collection, Iterator

@@ -22,7 +22,7 @@ class Rule:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mutation:
-    """One change of a function: the source text `was` becomes `now`.
+    """One change to a function: the source text `was` becomes `now`.
 
     `place` is the changed expression or the omitted statement.
     """

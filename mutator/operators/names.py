@@ -12,7 +12,7 @@ MODELS = (*(f"operator_{name}" for name in _OWN), "omission")  # fault models th
 
 
 class Operator(StrEnum):
-    """The mutation operators. A change that two operators make belongs to the first."""
+    """The mutation operators. If two of them make the same change, it belongs to the first."""
 
     ARITHMETIC = "arithmetic"
     COMPARISON = "comparison"
@@ -29,7 +29,7 @@ def operator_of(fault: Fault) -> Operator | None:
 
 
 def operators_named(names: Iterable[str]) -> tuple[Operator, ...]:
-    """Return the named operators without duplicates. MutatorError for an unknown name, or without names."""
+    """Return the named operators without duplicates; MutatorError for an unknown name or an empty list."""
     known = [one.value for one in Operator]
     found: dict[Operator, None] = {}
     for name in names:

@@ -108,7 +108,7 @@ def _comparison(node: ast.expr) -> Iterator[Rule]:
 
 
 def _constants(node: ast.expr) -> list[Value]:
-    """Return distinct replacements of a constant, of its type: 0, 1, -1, one more, one less, negated."""
+    """Return distinct replacements of a constant, with its type: 0, 1, -1, one more, one less, negated."""
     sign = 1
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
         sign, node = -1, node.operand
@@ -146,7 +146,7 @@ def _is_denied(node: ast.expr) -> bool:
 
 
 def _called(node: ast.Call) -> Iterator[Rule]:
-    """Swap adjacent positional arguments, drop keyword arguments."""
+    """Yield rules that swap adjacent positional arguments, and rules that drop a keyword argument."""
     operator = Operator.ARGUMENT
     known = 0
     while known < len(node.args) and not isinstance(node.args[known], ast.Starred):

@@ -89,7 +89,7 @@ OF_PATHS = (
     ),
 )
 EXTRA = (
-    Column("variant", "text", "", "the variant of the spec; of an operator's mutant, place and change"),
+    Column("variant", "text", "", "the variant of the spec; for an operator's mutant, its place and change"),
     Column("aim", "text", "", "the hazard that the fault aims at"),
     Column("condition", "text", "", "the condition of the trigger"),
     Column("detail", "text", "", "why the status is not `ok`"),
@@ -150,7 +150,7 @@ def severity_columns(head: Mapping[str, Any]) -> tuple[Column, ...]:
 
 
 def metric_columns(manifest: TargetManifest) -> list[list[str]]:
-    """Return name, unit, meaning and worse direction of each metric column of a target.
+    """Return the name, unit, meaning and worse direction of each of a target's metric columns.
 
     If a hazard can end the drive, the end of the drive comes first.
     """
@@ -216,8 +216,8 @@ def check_names(manifest: TargetManifest) -> None:
         if names & taken:
             raise manifest.source.error(
                 ("hazards", hazard if named else i),
-                f"'{hazard}'",
-                expected=f"a name whose columns, {' and '.join(sorted(names))}, are not in the results yet",
+                f"hazard '{hazard}' clashes with another column of the results",
+                expected=f"a name whose columns ({' and '.join(sorted(names))}) do not exist yet",
                 remedy="rename it",
             )
         taken |= names
@@ -225,8 +225,8 @@ def check_names(manifest: TargetManifest) -> None:
         if {metric.name, f"t_{metric.name}", metric.name.removeprefix("t_")} & taken:
             raise manifest.source.error(
                 ("metrics", metric.name),
-                f"'{metric.name}'",
-                expected="a name that no other column of the results has, with or without the prefix `t_`",
+                f"metric '{metric.name}' clashes with another column of the results",
+                expected="a name that no other column has, with or without the prefix `t_`",
                 remedy="rename it",
             )
         taken.add(metric.name)

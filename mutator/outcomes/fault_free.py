@@ -57,7 +57,7 @@ def fault_free_table(runs: Sequence[FaultFreeRun], *, alerts: bool = True) -> Ta
 
 
 def own_alerts(runs: Iterable[FaultFreeRun]) -> str:
-    """Return a note for tables that count alerts: which alerts fault-free runs raise; '' if none."""
+    """Return a note on the alerts that fault-free runs raise, for tables that count alerts; '' if none."""
     scenarios: dict[str, dict[str, None]] = {}
     for run in runs:
         for name, _ in run.alerts:

@@ -28,12 +28,12 @@ _TINY = 1e-9  # s
 
 
 class BadOutput(MutatorError):
-    """A run finished without a valid trace or record as described in the manifest."""
+    """A run finished, but its trace or record is missing or does not match the manifest."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Difference:
-    """How a trace differs from golden."""
+    """How a trace differs from the golden trace."""
 
     t_first: float | None  # time (s) of the first difference beyond tolerance
     max_dev: tuple[tuple[str, float], ...]  # largest difference of each compared channel in the whole run
@@ -145,7 +145,7 @@ def _check_is_of_output(err: Exception) -> None:
 
 
 def _why(err: Exception) -> str:
-    """Return the error's text without the path, because that differs between runs."""
+    """Return the error's text without the path, which differs between runs."""
     return str(err.strerror if isinstance(err, OSError) and err.strerror else err)
 
 

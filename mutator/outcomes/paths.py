@@ -26,7 +26,7 @@ class State(StrEnum):
 
     INJECTED = "injected"
     REACHED = "reached"  # one of its channels left golden
-    PASSED = "passed"  # none of its channels left golden, but those of a component that only it feeds did
+    PASSED = "passed"  # none of its channels left golden, but a component that only it feeds did
     FEEDBACK = "feedback"  # one of its channels left golden, but only after the process
     HELD = "held"  # it has channels, and none left golden
     UNSEEN = "unseen"  # it has no recorded channels
@@ -75,7 +75,7 @@ class Path:
 
     stages: tuple[Stage, ...]
     crossings: tuple[Crossing, ...]
-    reached: str  # the component nearest to the process that left golden, or ''
+    reached: str  # of the components that left golden, the nearest to the process; '' if none
     stopped_at: tuple[str, ...]  # the components that held the fault, if it changed no actuator
 
     @property
@@ -278,8 +278,8 @@ class Ways:
     def _fed_back(self, names: Collection[str], left: Mapping[str, float]) -> float:
         """Return the rank of the earliest time of feedback through one of these components, or infinity.
 
-        A recorded component feeds back once it has left golden, any other once a component that leads to it
-        has.
+        A recorded component feeds back once it has left golden, an unrecorded one once a component that leads
+        to it has left golden.
         """
         unseen = steps_from([name for name in names if name not in self._roles], self._back).keys()
         return min((left[name] for name in {*names, *unseen} if name in left), default=inf)

@@ -16,7 +16,7 @@ Departure = tuple[str, float, float]  # channel, first time (s), largest deviati
 _TINY = 1e-9  # s; times are sums of steps
 COLUMNS = (
     Column("experiment_id", "text", "", "the experiment"),
-    Column("channel", "text", "", "a channel that differed from golden by more than its tolerance"),
+    Column("channel", "text", "", "a channel that differed from the golden run by more than its tolerance"),
     Column("component", "text", "", "the component of the channel, from the manifest"),
     Column("role", "text", "", "`actuator`, `truth` or `internal`"),
     Column("t_first", "number", "s", "when the channel first left golden"),
@@ -27,10 +27,10 @@ COLUMNS = (
 def departures(
     golden: Trace, faulty: Trace, channels: Sequence[Channel], time: str, t_end: float | None
 ) -> tuple[Departure, ...]:
-    """Return the `channels` that left golden, by more than their tolerance, before the end of the drive.
+    """Return the `channels` that left golden before the end of the drive.
 
     Channels that are not recorded in both runs are skipped. If one run ends earlier, all channels leave
-    golden at its end at the latest. The largest deviation is taken over the time that both runs have.
+    golden at its end at the latest. The largest deviation is taken over the time that both runs cover.
     """
     end = np.inf if t_end is None else t_end + _TINY
     ended = end_of_shorter(golden[time], faulty[time])

@@ -75,7 +75,7 @@ class Results:
             raise MutatorError(
                 f"no results here (no {path.name})",
                 where=path.parent,
-                expected="a run folder, as `mutator run` makes it",
+                expected="a run folder, made by `mutator run`",
                 remedy="correct the path, or build the results: `mutator report DIR`",
             ) from None
         except OSError as err:

@@ -27,7 +27,7 @@ def row(
     ends: bool = False,
     scale: Scale | None = None,
 ) -> dict[str, object]:
-    """Return one row, by column name. If the run left no trace, the row has no largest differences.
+    """Return the cells of one row, by column name. Without a trace, the row has no largest differences.
 
     `hazards` are those that the target checks. `ends` says whether a hazard can end the drive. `scale`
     classifies delta-v. None is an empty cell. Flags are 0 or 1. Times are in simulated seconds.

@@ -105,7 +105,7 @@ def _write_results(folder: RunFolder, paths: Mapping[str, Path]) -> None:
 
 @contextmanager
 def _without_collection() -> Iterator[None]:
-    """Disable cyclic garbage collection, which took a fifth of the time. Rows and records have no cycles."""
+    """Disable garbage collection, which takes a fifth of the time: rows and records have no cycles."""
     was_on = gc.isenabled()
     gc.disable()
     try:
@@ -160,7 +160,7 @@ def _unedited(folder: RunFolder, now: Mapping[str, str]) -> dict[str, str]:
     made = {name: (now[name], stamp["tables"].get(name), stamp["before"].get(name)) for name in found}
     for name in found:
         if tells and found[name] not in made[name]:
-            text = f"{folder.path / name}: the table did not match plan and records, so it was rebuilt"
+            text = f"{folder.path / name}: the table did not match the plan and records, so it was rebuilt"
             warnings.warn(text, MutatorWarning, stacklevel=2)
     return {name: one for name, one in found.items() if one in made[name]}
 

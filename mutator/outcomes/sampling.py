@@ -26,7 +26,7 @@ _TINY = 1e-9  # s; times are sums of steps
 
 
 class Sampler:
-    """Builds the series of a golden run, and the series of faulty runs that belong to it."""
+    """Builds the series of a golden run, and the series of the faulty runs compared with it."""
 
     def __init__(self, manifest: TargetManifest, golden: Trace) -> None:
         self._channels = [c for c in (*manifest.compared, *manifest.plotted) if c.name in golden]

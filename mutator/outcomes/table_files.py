@@ -54,7 +54,7 @@ class CsvTable:
 
 
 class ParquetTable:
-    """A Parquet file. Equal rows give equal bytes, in whatever batches they are appended."""
+    """A Parquet file. Equal rows give equal bytes, regardless of the batches."""
 
     def __init__(self, path: Path, columns: Sequence[Column]) -> None:
         import pyarrow as pa

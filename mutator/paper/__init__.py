@@ -1,4 +1,4 @@
-"""The published study that the library reproduces: its tables, observations and figures next to a run's.
+"""Compares a run with the published study that the library reproduces: tables, observations, figures.
 
 No other package imports this one. An entry point in `mutator.studies` registers it.
 """

@@ -13,16 +13,16 @@ Steps = np.ndarray[tuple[int], np.dtype[np.bool_]]  # one flag per step
 APPLIED = 0.01  # share of full gas or brake; less is ignored
 WRONG_S = 0.5  # minimum duration of wrong gas or brake
 BRAKE_S = 0.1  # braking for less than this is ignored
-SHORT = 0.5  # braking is too short up to this share of golden's braking time
+SHORT = 0.5  # up to this share of the golden run's braking time, braking is too short
 RELEASED_S = 1.0  # maximum time from the alert to the last gas or brake
-MISSED_S = 0.1  # minimum duration of gas, and of braking, that only the fault-free run has
+MISSED_S = 0.1  # minimum duration of gas and of braking that only the golden run applies
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pair:
     """A golden and a faulty run over their common steps, with a value for each step.
 
-    Actions are sought from `start`, the activation of the fault, to `end`, the hazard or the end of the run.
+    The search covers `start` (the fault's activation) to `end` (the hazard, or the end of the run).
     """
 
     t: np.ndarray  # simulated time, s
@@ -75,7 +75,7 @@ class Wanted:
     look: Look
     actions: tuple[str, ...]  # channels of the action, whose panels are shaded
     panels: tuple[tuple[str, str], ...]  # (channel, meaning), from the top
-    hazard: str | None  # ends the search; None: the end of the run does
+    hazard: str | None  # the search ends at this hazard; None: at the end of the run
 
 
 def brake_too_short(pair: Pair) -> Steps | None:
@@ -106,7 +106,7 @@ def at_a_wrong_time(channel: str) -> Look:
 def both_unavailable(pair: Pair) -> Steps | None:
     """Return the steps after the last gas or brake of the faulty run.
 
-    None unless that was soon after the alert and the golden run still uses both.
+    None unless this last use came soon after the alert and the golden run still uses both.
     """
     used = (pair.faulty["gas"] > 0) | (pair.faulty["brake"] > 0)
     last = pair.t[used].max(initial=pair.start)

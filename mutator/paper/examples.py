@@ -5,6 +5,7 @@ from typing import Any
 
 import pandas as pd
 
+from mutator._common.text import counted
 from mutator.errors import MutatorError
 from mutator.execution.traces import Traces
 from mutator.figures.figures import Drawing
@@ -88,7 +89,7 @@ def _drawing(frame: pd.DataFrame, traces: Traces | None, wanted: Wanted) -> Draw
             )
     return _none(
         wanted,
-        f"none of the first {len(looked_at)} of the {len(found)} experiments that the query finds shows it",
+        f"the query finds {counted(len(found), 'experiment')}; examined: {len(looked_at)}; none shows it",
     )
 
 
@@ -107,7 +108,7 @@ def _note(wanted: Wanted, row: Mapping[Hashable, Any], number: int, of: int) -> 
     fault = fault_label(f"{row['kind']}/{row['variant']}", row["value"], row["unit"])
     return (
         f"{fault} in {row['scenario']}, {row['method']}, trigger "
-        f"{row['trigger']}: experiment {row['experiment_id']}. It is number {number} of the {of} that the "
-        f"query finds, largest {wanted.order} first, and the first (of at most {LOOKED_AT} examined) "
-        f"whose traces show that {wanted.confirmed}."
+        f"{row['trigger']}: experiment {row['experiment_id']}. The query finds {counted(of, 'experiment')}. "
+        f"Sorted by {wanted.order}, largest first, this is number {number}, and the first (of at most "
+        f"{LOOKED_AT} examined) whose traces show that {wanted.confirmed}."
     )

@@ -1,4 +1,4 @@
-"""Measures that evaluate published observations on a frame of results, each with an interval.
+"""Measures for published observations: numbers computed from a frame of results, each with an interval.
 
 `runs` comes from `mutator.statistics.frame.load`. `of`, `part` and `against` are pandas queries on it; an
 empty query selects all runs. Reports show the call for each claim, which you can repeat in Python:
@@ -15,6 +15,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from mutator._common.text import counted
 from mutator.statistics import contrasts, times
 from mutator.statistics.shares import CONFIDENCE, Share
 from mutator.statistics.shares import share as wilson
@@ -70,24 +71,26 @@ def clustered_difference(runs: pd.DataFrame, *, of: str) -> Estimate:
         _share(chosen, f'method == "{how}"', "is_hazard") for how in (contrasts.GUIDED, contrasts.RANDOM)
     )
     found = contrasts.resampled(chosen, "injected")  # `chosen` has only the runs to count
+    faults = counted(found.clusters, "fault")
     return Estimate(
         estimate=found.difference,
         low=found.low,
         high=found.high,
         n=min(one.of, other.of),
-        text=_against(found.difference, found.low, found.high, one, other, f", {found.clusters} faults"),
+        text=_against(found.difference, found.low, found.high, one, other, f", {faults}"),
     )
 
 
 def stratified(runs: pd.DataFrame, *, of: str) -> Estimate:
-    """Return the common odds ratio of a hazard over fault types, guided against random (Mantel-Haenszel)."""
+    """Return the odds ratio of a hazard, guided against random, over all fault types (Mantel-Haenszel)."""
     parts = contrasts.strata(by_kind(_query(runs, of)), "injected")
     found = contrasts.mantel_haenszel(parts)
-    said = f"- ({found.strata} fault types)"
+    types = counted(found.strata, "fault type")
+    said = f"- ({types})"
     if not math.isnan(found.odds_ratio):
         said = (
-            f"odds ratio {found.odds_ratio:.3g} ({found.low:.3g} to {found.high:.3g}; {found.strata} fault "
-            f"types; p {found.p:.2g}, equal in all types: p {found.p_equal:.2g})"
+            f"odds ratio {found.odds_ratio:.3g} ({found.low:.3g} to {found.high:.3g}; {types}; "
+            f"p {found.p:.2g}, equal in all types: p {found.p_equal:.2g})"
         )
     return Estimate(
         estimate=found.odds_ratio,
@@ -118,8 +121,8 @@ def paired(runs: pd.DataFrame, *, of: str) -> Estimate:
         high=high,
         n=unlike,
         count=matched.first_only,
-        text=f"of {matched.pairs} pairs, {matched.first_only} have a hazard only in the guided run, "
-        f"{matched.second_only} only in the random run (McNemar p {matched.p:.2g})",
+        text=f"{counted(matched.pairs, 'pair')}; hazard only in the guided run: {matched.first_only}, "
+        f"only in the random run: {matched.second_only} (McNemar p {matched.p:.2g})",
     )
 
 
@@ -162,7 +165,7 @@ def of_share(one: Share) -> Estimate:
 
 
 def of_difference(one: Share, other: Share) -> Estimate:
-    """Return the difference of the shares of different runs, first minus second (Newcombe, statsmodels)."""
+    """Return the first share minus the second, for separate sets of runs (Newcombe, statsmodels)."""
     from statsmodels.stats.proportion import confint_proportions_2indep
 
     low = high = math.nan

@@ -106,11 +106,11 @@ class Claim(StrictModel):
     @model_validator(mode="after")
     def _check(self) -> "Claim":
         if self.measure is not None and self.measure not in MEASURES:
-            raise ValueError(f"as `measure` one of {', '.join(MEASURES)}")
+            raise ValueError(f"a `measure` that is one of {', '.join(MEASURES)}")
         if (self.measure is None) != (self.holds is None) or (self.measure is None) != bool(self.see):
             raise ValueError("either `measure` and `holds`, or `see`")
         if any(len(pair) != 2 for pair in self.paper):
-            raise ValueError("in `paper` only pairs of a count and a total")
+            raise ValueError("pairs of a count and a total")
         return self
 
     def calls(self) -> Iterator[tuple[str, dict[str, str]]]:
@@ -159,7 +159,7 @@ class Answer:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JudgedClaim:
-    """A claim with its results and verdict. `why` has reasons in addition to the rule."""
+    """A claim with its results and verdict. `why` gives reasons beyond the rule."""
 
     number: str  # "1.2" is the second claim of the first observation
     claim: Claim
@@ -182,7 +182,7 @@ class JudgedObservation:
 def judge(
     path: Path, runs: pd.DataFrame, lacks: Sequence[str], *, only_needed: bool = False
 ) -> tuple[JudgedObservation, ...]:
-    """Judge the observations in a file on a frame of results.
+    """Judge the observations in a file against a frame of results.
 
     With `only_needed`, judge only the claims on which observations depend. `lacks` says how the runs differ
     from the paper's mixture of faults. MutatorError with file and line if the file or a query is invalid.

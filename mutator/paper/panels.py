@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from mutator._common.files import write_atomic
+from mutator._common.text import counted
 from mutator.outcomes.fault_free import own_alerts
 from mutator.paper import observations, observations_page, seeds
 from mutator.paper.observations import Verdict
@@ -110,13 +111,13 @@ def _missing(kinds: Sequence[str], runs: "pd.DataFrame") -> list[str]:
 def _lacks(run: ReportedRun, missing: list[str]) -> Iterator[str]:
     """Yield how the run differs from the paper's mixture of faults. A shard is always incomplete."""
     if missing:
-        yield f"{len(missing)} of the paper's fault types are missing"
+        yield f"no runs of {counted(len(missing), 'fault type')} of the paper"
     if run.done < (planned := int(run.folder.head["experiments"])):
-        yield f"only {run.done} of the {planned} experiments of the plan have been run"
+        yield f"only {run.done} of {planned} planned experiments were run"
 
 
 def _coverage(run: ReportedRun, kinds: int, missing: list[str]) -> str:
-    text = f"Based on {len(run.frame)} of {run.folder.planned} experiments, which have "
+    text = f"Based on {len(run.frame)} of {run.folder.planned} experiments, which cover "
     text += f"{kinds - len(missing)} of the paper's {kinds} fault types."
     text += f" Missing: {', '.join(missing)}." if missing else ""
     return " ".join(filter(None, (text, own_alerts(run.fault_free()))))

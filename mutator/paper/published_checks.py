@@ -17,7 +17,7 @@ _REMEDY = "compare with the published table"
 
 
 def check_paper(workspace: Workspace) -> Iterator[MutatorError]:
-    """Yield every problem of `references/paper_*.yaml` in a library whose campaigns name the study.
+    """Yield every problem in `references/paper_*.yaml` of a library whose campaigns name the study.
 
     Problems are missing files, impossible numbers (`load_paper`), duplicate rows, unknown methods, scenarios
     and fault types, and sums over scenarios that differ from those over fault types.
@@ -28,7 +28,7 @@ def check_paper(workspace: Workspace) -> Iterator[MutatorError]:
             f"the published numbers are not in this library: no {', '.join(missing)}",
             where=references,
             expected=f"{', '.join(FILES[:-1])} and {FILES[-1]}",
-            remedy="copy them from the library that ships, or remove `study:` from the campaigns",
+            remedy="copy them from the shipped library, or remove `study:` from the campaigns",
         )
         return
     try:
@@ -70,7 +70,7 @@ def _unknown(
         if name_of(row) not in known:
             yield source.error(
                 ("rows", i),
-                f"{what} '{name_of(row)}'",
+                f"unknown {what} '{name_of(row)}'",
                 expected=f"one of {', '.join(sorted(known))}",
                 remedy=f"correct the name, or add the {what} to the library",
             )

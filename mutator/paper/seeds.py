@@ -1,4 +1,4 @@
-"""Counts how many seeds show each of the published observations."""
+"""Counts the seeds whose runs confirm each published observation."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path

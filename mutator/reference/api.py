@@ -20,7 +20,7 @@ from mutator.workspace import Workspace
 _INTRO = """\
 `import mutator` offers the names on this page and no others. They are typed and stable: the
 [changelog](../../CHANGELOG.md) announces every change. Anything else below `mutator` can change at any time.
-The import is fast: a name loads what it needs when you first use it.
+The import is fast, because each name is loaded when you first use it.
 
 No function prints. Invalid input raises [MutatorError](#mutatorerror).
 A notebook shows most objects as a small table.

@@ -33,9 +33,9 @@ def fault_spec(workspace: Workspace) -> str:
         "A fault spec is one YAML file with a fault type of a module, in one or more variants. Its "
         "place in the "
         "library is\n`fault_library/faults/<module>/<fault_type>.yaml`. `mutator try FILE --scenario "
-        "S1` accepts a file anywhere.\n",
+        "S1` accepts a file with any path.\n",
         STRICT,
-        f"The first key is `schema: {specs.SCHEMA}`. Files of newer schemas are rejected.\n"
+        f"The first key is `schema: {specs.SCHEMA}`. Files with a newer schema are rejected.\n"
         "[Your editor can check the file](../how-to/edit-with-completion.md) while you write.\n",
         f"```yaml\n{example.rstrip()}\n```\n",
         *sections("fault-spec.md", specs.spec_model(workspace.readings())),
@@ -53,7 +53,7 @@ def campaigns(workspace: Workspace) -> str:
     return _page(
         generated("Campaigns"),
         "A campaign file chooses faults, scenarios, triggers and limits. Its place in the library is\n"
-        "`fault_library/campaigns/<name>.yaml`. `mutator run FILE --out DIR` accepts a file anywhere.\n",
+        "`fault_library/campaigns/<name>.yaml`. `mutator run FILE --out DIR` accepts a file with any path.\n",
         f"The first key is `schema: {campaign_files.SCHEMA}`. {_SAME}\n",
         f"```yaml\n{example.rstrip()}\n```\n",
         "The experiments are all combinations of the selected faults, scenarios, methods and "

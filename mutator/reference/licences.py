@@ -1,4 +1,4 @@
-"""Generate the page of licences, as stated by the installed packages of constraints.txt.
+"""Generate the page of licences, as stated by the installed packages that constraints.txt lists.
 
 `python -m mutator.reference.licences` writes it. `python -m mutator.reference` does not, since it depends on
 the installed packages.

@@ -43,8 +43,8 @@ def results(workspace: Workspace) -> str:
             "## plan.csv\n",
             f"`plan.csv` has the columns that are known before a run: {left_out}.\n",
             "## propagation.parquet\n",
-            "One row for each channel of an experiment that differed from golden by more than its tolerance, "
-            "in the order of\nexperiments and of the manifest's channels. [Fault "
+            "One row for each channel of an experiment that differed from the golden run by more than its "
+            "tolerance, in the order of\nexperiments and of the manifest's channels. [Fault "
             "paths](../explanation/fault-paths.md) explains how a path follows from\nthese rows.\n",
             *_columns(PROPAGATION),
             "## timings.parquet\n",
@@ -74,10 +74,10 @@ def channels(workspace: Workspace) -> str:
     manifests = [workspace.manifest(name) for name in workspace.targets]
     parts = [
         generated("Channels and units"),
-        "This page lists what is observed, recorded and compared for each target of the library, as the "
-        "target's [manifest](target-manifest.md) declares.\nInternally, all values are in SI units and "
-        "radians. Files and tables can "
-        "use other units, which are part of the\nnames there ([units](fault-spec.md#units)).\n",
+        "This page lists the variables, channels, hazards and metrics that the "
+        "[manifest](target-manifest.md) of each target declares.\nInternally, all values are in SI units "
+        "and radians. Files and tables can use other units, which the names of\nkeys and columns "
+        "contain ([units](fault-spec.md#units)).\n",
     ]
     for manifest in manifests:
         parts += _target(manifest)
@@ -137,7 +137,7 @@ def _metric(metric: Metric) -> tuple[str, ...]:
     elif metric.formula:
         what = f"{metric.aggregate} of `{metric.formula}`"
     else:
-        what = "min of its robustness"
+        what = "min of the hazard's robustness"
     if metric.where:
         what += f" where `{metric.where}`"
     about = f"{metric.about} ({metric.source})" if metric.source else metric.about

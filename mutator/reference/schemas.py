@@ -73,7 +73,7 @@ def definitions(model: type[StrictModel]) -> dict[str, dict[str, Any]]:
     """Return the JSON Schema of every model in a file of `model`, by short name (`Variant`), that of `model`
     first.
 
-    Each has the class's title, its docstring in one line, and descriptions of its properties.
+    Each schema has the class's title, its docstring in one line, and descriptions of its properties.
     """
     whole = model.model_json_schema(by_alias=True)
     parts = {model.__name__: whole} | whole.pop("$defs", {})

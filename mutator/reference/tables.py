@@ -33,7 +33,7 @@ def sections(page: str, *models: type[StrictModel], below: int = 1) -> Iterator[
     """Yield a section for each model in files of `models`, each once, in the order of their keys.
 
     Headings are one level below `below`; with several `models`, those of their parts are two levels below it.
-    Models of other pages are only linked.
+    Models that other pages describe are only linked.
     """
     parts: dict[str, dict[str, Any]] = {}
     for model in models:
@@ -95,7 +95,7 @@ class _Tables:
         yield ""
 
     def _type(self, value: dict[str, Any]) -> str:
-        """Return a JSON Schema type as text; optional keys without null."""
+        """Return a JSON Schema type as text; for optional keys, null is left out."""
         if "anyOf" in value:
             types = [v.get("type") for v in value["anyOf"]]
             # "number" includes whole numbers

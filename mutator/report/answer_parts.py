@@ -48,7 +48,7 @@ class Answer:
 
 
 def to_list(facets: Mapping[str, Sequence[str]], sort: str = "") -> str:
-    """The URL fragment that shows the list of experiments with these filters."""
+    """The URL fragment that opens the list of experiments with these filters."""
     parts = [f"{name}={','.join(quote(v, safe='') for v in values)}" for name, values in facets.items()]
     return "&".join((*parts, *([f"sort={sort}"] if sort else ())))
 

@@ -64,7 +64,7 @@ def _warned(row: Row) -> str:
 
 
 def unwarned(frame: pd.DataFrame, note: str = "") -> Answer:
-    """Answer which hazards were silent. `note` is a caveat on alerts that were not observed."""
+    """Say which hazards were silent. `note` is a caveat about alerts that were not observed."""
     hazards = frame[frame["outcome"] == "hazard"]
     silent = hazards[hazards["warning"] != FIRST]
     never, late = (int((silent["warning"] == name).sum()) for name in (NO_ALERT, LATE))
@@ -104,12 +104,12 @@ def unwarned(frame: pd.DataFrame, note: str = "") -> Answer:
 
 
 def _more(count: int, what: str) -> str:
-    """A note that a list is cut, or '' if it is complete."""
+    """A note that a list is truncated, or '' if it is complete."""
     return f" The table shows {TYPES} of the {count:,} {what}." if count > TYPES else ""
 
 
 def survived(frame: pd.DataFrame) -> Answer:
-    """Answer how many activated faults led to no hazard, and which fault types never led to one."""
+    """Say how many activated faults led to no hazard, and which fault types never led to one."""
     active = frame[frame["is_activated"]]
     fine = active[active["outcome"].isin(["masked", "sdc"])]
     moved = int(fine["is_manifested"].sum())
@@ -122,7 +122,7 @@ def survived(frame: pd.DataFrame) -> Answer:
     says += f" {share(len(whole), len(kinds), 'fault types')} never led to a hazard"
     says += ", a crash or a timeout." if broken else "."
     weak = sorted((k for k in kinds if k[1] < k[2]), key=lambda k: (k[1] / k[2], -k[2], k[0]))
-    says += _more(len(weak), "fault types that did")
+    says += _more(len(weak), "fault types that led to one")
     ends = {"outcome": ["masked", "sdc"]}
     least = [(kind_link(kind, **ends), bar(part, of)) for kind, part, of in weak[:TYPES]]
     never = [(kind_link(kind, **ends), f"{of:,}") for kind, of in whole]
@@ -143,11 +143,11 @@ def survived(frame: pd.DataFrame) -> Answer:
 
 
 def time_spent(frame: pd.DataFrame, timings: pd.DataFrame) -> Answer:
-    """Answer how much CPU time the experiments took, and why some took none."""
+    """Say how much CPU time the experiments took, and why some took none."""
     cpu = frame["experiment_id"].map(timings.set_index("experiment_id")["cpu_s"])
     total, ran = float(cpu.sum()), int((cpu > 0).sum())
     workers = timings["worker"].nunique()
-    says = f"The experiments took {duration(total)} of CPU time, by {counted(workers, 'worker')}: "
+    says = f"The experiments took {duration(total)} of CPU time on {counted(workers, 'worker')}: "
     says += f"{share(ran, len(frame), 'experiments')} {were(ran)} simulated{_undriven(frame, cpu, timings)}."
     if ran:
         says += f" Median {cpu[cpu > 0].median():.2f} s, longest {cpu.max():.2f} s."
@@ -172,6 +172,6 @@ def _undriven(frame: pd.DataFrame, cpu: pd.Series, timings: pd.DataFrame) -> str
     idle = int(rest.isin(golden["experiment_id"]).sum())
     why = {
         "the trigger never held, so the golden run's result was used": idle,
-        "the result is that of an experiment with the same run": len(rest) - idle,
+        "the result of an experiment with an identical run was used": len(rest) - idle,
     }
     return "".join(f"; for {count:,}, {words}" for words, count in why.items() if count)

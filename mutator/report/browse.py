@@ -41,7 +41,7 @@ SCHEMA = "report-table/1"
 DETAILS_SCHEMA = "report-details/1"
 _OF_ALERTS = ("alerts", "t_alert", "reaction_time")  # columns that need a target with alerts
 STILLS_BYTES = 1_000_000  # limit of the stills embedded in the page; the others become links
-LISTED = 50_000  # maximum number of experiments that the page lists; with more it would open slowly
+LISTED = 50_000  # maximum number of experiments that the page lists, so that it opens quickly
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,8 +86,9 @@ def _which(run: ReportedRun) -> str:
         return ""
     return (
         f"The list has the {LISTED:,} worst of {count:,} experiments (by rank). All other parts of this page "
-        f"count all of them. To see another experiment: `mutator show ID --run {path}`. To list the worst "
-        f"that match a filter: `mutator show --run {path} --only 'FILTER'`. results.parquet has all of them."
+        f"cover all experiments. To see another experiment: `mutator show ID --run {path}`. To list the "
+        f"worst that match a filter: `mutator show --run {path} --only 'FILTER'`. All experiments are in "
+        "results.parquet."
     )
 
 

@@ -1,6 +1,6 @@
 """Builds the report of a run: REPORT.md and one self-contained HTML page.
 
-The only inputs are results.csv and the run folder, so rebuilding the report gives the same bytes.
+The only inputs are the run folder and the fault library. Equal inputs give equal bytes.
 """
 
 from collections.abc import Callable, Sequence
@@ -10,6 +10,7 @@ from pathlib import Path
 from mutator._common.files import write_atomic
 from mutator._common.processes import beside, processes_for
 from mutator._common.tables import Table
+from mutator._common.text import counted
 from mutator.outcomes.counting import outcome_counts
 from mutator.outcomes.reader import Results
 from mutator.report.browse import Browse, browse_data
@@ -102,11 +103,11 @@ def _content(run: ReportedRun, browse: Callable[[], Browse]) -> Content:
 
 def _planned(folder: RunFolder) -> str:
     experiments, runs = int(folder.head["experiments"]), folder.head.get("runs")
-    text = f"{experiments} experiments are planned"
+    text = f"Planned: {counted(experiments, 'experiment')}"
     if folder.shard:
         text += f", {folder.planned} of them in shard {folder.shard}"
     if runs == experiments:
         text += "; each needs its own run"
     elif runs is not None:  # older plans do not count runs
-        text += f", in {runs} runs: if a fault makes several scenarios identical, they share one run"
+        text += f", in {counted(runs, 'run')}, because experiments with identical runs share one run"
     return " ".join(filter(None, (f"{text}.", folder.stop_note)))

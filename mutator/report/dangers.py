@@ -25,7 +25,7 @@ def dangerous(frame: pd.DataFrame, metrics: Sequence[Sequence[str]], *, has_aler
         says = f"{says.removesuffix('.')}: {_classes(ranked)}."
     elif contact:
         hits = int((pd.to_numeric(ranked[contact]) > 0).sum())
-        says += f" {share(hits, len(ranked), 'hazards')} came with contact."
+        says += f" {share(hits, len(ranked), 'hazards')} involved contact."
     units = {name: unit for name, unit, *_ in metrics}
     kinds = by_kind(ranked, active)
     came = [kind for kind in kinds if kind[1]]
@@ -43,7 +43,7 @@ def dangerous(frame: pd.DataFrame, metrics: Sequence[Sequence[str]], *, has_aler
 
 
 def worst_of(frame: pd.DataFrame) -> list[str]:
-    """Ids of the experiments that `dangerous` can list, by `place`."""
+    """Ids of the experiments that `dangerous` can list, sorted by `place`."""
     hazards = frame[frame["outcome"] == "hazard"]
     groups = [hazards]
     if SEVERITY in frame:
@@ -125,7 +125,7 @@ def _worst(
 
 
 def _how_bad(row: Mapping[Any, Any], contact: str, units: Mapping[str, str]) -> str:
-    """For a contact its speed, for example `delta-v 6.70 m/s`; otherwise the smallest margin to hazards that
+    """For a contact, its speed, for example `delta-v 6.70 m/s`; otherwise the smallest margin to hazards that
     occurred, or `-`."""
     if contact and row[contact] not in ("", "0.0"):
         words = "delta-v" if contact == "delta_v" else "contact at"

@@ -33,7 +33,7 @@ class EngineSummary:
     table: Table
     proof: str
     state: str
-    failed: bool  # an experiment had another result on the reference engine
+    failed: bool  # an experiment had a different result on the reference engine
 
 
 def engine_summary(

@@ -15,7 +15,7 @@ LISTED = 5  # maximum number of fault types listed
 
 
 def first_to_fix(frame: pd.DataFrame, paths: FoundPaths | None, *, has_alerts: bool) -> Answer:
-    """Answer which fault types to fix first: those with the most silent hazards in the highest severity
+    """Say which fault types to fix first: those with the most silent hazards in the highest severity
     class; ties are broken by the next lower classes, then by hazards without contact, then by the shortest
     time from activation to hazard. If the target has no alerts, all hazards are counted. `frame` must have at
     least one hazard."""
@@ -75,8 +75,10 @@ def _says(order: Sequence[str], counted: pd.DataFrame, classes: Sequence[str], w
         says += f", the highest among the {what}"
     says += f". The rule: fault types with the most {what}"
     if len(classes) > 1:
-        says += " of the highest severity come first; ties are broken by the next lower class"
-    says += ", then the shortest time from fault to hazard."
+        says += " of the highest severity come first; ties are broken by the next lower class, then by"
+    else:
+        says += " come first; ties are broken by"
+    says += " the shortest time from fault to hazard."
     if len(order) > LISTED:
         says += f" The table shows the first {LISTED} of {len(order)} fault types."
     return says

@@ -35,7 +35,7 @@ _HEADS = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PastRun:
-    """One run. `date` is the time of its last record, `commit` that of the target."""
+    """One run. `date` is the time of its last record, `commit` the commit of its target."""
 
     folder: RunFolder
     date: datetime
@@ -137,7 +137,7 @@ def _changes(before: PastRun, after: PastRun) -> str:
     gone = sum(a.outcome is Outcome.HAZARD is not b.outcome for a, b in pairs)
     other = sum(a.ending != b.ending for a, b in pairs) - new - gone
     if not new + gone + other:
-        return f"all {counted(len(shared), 'shared experiment')} ended the same"
+        return f"{counted(len(shared), 'shared experiment')}, no difference"
     return f"{counted(new, 'new hazard')}, {gone} gone, {other} changed otherwise, of {len(shared):,} shared"
 
 

@@ -51,7 +51,7 @@ class FoundPaths:
     by_id: Mapping[str, Path]
     records: Mapping[str, Record]
     courses: Sequence[Course] = ()
-    course_of: Mapping[str, int] = field(default_factory=dict)  # by experiment id; not for all
+    course_of: Mapping[str, int] = field(default_factory=dict)  # by experiment id, for some experiments
 
     @classmethod
     def of(

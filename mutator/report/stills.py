@@ -17,7 +17,7 @@ from mutator.store.progress import Pace, Progress
 from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.workspace import Workspace
 
-MOST, ONE_IN = 10, 20  # at most 10 experiments, and at most one in 20 of the plan
+MOST, ONE_IN = 10, 20  # at most 10 experiments, and at most one in 20 of the planned ones
 BUDGET_S = 120.0  # no further experiment starts after this time
 
 Notify = Callable[[Progress], None]

@@ -1,4 +1,4 @@
-"""The data from which a report is made, and what a study adds to the report."""
+"""The data that a report is made from, and the interface through which a study adds to it."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -111,9 +111,9 @@ class ReportedRun:
 class Study:
     """Published work with which runs are compared, provided by an entry point in `mutator.studies`. `about`
     cites it. `check` finds problems in its data in a fault library. `published` returns the counts to show
-    next to those of a run, or None if they do not apply. Each function in `panels` may return a panel of
-    the study's page and write files next to it. If none does, there is no page. `drawings` returns the
-    figures of that page."""
+    next to those of a run, or None if they do not apply. Each function in `panels` can return a panel of
+    the study's page and write files next to it. If none returns a panel, there is no page. `drawings`
+    returns the figures of that page."""
 
     about: str
     check: Callable[[Workspace], Iterable[MutatorError]]

@@ -87,7 +87,7 @@ def _severity(scale: Mapping[str, object] | None) -> dict[str, str]:
     classes = scale["classes"]
     assert isinstance(classes, list)
     told = {f"severity {name}": f"delta-v of {low:.2f} m/s or more: {about}" for name, low, about in classes}
-    return told | {"no contact": "no severity class; these hazards rank by margin, each hazard in turn"}
+    return told | {"no contact": "no severity class; these runs rank by margin, alternating between hazards"}
 
 
 def _scenarios(run: ReportedRun) -> dict[str, str]:

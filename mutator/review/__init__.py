@@ -1,2 +1,2 @@
-"""Review of generated diffs: groups of mutants, decisions, the review page and the gate. Runs no
-experiment."""
+"""Review of generated diffs: groups of mutants, decisions, the review page and the gate. This package
+runs no experiments."""

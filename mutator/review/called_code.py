@@ -1,8 +1,8 @@
 """Finds, by name, the target code that injected lines call, so that reviewers can see it.
 
 Names are resolved through imports, transitively, to functions, classes and constants of the tree. Classes are
-included whole, with their bases; for `self`, only the named method is. Calls that depend on values (a method
-of an argument, say) are not followed. Annotations are ignored.
+included whole, with their bases; for a call on `self`, only the called method is. Calls that depend on values
+(a method of an argument, say) are not followed. Annotations are ignored.
 """
 
 import ast
@@ -23,8 +23,8 @@ _FURTHEST = 20  # maximum number of imports to follow for a name
 
 @dataclass(frozen=True, slots=True, order=True)
 class _Place:
-    """A piece of the tree: `name` in the file at `path`, or the whole file (no name). For a method, `me` is
-    the class of the object on which it is called."""
+    """A piece of the source tree: `name` in the file at `path`, or the whole file (no name). For a method,
+    `me` is the class of the object on which it is called."""
 
     path: str
     name: str
@@ -36,8 +36,9 @@ class CalledCode:
         self._tree = tree
 
     def of_lines(self, path: str, data: bytes) -> dict[str, str]:
-        """Return the code that the injected lines in `data`, the mutated file at `path`, call: the source of
-        each place, such as `car/weather.py Rain`. Files other than Python are included whole."""
+        """Return the code that the injected lines of a mutated file call: the source of each place, such as
+        `car/weather.py Rain`. `data` is the content of the file at `path`. Files other than Python are
+        included whole."""
         module = source_names.read_module(path, data, Path())
         return self._closure(path, uses_in(module.tree, wanted=_injected(data)))
 

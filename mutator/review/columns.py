@@ -1,4 +1,4 @@
-"""The columns for filters over groups, in a separate module because help texts need nothing else."""
+"""The columns for filters over groups. They are in a separate module because help texts need only them."""
 
 COLUMNS = (
     "group",

@@ -66,7 +66,7 @@ def _last_changes(group: Group) -> dict[Path, _Commit]:
         top = git(path.parent, "rev-parse", "--show-toplevel")
         if top is None:
             raise _refusal(
-                f"cannot determine who last changed group {group.id}: it is not in a git clone",
+                f"cannot determine who last changed group {group.id}: its file is not in a git clone",
                 path,
                 "put the file under git",
             )

@@ -141,7 +141,7 @@ def load_review(workspace: Workspace, target: str) -> Review:
     path = workspace.library / "reviews" / f"{target}.yaml"
     if path.is_symlink():
         raise MutatorError(
-            "a link", where=path, expected="a regular file", remedy="replace the link with the file"
+            "a symbolic link", where=path, expected="a regular file", remedy="replace the link with the file"
         )
     if not path.exists():
         return Review(path=path, target=target, entries={})
@@ -190,10 +190,10 @@ def _refuse_unseen(review: Review, changes: Sequence[Change], looked_at: Mapping
         return
     told = [f"  {one.id}  {_last_word(review, one)}" for one in unseen]
     conflict = Conflict(
-        "\n".join(["somebody else has reviewed these groups in the meantime:", *told]),
+        "\n".join(["somebody else has changed the review in the meantime:", *told]),
         where=review.path,
-        expected="groups unchanged since you saw them",
-        remedy="check these groups again, then decide (nothing was written)",
+        expected="no changes since you last looked",
+        remedy="check again, then decide (nothing was written)",
     )
     conflict.groups, conflict.review = tuple(one.id for one in unseen), review
     raise conflict

@@ -13,7 +13,7 @@ _WORDS = {
     "template": "template",
     "function": "target function",
     "diff": "diff",
-    "calls": "code that it calls",
+    "calls": "called code",
 }
 
 

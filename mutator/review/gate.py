@@ -45,7 +45,7 @@ def approval_summary(run: Path) -> str:
         return ""
     groups = read_json(run / FILE, SCHEMA)["groups"]
     names = Counter(group["by"] for group in groups)
-    return f"all of {counted(len(groups), 'group')} approved, by " + ", ".join(
+    return f"{counted(len(groups), 'group')} approved by " + ", ".join(
         f"{name} ({n})" for name, n in sorted(names.items())
     )
 
@@ -60,18 +60,20 @@ def _refusal(workspace: Workspace, plan: Plan, review: Review, refused: list[Gro
         f"  {group.id}  {reason(review, group)}, {share(group)}: {group.what}"
         for group in review.in_turn(refused)
     ]
-    many = f"{len(refused)} groups of mutants are" if len(refused) > 1 else "a group of mutants is"
+    several = len(refused) > 1
+    many = f"{len(refused)} groups of mutants are" if several else "a group of mutants is"
     wanted = f"--campaign {_campaign(workspace, plan)}"
     wanted += f" --reading {plan.reading}" if plan.choices.reading else ""
     at_once = ""
     if len(refused) <= _MOST_IDS:
         ids = " ".join(group.id for group in refused)
-        at_once = f"; or approve all of them: `mutator review approve {ids} {wanted} --by NAME`"
+        at_once = f"; or approve {'all of them' if several else 'it'}: "
+        at_once += f"`mutator review approve {ids} {wanted} --by NAME`"
     return CheckFailed(
         "\n".join([f"{many} not approved:", *lines]),
         where=review.path,
         expected="a valid approval of each group",
-        remedy=f"review them: `mutator review walk {wanted} --by NAME`{at_once}",
+        remedy=f"review {'them' if several else 'it'}: `mutator review walk {wanted} --by NAME`{at_once}",
     )
 
 

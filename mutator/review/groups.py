@@ -1,7 +1,7 @@
-"""Groups patches that differ only in values: a diff with holes, and a table of the values in them.
+"""Groups patches that differ only in values: one diff with holes, and a table of the values in the holes.
 
 Patches of the same shape differ only in the numbers, truth values and ids of their injected lines and, in the
-probe, in ids and the lines that define the trigger. A value that is equal in all of them stays in the text;
+probe, in ids and the lines that define the trigger. A value that is equal in all patches stays in the text;
 every other value becomes a hole.
 """
 

@@ -20,8 +20,8 @@ _SHOWN_HOLE = "⟨⟩"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Material:
-    """The texts. `diff` has one text for each shape, or a pair of texts for each change that an operator
-    makes."""
+    """The texts that a decision is bound to. `diff` has one text for each shape, or a pair of texts for each
+    change that an operator makes."""
 
     diff: Sequence[str] | Sequence[Sequence[str]]
     functions: Mapping[str, str]

@@ -45,8 +45,8 @@ def condition_lines(triggers: Sequence[Trigger]) -> list[str]:
         else:
             named.setdefault(trigger.condition, []).append(trigger.name)
     lines = [f"{condition}  ({', '.join(dict.fromkeys(names))})" for condition, names in named.items()]
-    if len(times) == 1:
-        lines.append("from a time on")
+    if len(set(times)) == 1:
+        lines.append("starts at a given time")
     elif times:
-        lines.append(f"from one of {len(set(times))} times on ({min(times)} s to {max(times)} s)")
+        lines.append(f"starts at one of {len(set(times))} times ({min(times)} s to {max(times)} s)")
     return lines

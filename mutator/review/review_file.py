@@ -75,7 +75,7 @@ def load(path: Path, target: str) -> Content:
     model, source = read(path, _FileModel, SCHEMA, older={_FIRST: _from_first})
     if model.target != target:
         raise source.error(
-            ("target",), f"target '{model.target}'", expected=f"'{target}', like the file name"
+            ("target",), f"target '{model.target}'", expected=f"'{target}', as in the file name"
         )
     entries: dict[str, Entry] = {}
     for i, block in enumerate(model.decisions):

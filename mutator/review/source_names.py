@@ -81,7 +81,7 @@ class Module:
 
 
 def read_module(path: str, data: bytes, root: Path) -> Module:
-    """The names of a file of a tree; empty if it is not Python."""
+    """The names in a file; empty if it is not Python."""
     try:
         tree = ast.parse(data)
     except (SyntaxError, ValueError, RecursionError):
@@ -221,7 +221,7 @@ def _bound(node: _Function) -> tuple[frozenset[str], list[tuple[str, Import]]]:
 
 
 def _definitions(body: Sequence[ast.stmt], inside: str) -> Iterator[tuple[str, ast.stmt]]:
-    """Name and statement of every definition in a module or class, including blocks like `if`."""
+    """Name and statement of every definition in a module or class, including those in blocks such as `if`."""
     for node in body:
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
             yield inside + node.name, node

@@ -27,7 +27,7 @@ const Ways = (() => {
       line.style.strokeWidth = `${THIN + (came ? ((WIDEST - THIN) * through) / came : 0)}px`;
       const [first, last = ""] = "short" in way.dataset ? share(numbers).split(", ") : [share(numbers)];
       way.querySelectorAll(".count").forEach((line, i) => { line.textContent = i ? last : first; });
-      document.querySelector(`#ways-table [data-link="${CSS.escape(way.dataset.link)}"] td:last-child`).textContent = share(numbers) || "none came";
+      document.querySelector(`#ways-table [data-link="${CSS.escape(way.dataset.link)}"] td:last-child`).textContent = share(numbers) || "none reached it";
       filter(way);
     }
     for (const box of place.querySelectorAll("[data-component]")) {

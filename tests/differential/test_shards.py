@@ -108,7 +108,7 @@ def test_an_approval_is_merged_if_every_shard_has_it(copies: Runs, tmp_path: Pat
     assert gate.approval_summary(tmp_path / "half") == ""
     gate.write_approvals(shards[1], said)
     merge(shards, tmp_path / "out")
-    assert gate.approval_summary(tmp_path / "out") == "all of 1 group approved, by Jane Doe (1)"
+    assert gate.approval_summary(tmp_path / "out") == "1 group approved by Jane Doe (1)"
 
 
 def test_each_experiment_is_in_exactly_one_shard(runs: Runs) -> None:

@@ -241,7 +241,7 @@ def cli(
 
 
 Cli = Callable[..., tuple[int, str]]
-EDITED = "results.csv: the table did not match plan and records, so it was rebuilt"
+EDITED = "results.csv: the table did not match the plan and records, so it was rebuilt"
 
 
 def readers(run: Path, genuine: Path) -> dict[str, tuple[object, ...]]:

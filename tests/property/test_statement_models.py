@@ -22,7 +22,7 @@ EXCUSES = (
     "the next statement is missing",
     "the anchor is not at a statement that is alone",
     "the anchored statement",
-    "the template yields",
+    "the template contains `yield`",
     "ends its block",
 )
 

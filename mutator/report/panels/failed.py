@@ -43,7 +43,7 @@ def _markdown(failed: Sequence[Row], count: int) -> str:
     rows = [(r.status.value, r.experiment_id, r.fault, r.scenario, r.detail) for r in failed[:LISTED]]
     table = Table(heads=_HEADS, rows=rows).as_markdown()
     more = count - LISTED
-    return f"{table}\n\n{more} more are in `results.csv`." if more > 0 else table
+    return f"{table}\n\nOthers in `results.csv`: {more}." if more > 0 else table
 
 
 def _linked(failed: Sequence[Row]) -> Table:

@@ -1,5 +1,5 @@
 """The panel of the mutation score: the share of operator mutants that change the closed loop. Runs without
-operators have none."""
+operators have no such panel."""
 
 from dataclasses import replace
 

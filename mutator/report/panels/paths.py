@@ -11,7 +11,7 @@ from mutator.report.studies import ReportedRun
 from mutator.web import plainly_embedded
 
 _ABOUT = (
-    "Each link shows how many active faults came to it and how many got through it. A fault got through if "
+    "Each link shows how many active faults reached it and how many got through it. A fault got through if "
     "recorded signals behind the link differ from the golden run."
 )
 _NONE_STOPPED = "None: every active fault changed an actuator."
@@ -20,11 +20,11 @@ _HTML = """\
 <p>{{ about }}</p>
 {% if figure %}
 <p class="quiet">Links: the thicker, the more faults got through; dashed if none did; thin if the end is not
-recorded; dotted if it is feedback or a link of people, which belong to no path. Boxes: orange if faults were
-<strong>injected</strong> here; green if faults were <strong>stopped</strong> here, so they got no further
-through this component. A fault that two components stopped is counted at both. A <strong>masked</strong>
-fault changed no actuator at all. Select a link to list the experiments whose faults got through it, or a box
-to list those whose faults were masked there.</p>
+recorded; dotted if it is feedback, or a link from or to people, which belong to no path. Boxes: orange if
+faults were <strong>injected</strong> here; green if faults were <strong>stopped</strong> here, so they got
+no further through this component. A fault that two components stopped is counted at both. A
+<strong>masked</strong> fault changed no actuator at all. Select a link to list the experiments whose faults
+got through it, or a box to list those whose faults were masked there.</p>
 <div class="row"><label for="ways-kind">Faults:</label> <select id="ways-kind" disabled>
 {% for kind in kinds %}
 <option>{{ kind }}</option>
@@ -36,7 +36,8 @@ to list those whose faults were masked there.</p>
 <details{{ "" if figure else " open" }}>
 <summary>{{ "The same numbers as a table" if figure else "Links" }}</summary>
 <div class="scroll"><table id="ways-table"><thead><tr><th scope="col">from</th><th scope="col">to</th>
-<th scope="col">what it carries</th><th scope="col">got through, of those that came</th></tr></thead><tbody>
+<th scope="col">what it carries</th><th scope="col">got through, of those that reached it</th></tr></thead>
+<tbody>
 {% for name, (tail, tip, carries) in links.items() %}
 <tr data-link="{{ name }}"><td>{{ label(tail) }}</td><td>{{ label(tip) }}</td>
 <td>{{ carries }}</td>
@@ -44,7 +45,8 @@ to list those whose faults were masked there.</p>
 {% endfor %}
 </tbody></table></div></details>
 <h3>Where masked faults were stopped</h3>
-<p class="quiet">Each fault that changed no actuator is counted once, under all that stopped it.</p>
+<p class="quiet">Each fault that changed no actuator is counted once, in the column that
+names all components that stopped it.</p>
 {% if stops %}
 {{ stops.as_html("counts") }}
 {% else %}
@@ -74,7 +76,7 @@ def paths_panel(run: ReportedRun) -> Panel | None:
         data=_markup(plainly_embedded({kind: c.plain() for kind, c in counts.items()}, "ways-data")),
         links=links,
         label=paths.label,
-        share=lambda through, came: share_text(through, came) or "none came",
+        share=lambda through, came: share_text(through, came) or "none reached it",
         stops=stops,
         none_stopped=_NONE_STOPPED,
     )
@@ -105,7 +107,7 @@ def _table(links: Links, counts: PathCounts, paths: FoundPaths) -> Table:
         for name, (tail, tip, carries) in links.items()
         if (came := counts.came[name])
     ]
-    return Table(heads=("from", "to", "what it carries", "got through, of those that came"), rows=rows)
+    return Table(heads=("from", "to", "what it carries", "got through, of those that reached it"), rows=rows)
 
 
 def _stops(counts: Mapping[str, PathCounts], paths: FoundPaths) -> Table | None:

@@ -1,4 +1,4 @@
-"""The panel of how much results vary between a campaign's seeds. Runs with one seed have none."""
+"""The panel that shows how much results vary between seeds. Runs with one seed have no such panel."""
 
 from mutator._common.tables import Table
 from mutator.report.panel import Panel, rendered
@@ -27,7 +27,7 @@ def seeds_panel(run: ReportedRun) -> Panel | None:
         return None
     sheets = (seeds_sheet(run.frame, alerts=run.folder.has_alerts), kinds_sheet(run.frame))
     write_sheets(sheets, run.out)
-    about = f"{len(seeds)} seeds, from {seeds[0]} to {seeds[-1]}. Each repeats the campaign with new draws."
+    about = f"{len(seeds)} seeds ({seeds[0]} to {seeds[-1]}). Each seed repeats the campaign with new draws."
     markdown = "\n\n".join(["## Seeds", about, *(f"#{sheet.markdown().rstrip()}" for sheet in sheets)])
     html = rendered(_HTML, about=about, sheets=sheets)
     return Panel(anchor="seeds", link="Seeds", markdown=markdown, html=html, summary=_summary(sheets[0]))

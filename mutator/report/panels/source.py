@@ -142,7 +142,7 @@ def _query(place: str, *more: str) -> str:
 
 
 def _coloured(file: MarkedFile) -> list[Markup]:
-    """The lines of a file as HTML, in the colours of diffs."""
+    """The lines of a file as HTML, coloured as in diffs."""
     made, done = [Markup("")] * len(file.lines), [0] * len(file.lines)
     for line, start, end, name in _parts(file):
         text, begin = file.lines[line], max(start, done[line])

@@ -21,7 +21,7 @@ from mutator.store.run_folder import RunFolder
 FOLDER = "tables"  # a folder of the report
 NOTES = (
     "*Injected*: experiments with a valid result. Harness errors and invalid mutants are counted "
-    "separately. *Activated*: an injected statement ran while triggered. "
+    "separately. *Activated*: an injected statement ran while the trigger held. "
     "*Manifested*: an actuator output then differed from the fault-free run."
 )
 NO_ALERT = " *Hazard, no alert*: no alert at all, before or after the hazard."
@@ -60,7 +60,7 @@ _HTML = """\
 
 
 def notes(folder: RunFolder) -> str:
-    """What the headings of the counts mean."""
+    """The meanings of the headings of the counts."""
     note = f" {folder.stop_note}" if folder.stop_note else ""
     return NOTES + (NO_ALERT + note if folder.has_alerts else "")
 

@@ -149,9 +149,9 @@ def test_a_function_is_found_by_its_qualified_name() -> None:
         (AnchorKind.AFTER_ASSIGN, "b", "A.run", 2, ["m.py:24:", "is on the line of its `if`"]),
         (AnchorKind.BEFORE_RETURN, "self._width", "A.width", None, ["m.py:7:", "`if`, `for` or `def`"]),
         (AnchorKind.AFTER_ASSIGN, "a", "A.runn", None, ["no function 'A.runn'", "A.run,", "mean 'A.run'"]),
-        (AnchorKind.ENTRY, "", "A.width", None, ["2 functions 'A.width'", "line 7, line 10", "from 1 to 2"]),
+        (AnchorKind.ENTRY, "", "A.width", None, ["2 functions named", "line 7, line 10", "from 1 to 2"]),
         (AnchorKind.ENTRY, "", "A.width", 1, ["has no line at which to insert"]),
-        (AnchorKind.BEFORE_CALL, "x", "empty", None, ["another anchor: there is none of this kind"]),
+        (AnchorKind.BEFORE_CALL, "x", "empty", None, ["another kind of anchor: there is none"]),
     ],
 )  # fmt: skip
 def test_an_anchor_with_no_match_or_several_is_an_error(
@@ -192,9 +192,9 @@ def test_the_probe_is_imported_below_the_head_of_the_file(source: str, line: int
         (b"def f(:\n    pass\n", "m.py:1: not valid Python"),
         (b"# coding: latin-9x\nx = 1\n", "unknown encoding"),
         (b"x = '\xff'\n", "not valid Python"),
-        (b"x = 1\ry = 2\r", "line ends of CR alone"),
-        (b"import os\nfrom p import _fi\n", "m.py:2: the name _fi"),
-        (b"import os\n\nx = 1  # fi:ab12\n", "m.py:3: the name _fi or a `# fi:` tag is in use"),
+        (b"x = 1\ry = 2\r", "a line ends in CR alone"),
+        (b"import os\nfrom p import _fi\n", "m.py:2: the target uses the name `_fi`"),
+        (b"import os\n\nx = 1  # fi:ab12\n", "m.py:3: the target uses the name `_fi` or a `# fi:` tag"),
     ],
 )
 def test_an_invalid_or_already_injected_file_is_refused(source: bytes, piece: str) -> None:

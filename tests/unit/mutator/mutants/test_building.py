@@ -188,7 +188,7 @@ def test_a_mutant_that_does_not_compile_is_invalid(toy: Workspace, tmp_path: Pat
 def test_an_invalid_trigger_is_refused(toy: Workspace) -> None:
     with pytest.raises(MutatorError, match="is not a truth value"):
         build(toy, None, Trigger(name="x", condition="__import__('os')"))
-    with pytest.raises(MutatorError, match="without a time; expected hold_s"):
+    with pytest.raises(MutatorError, match="without a time; expected `hold_s`"):
         build(toy, None, Trigger(name="x", condition="True", hold=Hold.FOR))
 
 

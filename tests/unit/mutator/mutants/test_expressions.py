@@ -118,10 +118,16 @@ def test_an_anchor_matches_regardless_of_spaces_and_quotes(place: FaultLocation,
         (location("value", "gap"), ["m.py:8:", "`value: gap` names", "give `nth`, from 1 to"]),
         (location("value", "gap", nth=9), ["`nth` is 9"]),
         (location("condition", "gap > low"), ["no `condition: gap > low`", "`gap < low` (line 8)"]),
-        (location("argument", "len", which="2"), ["no `argument: len` which 2", "`len` which 1 (line 11)"]),
+        (
+            location("argument", "len", which="2"),
+            ["no `argument: len` with `which: 2`", "`len` with `which: 1` (line 11)"],
+        ),
         (location("argument", "self.pid.update"), ["names 2 expressions"]),
         (location("value", "1 + 2"), ["no `value: 1 + 2`", "exactly as in the source"]),
-        (location("condition", "", function="Control.inner"), ["another anchor: there is none of this kind"]),
+        (
+            location("condition", "", function="Control.inner"),
+            ["another kind of anchor: there is none"],
+        ),
         (location("value", "a", function="deeper"), ["no function 'deeper'"]),
     ],
 )

@@ -173,7 +173,7 @@ def test_tagged_lines_follow_the_statement_that_sets_the_value(clone: Workspace)
         (at("x", "Gains.gone"), "no function 'Gains.gone'"),
         (at("Field.b"), "m.py:29: the constant 'Field.b' cannot be set: the field has no default"),
         (at("Gear.DRIVE"), "its class derives from Enum"),
-        (at("COUNT"), "a function sets it, too"),
+        (at("COUNT"), "a function also sets it"),
     ],
 )
 def test_an_unsuitable_value_is_refused(clone: Workspace, location: FaultLocation, words: str) -> None:
@@ -220,8 +220,6 @@ def test_imports_that_cannot_be_changed_are_listed(tmp_path: Path) -> None:
     for name, text in texts.items():
         (tmp_path / f"{name}.py").write_text(text)
     assert importers(read_tree(tmp_path, ["**"]), "kept.py", "LIMIT") == (), "`*` does not include it"
-    words = (
-        "a.py:1 imports \\*; b.py:2 imports it into a class; c.py:1 imports it, and sets LIMIT in another way"
-    )
+    words = "a.py:1 imports \\*; b.py:2 imports it into a class; c.py:1 imports it, and also sets LIMIT in"
     with pytest.raises(MutatorError, match=words):
         importers(read_tree(tmp_path, ["**"]), "limits.py", "LIMIT")

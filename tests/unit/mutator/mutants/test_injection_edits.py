@@ -63,7 +63,7 @@ def injected(
         ("reads", "limit", 6, "make 'limit' local in reads, where it is global or built-in"),
         ("reads", "min", 6, "make 'min' local in reads, where it is global or built-in"),
         ("reads", "µ", 6, "make 'μ' local in reads, where it is global or built-in"),
-        ("outer.look", "x", 21, "make 'x' local in look, where it is of an enclosing function"),
+        ("outer.look", "x", 21, "make 'x' local in look, where it is nonlocal"),
         ("_Car.drive", "Rain", 26, "make 'Rain' local in drive, where it is global or built-in"),
         ("reads", "gap", 6, "'gap' is not known in reads"),
         ("outer", "limit", 16, "'limit' is not known in outer"),

@@ -216,7 +216,7 @@ def test_only_two_different_arguments_without_stars_can_be_swapped(
 def test_a_model_of_a_call_needs_a_call_anchor(toy: Make, model: str, kind: AnchorKind, name: str) -> None:
     params: dict[str, Value] = {"duration": 1.0} if model == "slow_call" else {"first": 1, "second": 2}
     with pytest.raises(
-        MutatorError, match=rf"m.py:2: model {model} needs more than .*; expected a call: an anchor `result`"
+        MutatorError, match=rf"m.py:2: model {model} does not fit .*; expected a call: an anchor `result`"
     ):
         toy("def f(x):\n    y = x + 1\n    return y\n", kind, name, model, target="y", **params)
 
@@ -273,9 +273,9 @@ def test_the_drift_of_an_expression_grows_with_each_active_step(toy: Make) -> No
         (
             "unit_mix_up",
             {"written_in": "m", "read_as": "mps"},
-            "written in m, read as mps; expected two units of length",
+            "written in m, read as mps; expected two different units of length",
         ),
-        ("unit_mix_up", {"written_in": "m", "read_as": "m"}, "expected two units of length"),
+        ("unit_mix_up", {"written_in": "m", "read_as": "m"}, "expected two different units of length"),
         (
             "unit_mix_up",
             {"written_in": "m", "read_as": "feet"},

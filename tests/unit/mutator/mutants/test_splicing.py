@@ -170,7 +170,7 @@ def test_a_snippet_that_the_files_encoding_cannot_represent_is_refused() -> None
     site = file.resolve(
         FaultLocation(path="m.py", function="f", anchor=Anchor(kind=AnchorKind.AFTER_ASSIGN, name="x"))
     )
-    with pytest.raises(MutatorError, match=r":\d+: .* cannot be written in ascii"):
+    with pytest.raises(MutatorError, match=r":\d+: .* cannot be encoded in ascii"):
         splicing.insertion(file, site, ["gr\xf6\xdfe = 1"], "ab12")
 
 

@@ -338,7 +338,7 @@ def test_replacing_an_edited_table_is_reported(folder: RunFolder, stamp: bool) -
     table.write_bytes(made.replace(b"masked", b"hazard", 1))
     if not stamp:
         (folder.path / results.STAMP).unlink()
-    with pytest.warns(MutatorWarning, match=r"results\.csv: the table did not match plan and records"):
+    with pytest.warns(MutatorWarning, match=r"results\.csv: the table did not match the plan and records"):
         results.ensure(folder.path)
     assert table.read_bytes() == made
 

@@ -52,7 +52,7 @@ def test_claims_about_all_faults_need_the_whole_plan(
         run = ReportedRun(folder=folder, workspace=toycar, texts=texts, frame=frame, study=None, seen=SEEN)
         assert observations_panel(run) is not None
         text = (folder.path / "report" / "observations.md").read_text()
-        why = f"not enough data: only {done} of the 12 experiments of the plan have been run"
+        why = f"not enough data: only {done} of 12 planned experiments were run"
         assert text.count(why) == (0 if done == 12 else of_all)
 
 

@@ -78,7 +78,7 @@ def test_the_worst_experiment_is_first(said: dict[str, Answer]) -> None:
     answer = said["dangerous"]
     assert (
         answer.says
-        == "4 of 7 activated faults (57 %) led to a hazard. 2 of 4 hazards (50 %) came with contact."
+        == "4 of 7 activated faults (57 %) led to a hazard. 2 of 4 hazards (50 %) involved contact."
     )
     worst, kinds = answer.listings
     assert [line[0] for line in worst.lines] == [
@@ -202,7 +202,7 @@ def test_tolerated_faults_are_a_share_of_the_activated_ones(said: dict[str, Answ
 def test_cpu_time_is_added_up_by_fault_type(said: dict[str, Answer]) -> None:
     answer = said["time"]
     assert answer.says == (
-        "The experiments took 2 min 07 s of CPU time, by 2 workers: 7 of 8 experiments (88 %) were "
+        "The experiments took 2 min 07 s of CPU time on 2 workers: 7 of 8 experiments (88 %) were "
         "simulated; for 1, the trigger never held, so the golden run's result was used. Median 8.00 s, "
         "longest 64.00 s. Checks, golden runs and the equivalence check are not timed."
     )
@@ -236,7 +236,7 @@ def test_a_report_without_activated_faults_calls_none_tolerated(run: ReportedRun
     assert found["dangerous"].says == found["survived"].says == "No fault was activated."
     assert not any(answer.links for answer in found.values())
     assert found["time"].says.startswith(
-        "The experiments took 0 s of CPU time, by 2 workers: 0 of 1 experiment (0 %) were simulated"
+        "The experiments took 0 s of CPU time on 2 workers: 0 of 1 experiment (0 %) were simulated"
     )
 
 

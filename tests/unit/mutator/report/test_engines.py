@@ -160,7 +160,7 @@ def test_a_failed_proof_is_reported_first(finish: Finish) -> None:
     build(run)
     written = building.write(run, None)
     for text in (written.markdown.read_text(), written.page.read_text()):
-        assert text.index("The equivalence check failed") < text.index("experiments are planned")
+        assert text.index("The equivalence check failed") < text.index("Planned: ")
         assert f"FAILED: experiment {record_ids(run)[0]} differs on the reference engine" in text
         assert "How the experiments were run" in text
     assert "its golden run has &lt;two&gt; threads" in written.page.read_text()

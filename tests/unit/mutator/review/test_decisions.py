@@ -73,9 +73,9 @@ def test_a_group_is_new_decided_or_changed(toycar: Workspace) -> None:
     states = [found.state(g) for g in (group("c"), group("a", other), group("b"), group("a"))]
     assert states == list(State)
     assert found.in_turn([group("a"), group("b"), group("c")]) == [group("c"), group("b"), group("a")]
-    assert found.changed(group("a", other)) == ["template", "target function", "code that it calls"]
+    assert found.changed(group("a", other)) == ["template", "target function", "called code"]
     assert found.describe(group("a", other)).endswith(
-        " (changed since: template, target function, code that it calls)"
+        " (changed since: template, target function, called code)"
     )
     assert found.describe(group("b")).startswith("rejected by Jane Doe on 20")
     assert found.describe(group("c")) == ""

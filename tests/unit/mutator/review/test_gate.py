@@ -39,7 +39,7 @@ def test_the_run_folder_of_an_approved_plan_names_its_reviewers(
         assert kept["at"] and set(kept["bound"]) == {"diff", "function", "template", "calls"}
     total = len(of_plan(toycar, plan))
     assert gate.approval_summary(run) == (
-        f"all of {total} groups approved, by Reviewer 1 (1), Reviewer None ({total - 1})"
+        f"{total} groups approved by Reviewer 1 (1), Reviewer None ({total - 1})"
     )
 
 
