@@ -127,7 +127,6 @@ def _class_score(name: str) -> int:
 
 
 def _needed(function: Function, *, is_method: bool) -> tuple[str, ...]:
-    """Return the arguments without defaults."""
     given = function.args
     positional = [*given.posonlyargs, *given.args]
     positional = positional[: len(positional) - len(given.defaults)]

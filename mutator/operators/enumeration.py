@@ -60,7 +60,6 @@ def _of_values(
 
 
 def _omissions(file: ParsedFile, facts: Facts, function: str) -> Iterator[Mutation]:
-    """Yield omissions of assignments and calls that are alone on their lines."""
     every = ((f.line + 1, one) for f in file.functions.get(function, ()) for one in f.statements)
     found = [(line, one) for line, one in every if one.reason is None and one.opens is None]
     seen: Counter[tuple[str, str]] = Counter()

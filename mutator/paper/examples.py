@@ -104,7 +104,6 @@ def _none(wanted: Wanted, why: str) -> Drawing:
 
 
 def _note(wanted: Wanted, row: Mapping[Hashable, Any], number: int, of: int) -> str:
-    """Describe what the figure shows and how it was found."""
     fault = fault_label(f"{row['kind']}/{row['variant']}", row["value"], row["unit"])
     return (
         f"{fault} in {row['scenario']}, {row['method']}, trigger "

@@ -205,7 +205,7 @@ def details(
     experiments: Sequence[Experiment | None], found: Sequence[Shape], rows: Sequence[Row]
 ) -> dict[str, Any]:
     """For each row, the codes of its spec and trigger setting (-1: not in the plan), and the index of its
-    diff's shape (-1: no diff). Each hole of a shape has the values of its members, in row order."""
+    diff's shape (-1: no diff). A shape has a list of values for each hole in its text, in row order."""
     specs, settings = _Codes(), _Codes()
     faults = {e.fault.id: e.fault for e in experiments if e}
     spec = {name: _spec(fault) for name, fault in faults.items()}

@@ -135,7 +135,7 @@ def _short(value: float) -> float | str:
 
 
 def _placed(path: Path) -> Iterator[tuple[Any, int]]:
-    """Yield each stage and its column in the strip, to the right of all components that feed the stage."""
+    """Yield each stage and its column on the page, to the right of all components that feed the stage."""
     columns: dict[str, int] = {}
     for stage in path.stages:
         feeders = (c.tail for c in path.crossings if c.tip == stage.component)

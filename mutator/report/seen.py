@@ -83,7 +83,6 @@ def _looks(
 
 
 def timings_of(folder: RunFolder) -> "DataFrame":
-    """The `timings` of a `Seen`, read from a run folder."""
     import pandas as pd
 
     newest = folder.timings()

@@ -74,7 +74,6 @@ def _pairs(part: np.ndarray, of: np.ndarray) -> Cells:
 def _summaries(
     name: str, worse: str, values: np.ndarray, y: np.ndarray, x: np.ndarray, shape: tuple[int, int]
 ) -> Mapping[str, Cells]:
-    """The cells of a metric's median and worst value."""
     medians: Cells = []
     worsts: Cells = []
     for row in range(shape[0]):

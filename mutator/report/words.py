@@ -81,7 +81,6 @@ def meanings_of(run: ReportedRun) -> Words:
 
 
 def _severity(scale: Mapping[str, object] | None) -> dict[str, str]:
-    """The severity classes with their lower limits of delta-v."""
     if not scale:
         return {}
     classes = scale["classes"]
@@ -91,7 +90,6 @@ def _severity(scale: Mapping[str, object] | None) -> dict[str, str]:
 
 
 def _scenarios(run: ReportedRun) -> dict[str, str]:
-    """The descriptions of scenarios whose files have one."""
     names = sorted(run.texts["scenario"].unique())
     return {name: about for name in names if (about := _title(run, name))}
 

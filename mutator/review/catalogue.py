@@ -1,7 +1,8 @@
 """The groups to review: the mutants of a library or campaign by location and template.
 
-A group does not depend on triggers, or on which of its mutants are selected. Its id follows from its label;
-decisions are bound to its diff with holes, the target's code and the templates (`Material`).
+A group does not depend on triggers, or on which of its mutants are selected. Its id follows from its label.
+Decisions are bound to its diff, which has holes instead of values, to the target's code and to the templates
+(`Material`).
 """
 
 from collections import Counter

@@ -1,4 +1,4 @@
-"""The columns for filters over groups. They are in a separate module because help texts need only them."""
+"""The columns for filters over groups. Help texts import them without the rest of the package."""
 
 COLUMNS = (
     "group",

@@ -48,6 +48,5 @@ def _panel(made: tuple[Drawing, ...], run: ReportedRun) -> Panel | None:
 
 
 def _embedded(path: Path) -> str:
-    """The figure as a data URL."""
     svg = themed(path.read_text(encoding="utf-8"))
     return f"data:image/svg+xml;base64,{base64.b64encode(svg.encode()).decode()}"

@@ -60,7 +60,6 @@ _HTML = """\
 
 
 def notes(folder: RunFolder) -> str:
-    """The meanings of the headings of the counts."""
     note = f" {folder.stop_note}" if folder.stop_note else ""
     return NOTES + (NO_ALERT + note if folder.has_alerts else "")
 
@@ -144,6 +143,5 @@ def write_sheets(sheets: Sequence[Sheet], out: Path) -> None:
 
 
 def write_csv(sheet: Sheet, out: Path) -> None:
-    """Write a table as `out`/tables/<name>.csv."""
     (out / FOLDER).mkdir(parents=True, exist_ok=True)
     write_atomic(out / FOLDER / f"{sheet.name}.csv", sheet.csv().encode())

@@ -125,7 +125,7 @@ def test_matching_experiments_are_tried_until_one_shows_the_action(place: Path) 
         looked_at.append(pair.start)
         return pair.t > pair.start if len(looked_at) == 2 else None
 
-    assert "number 2 of the" in drawn(place, replace(BRAKE, look=second)).note
+    assert "this is number 2," in drawn(place, replace(BRAKE, look=second)).note
     none = drawn(place, replace(BRAKE, look=lambda pair: None))
     assert none.figure is None
     assert "none shows it" in none.note
