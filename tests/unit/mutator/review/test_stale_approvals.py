@@ -134,7 +134,7 @@ def groups(toy: Workspace) -> tuple[Group, ...]:
     ("file", "old", "new", "stale", "why"),
     [
         ("tree/toycar/effects.py", "gap - self.amount", "gap - 2.0", {GLARE}, "called code"),
-        ("tree/toycar/effects.py", "self.amount = amount", "self.amount = 0", {VEIL, GLARE}, "code that it"),
+        ("tree/toycar/effects.py", "self.amount = amount", "self.amount = 0", {VEIL, GLARE}, "called code"),
         ("tree/toycar/optics.py", "(1.0 - LOSS)", "LOSS", {VEIL, GLARE, HELPER}, "called code"),
         ("tree/toycar/optics.py", "LOSS = 0.5", "LOSS = 0.4", {VEIL, GLARE, HELPER}, "called code"),
         ("tree/toycar/optics.py", "return value\n", "return 1\n", set(), ""),

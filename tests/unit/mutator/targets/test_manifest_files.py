@@ -197,7 +197,7 @@ def test_a_manifest_is_a_snapshot(toy: Workspace) -> None:
             f"{FILM}\nalerts: [beep]",
             "27: '{film}' in '{film}'; expected one of {golden}",
         ),
-        ("hazards: [H1]", "hazards: [H1, alert]", "26: 'alert'; expected a name"),
+        ("hazards: [H1]", "hazards: [H1, alert]", "26: hazard 'alert' clashes"),
         ("hazards: [H1]", "hazards: [H1, h1]", "26: 'h1'; expected a unique name"),
         ("alerts: [beep]", "alerts: [beep;boop]", "27: 'beep;boop'; expected a unique name"),
         ("  derived:", "  deriven:", "23: unknown key 'deriven'; expected one of at, time, values, derived"),
