@@ -164,8 +164,6 @@ class Actuators:
 
 @dataclass(slots=True)
 class CarControl:
-    """The controller's demand in one cycle."""
-
     enabled: bool = False
     actuators: Actuators = field(default_factory=Actuators)
     cancel_cruise: bool = False
@@ -179,8 +177,6 @@ class CarControl:
 
 @dataclass(slots=True)
 class Plan:
-    """The planner's output in one control cycle."""
-
     t: float = 0.0
     v_target: float = 0.0  # m/s
     a_target: float = 0.0  # m/s^2
@@ -195,8 +191,6 @@ class Plan:
 
 @dataclass(slots=True)
 class ControlsState:
-    """The controller's state in one cycle."""
-
     t: float = 0.0
     state: str = "disabled"  # disabled, pre_enabled, enabled, soft_disabling
     enabled: bool = False

@@ -84,7 +84,6 @@ class ImageFolder:
 
 
 def camera_of(folder: Path) -> CameraModel:
-    """The camera from the calibration in `folder`, which need not contain frames."""
     return _camera(_calibration(folder)[1])
 
 

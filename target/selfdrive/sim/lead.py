@@ -7,8 +7,6 @@ from selfdrive.common.realtime import DT_CTRL
 
 
 class LeadVehicle:
-    """Drives in the middle of the lane; its speed is a table over time."""
-
     def __init__(self, gap: float, times: Sequence[float], speeds: Sequence[float]) -> None:
         self.position = gap  # m, rear bumper
         self.speed = speeds[0]

@@ -81,7 +81,6 @@ class Look:
 
 
 def standard_look(marks: str = SOLID) -> Look:
-    """The road of the image library: left line solid yellow, right line white, solid or dashed."""
     if marks not in (SOLID, DASHED):
         raise ValueError(f"marks: {marks!r}, expected {SOLID!r} or {DASHED!r}")
     look = Look()

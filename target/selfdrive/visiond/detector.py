@@ -34,8 +34,6 @@ class LaneDetector(Protocol):
 
 
 class IdealDetector:
-    """Reads the view's geometry, in runs without pictures."""
-
     def detect(self, view: CameraView) -> LaneLines:
         return LaneLines(
             left=RoadLine(y=view.left_lane_y, bend=view.bend),
@@ -45,8 +43,6 @@ class IdealDetector:
 
 
 class MirroredDetector:
-    """Swaps left and right of another detector's result."""
-
     def __init__(self, detector: LaneDetector) -> None:
         self._detector = detector
 

@@ -158,7 +158,6 @@ def report(detector: str, findings: list[Finding]) -> str:
 
 
 def draw(finding: Finding) -> np.ndarray:
-    """The frame with the found lines (green) and the truth in row 278 (red)."""
     canvas, frame = finding.frame.colour.copy(), finding.frame
     for line in (finding.lines.left, finding.lines.right):
         if line.prob > 0.0:

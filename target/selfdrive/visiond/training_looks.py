@@ -11,7 +11,6 @@ LEAST_CONTRAST = 14.0  # grey levels between paint and asphalt
 
 
 def random_camera(rng: np.random.Generator) -> CameraModel:
-    """A camera behind a windscreen or on a roof; every third one is similar to the default."""
     if rng.random() < 0.33:
         default = CameraModel()
         return replace(

@@ -11,8 +11,6 @@ TURN_FACTOR = 0.02 * RAD_TO_DEG  # 1/(rad m/s); learns less in turns
 
 
 class AngleOffset:
-    """Integrates the distance from the lane centre (20 Hz)."""
-
     def __init__(self, value: float = 0.0) -> None:
         self.value = value  # rad at the steering wheel
 

@@ -50,8 +50,6 @@ class ChannelResult:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FigureResult:
-    """One key figure of run and reference; `limit` None: not limited."""
-
     name: str
     reference: figures.Value
     ours: figures.Value

@@ -19,8 +19,6 @@ _POINTER, _LONG = ctypes.c_void_p, ctypes.c_long
 
 
 class Scattered(NamedTuple):
-    """The functions of `scattered`, or compiled equivalents."""
-
     streak_light: Callable[..., np.ndarray]
     flake_light: Callable[..., np.ndarray]
     droplets: Callable[[np.random.Generator, tuple[int, int], int], np.ndarray]

@@ -35,8 +35,6 @@ class Scene(Protocol):
 
 
 class Moment(NamedTuple):
-    """A fixed scene."""
-
     t: float
     position: float
     v_ego: float

@@ -23,8 +23,6 @@ class Severity(NamedTuple):
 
 
 class RoadGauge:
-    """Measures pictures of one straight lane."""
-
     def __init__(self, model: CameraModel, lines: tuple[tuple[float, float], tuple[float, float]]) -> None:
         """`lines` are (y, slope) of the lane's left and right line in m; both are solid."""
         self._rows = np.arange(int(model.row(FAR)) + 1, min(int(model.row(NEAR)), model.rows - 1) + 1)
