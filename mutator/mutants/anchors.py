@@ -66,7 +66,7 @@ class ParsedFile:
         return choose_fixed(self.fixed, location, self.where)
 
     def span(self, location: FaultLocation) -> tuple[int, int]:
-        """Return the lines of the statement or value at the location, from 0, the last exclusive."""
+        """Return the lines of the statement or value at the location (from 0, the last exclusive)."""
         if location.anchor.kind in VALUE_ANCHORS:
             expression = self.resolve_value(location)
             return expression.start[0], expression.end[0] + 1
@@ -202,7 +202,7 @@ def _entry(file: ParsedFile, location: FaultLocation, functions: tuple[Function,
     function = functions[(nth or 1) - 1]
     if function.entry is None:
         raise MutatorError(
-            f"function '{location.function}' has no line at which to insert",
+            f"nothing can be inserted at the entry of function '{location.function}'",
             where=file.where,
             line=function.line + 1,
             expected="a body below the `def` line, and nothing else on the docstring's lines",

@@ -111,7 +111,7 @@ def _exported(tree: ast.Module) -> frozenset[str] | None:
 
 
 def _of_body(body: Iterable[ast.stmt], path: str, *, inside: bool) -> Iterator[_Import]:
-    """Yield the imports of a module and its classes. Imports in functions last for one call: skip them."""
+    """Yield the imports of a module and its classes, but not those in functions, which last for one call."""
     for statement in body:
         match statement:
             case ast.ImportFrom(module=module, names=names, level=level, lineno=line):

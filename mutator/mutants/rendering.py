@@ -274,7 +274,7 @@ def _check_lines(text: str, kind: SnippetKind, where: Path) -> None:
         else:
             problem = f"{error.msg} (a guard's last line must open a block)"
         raise MutatorError(
-            f"the template does not render Python: {problem}: {text!r}",
+            f"the template does not give valid Python: {problem}: {text!r}",
             where=where,
             remedy="correct the template",
         ) from None

@@ -1,6 +1,6 @@
 """Reuses a changed file for all mutants whose inserted lines differ only in numbers and ids.
 
-Only the first of these mutants is spliced and compiled. The others insert their own lines instead.
+Only the first of these mutants is spliced and compiled. For the others, its inserted lines are replaced.
 """
 
 from collections.abc import Sequence

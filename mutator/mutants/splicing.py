@@ -79,7 +79,7 @@ def guard(file: ParsedFile, site: Site, code: Sequence[str], tag: str) -> Edit:
             "a guard needs a statement that is alone on its lines",
             where=file.where,
             line=site.first + 1,
-            expected="an anchor before_call, before_assign or before_return",
+            expected="an anchor `before_call`, `before_assign` or `before_return`",
             remedy="anchor at the statement to omit",
         )
     lines = _lines(file, site, code, tag, site.reindent)

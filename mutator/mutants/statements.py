@@ -48,8 +48,8 @@ class Statement:
 class Function:
     """A function. Its statements do not include those of nested functions and classes.
 
-    `entry` is the index of the line before which to insert, and of the line whose indentation to use; None
-    if nothing can be inserted there.
+    `entry` has the index of the line before which to insert, and of the line whose indentation to use; None
+    if nothing can be inserted.
     """
 
     line: int

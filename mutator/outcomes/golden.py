@@ -171,7 +171,7 @@ def alerts_of(record: Mapping[str, Any], counted: Sequence[str]) -> list[tuple[s
 
 
 def sharing_times(golden: Trace, faulty: Trace, time: str) -> Trace:
-    """Return the faulty trace with golden's time array if both are equal, which makes comparisons faster."""
+    """Return the faulty trace with the golden time array if both are equal, which speeds up comparisons."""
     return {**faulty, time: golden[time]} if np.array_equal(golden[time], faulty[time]) else faulty
 
 

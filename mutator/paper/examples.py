@@ -1,4 +1,4 @@
-"""Draws figures of single experiments, found by a query over the results and confirmed on traces."""
+"""Draws figures of single experiments, found by a query over the results and confirmed in the traces."""
 
 from collections.abc import Hashable, Mapping, Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""Judges the published observations on the results of a run, writes them, and shows them in the report."""
+"""Judges the published observations by a run's results, and shows the verdicts in the report."""
 
 import re
 from collections.abc import Iterator, Sequence

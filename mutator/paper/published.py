@@ -81,7 +81,7 @@ class _Times(StrictModel):
 
 
 def load_paper(references: Path) -> Paper:
-    """Load the cited numbers of a folder. MutatorError with file and line if counts are impossible."""
+    """Load the numbers cited in a folder. MutatorError with file and line if counts are impossible."""
     summary, summary_source = read(references / FILES[0], _Summary, "paper_summary/1")
     coverage, coverage_source = read(references / FILES[1], _Coverage, "paper_coverage/1")
     times, _ = read(references / FILES[2], _Times, "paper_times/1")

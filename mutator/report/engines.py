@@ -1,4 +1,4 @@
-"""How the experiments of a run were executed, and the result of their equivalence check."""
+"""Summarizes how the experiments of a run were executed, and the result of their equivalence check."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping

@@ -1,4 +1,4 @@
-"""Which fault types to fix first, and the component that lets them through."""
+"""Answers which fault types to fix first, and which component lets them through."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""The data, read once, that a report needs from all experiments in addition to the results."""
+"""Data about all experiments that a report needs in addition to the results. It is read only once."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

@@ -33,8 +33,8 @@ class Import:
 class Use:
     """A name that is not a local variable, with its attributes: `("effects", "Rain")`.
 
-    `imported` is the import inside the function that binds the name, if any. `owner` is the class of a `self`
-    or `super()`.
+    `imported` is the import inside the function that binds the name, if any. For `self` and `super()`,
+    `owner` is the class.
     """
 
     words: tuple[str, ...]

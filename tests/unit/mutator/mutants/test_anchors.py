@@ -150,7 +150,7 @@ def test_a_function_is_found_by_its_qualified_name() -> None:
         (AnchorKind.BEFORE_RETURN, "self._width", "A.width", None, ["m.py:7:", "`if`, `for` or `def`"]),
         (AnchorKind.AFTER_ASSIGN, "a", "A.runn", None, ["no function 'A.runn'", "A.run,", "mean 'A.run'"]),
         (AnchorKind.ENTRY, "", "A.width", None, ["2 functions named", "line 7, line 10", "from 1 to 2"]),
-        (AnchorKind.ENTRY, "", "A.width", 1, ["has no line at which to insert"]),
+        (AnchorKind.ENTRY, "", "A.width", 1, ["nothing can be inserted at the entry"]),
         (AnchorKind.BEFORE_CALL, "x", "empty", None, ["another kind of anchor: there is none"]),
     ],
 )  # fmt: skip
