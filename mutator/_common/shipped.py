@@ -115,7 +115,6 @@ def _unpack(archive: Path, folder: Path) -> None:
 
 
 def _changed(archive: Path, folder: Path) -> list[str]:
-    """List files that were edited, added or deleted since unpacking, except bytecode."""
     files = (path for path in folder.rglob("*") if path.is_file() and path.parent.name != "__pycache__")
     found = {path.relative_to(folder).as_posix(): path for path in files}
     with ZipFile(archive) as file:

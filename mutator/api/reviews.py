@@ -64,7 +64,7 @@ class ReviewedGroups:
                 raise MutatorError(
                     f"several ids ({len(hits)}) start with '{start}'" if hits else f"no group '{start}'",
                     expected="an id from `mutator review`, or the start of only one id",
-                    remedy="give more digits of the id" if hits else "choose the group's campaign or spec",
+                    remedy="give more digits of the id" if hits else "select the group's campaign or spec",
                 )
             found[hits[0].id] = hits[0]
         return list(found.values())

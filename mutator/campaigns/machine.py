@@ -115,7 +115,7 @@ def packages_of(modules: Iterable[str]) -> tuple[str, ...]:
 
 @lru_cache(maxsize=1)
 def _providers() -> dict[str, list[str]]:
-    """Return the packages of each top-level module. Slow, because it reads the file list of each package."""
+    """Return the packages of each top-level module; cached, because it reads every package's file list."""
     return dict(metadata.packages_distributions())
 
 

@@ -178,7 +178,6 @@ def _open_streams() -> None:
 
 
 def _answer(words: Sequence[str]) -> int:
-    """Run one command line and report errors; BrokenPipeError if nobody reads the output."""
     try:
         # Not `app()`, which has its own handling of errors, interrupts and closed pipes.
         command = get_command(app)

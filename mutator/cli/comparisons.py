@@ -140,7 +140,6 @@ def _as_json(compared: "mutator.RunComparison", failing: "tuple[Finding, ...]") 
 def _judge(
     terminal: Terminal, found: "Comparison", gates: "list[mutator.Gate]", failing: "tuple[Finding, ...]"
 ) -> None:
-    """Exit with 1 if there are findings, or with 3 if results are missing."""
     for finding in failing[:NAMED]:
         terminal.complain(f"{finding.gate.value}: {finding.words} [{finding.experiment_id}]")
     if more := failing[NAMED:]:

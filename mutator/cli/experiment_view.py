@@ -130,7 +130,6 @@ def _values(values: Iterable[tuple[str, float]], units: Mapping[str, str]) -> st
 
 
 def _no_alert(record: "Record", manifest: "TargetManifest", reaction_s: float | None) -> str:
-    """Return a note if there was no alert, or none before the first hazard; empty otherwise."""
     if not (manifest.alerts and record.outcome and record.activation):
         return ""
     if record.hazards:

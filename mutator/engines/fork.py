@@ -198,7 +198,6 @@ class ForkEngine:
         return replace(self._judged(job, folder, ended), start=start.step)
 
     def _judged(self, job: Job, folder: Path, ended: Ended) -> Execution:
-        """Return the result of a child; Refused if the reference engine must rerun the job."""
         report = read_report(folder / "report.json", threads=list)
         if report is not None:
             self._check(job, report)

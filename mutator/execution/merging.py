@@ -163,7 +163,6 @@ def _check_complete(folder: RunFolder) -> None:
 
 
 def _check_goldens(folders: Sequence[RunFolder]) -> None:
-    """Check that golden runs are equal in all shards; otherwise their results cannot be combined."""
     first = read_json(folders[0].path / CHECKS, CHECKS_SCHEMA)["goldens"]
     for folder in folders[1:]:
         goldens = read_json(folder.path / CHECKS, CHECKS_SCHEMA)["goldens"]

@@ -243,7 +243,6 @@ class Session:
             self.problem = self.problem or str(err)
 
     def _close_segments(self, *, finished: bool | None = None) -> None:
-        """Record the digests of the workers' files, unless a worker is still running."""
         if not wait_for_workers(self.folder.path):
             digests.close_segments(self.folder.path, finished=finished)
 

@@ -166,7 +166,7 @@ class Content:
 
 
 class _Written:
-    """Collect messages, and write them in time order."""
+    """Collects messages, and writes them in time order."""
 
     def __init__(self) -> None:
         try:

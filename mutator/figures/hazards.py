@@ -51,7 +51,6 @@ def draw(frame: pd.DataFrame) -> "Figure":
 
 
 def _counts(axis: "Axes", frame: pd.DataFrame, kinds: list[str]) -> None:
-    """Draw bars of hazards, each with its count and the number of injected faults."""
     names = hazard_names(frame)
     counts = pd.crosstab(frame["kind"], hazard_sets(frame)).reindex(kinds, fill_value=0)
     injected = frame["kind"].value_counts().reindex(kinds, fill_value=0)

@@ -37,7 +37,6 @@ def draw(frame: pd.DataFrame) -> "Figure":
 
 
 def _method(axis: "Axes", spreads: Sequence[tuple[float, Spread]], method: str) -> None:
-    """Draw quartiles as a bar, the median, the mean, and the number of runs."""
     colour, marker = style.method_look(method)
     known = [(x, spread) for x, spread in spreads if spread.n]
     xs = [x for x, _ in known]

@@ -72,7 +72,6 @@ def live_function(module: str, path: Sequence[str], code: types.CodeType) -> typ
 
 
 def _functions(named: Any) -> Iterator[types.FunctionType]:
-    """Yield the functions of a named object: itself, those of a method or property, and wrapped ones."""
     if isinstance(named, types.FunctionType):
         yield named
     if named is not None and not isinstance(named, type):

@@ -76,7 +76,6 @@ def _parts(workspace: Workspace, folder: RunFolder, engine: str) -> Iterator[tup
 
 
 def _read_in_root(manifest: TargetManifest) -> list[Path]:
-    """Return the files outside the tree that the arguments of a run name."""
     named = [word.removeprefix(_ROOT) for word in manifest.entry_args if word.startswith(_ROOT)]
     places = [manifest.root / name for name in named]
     return sorted(path for place in places for path in (place, *place.rglob("*")) if path.is_file())

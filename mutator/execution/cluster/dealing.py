@@ -279,7 +279,6 @@ class Deal:
 
 
 def _read(data: bytes, piece: Piece) -> Result:
-    """Return the result of a piece; for damaged data, one with the ending UNFIT."""
     try:
         return Result.of(data)
     except MutatorError as err:

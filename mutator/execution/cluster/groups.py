@@ -45,7 +45,6 @@ def groups_of(folder: RunFolder, pending: Sequence[Pending], faults: Faults) -> 
 
 
 def _runs_of(folder: RunFolder, pending: Sequence[Pending]) -> Iterator[Run]:
-    """Yield the remaining runs of these chunks, each with all its experiments."""
     for one in pending:
         lines = list(plan_file.chunk_lines(folder.path, folder.head["chunks"][one.chunk]))
         read = [(_read(lines[place]), lines[place]) for place in one.places]
