@@ -175,7 +175,7 @@ static double crossing(const Coded *c, const int32_t *starts, int32_t cluster)
     return mean_column + slope * ((double)ROW - mean_row);
 }
 
-/* List edges row by row, left to right, and the rows' first ones. Returns their number, summed over all windows. */
+/* List edges row by row, left to right, and the first edge of each row. Returns their number, summed over all windows. */
 INLINE long list_edges(Coded *c, int32_t *starts, double *box)
 {
     int32_t found = 0, left = WIDTH, right = 0, top = ROWS, bottom = 0;

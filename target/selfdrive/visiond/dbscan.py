@@ -16,7 +16,7 @@ _NONE = 65535
 def dbscan(points: np.ndarray, shape: tuple[int, int], eps: int, min_samples: int) -> np.ndarray:
     """Return the cluster (0, 1, ...) of each pixel, or NOISE for outliers.
 
-    `points` are row-major numbers of pixels in a picture of that shape, ascending. A core pixel has at least
+    `points` are row-major positions in a picture of that shape, ascending. A core pixel has at least
     `min_samples` of them, itself included, within `eps` pixels. Clusters are numbered, and pixels between
     clusters assigned, as in scikit-learn.
     """

@@ -51,7 +51,7 @@ class EdgeLines:
     def nearest(
         self, at: np.ndarray, rising: np.ndarray, labels: np.ndarray
     ) -> tuple[RoadLine | None, RoadLine | None]:
-        """The lines next to the car, left and right, among the edges at the pixels `at` (row-major numbers).
+        """The lines next to the car, left and right, among the edges at the pixels `at` (row-major).
 
         `rising` says for each edge whether the picture gets brighter to the right; `labels` are its clusters.
         """

@@ -34,7 +34,7 @@ def edges(part: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Find steep edges in `part` (uint8, sides are multiples of a tile's).
 
     Steepness is relative to the root mean square of nearby tiles, so light and haze do not matter. Returns
-    row-major pixel numbers, and whether the picture gets brighter to the right of each.
+    row-major pixel positions, and whether the picture gets brighter to the right of each.
     """
     rows, width = part.shape
     gradient = cv2.Sobel(part, cv2.CV_32F, 1, 0, ksize=3)

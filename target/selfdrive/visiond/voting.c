@@ -211,7 +211,7 @@ static void take_votes(const float *lefts, const float *drops, const float *metr
         votes[k] = (0.5f * shares[k] + shares[k + 1]) + 0.5f * shares[k + 2];
 }
 
-/* How much the votes for each y exceed those around. */
+/* How much the votes for each y exceed those around it. */
 static void take_support(const float *votes, float unlikely, double *support)
 {
     float wide[BINS + 2 * AROUND];
@@ -353,7 +353,7 @@ static double doubt(const Map *map, const double *metre, const double *error, co
     return -(above <= 0.0 ? 0.0 : above) / (double)(FAINT + chance);
 }
 
-/* Find the lines in the map `road`, whose `n` points have the numbers `at` and certainties `sure`. `pose` becomes
+/* Find the lines in the map `road`, which has `n` points with the positions `at` and certainties `sure`. `pose` becomes
  * left, dip, y_left, y_right, and the logarithms of the lines' improbabilities. Returns 0 if `elect` does. */
 long vote(const Map *map, const uint8_t *road, const int64_t *at, const float *sure, long n, const double *belief,
           double *pose)
