@@ -1,4 +1,4 @@
-"""An opened experiment that did not end well, and closing an experiment."""
+"""Opening an experiment that did not end well, and closing an experiment."""
 
 from typing import TYPE_CHECKING
 
@@ -43,7 +43,7 @@ def test_a_closed_experiment_is_removed_from_the_page(page: "Page") -> None:
     assert page.page.inner_html("#experiment") == ""
 
 
-def test_arrows_in_code_scroll_the_code(page: "Page") -> None:
+def test_arrow_keys_in_code_do_not_open_another_experiment(page: "Page") -> None:
     page.page.click(FIRST)
     page.page.focus("#experiment .spec pre")
     before = page.fragment

@@ -42,7 +42,7 @@ MASKED = {**ACTIVE, "outcome": Outcome.MASKED}
 QUIET = {"activation": None, "outcome": Outcome.NOT_ACTIVATED}
 
 
-def became(experiment: Experiment) -> dict[str, Any]:
+def result_of(experiment: Experiment) -> dict[str, Any]:
     return {"lane": CHANGED, "distance": MASKED}.get(experiment.fault.fault_type, QUIET)
 
 
@@ -60,7 +60,7 @@ def report(
         text = text.replace(f"  {channel}: {{unit: ", f"  {channel}: {{component: {component}, unit: ")
     manifest.write_text(text)
     (workspace.library / "stpa" / "control_structure.yaml").write_text(STRUCTURE)
-    run = write_run(workspace, folder / "run", became)
+    run = write_run(workspace, folder / "run", result_of)
     results.build(run)
     with pytest.MonkeyPatch.context() as patch:  # figures take seconds and are tested elsewhere
         patch.setattr(figures, "drawings", lambda frame: ())

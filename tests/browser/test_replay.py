@@ -301,7 +301,7 @@ def test_plots_and_replay_show_the_same_time_during_playback(replayed: Replayed)
 
 
 def test_past_events_stay_listed(replayed: Replayed) -> None:
-    """The place of an event on the road can be out of sight."""
+    """An event's place on the road can be out of sight."""
     replayed.show(FACTS)
     seek(replayed, 2.02)
     assert replayed.texts(".states .chip") == ["fault active"]

@@ -81,7 +81,7 @@ def scrolled(page: "Page") -> Iterator["Page"]:
     yield page
 
 
-def test_the_printed_page_has_the_filtered_rows(page: "Page") -> None:
+def test_the_printed_page_has_rows_up_to_a_limit(page: "Page") -> None:
     page.page.emulate_media(media="print")
     page.page.evaluate("dispatchEvent(new Event('beforeprint'))")
     assert len(page.column("experiment_id")) == EXPERIMENTS
@@ -104,7 +104,7 @@ def test_the_printed_page_has_the_first_rows_after_a_late_redraw(scrolled: "Page
     assert scrolled.page.evaluate(printing) == list(range(5))
 
 
-def test_a_printed_page_has_all_rows_and_the_screen_is_restored(scrolled: "Page") -> None:
+def test_printing_the_first_rows_restores_the_screen(scrolled: "Page") -> None:
     page = scrolled.page
     page.evaluate("document.querySelector('#grid').hidden = true")
     others = rows_of(page.pdf(tagged=True))

@@ -14,7 +14,7 @@ from mutator.workspace import Workspace
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]) -> Path:
-    """A page of the toy's five groups, of which one is approved."""
+    """A page of the toy's five groups, one of which is approved."""
     folder = tmp_path_factory.mktemp("review")
     toy = copy_toycar(folder)
     groups = of_library(toy, toy.manifest("toycar"), specs=["sensor/*"])

@@ -46,7 +46,7 @@ def load(browser: Any, run: Path, name: str) -> Any:
 
 
 def as_read(run: Path, name: str) -> list[dict[str, Any]]:
-    """Return channels as Python reads them, as bits, including the points between the values."""
+    """Return the channels that Python reads, as bits, including the points between the values."""
     read = SeriesFolder(run).read(name)
     assert read is not None
     golden, faulty = read

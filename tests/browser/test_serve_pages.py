@@ -24,7 +24,7 @@ def folder(run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def address(
     folder: Path, run: Path, serve: Callable[..., Any], module_patch: pytest.MonkeyPatch
 ) -> Iterator[str]:
-    """The server's address. Its library is that of the run, without the faults that have no mutant."""
+    """The address of a server that uses the run's library."""
     module_patch.setattr(figures, "drawings", lambda frame: ())  # they take seconds
     root = run.parent / "toy"
     with serve(Workspace(library=root / "fault_library", templates=root / "templates"), (folder,)) as found:

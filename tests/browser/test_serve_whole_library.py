@@ -81,7 +81,7 @@ def test_twenty_marks_survive_reloads_and_killed_servers(browser: Any, root: Pat
         page.keyboard.press("Escape")
         page.click("[data-state=new]")
         marks |= marked(page, 10)
-        page.wait_for_timeout(2000)  # the server confirms all marks by then
+        page.wait_for_timeout(2000)  # by then, the server has confirmed all marks
         page.reload()
         page.wait_for_selector("html[data-ready]", state="attached")
         assert {group: shown(page, group) for group in marks} == marks

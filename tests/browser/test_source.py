@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 HAZARD = {"outcome": Outcome.HAZARD, "hazards": (("H3", 4.0),), "t_manifest": 2.5}
 
 
-def became(experiment: Experiment) -> dict[str, Any]:
+def result_of(experiment: Experiment) -> dict[str, Any]:
     return HAZARD if experiment.trigger.name == "always" else {}
 
 
@@ -31,7 +31,7 @@ def report(
 ) -> Path:
     folder = tmp_path_factory.mktemp("source")
     workspace = copy_toycar(folder)
-    out = write_run(workspace, folder / "run", became, changed=of_operators(workspace, "toycar/driver.py"))
+    out = write_run(workspace, folder / "run", result_of, changed=of_operators(workspace, "toycar/driver.py"))
     results.build(out)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(figures, "drawings", lambda frame: ())

@@ -14,7 +14,7 @@ SPEC = """\
 schema: fault_spec/1
 module: sensor
 fault_type: own
-about: A fault of one's own.
+about: A custom fault.
 variants:
   it:
     aim: H1
@@ -174,7 +174,7 @@ def test_errors_name_the_options_of_the_command_line(
 
 
 def test_errors_about_the_target_name_the_option_manifest(cli: Cli, own: Path, root: Path) -> None:
-    """The option --target is the controller's source."""
+    """The option --target gives the controller's source."""
     targets = root / "fault_library" / "targets"
     (targets / "other.yaml").write_text((targets / "toycar.yaml").read_text())
     answer = cli("diff", "own.yaml")

@@ -247,7 +247,7 @@ def test_the_library_for_the_report_can_be_given(cli: Cli, run: Path, root: Path
     assert "fault_library" in answer.err
 
 
-def test_the_page_loads_nothing(run: Path) -> None:
+def test_the_page_loads_no_other_file(run: Path) -> None:
     text = (run / "report" / "index.html").read_text()
     assert "http" not in text.replace("http://www.w3.org/2000/svg", "")
     links = re.findall(r'<[^>]* (?:href|src)="([^"]*)"', text)
@@ -350,7 +350,7 @@ def test_clean_deletes_only_run_folders(cli: Cli, root: Path) -> None:
     cli("plan", "toy", "--out", "runs/p", "--limit", "2")
     Path("mine").mkdir()
     assert cli("clean", "mine", "--yes").code == 2
-    assert cli("clean", "runs/p").code == 2  # there is no terminal to ask at
+    assert cli("clean", "runs/p").code == 2  # there is no terminal to ask for confirmation
     assert Path("runs/p/run.json").exists()
     assert cli("clean", "runs/p", "--yes").code == 0
     assert not Path("runs/p").exists()

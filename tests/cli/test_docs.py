@@ -127,8 +127,8 @@ def work_through(page: Path, folder: Path) -> list[tuple[str, str]]:
 
 
 def run(command: str, folder: Path) -> str:
-    """Run a command line that must succeed and return its standard output. `mutator` is run by
-    this interpreter."""
+    """Run a command line, which must succeed, and return its standard output. `mutator` is run by this
+    interpreter."""
     bin_folder = str(Path(sys.executable).parent)
     environment = os.environ | {"PATH": bin_folder + os.pathsep + os.environ["PATH"]}
     environment.pop("COLUMNS", None)  # pages show piped output

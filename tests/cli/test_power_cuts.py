@@ -25,20 +25,20 @@ WORDS = ("run", "small", "--out", "run", "-n", "0", "--limit", 4, "--engine", "r
 
 
 @pytest.fixture(scope="module")
-def driven(tmp_path_factory: pytest.TempPathFactory) -> list[Any]:
-    """A list of the shared run folder and, once it is known, its seal."""
-    return [tmp_path_factory.mktemp("driven") / "run"]
+def shared(tmp_path_factory: pytest.TempPathFactory) -> list[Any]:
+    """A list of the shared run folder and, once known, its seal."""
+    return [tmp_path_factory.mktemp("shared") / "run"]
 
 
 @pytest.fixture
-def cut(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch, driven: list[Any]) -> Path:
+def cut(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch, shared: list[Any]) -> Path:
     """An unfinished run folder in which all experiments have run. All tests share it, because they have the
     same library."""
 
     def end(self: Session) -> None:
         raise MutatorError("the power is cut")
 
-    kept = driven[0]
+    kept = shared[0]
     if not kept.exists():
         with monkeypatch.context() as patch:
             patch.setattr(Session, "finish", end)
@@ -50,15 +50,15 @@ def cut(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch, driven: list[Any]
 
 
 @pytest.fixture
-def seal(cli: Cli, cut: Path, driven: list[Any]) -> str:
-    if not driven[1:]:
+def seal(cli: Cli, cut: Path, shared: list[Any]) -> str:
+    if not shared[1:]:
         shutil.copytree(cut, "whole")
         whole = cli(*("whole" if word == "run" and place else word for place, word in enumerate(WORDS)))
         assert whole.code == 0, whole.err
         found = re.search(r"^seal: (\w+)$", whole.out, re.MULTILINE)
         assert found
-        driven.append(found[1])
-    return str(driven[1])
+        shared.append(found[1])
+    return str(shared[1])
 
 
 def last_block(path: Path) -> int:

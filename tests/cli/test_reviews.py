@@ -71,7 +71,7 @@ def test_a_group_is_shown_with_holes_and_values(cli: Cli, root: Path, known: dic
     assert "\nvalues: by: 1 to 65\n" in answer.out
     [group] = cli("review", "show", longer, "--json").json
     assert group["values"][0]["by"].startswith("+ ")
-    assert len(group["values"]) == group["faults"] == 8  # four, in either reading
+    assert len(group["values"]) == group["faults"] == 8  # four faults in each of two readings
 
 
 def test_a_review_covers_the_library_specs_or_a_campaign(cli: Cli, root: Path, known: dict[str, str]) -> None:
@@ -114,7 +114,7 @@ def test_a_decision_needs_a_reviewer(
     assert " approved by Git Smith on " in cli("review", "approve", group).out
 
 
-def test_deciding_about_a_filter_asks_first(
+def test_a_decision_about_filtered_groups_needs_confirmation(
     cli: Cli, root: Path, known: dict[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     words = ("review", "approve", "--only", 'state == "new" and model == "offset"', *JANE)

@@ -15,26 +15,26 @@ Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, jso
 
 
 @pytest.fixture(scope="module")
-def driven(tmp_path_factory: pytest.TempPathFactory) -> list[Any]:
-    """A list of the shared run folder and, once it is known, its seal."""
-    return [tmp_path_factory.mktemp("driven") / "run"]
+def shared(tmp_path_factory: pytest.TempPathFactory) -> list[Any]:
+    """A list of the shared run folder and, once known, its seal."""
+    return [tmp_path_factory.mktemp("shared") / "run"]
 
 
 @pytest.fixture
-def sealed(cli: Cli, root: Path, driven: list[Any]) -> str:
+def sealed(cli: Cli, root: Path, shared: list[Any]) -> str:
     """The seal that `mutator run` prints. All tests share the folder `run`, because they have the same
     library."""
-    kept, *seals = driven
+    kept, *seals = shared
     if not seals:
         ran = cli("run", "small", "--out", "run", "-n", "0", "--limit", 4, "--engine", "fork")
         assert ran.code == 0, ran.err
         found = re.search(r"^seal: ([0-9a-f]{64})$", ran.out, re.MULTILINE)
         assert found
-        driven.append(found[1])
+        shared.append(found[1])
         shutil.copytree("run", kept)
     elif not Path("run").exists():
         shutil.copytree(kept, "run")
-    return str(driven[1])
+    return str(shared[1])
 
 
 def test_an_audit_is_printed_on_one_page(cli: Cli, sealed: str) -> None:
@@ -49,7 +49,7 @@ def test_an_audit_is_printed_on_one_page(cli: Cli, sealed: str) -> None:
     assert sum(check["count"] for check in as_json["checks"]) > 20
 
 
-def test_the_seal_is_shown_wherever_a_run_ends(cli: Cli, sealed: str) -> None:
+def test_the_seal_is_in_the_output_and_the_report(cli: Cli, sealed: str) -> None:
     again = cli("run", "small", "--out", "run", "-n", "0", "--json")
     assert (again.code, again.json["ran"], again.json["seal"]) == (0, 0, sealed)
     assert f"| seal | {sealed} |" in Path("run/report/REPORT.md").read_text()
@@ -163,7 +163,7 @@ def test_damaged_blocks_of_patches_are_reported(cli: Cli, sealed: str) -> None:
     assert cli("verify", "run", "--expect", sealed).code == 0
 
 
-def test_the_page_lists_only_some_of_many_differences(cli: Cli, sealed: str, root: Path) -> None:
+def test_the_audit_lists_only_some_of_many_differences(cli: Cli, sealed: str, root: Path) -> None:
     table = Path("run/results.csv")
     table.write_text("\n" * 60)
     found = cli("verify", "run")

@@ -1,4 +1,4 @@
-"""Warnings: faults without effect, and values that no spec declares."""
+"""Warnings about faults without effect and about values that no spec declares."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -46,7 +46,7 @@ class Machines:
             os.kill(pid, number)
 
     def processes(self, name: str) -> list[int]:
-        """Return the process that does a worker's work, or none while its nanny restarts it."""
+        """Return the id of the process that does a worker's work, or nothing while its nanny restarts it."""
         process = self.workers[name]
         if not self.nanny:
             return [process.pid]

@@ -35,9 +35,9 @@ FROM_2_S = at_time(2.0)
 IN_ONE_STEP = Trigger(name="x", condition="t > 1.97 and t < 2.02")
 FIRST_ACTIVE_S = 2.0
 
-# When the sensor returns a text instead of a distance, `gap_of` calls the function of that name and returns a
-# distance. In scenario `earlyN`, a mutant calls one of four functions in every step. In `careful`, the target
-# reports a failing sensor.
+# When the sensor returns a text instead of a distance, `gap_of` calls the function that the text names, and
+# returns a distance. In scenario `earlyN`, a mutant calls one of four functions in every step. In `careful`,
+# the target reports a failing sensor.
 MOODS = """
 import ctypes, os, sys
 from contextlib import suppress

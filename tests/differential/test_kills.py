@@ -31,7 +31,8 @@ def contents(tree: Path) -> dict[str, bytes]:
 
 
 def struck(command: Command, kill: Kill, after_s: float) -> bool:
-    """Kill the command, or one of its workers, after that time. Return false if the command ended earlier."""
+    """Kill the command, or one of its workers, after `after_s` seconds. Return false if the command ended
+    earlier."""
     try:
         command.process.wait(after_s)
         return False

@@ -1,4 +1,4 @@
-"""A run's process ends in the same way in every engine, and leaves the same files and processes."""
+"""In every engine, a run's process ends in the same way and leaves the same files and no daemon."""
 
 import os
 import signal
@@ -28,7 +28,8 @@ ACTIVE = (fault(*MODELS["offset"]), TRIGGERS["from 2.01 s"])
 
 
 def with_trouble(toy: Workspace, folder: Path, trouble: str, head: str, limits: Limits) -> Engines:
-    """Engines on the toy with a mutant that executes `trouble`. `head` runs when the target is loaded."""
+    """Return engines for the toy with a mutant that executes `trouble`. `head` runs when the target is
+    loaded."""
     package = toy.library.parent / "tree" / "toycar"
     go = (package / "go.py").read_text()
     assert MEET_TROUBLE in go

@@ -1,4 +1,4 @@
-"""Shards that run separately and are merged equal the run of one machine."""
+"""Shards that are run separately and then merged equal a single run."""
 
 import json
 import shutil

@@ -51,18 +51,18 @@ def two_scenarios(toy: Workspace, changes: str) -> Workspace:
 
 
 @pytest.fixture(scope="module")
-def driven() -> dict[str, list[str]]:
+def executed() -> dict[str, list[str]]:
     return {"shared": [], "apart": []}
 
 
 @pytest.fixture(scope="module")
 def runs(
-    tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar, driven: dict[str, list[str]]
+    tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar, executed: dict[str, list[str]]
 ) -> tuple[Path, Path]:
     execute = ReferenceEngine.execute
 
     def counted(self: ReferenceEngine, job, scratch):  # type: ignore[no-untyped-def]
-        driven[name].append(job.name)
+        executed[name].append(job.name)
         return execute(self, job, scratch)
 
     made = []
@@ -99,9 +99,9 @@ def test_plan_and_folder_report_the_shared_runs(runs: tuple[Path, Path]) -> None
 
 
 @pytest.mark.slow
-def test_shared_runs_run_once(runs: tuple[Path, Path], driven: dict[str, list[str]]) -> None:
+def test_shared_runs_run_once(runs: tuple[Path, Path], executed: dict[str, list[str]]) -> None:
     ids = {e.id for e in load_plan(RunFolder.open(runs[0])).experiments}
-    counts = {which: sum(name in ids for name in names) for which, names in driven.items()}
+    counts = {which: sum(name in ids for name in names) for which, names in executed.items()}
     assert counts == {"shared": 6, "apart": 8}
 
 

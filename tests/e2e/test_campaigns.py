@@ -252,7 +252,7 @@ def test_a_campaign_that_cannot_be_planned_leaves_no_folder(toy: Workspace, tmp_
     assert [path.name for path in tmp_path.iterdir() if path.name in ("new", "old")] == ["old"]
 
 
-def test_a_run_keeps_its_options(toy: Workspace, finished: Path) -> None:
+def test_a_run_refuses_options_that_differ_from_its_plan(toy: Workspace, finished: Path) -> None:
     assert run_campaign(toy, "small", finished, choices=Choices(seed=3)).exit_code == 0
     for choices in (
         Choices(seed=4),

@@ -23,8 +23,8 @@ class Killed(BaseException):
 
 
 class Death:
-    """Allow this many renames and deletions in a run folder and fail all later ones. Each file is put in
-    place by a rename. Scratch files are ignored."""
+    """Let `after` renames and deletions in a run folder pass, then fail all others. Each file is put in place
+    by a rename. Scratch files are not counted."""
 
     def __init__(self, run: Path, after: int, patch: pytest.MonkeyPatch) -> None:
         self.left, self._run = after, run
@@ -51,7 +51,7 @@ def run(workspace: Workspace, out: Path) -> str | None:
 
 
 def check_kill(workspace: Workspace, out: Path, after: int, expected: tuple[str | None, bytes]) -> bool:
-    """Kill a run after this many renames, check the folder and resume. Return whether the run was killed."""
+    """Kill a run after `after` renames, check the folder and resume. Return whether the run was killed."""
     with pytest.MonkeyPatch.context() as patch:
         death = Death(out, after, patch)
         with suppress(Killed, AssertionError):

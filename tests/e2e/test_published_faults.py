@@ -61,7 +61,7 @@ def test_hazards_and_alerts_are_those_of_the_original(
 
 
 # The original's simulator swaps the lanes. Source: its runs of the authors' files 14 (value 1) and 16 (value
-# 2); the campaign's first right lane and second large steering error are closest to these.
+# 2). The values below are the campaign's closest ones.
 SWAPPED = {
     ("path_model", "right", "-2.01"): {"t_h1": 14.79, "t_h3": 11.75, "t_alert": 7.745},
     ("steer", "angle", "-32.89"): {"t_h3": 13.0},

@@ -71,7 +71,7 @@ def python(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
 
 
 @pytest.fixture
-def driven(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+def executed(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     names: list[str] = []
     execute = ReferenceEngine.execute
 
@@ -85,7 +85,7 @@ def driven(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 def other_digits(execute: Execute) -> Execute:
-    """Simulate a machine that computes differently: each output file of the target ends with a space."""
+    """Simulate a machine that computes differently: append a space to an output file of the target."""
 
     def run(self: ReferenceEngine, job: Job, folder: Path) -> Execution:
         done = execute(self, job, folder)
@@ -110,12 +110,12 @@ def test_another_python_is_refused(cli: Cli, half: Path) -> None:
 
 @pytest.mark.slow
 def test_another_python_can_be_accepted_and_is_recorded(
-    cli: Cli, toy: Workspace, driven: list[str], half: Path, tmp_path: Path
+    cli: Cli, toy: Workspace, executed: list[str], half: Path, tmp_path: Path
 ) -> None:
-    before = len(driven)
+    before = len(executed)
     code, _, err = cli("run", "small", "--out", half, "-n", "0", "--accept-versions")
     assert code == 0, err
-    assert before == 4 and sorted(driven[:4]) == sorted(driven[4:])
+    assert before == 4 and sorted(executed[:4]) == sorted(executed[4:])
     assert run_campaign(toy, "small", tmp_path / "whole").exit_code == 0
     assert (half / "results.csv").read_bytes() == (tmp_path / "whole" / "results.csv").read_bytes()
     stretches = json.loads((half / "run.json").read_text())["stretches"]
@@ -159,16 +159,16 @@ def test_pytest_refuses_and_accepts_versions_like_the_command(
 
 @pytest.mark.slow
 def test_another_machine_repeats_the_golden_runs(
-    toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, driven: list[str]
+    toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, executed: list[str]
 ) -> None:
     out = tmp_path / "run"
     run_campaign(toy, "small", out, distributor=OnePiece())
-    assert sorted(driven) == ["a-A", "a-A+alone", "b-A", "b-A+alone"]
+    assert sorted(executed) == ["a-A", "a-A+alone", "b-A", "b-A+alone"]
     run_campaign(toy, "small", out, distributor=OnePiece())
-    assert len(driven) == 4  # this machine is already checked
+    assert len(executed) == 4  # this machine is already checked
     monkeypatch.setattr(machine, "cpu", lambda: "another")
     assert run_campaign(toy, "small", out, distributor=OnePiece()).done == 6
-    assert len(driven) == 8
+    assert len(executed) == 8
     assert [stretch.cpu == "another" for stretch in RunFolder.open(out).stretches] == [False, False, True]
 
     monkeypatch.setattr(machine, "cpu", lambda: "a third")

@@ -26,7 +26,7 @@ class Spot:
 
 
 def spots(tree: ast.Module) -> Iterator[Spot]:
-    """Return every anchor. Statements of one kind and name are numbered like `nth`."""
+    """Yield every anchor. `nth` numbers the statements of one kind and name."""
     functions: dict[str, list[_Function]] = {}
     for name, function in _functions(tree, ""):
         functions.setdefault(name, []).append(function)

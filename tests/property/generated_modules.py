@@ -1,4 +1,4 @@
-"""Generated modules of every shape that Python allows, which terminate and trace what they did. They need the
+"""Generated modules of every shape that Python allows, which terminate and trace what they do. They need the
 names that `behaviour` provides, such as `T`, which records and returns a value, and `call`."""
 
 import sys

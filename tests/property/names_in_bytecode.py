@@ -9,7 +9,8 @@ from .injected_statements import Lines
 
 
 def keeps_names(source: bytes, mutant: bytes) -> bool:
-    """Whether every name in the bytecode of each function is still local, free or global."""
+    """Whether every name in each function's bytecode has the same scope (local, free or global) in the
+    mutant."""
     lines = Lines.of(mutant)
     try:
         after = dict(_homes(compile(mutant, "m.py", "exec", dont_inherit=True), lines))

@@ -156,7 +156,7 @@ def _add_guard(
 
 
 def _crowded(file: ParsedFile, spot: Spot) -> bool:
-    """Whether an anchor must be refused: its statement returns, or shares its lines."""
+    """Whether an anchor must be refused, because its statement returns or shares its lines."""
     node, kind = spot.node, spot.kind
     if kind is AnchorKind.ENTRY:
         node = spot.within.body[0]
@@ -170,7 +170,8 @@ def _crowded(file: ParsedFile, spot: Spot) -> bool:
 
 
 def _line(file: ParsedFile, number: int) -> bytes:
-    """Return a line without byte order mark, in UTF-8, because `ast` counts columns in it."""
+    """Return a line in UTF-8, because `ast` counts columns in UTF-8 bytes, and without the byte order
+    mark."""
     return file.lines[number - 1].decode(file.encoding).removeprefix("\ufeff").encode()
 
 
@@ -224,8 +225,8 @@ def _check_tree(original: str, mutant: bytes, group: Sequence[_Placed]) -> None:
 
 
 def _with_variable_set(file: ParsedFile, spot: Spot, figures: Figures) -> bytes:
-    """Return the mutant in which a variable is set at an anchor, with unchanged scopes of its names. Return
-    empty bytes if the splicer refuses."""
+    """Return a mutant that sets a variable at an anchor, or empty bytes if the splicer refuses. Each name
+    must keep its scope."""
     chosen = random.Random(f"{spot.location}")
     known = sorted(
         {n.id for n in ast.walk(spot.within) if isinstance(n, ast.Name)} - {"int"} | {"max", "new"}

@@ -24,7 +24,7 @@ TIME = st.sampled_from([2.0, 2.5, 3.0, 7.25])
 
 @st.composite
 def rows(draw: st.DrawFn) -> Row:
-    """Return any row that a campaign can leave, and some that it cannot."""
+    """Draw a row, including some that no campaign can produce."""
     names = draw(st.lists(st.sampled_from(["H1", "H2"]), unique=True))
     hazards = tuple(sorted(((name, draw(TIME)) for name in names), key=lambda h: h[1]))
     status = draw(st.sampled_from(Status))

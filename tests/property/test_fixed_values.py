@@ -66,7 +66,7 @@ def probe(ids: Sequence[str]) -> Any:
 
 
 def read(names: types.ModuleType, one: FixedValue) -> Any:
-    """Return the value under its name, or in the signature as Python reports it."""
+    """Return a constant's value, or a default from the signature that Python reports."""
     *path, last = one.path.split(".")
     found: Any = names
     for name in path:
@@ -80,7 +80,7 @@ def read(names: types.ModuleType, one: FixedValue) -> Any:
 def readable(
     names: types.ModuleType, cases: Sequence[tuple[FixedValue, FaultLocation]]
 ) -> Iterator[FixedValue]:
-    """Return the values that exist on this system. Some are defined only on others."""
+    """Yield the values that exist on this system. The library defines some only on other systems."""
     for one, _ in cases:
         try:
             read(names, one)
@@ -90,8 +90,8 @@ def readable(
 
 
 def check(file: ParsedFile, cases: Sequence[tuple[FixedValue, FaultLocation]], *, run: bool) -> None:
-    """Check that a mutant compiles, un-splices and differs from the module only in the lines that set values.
-    With `run`, each value must differ only in an active step and be restored afterwards."""
+    """Check that a mutant compiles and equals the module except for the lines that set values. With `run`,
+    each value must differ only in an active step and be restored afterwards."""
     data = mutant(file, cases)
     tree = ast.parse(data)
     compile(tree, "<mutant>", "exec", dont_inherit=True)

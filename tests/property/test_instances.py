@@ -79,8 +79,8 @@ def limited(random_: random.Random, file: ParsedFile, location: FaultLocation) -
 
 
 def check(file: ParsedFile, injection: Injection) -> None:
-    """Check that a mutant compiles, un-splices and equals the inactive module, and that the line of its probe
-    call is known."""
+    """Check that a mutant compiles, equals the module while its fault is inactive, and has a tag for its
+    probe call."""
     edit = injection_edit(file, models(), injection, "0a1b2c3d")
     data = joined(apply_edits(file, in_lines(file, [edit])))
     assert unsplice(data) == file.data, injection

@@ -1,4 +1,4 @@
-"""On generated sources, the splicer restores every byte and does what LibCST's insertion does."""
+"""On generated sources, unsplicing restores every byte, and splicing equals an insertion by LibCST."""
 
 import ast
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ NEWLINES = st.sampled_from(["\n", "\r\n"])
 
 @st.composite
 def sources(draw: st.DrawFn) -> tuple[bytes, list[str]]:
-    """A module with one function `f` of random shape, and the names it assigns, each once."""
+    """Draw a module with one function `f` of random shape, and the names that it assigns, once each."""
     unit, newline = draw(UNITS), draw(NEWLINES)
     names: list[str] = []
     head = draw(st.lists(st.sampled_from(['"""Doc."""', "# note", "import os", ""]), max_size=3))
@@ -70,7 +70,7 @@ def site(name: str, kind: AnchorKind) -> FaultLocation:
 
 
 class Direct(cst.CSTTransformer):
-    """The same mutation in LibCST's tree."""
+    """The same mutation, applied to LibCST's tree."""
 
     def __init__(self, after: set[str], guarded: set[str]) -> None:
         super().__init__()

@@ -81,7 +81,7 @@ def active(node: ast.expr) -> bool:
 
 
 class Inactive(ast.NodeTransformer):
-    """Removes the injected conditions, as if no fault were active. `kept` are the expressions with changed
+    """Removes the injected conditions, as if no fault were active. `kept` has the expressions with changed
     values."""
 
     def __init__(self) -> None:
@@ -127,8 +127,8 @@ def apart(cases: Sequence[Case]) -> Iterator[list[Case]]:
 
 
 def check(file: ParsedFile, cases: Sequence[Case]) -> None:
-    """Check that a mutant compiles, un-splices, calls the probe once for each value, changes exactly these
-    expressions, and acts like the file while no fault is active."""
+    """Check that a mutant compiles, calls the probe once for each value, changes exactly these expressions,
+    and equals the module while no fault is active."""
     edits = [edit_of(file, case, number) for number, case in enumerate(cases)]
     kept = check_edits(file, edits, cases)
     assert sorted(kept) == sorted(ast.dump(expression.node) for expression, _ in cases), cases

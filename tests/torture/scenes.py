@@ -65,7 +65,7 @@ class Scene:
         ]
 
     def _is_done(self, command: Command) -> bool:
-        """A merge killed after its last write is done, because the next one would not overwrite a run."""
+        """A merge killed after its last write is complete: the next one would not overwrite the run."""
         merged = self.name == "merge" and RunFolder.exists(self.at / "run")
         return command.process.returncode == 0 or merged
 

@@ -1,5 +1,5 @@
-"""In any surroundings a campaign gives the same bytes or is refused with a remedy. After the remedy, the same
-command gives these bytes."""
+"""In any surroundings, a campaign gives the same bytes or is refused with a remedy. After the remedy, the
+same command gives these bytes."""
 
 import random
 import shutil

@@ -68,7 +68,7 @@ CRASHED = OK | NONE | {"status": "crashed", "detail": "IndexError"}
 
 
 def make_run(folder: Path, **head: object) -> Path:
-    """A run folder without digests, as older versions wrote it, with a hazard, a crash and a harness error.
+    """Write a run folder without digests, as older versions did, with a hazard, a crash and a harness error.
     `head` is added to run.json."""
     (folder / "run.json").write_text(json.dumps(HEAD | head))
     with (folder / "results.csv").open("w", newline="") as file:

@@ -156,8 +156,8 @@ def test_severity_and_then_time_decide_what_to_fix_first() -> None:
 
 
 def course(by: str = "", stopped_at: tuple[str, ...] = ()) -> Course:
-    """The path of a fault that reached its first actuator through the link `by`, or was stopped at
-    components."""
+    """Return the path of a fault that reached its first actuator through the link `by`, or was stopped at
+    these components."""
     entered = Crossing(link=by, tail=by, tip="pedals", passage=Passage.THROUGH) if by else None
     return Course(states={}, late={}, crossings=(), reached="", stopped_at=stopped_at, entered=entered)
 

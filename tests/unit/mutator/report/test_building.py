@@ -134,7 +134,7 @@ def test_experiments_and_runs_are_counted_separately(run: Path) -> None:
 
 
 def test_the_report_says_what_stopped_runs_might_have_missed(run: Path) -> None:
-    """If a run stops at a hazard, an alert after the end cannot be known."""
+    """If a run stops at a hazard, later alerts are unknown."""
     assert STOP_NOTE not in building.write(run, None).markdown.read_text()
     stops = {"canary": {"after_hazard": "stop"}, "alerts": ["fcw"]}
     (run / "run.json").write_text(json.dumps(HEAD | stops))

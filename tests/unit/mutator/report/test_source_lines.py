@@ -31,7 +31,7 @@ def at(text: str) -> int:
     return next(number for number, line in enumerate(lines, 1) if line.strip().startswith(text))
 
 
-def became(experiment: Experiment) -> dict[str, Any]:
+def result_of(experiment: Experiment) -> dict[str, Any]:
     """Return a mutant's result: FAILED for the pedals; IDLE or HAZARD for a permanent mutant; masked for a
     transient one."""
     place = str(experiment.fault.value)
@@ -46,7 +46,7 @@ def became(experiment: Experiment) -> dict[str, Any]:
 def run(
     toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path], of_operators: Callable[..., Any]
 ) -> Path:
-    out = write_run(toycar, tmp_path / "run", became, changed=of_operators(toycar, DRIVER))
+    out = write_run(toycar, tmp_path / "run", result_of, changed=of_operators(toycar, DRIVER))
     results.build(out)
     (out / "report").mkdir()
     return out

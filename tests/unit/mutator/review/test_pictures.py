@@ -113,7 +113,7 @@ def test_each_value_is_applied_to_the_original_image(lit: Lit) -> None:
     assert [round(grey(one.after)) for one in drawn(workspace, group).levels] == [100, 110, 120]
 
 
-def test_the_more_severe_amount_changes_the_image_more() -> None:
+def test_amounts_are_ordered_by_their_effect_on_the_image() -> None:
     assert pictures._by_severity([1.0, 2.0, 4.0]) == [0, 1, 2]
     assert pictures._by_severity([90.0, 40.0, 20.0]) == [2, 1, 0]
     assert pictures._by_severity([90.0, 40.0, 1.0, 30.0, 80.0]) == [2, 3, 1, 4, 0]

@@ -38,7 +38,7 @@ SPEC = """\
 schema: fault_spec/1
 module: sensor
 fault_type: seen
-about: What is seen is another thing.
+about: The sensor sees something else.
 variants:
 {variants}
 """
@@ -60,12 +60,12 @@ HELPED_YAML = """\
 schema: fault_model/1
 name: helped
 kind: insert
-about: Asks a helper of the target.
+about: Calls a helper of the target.
 params:
   target: {type: variable, about: what is changed}
   by: {type: number, about: how much}
 examples:
-  - about: the helper is asked
+  - about: the helper is called
     injection:
       at: {file: example.py, function: measure, after_assign: gap}
       model: helped

@@ -132,8 +132,8 @@ def client(
     copy_toycar: Callable[[Path], Workspace],
     served_at: Callable[[Workspace, Path], Any],
 ) -> Iterator[Client]:
-    """A server for a copy of the toy's library and the made-up run `night`, with a secret file in the
-    folder above."""
+    """A client for a server of the toy library and the made-up run `night`. The folder above the runs has a
+    secret file."""
     place = tmp_path_factory.mktemp("served")
     workspace = copy_toycar(place)
     shutil.rmtree(workspace.library / "faults" / "hostile")

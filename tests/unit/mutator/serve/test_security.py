@@ -31,7 +31,7 @@ def test_localhost_is_an_accepted_host(client: Client) -> None:
 
 @pytest.mark.parametrize("origin", ["http://evil.example", "null", "http://127.0.0.1:1", "https://{own}", ""])
 @pytest.mark.parametrize("method", ["GET", "POST"])
-def test_another_origin_is_refused_whatever_its_headers(client: Client, method: str, origin: str) -> None:
+def test_another_origin_is_refused(client: Client, method: str, origin: str) -> None:
     own = origin.format(own=f"127.0.0.1:{client.port}")
     answer = client.ask(method, "/api/jobs", {"Origin": own}, b"{}" if method == "POST" else None)
     assert answer.status == 403
@@ -113,7 +113,7 @@ def test_every_response_has_the_policy(client: Client, path: str) -> None:
 
 
 def blocks(page: str, tag: str) -> list[str]:
-    """The content of the page's elements of this kind that a browser would run or apply."""
+    """Return the contents of the page's `tag` elements that a browser would run or apply."""
     found = re.findall(rf"<{tag}( type=[^>]*)?>(.*?)</{tag}>", page, re.DOTALL)
     return [text for kind, text in found if not kind]
 

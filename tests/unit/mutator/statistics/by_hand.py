@@ -1,5 +1,5 @@
 """The statistics of a report, computed a second time in plain Python from formulas, without the harness. Rows
-are the dicts that `made_up` draws, without the times that are missing."""
+are the dicts that `made_up` draws. A missing time has no key."""
 
 import math
 import random
@@ -34,11 +34,11 @@ def made_up(seed: int) -> list[dict[str, Any]]:
             row = {"module": module, "fault_type": fault_type, "fault_id": f"f{fault}"}
             row |= {"scenario": scenario, "method": method, "trigger": trigger, "status": "ok"}
             chance = harm[kind] * (1.0 if method == "guided" else tame)
-            rows.append(row | _became(draw, ENDS[scenario], chance, alarm))
+            rows.append(row | _outcome(draw, ENDS[scenario], chance, alarm))
     return rows
 
 
-def _became(draw: random.Random, end: float, harm: float, alarm: float) -> dict[str, Any]:
+def _outcome(draw: random.Random, end: float, harm: float, alarm: float) -> dict[str, Any]:
     if draw.random() < 0.04:
         return {"status": draw.choice(["crashed", "timeout", "harness_error", "invalid_mutant"])}
     if draw.random() < 0.2:

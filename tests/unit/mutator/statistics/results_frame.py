@@ -21,7 +21,8 @@ _ROW = {
 
 
 def results(*rows: dict[str, Any]) -> pd.DataFrame:
-    """A frame of runs. Each row changes some values of a guided chaff run in S1 that was not activated."""
+    """Return a frame of runs. Each row changes some values of a guided chaff run in S1 that was not
+    activated."""
     texts = [
         _ROW | {"experiment_id": str(i)} | {name: str(value) for name, value in row.items()}
         for i, row in enumerate(rows)

@@ -74,7 +74,7 @@ def test_times_to_a_hazard_need_an_earlier_event() -> None:
 def test_the_interval_of_a_median_resamples_whole_faults(
     pairs: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A simple loop that copies the runs of each fault drawn gives the same interval."""
+    """A simple loop that copies the runs of each drawn fault gives the same interval."""
     monkeypatch.setattr(medians, "RESAMPLES", 40)
     monkeypatch.setattr(medians, "_CELLS", 300)  # the draws need several batches
     rng = np.random.default_rng(3)

@@ -78,8 +78,8 @@ def test_the_interval_of_a_rate_equals_that_of_all_resamples(seed: int) -> None:
 
 @pytest.mark.parametrize("size", [5, 6, 9, 10, 30])
 def test_the_median_difference_lies_between_order_statistics(size: int) -> None:
-    """As in a sign test by hand, the interval drops as many differences as 95 % coverage allows. With fewer
-    than six, there is none."""
+    """As in a sign test by hand, the interval drops as many differences at each end as 95 % coverage allows.
+    With fewer than six differences, there is no interval."""
     change = pd.Series(np.random.default_rng(size).normal(0.3, 1.0, size))
     found = times(pd.Series(np.zeros(size)), change).median
     tails = [sum(math.comb(size, k) for k in range(i + 1)) / 2**size for i in range(size)]

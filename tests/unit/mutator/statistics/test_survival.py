@@ -55,9 +55,9 @@ def test_the_median_equals_that_of_lifelines_except_for_flat_halves(
 
 @pytest.mark.parametrize("sample", LIFELINES.values(), ids=LIFELINES)
 def test_the_interval_of_the_median_equals_that_of_lifelines(sample: dict[str, Any]) -> None:
-    """The interval has the times at which lifelines' interval of the curve contains one half. Where the curve
-    is 0, lifelines uses (0, 0), so its interval ends there. The report leaves the interval open, as R
-    does."""
+    """The interval consists of the times at which lifelines' interval of the curve contains one half. Where
+    the curve is 0, lifelines uses (0, 0), so its interval ends there. The report leaves the interval open, as
+    R does."""
     found = reaction(sample)
     high = sample["median_high"]
     if high == sample["at"][-1] and sample["survival"][-1] == 0.0:

@@ -78,7 +78,7 @@ def test_alerts_are_counted_before_each_hazard() -> None:
     frame = results(run(8.0, 9.0), run(9.0, 10.0, t_h3=8.0), run("", "", t_h3=8.0), run("", 9.0))
     alerts = {
         "0": (("steer_saturated", 8.0), ("fcw", 8.5)),
-        "1": (("fcw", 9.0), ("steer_saturated", 10.0)),  # the second alert came with the hazard
+        "1": (("fcw", 9.0), ("steer_saturated", 10.0)),  # the second alert comes with the hazard
         "2": (),
         "3": (),
     }

@@ -122,7 +122,7 @@ def test_a_file_announced_for_deletion_can_be_missing(run: Path) -> None:
     assert digests.read(run).names == ["b"] and accepted(run)
 
 
-def test_segments_are_entered_when_they_are_closed(run: Path) -> None:
+def test_a_closed_segment_is_in_the_ledger(run: Path) -> None:
     path = segment(run, "records/0001-gw0.jsonl", 1, 2)
     whole = path.read_bytes()
     path.write_bytes(whole + b'{"sum":"0123')
@@ -135,7 +135,7 @@ def test_segments_are_entered_when_they_are_closed(run: Path) -> None:
     assert not accepted(run)
 
 
-def test_a_damaged_segment_is_not_entered(run: Path) -> None:
+def test_a_damaged_segment_cannot_be_closed(run: Path) -> None:
     path = segment(run, "proof/0001-gw0.jsonl", 1, 2)
     path.write_bytes(path.read_bytes().replace(b'"value":1', b'"value":3'))
     with pytest.raises(MutatorError, match=r"0001-gw0\.jsonl:2: a damaged line"):

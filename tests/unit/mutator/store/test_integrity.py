@@ -130,7 +130,7 @@ def test_swapped_files_are_reported(run: Path) -> None:
 
 
 def unsealed(run: Path, *lines: dict[str, object], plan: str | None = None) -> Path:
-    """A run that was killed, with these lines in an unclosed segment."""
+    """Turn a finished run into a killed one, with these lines in an unclosed segment."""
     digests.close_segments(run, finished=False)
     head = {"schema": SCHEMA, "plan": plan or RunFolder.unverified(run).head["plan"]}
     writer = LineWriter(run / "records" / "0002-a.jsonl", head)

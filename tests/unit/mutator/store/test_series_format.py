@@ -27,7 +27,7 @@ def bits(one: Series) -> list[list[int]]:
 
 
 @given(WORDS, WORDS, st.integers(1, 6))
-def test_all_values_round_trip_to_the_bit(one: np.ndarray, other: np.ndarray, count: int) -> None:
+def test_all_values_round_trip_bit_for_bit(one: np.ndarray, other: np.ndarray, count: int) -> None:
     golden = series(one.view("<f4"))
     faulty = series(np.ascontiguousarray(other[:, :count]).view("<f4"))
     back = decode(encode(golden))

@@ -33,7 +33,7 @@ observation:
   time: now
   values:
     gap: {is: cart.gap, unit: m, about: to the wall}
-    seen: {is: cart.seen, unit: m, about: what is observed alone}
+    seen: {is: cart.seen, unit: m, about: an observed value}
   derived:
     closing: {is: 0 - gap, unit: m, about: the other way}
 hazards:

@@ -26,7 +26,7 @@ classes:
     [(0, "S0"), (3.99, "S0"), (4, "S1"), (19.9, "S1"), (20, "S2"), (39.9, "S2"), (40, "S3"), (150, "S3")],
 )
 def test_the_shipped_scale_is_that_of_sae_j2980(kph: float, severity: str) -> None:
-    """Contacts are classed by the strict limits of the ranges in SAE J2980."""
+    """Contacts are classified by the strict limits of the ranges in SAE J2980."""
     workspace = Workspace.find()
     scale = workspace.scale_of(workspace.manifest("openpilot"))
     assert scale is not None

@@ -35,12 +35,12 @@ def line_of(toy: Workspace, text: str, file: str = "driver.py") -> int:
     return number
 
 
-def driven(toy: Workspace) -> dict[str, Finding]:
+def findings(toy: Workspace) -> dict[str, Finding]:
     return {finding.name: finding for finding in check_drive(toy, "toycar", SCENARIO)}
 
 
 def test_a_sound_target_passes_every_check(toy: Workspace) -> None:
-    found = driven(toy)
+    found = findings(toy)
     assert {name: one.level for name, one in found.items()} == dict.fromkeys(
         ["golden A", "fast engines", "statements", "triggers", "canary small"], Level.OK
     )
@@ -80,7 +80,7 @@ def test_a_nondeterministic_line_is_reported(
     for old, new in edits:
         change(toy, "driver.py", old, new)
     change(toy, "driver.py", "class Driver", f"{imports}\n\n\nclass Driver")
-    found = driven(toy)["golden A"]
+    found = findings(toy)["golden A"]
     assert found.level is Level.FAIL
     assert "first differ in channel gas at step 0 (0 s): " in found.found
     assert ("but only if their hash seeds differ" in found.found) == ("set" in told)
@@ -102,7 +102,7 @@ def test_an_effect_of_the_hash_seed_is_reported_without_a_line(toy: Workspace, m
         f"        for place, name in enumerate({made}):\n"
         "            shift += 1e-9 * place * ord(name[0])\n        self.publish((gap + shift,",
     )
-    found = driven(toy)["golden A"]
+    found = findings(toy)["golden A"]
     assert "but only if their hash seeds differ; they first differ in channel " in found.found
     assert (found.places, "sorted(...)" in found.remedy) == ((), True)
 
@@ -129,7 +129,7 @@ def test_a_thread_pool_is_reported_with_its_line(
     )
     if long:
         monkeypatch.setattr(drive, "_BRIEF_S", 0.0)
-    found = driven(toy)
+    found = findings(toy)
     assert found["golden A"].level is Level.OK
     fast = found["fast engines"]
     assert fast.level is Level.WARN
@@ -152,7 +152,7 @@ def test_reading_a_clock_without_effect_is_only_a_note(toy: Workspace) -> None:
         "        return gas, brake",
         "        time.perf_counter()\n        return gas, brake",
     )
-    found = driven(toy)
+    found = findings(toy)
     assert found["golden A"].level is found["clocks"].level is Level.OK
     assert [place.line for place in found["clocks"].places] == [line_of(toy, "time.perf_counter()")]
 
@@ -166,7 +166,7 @@ def test_reported_lines_are_those_of_the_target(toy: Workspace) -> None:
         "self.reading = reading",
         "self.reading = (reading[0] + time.time() * 1e-9, *reading[1:])",
     )
-    (place,) = driven(toy)["golden A"].places
+    (place,) = findings(toy)["golden A"].places
     assert (place.file, place.line) == ("toycar/sensing.py", line_of(toy, "time.time()", "sensing.py"))
 
 
@@ -179,7 +179,7 @@ def test_an_anchor_that_no_run_executes_is_reported(toy: Workspace) -> None:
     )
     spec = "fault_library/faults/sensor/lane.yaml"
     change(toy, spec, "after_assign: offset}", "after_assign: offset, nth: 2}")
-    found = driven(toy)["statements"]
+    found = findings(toy)["statements"]
     assert (found.level, found.found) == (
         Level.WARN,
         "1 of 4 statements never reached in A, A+alone",
@@ -202,7 +202,7 @@ def test_an_anchor_reached_only_without_the_faults_change_is_reported(toy: Works
     for kind in ("distance",):
         path = toy.library / "faults" / "sensor" / f"{kind}.yaml"
         path.write_text(path.read_text().replace("after_assign: gap}", "after_assign: gap, nth: 2}"))
-    found = driven(toy)["statements"]
+    found = findings(toy)["statements"]
     assert [place.what.partition(":")[0] for place in found.places] == ["sensor/distance/nearer"]
 
 
@@ -218,7 +218,7 @@ def test_the_wording_fits_the_number_of_places_reached(toy: Workspace, count: in
 def test_a_trigger_that_no_scenario_reaches_is_reported(toy: Workspace) -> None:
     change(toy, "fault_library/stpa/contexts/near_far.yaml", "near_s: 2.0", "near_s: 0.01")
     change(toy, "fault_library/campaigns/small.yaml", "random_until_s: 5.5", "random_until_s: 9.0")
-    found = driven(toy)["triggers"]
+    found = findings(toy)["triggers"]
     assert found.level is Level.WARN
     assert found.found.endswith("never reached in A, A+alone")
     whats = {Path(place.file).name: place.what for place in found.places}
@@ -231,7 +231,7 @@ def test_a_trigger_that_no_scenario_reaches_is_reported(toy: Workspace) -> None:
 def test_a_harmless_canary_is_reported_with_all_values(toy: Workspace) -> None:
     change(toy, "fault_library/campaigns/small.yaml", "at_s: 1.0", "at_s: 5.9")
     toy.campaign("toy").unlink()
-    found = driven(toy)["canary small"]
+    found = findings(toy)["canary small"]
     assert found.level is Level.FAIL
     assert "sensor/lane/shifted in A did not reach H3 with any of its values: 2." in found.found
     assert found.found.count(" m") == 4
@@ -239,7 +239,7 @@ def test_a_harmless_canary_is_reported_with_all_values(toy: Workspace) -> None:
 
 def test_a_crashing_or_hazardous_target_is_reported(toy: Workspace) -> None:
     change(toy, "driver.py", "        gap, closing", "        1 / 0\n        gap, closing")
-    found = driven(toy)["golden A"]
+    found = findings(toy)["golden A"]
     assert (found.level, "crashed: ZeroDivisionError" in found.found) == (Level.FAIL, True)
 
 
@@ -247,13 +247,13 @@ def test_a_nondeterministic_target_is_not_forked(toy: Workspace) -> None:
     """A fork would differ for the same reason."""
     change(toy, "driver.py", "class Driver", "import time\n\n\nclass Driver")
     change(toy, "driver.py", *CLOCK)
-    fast = driven(toy)["fast engines"]
+    fast = findings(toy)["fast engines"]
     assert (fast.level, "not tried, because a golden run fails" in fast.found) == (Level.WARN, True)
 
 
 def test_a_target_without_a_stepwise_entry_is_reported(toy: Workspace) -> None:
     change(toy, "fault_library/targets/toycar.yaml", "  stepwise: begin\n", "")
-    found = driven(toy)
+    found = findings(toy)
     assert found["golden A"].level is Level.OK
     assert "names no `entry.stepwise`" in found["fast engines"].found
     assert "toycar.yaml" in found["fast engines"].remedy

@@ -87,7 +87,8 @@ _BELIEVE = """
 
 @pytest.fixture
 def sharing(toycar: Workspace, tmp_path: Path) -> Workspace:
-    """A toy whose runs read the car's drift and start from a shared file, unless `--forget` is given."""
+    """A toy whose runs read the start and the rate of the car's drift from a shared file, unless `--forget`
+    is given."""
     go, world = (tmp_path / "toy/tree/toycar" / name for name in ("go.py", "world.py"))
     believe = _BELIEVE.replace("{kept}", str(tmp_path / "kept"))
     go.write_text(go.read_text().replace("\n    return Drive(case)\n", believe))

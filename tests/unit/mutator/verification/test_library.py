@@ -97,8 +97,7 @@ def test_values_have_the_expected_ranges_and_signs(faults: dict[str, tuple[Fault
 
 
 def test_faults_have_the_expected_aims_holds_and_changes(faults: dict[str, tuple[Fault, ...]]) -> None:
-    """Faults without a lead vehicle aim at H2, steering, lane and image faults at H3, and the others at
-    H1."""
+    """Faults without a lead vehicle aim at H2; steering, lane and image faults at H3; all others at H1."""
     for fault in faults["as_described"]:
         seen = fault.module == "vision_input"
         lateral = seen or fault.fault_type in ("steer", "path_model", "camera_unavailable")
@@ -225,7 +224,7 @@ def test_every_mutant_of_the_library_compiles_and_can_be_undone(
 
 
 def edited(toy: Workspace, file: str, old: str, new: str) -> list[str]:
-    """All problems of the toy's library after one edit, without the name of the folder."""
+    """Edit a file. Return all problems of the toy's library, without the folder's name."""
     path = toy.library.parent / file
     assert old in path.read_text()
     path.write_text(path.read_text().replace(old, new, 1))

@@ -37,19 +37,19 @@ def cache(checked: tuple[Workspace, RunFolder], tmp_path: Path, monkeypatch: pyt
     return entry
 
 
-class Driven(Exception):
+class RunStarted(Exception):
     pass
 
 
 @pytest.fixture
-def nothing_is_driven(monkeypatch: pytest.MonkeyPatch) -> None:
+def no_run_starts(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*given: object) -> None:
-        raise Driven
+        raise RunStarted
 
     monkeypatch.setattr(ReferenceEngine, "execute", refuse)
 
 
-@pytest.mark.usefixtures("cache", "nothing_is_driven")
+@pytest.mark.usefixtures("cache", "no_run_starts")
 def test_another_folder_uses_the_cached_results(checked: tuple[Workspace, RunFolder], tmp_path: Path) -> None:
     toy, before = checked
     folder = freeze(make_plan(toy, "small", Choices(only='method == "guided"')), tmp_path / "run", toy)
@@ -60,7 +60,7 @@ def test_another_folder_uses_the_cached_results(checked: tuple[Workspace, RunFol
     assert all((folder.path / f).read_bytes() == (before.path / f).read_bytes() for f in files)
 
 
-@pytest.mark.usefixtures("nothing_is_driven")
+@pytest.mark.usefixtures("no_run_starts")
 @pytest.mark.parametrize("damaged", ["checks.json", "golden/A/log.npz", "golden/A+alone/said.json", ""])
 @pytest.mark.parametrize("content", [b"", b"{}", None])
 def test_a_damaged_entry_is_ignored(
@@ -74,11 +74,11 @@ def test_a_damaged_entry_is_ignored(
         (cache / damaged).write_bytes(content)
     toy, _ = checked
     folder = freeze(make_plan(toy, "small"), tmp_path / "run", toy)
-    with pytest.raises(Driven):
+    with pytest.raises(RunStarted):
         run_checks(toy, folder)
 
 
-@pytest.mark.usefixtures("nothing_is_driven")
+@pytest.mark.usefixtures("no_run_starts")
 @pytest.mark.parametrize("how", ["another word in a result", "another file", "a pipe"])
 def test_a_changed_entry_is_ignored(
     checked: tuple[Workspace, RunFolder], tmp_path: Path, cache: Path, how: str
@@ -95,11 +95,11 @@ def test_a_changed_entry_is_ignored(
         (cache / "checks.json").write_text(text.replace("the same bytes twice", "the same bytes thrice"))
     toy, _ = checked
     folder = freeze(make_plan(toy, "small"), tmp_path / "run", toy)
-    with pytest.raises(Driven):
+    with pytest.raises(RunStarted):
         run_checks(toy, folder)
 
 
-@pytest.mark.usefixtures("cache", "nothing_is_driven")
+@pytest.mark.usefixtures("cache", "no_run_starts")
 @pytest.mark.parametrize("changed", ["seed", "target", "machine"])
 def test_another_seed_target_or_machine_has_no_entry(
     checked: tuple[Workspace, RunFolder],
@@ -114,7 +114,7 @@ def test_another_seed_target_or_machine_has_no_entry(
         with (toycar.library.parent / "tree" / "toycar" / "go.py").open("a") as file:
             file.write("# another\n")
     plan = make_plan(toycar, "small", Choices(seed=9 if changed == "seed" else None))
-    with pytest.raises(Driven):
+    with pytest.raises(RunStarted):
         run_checks(toycar, freeze(plan, tmp_path / "run", toycar))
 
 

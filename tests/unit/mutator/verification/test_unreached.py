@@ -58,7 +58,7 @@ def test_triggers_are_checked_with_cached_golden_runs(toycar: Workspace, tmp_pat
     campaign = toycar.library / "campaigns" / "small.yaml"
     text = campaign.read_text().replace("methods: [guided, random]", "methods: [guided]")
     campaign.write_text(text.replace("table: near_far", "list: [{when: v_ego > 99}, {at_s: 50}]"))
-    for name in ("driven", "cached"):
+    for name in ("fresh", "cached"):
         folder = freeze(make_plan(toycar, "small"), tmp_path / name, toycar)
         run_checks(toycar, folder)
         late, never = unreached_triggers(toycar, folder)

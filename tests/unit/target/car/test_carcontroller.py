@@ -31,7 +31,7 @@ def rig():
     return Rig()
 
 
-def test_gas_is_quantised_like_openpilots(rig):
+def test_gas_is_quantised_as_in_openpilot(rig):
     """Gas is sent in whole pedal counts, with the values that openpilot's plant decoded."""
     assert rig.send(gas=0.011).gas == pytest.approx(0.01094, abs=1e-5)  # 11 counts
     assert rig.send(gas=0.0359).gas == pytest.approx(0.035743, abs=1e-6)  # 36 counts
@@ -92,7 +92,7 @@ def test_nan_and_infinite_demands_are_sent_as_zero(rig, bad):
     assert rig.send(cycles=20, brake=0.1).brake > 0.0
 
 
-def test_periods_of_the_commands(rig):
+def test_each_command_has_its_period(rig):
     addresses = []
     for frame in range(20):
         frames = rig.controller.update(CarControl(enabled=True), rig.car, frame)

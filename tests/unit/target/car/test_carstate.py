@@ -81,7 +81,7 @@ def test_only_a_stopped_car_is_at_standstill(reader, bench):
     assert not rolling.standstill and rolling.v_ego_raw == pytest.approx(0.31, abs=0.002)
 
 
-def test_button_events(reader, bench):
+def test_buttons_raise_events_when_pressed_and_released(reader, bench):
     read(reader, bench)
     assert read(reader, bench, button=CruiseButton.DECEL_SET).buttons == (ButtonEvent("decel", True),)
     assert read(reader, bench, button=CruiseButton.DECEL_SET).buttons == ()
@@ -91,7 +91,7 @@ def test_button_events(reader, bench):
     assert read(reader, bench, button=CruiseButton.CANCEL).buttons == (ButtonEvent("cancel", True),)
 
 
-def test_setting_button(reader):
+def test_the_setting_button_raises_an_event(reader):
     state = reader.update([pack("SCM_BUTTONS", 0, CRUISE_SETTING=1)], 0.0)
     assert state.buttons == (ButtonEvent("setting", True),)
 

@@ -5,7 +5,7 @@ from selfdrive.car.honda.carstate import SPEED_GAINS
 from selfdrive.common.kalman import DistanceFilter, SteadyKalman
 
 
-def test_speed_estimate_starts_like_openpilots() -> None:
+def test_the_first_speed_estimates_agree_with_openpilot() -> None:
     """For a measured speed of 26.797 m/s, the third and fourth estimates equal openpilot's."""
     speed = SteadyKalman(0.0, 0.0, dt=0.01, gains=SPEED_GAINS)
     values = []

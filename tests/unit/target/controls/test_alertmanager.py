@@ -16,7 +16,7 @@ from selfdrive.controls.lib.events import (
 
 
 def test_the_engage_alert_interrupts_the_startup_text() -> None:
-    """As on openpilot, the start-up text is shown for 15 s, except for 0.2 s after engaging at 1.31 s."""
+    """As in openpilot, the start-up text is shown for 15 s, except for 0.2 s after engaging at 1.31 s."""
     alerts = AlertManager()
     alerts.add("startup", 0.12)
     shown = {}

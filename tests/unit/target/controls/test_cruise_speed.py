@@ -26,7 +26,7 @@ def test_engaging_sets_the_cars_speed_but_at_least_40_kmh(v_ego: float, expected
     ],
 )
 def test_releasing_a_button_sets_a_multiple_of_8(button: str, before: int, after: int) -> None:
-    """SET rounds down to a multiple of 8 and subtracts 8."""
+    """A decrease starts from the multiple of 8 at or below the speed."""
     assert button_v_cruise(before, [ButtonEvent(button, False)]) == after
 
 

@@ -19,8 +19,7 @@ def warnings(
 
 
 def test_time_to_collision() -> None:
-    """Time to collision is the gap divided by the closing speed, and less if the lead brakes. The limit is 5
-    s."""
+    """The gap divided by the closing speed, less if the lead brakes, and at most 5 s."""
     assert time_to_collision(20.0, 0.0, LEAD) == pytest.approx(2.0)
     assert time_to_collision(20.0, 0.0, replace(LEAD, a_lead_k=-2.0)) == pytest.approx(1.7082, abs=1e-3)
     assert time_to_collision(5.0, 0.0, LEAD) == 5.0

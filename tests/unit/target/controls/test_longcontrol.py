@@ -43,7 +43,8 @@ def test_while_off_outputs_are_zero_and_the_target_follows_the_car(params: CarPa
 def test_output_is_the_scaled_acceleration(
     params: CarParams, v_ego: float, v_target: float, a_target: float, gas: float, brake: float
 ) -> None:
-    """The output is the acceleration divided by 4.8. Below 2.3 m/s, the loop brakes against creeping."""
+    """The output is the acceleration divided by 4.8. Below 2.3 m/s, the loop also brakes to prevent
+    creeping."""
     assert follow(LongControl(params), at(v_ego), plan(v_target, a_target)) == pytest.approx(
         (gas, brake), abs=1e-5
     )

@@ -45,11 +45,9 @@ class Drive:
         return state
 
 
-def test_lead_speed_starts_like_openpilots(params: CarParams) -> None:
-    """There is no lead while the speeds of 0.1 s ago are unknown.
-
-    Then the filtered speeds match openpilot's.
-    """
+def test_the_first_lead_speeds_agree_with_openpilot(params: CarParams) -> None:
+    """There is no lead in the first 0.1 s, while the earlier speeds are unknown. After that, the filtered
+    speeds match openpilot's."""
     radard = Radard(params, ModelFit())
     leads = []
     for v_ego, v_rel in zip(V_EGO, V_REL, strict=True):

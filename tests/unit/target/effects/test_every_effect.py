@@ -76,7 +76,7 @@ CAMERAS = [
     CameraModel.from_view(width=352, rows=264, horizon=90.0, focal=200.0, height=1.4),
     CameraModel.from_view(
         width=333, rows=251, horizon=70.3, focal=180.0, height=1.4
-    ),  # not divisible by a vector
+    ),  # the size is not a multiple of a vector's length
 ]
 
 

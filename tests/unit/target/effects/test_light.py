@@ -7,7 +7,7 @@ from selfdrive.sim.effects.light import level_rays
 
 
 def test_rays_meet_the_horizon(camera):
-    """In a lower row, the slope of the rays is the camera's height over the distance of the road."""
+    """Below the horizon, the slope of a ray is the camera's height divided by the distance to the road."""
     rays = level_rays(camera)
     fall = rays[:, round(camera.cx), 1] / rays[:, round(camera.cx), 2]
     assert np.interp(camera.horizon, np.arange(camera.rows), fall) == pytest.approx(0.0, abs=1e-4)

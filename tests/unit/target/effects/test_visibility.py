@@ -38,7 +38,8 @@ def test_higher_levels_have_a_shorter_visibility(camera):
 
 
 def test_fog_leaves_the_given_contrast():
-    """The contrast applies to the middle of the measured road, at 17.5 m. At the visibility, it is 5 %."""
+    """The contrast applies to the middle of the measured road, at 17.5 m. At a distance equal to the
+    visibility, it is 5 %."""
     assert fog(0.05).range == pytest.approx(17.5)
     assert fog(0.9).range > fog(0.4).range > 50.0
 

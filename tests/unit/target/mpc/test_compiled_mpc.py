@@ -71,10 +71,10 @@ def spoil(values: list[float], draw: random.Random) -> None:
 @pytest.mark.usefixtures("use")
 @pytest.mark.parametrize("name", REFERENCES)
 @pytest.mark.parametrize("seed", range(40))
-def test_compiled_iterations_have_the_bits_of_casadis(
+def test_compiled_iterations_have_the_same_bits_as_casadi(
     name: str, seed: int, references: dict[str, Solver]
 ) -> None:
-    """Results that are not finite are equal to each other."""
+    """Results that are not finite are considered equal."""
     draw = random.Random(seed)
     wild = draw.choice((1.0, 3.0, 10.0, 1e3, 1e10, 1e100, 1e308)) if seed % 4 == 0 else 1.0
     solver = COMPILED[name]()

@@ -40,7 +40,7 @@ def settling(trace, start, band):
 
 
 @pytest.mark.parametrize("side", [1, -1])
-def test_response_to_an_offset_start(drive, side):
+def test_response_to_an_initial_offset(drive, side):
     result = drive("L01", side)
     offset = side * result.trace["lateral_offset"]
     assert offset[:131] == pytest.approx(0.5)

@@ -46,10 +46,8 @@ def test_brake_and_grade():
 
 
 def test_creep():
-    """The idling engine accelerates the car by 1 m/s^2 at rest and by 0 at 1.5 m/s.
-
-    Rolling resistance is subtracted.
-    """
+    """The idling engine accelerates the car at 1 m/s^2 at rest and not at all at 1.5 m/s. Rolling resistance
+    is subtracted."""
     assert acceleration(0.0, 0.0, 0.0, 0.0) == pytest.approx(1.0 - 0.0981)
     assert acceleration(0.75, 0.0, 0.0, 0.0) == pytest.approx(0.5 - 0.0981, abs=1e-3)
     assert acceleration(1.5, 0.0, 0.0, 0.0) == pytest.approx(-0.0981, abs=1e-3)

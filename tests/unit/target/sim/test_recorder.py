@@ -10,7 +10,7 @@ from selfdrive.sim.recorder import CHANNELS, Recorder
 TRUTH = ("t", "v_ego", "a_ego", "d_rel", "v_lead", "hwt", "steer_angle", "lateral_offset", "heading")
 
 
-def driven(rows: int) -> tuple[Recorder, np.ndarray]:
+def make_recorder(rows: int) -> tuple[Recorder, np.ndarray]:
     state = SimpleNamespace(
         **{"alerts": (), "enabled": True, "long_state": "pid", "angle_desired": 0.5},
         **dict.fromkeys(("v_ego", "a_ego", "v_cruise", "v_pid"), 1.5),
@@ -26,7 +26,7 @@ def driven(rows: int) -> tuple[Recorder, np.ndarray]:
 
 @pytest.mark.parametrize("rows", [0, 1, 63, 64, 65, 129, 4096, 4097, 8300])
 def test_every_row_is_in_the_trace(rows):
-    recorder, values = driven(rows)
+    recorder, values = make_recorder(rows)
     trace = recorder.trace()
     assert tuple(trace) == CHANNELS
     assert np.array_equal(trace["t"], values[:, 0]) and np.array_equal(trace["heading"], values[:, 1])
@@ -36,9 +36,9 @@ def test_every_row_is_in_the_trace(rows):
 
 
 def test_later_rows_do_not_change_a_trace():
-    recorder, values = driven(100)
+    recorder, values = make_recorder(100)
     trace = recorder.trace()
-    others, _ = driven(100)
+    others, _ = make_recorder(100)
     recorder._rows.extend(others._rows)
     recorder._fold()
     assert np.array_equal(trace["t"], values[:, 0])

@@ -26,7 +26,7 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
-def recorded():
+def read_recording():
     """Read a recording: its steps, and its columns as arrays with NaN where nothing was published."""
 
     def read(name):
@@ -45,7 +45,7 @@ def recorded():
 
 
 @pytest.fixture(scope="module")
-def driven():
+def run_once():
     """Run a scenario on the reference plant once. `X_nolead` is X without its lead."""
 
     def run(name):
@@ -60,9 +60,9 @@ def rms(values):
 
 
 @pytest.mark.parametrize("name", RECORDED)
-def test_a_run_agrees_with_its_recording(recorded, driven, name):
-    steps, column = recorded(name)
-    result = driven(name)
+def test_a_run_agrees_with_its_recording(read_recording, run_once, name):
+    steps, column = read_recording(name)
+    result = run_once(name)
     trace = {channel: values[steps] for channel, values in result.trace.items()}
     assert rms(trace["v_ego"] - column("speed")) < 0.03
     assert rms(trace["d_rel"] - column("d_rel")) < 0.03
@@ -80,9 +80,9 @@ def test_a_run_agrees_with_its_recording(recorded, driven, name):
 
 
 @pytest.mark.parametrize("name", ["S1", "S3", "O02", "O09"])
-def test_the_controllers_estimates_agree_with_the_recording(recorded, driven, name):
-    steps, column = recorded(name)
-    trace = driven(name).trace
+def test_the_controllers_estimates_agree_with_the_recording(read_recording, run_once, name):
+    steps, column = read_recording(name)
+    trace = run_once(name).trace
     later = steps > 150
     published = steps[later] - LOG_DELAY
     assert trace["v_ego_est"][published] == pytest.approx(column("vEgo")[later], abs=0.02)
@@ -95,15 +95,15 @@ def test_the_controllers_estimates_agree_with_the_recording(recorded, driven, na
 
 
 @pytest.mark.parametrize("name", ["S5", "O06", "O08"])
-def test_the_final_brake_equals_the_recorded_one(recorded, driven, name):
-    _, column = recorded(name)
-    assert driven(name).trace["brake"][-1] == pytest.approx(column("brake")[-1], abs=1e-5)
+def test_the_final_brake_equals_the_recorded_one(read_recording, run_once, name):
+    _, column = read_recording(name)
+    assert run_once(name).trace["brake"][-1] == pytest.approx(column("brake")[-1], abs=1e-5)
 
 
 @pytest.mark.parametrize(("name", "rows"), [("S1", 3), ("S2", 4), ("S3", 4), ("S4", 4), ("S5", 3)])
-def test_runs_reach_as_many_contexts_as_openpilot(driven, name, rows):
+def test_runs_reach_as_many_contexts_as_openpilot(run_once, name, rows):
     """S1 misses the fourth row that openpilot reaches."""
-    result = driven(name)
+    result = run_once(name)
     trace = result.trace
     armed = trace["t"] >= 1.5
     far, closing = trace["hwt"][armed] > 2.0, trace["v_rel"][armed] < 0.0
@@ -145,8 +145,8 @@ def angle_off(degrees):
     return disturb
 
 
-# Published for openpilot are the error of 0.86 deg and the times. The errors in between were chosen to give
-# these times (at 13.0 s, also the published torque of 0.952).
+# The error of 0.86 deg and the times are published for openpilot. The other errors were chosen to give these
+# times and, at 13.0 s, the published torque of 0.952.
 @pytest.mark.parametrize(
     ("degrees", "leaves"), [(0.86, 11.9), (-0.86, 11.9), (0.576, 13.0), (0.366, 18.3), (0.34, None)]
 )

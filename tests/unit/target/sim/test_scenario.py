@@ -136,7 +136,7 @@ def test_unreadable_files_are_refused(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["S1", "S2", "S3", "S4", "S5"])
-def test_the_five_scenarios(scenarios, name):
+def test_the_five_scenarios_have_the_expected_values(scenarios, name):
     scenario = load_scenario(scenarios / f"{name}.yaml")
     assert (scenario.name, scenario.steps, scenario.speed) == (name, 3000, pytest.approx(26.8224))
     assert scenario.lead.gap == 100.0

@@ -81,8 +81,8 @@ def test_buttons_reach_the_bus(s1):
     assert down == list(range(120, 130))
 
 
-def test_a_coasting_car_moves_like_openpilots(s1):
-    """The first rows match openpilot's plant to all printed digits."""
+def test_a_coasting_car_agrees_with_openpilot(s1):
+    """The expected values are those that openpilot's plant printed."""
     trace = drive(s1, Script(), 101).result().trace
     row = {name: trace[name][100] for name in ("d_rel", "v_rel", "v_ego", "a_ego", "hwt")}
     expected = {"d_rel": 91.058, "v_rel": -8.7637, "v_ego": 26.645, "a_ego": -0.17485, "hwt": 3.4174}
@@ -108,7 +108,7 @@ def test_without_a_lead_sensors_report_an_object_200_m_ahead(s1):
     assert tracks == {bytes.fromhex("c800000000000000")}
 
 
-def test_hazards_and_alerts_in_the_record(s1):
+def test_the_record_has_hazards_and_alerts(s1):
     script = Script(lambda step: (0, 0, 1332))
     simulator = Simulator()
     simulator.reset(replace(s1, steps=1000), 7)

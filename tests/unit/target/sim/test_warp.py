@@ -28,7 +28,8 @@ def library(all_compiled):
 
 
 def moves(random):
-    """Return homographies of cars slightly, far or absurdly off the middle, and impossible ones."""
+    """Yield homographies for cars slightly, far and absurdly far off the middle, and impossible
+    homographies."""
     for offset, heading in random.normal(0.0, 1.0, (12, 2)) * ((0.5, 0.02),):
         yield product(product(np.linalg.inv(TO_CAR), car_to_road(0.0, offset, heading)), TO_CAR)
     for offset, heading in ((9.0, 0.4), (-30.0, 1.5), (0.0, 3.0)):

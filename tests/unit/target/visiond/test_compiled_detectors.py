@@ -89,7 +89,7 @@ def view(picture) -> CameraView:
 
 
 @pytest.mark.parametrize("name", DETECTORS)
-def test_lines_are_the_same_to_the_bit(name, pictures):
+def test_lines_have_the_same_bits(name, pictures):
     plain, build, kind = DETECTORS[name]
     slow, fast = plain(MODEL), build(MODEL)
     assert type(fast) is kind and fast.calculated_by != slow.calculated_by
@@ -107,7 +107,7 @@ def test_lines_are_the_same_to_the_bit(name, pictures):
     ],
     ids=["wide", "small", "narrow"],
 )
-def test_lines_of_another_camera_are_the_same_to_the_bit(model):
+def test_lines_of_another_camera_have_the_same_bits(model):
     slow, fast = PaperDetector(model), build_paper_detector(model)
     road = RoadRenderer(model, "dashed", 2, periods=2)
     for k in range(8):

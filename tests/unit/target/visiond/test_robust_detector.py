@@ -52,7 +52,8 @@ def test_one_frame_is_enough_to_find_both_lines(camera, marks, offset, heading):
 
 
 def test_distractors_do_not_hide_the_lines():
-    """The road is of concrete and has seams, joints, shadows, faint paint, a double line, a kerb and cars."""
+    """The road is made of concrete and has seams, joints, shadows, faint paint, a double line, a kerb and
+    cars."""
     look = replace(
         standard_look("dashed"),
         asphalt=150.0,
