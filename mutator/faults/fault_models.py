@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import lru_cache
 from pathlib import Path
 from typing import Literal
 
@@ -215,6 +216,22 @@ class FaultModelModel(StrictModel, title="The file"):
 
 
 def load_fault_models(folder: Path) -> FaultModels:
+    """Load the fault models of a templates folder, from memory unless a file has changed."""
+    paths = sorted([*folder.glob("*.yaml"), *folder.glob("*.j2")])
+    try:
+        contents = tuple((path, no_pipe(path).read_bytes()) for path in paths)
+    except OSError:
+        return _load_all(folder)  # the error that names the file
+    return _unchanged(folder, contents)
+
+
+@lru_cache(maxsize=4)
+def _unchanged(folder: Path, contents: tuple[tuple[Path, bytes], ...]) -> FaultModels:
+    """Load a folder. `contents` of its files only distinguishes cached results."""
+    return _load_all(folder)
+
+
+def _load_all(folder: Path) -> FaultModels:
     models = {}
     for path in sorted(folder.glob("*.yaml")):
         model = _load(path)
