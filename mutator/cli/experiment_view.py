@@ -120,8 +120,9 @@ def _manifest(result: "ExperimentResult") -> "TargetManifest | None":
 
 
 def _units(manifest: "TargetManifest") -> dict[str, str]:
-    known = (*manifest.compared, *manifest.measures)
-    return {one.name: one.unit for one in known if one.unit not in ("", "-")}
+    channels = [(channel.name, channel.unit) for channel in manifest.compared]
+    known = channels + [(metric.name, metric.unit) for metric in manifest.measures]
+    return {name: unit for name, unit in known if unit not in ("", "-")}
 
 
 def _values(values: Iterable[tuple[str, float]], units: Mapping[str, str]) -> str:
