@@ -77,7 +77,7 @@ Vote = Callable[[RoadView, np.ndarray, np.ndarray, np.ndarray, Belief], Pose]
 
 
 def vote(view: RoadView, road: np.ndarray, at: np.ndarray, weight: np.ndarray, belief: Belief) -> Pose:
-    """Find the lines from `belief` and points: their positions in the map `road` and weights (see `crests`)."""
+    """Find the lines from `belief` and points: positions in the map `road`, and weights (see `crests`)."""
     voters = Voters(view, points_at(at, weight, road), view.rows_with_content(road))
     return fit(elect(voters, belief), voters, belief)
 
