@@ -148,8 +148,8 @@ def _unjudged(analysis: Analysis) -> Iterator[MutatorError]:
                     if hazard and (f"{table.name}/{row.id}", action, category, hazard) not in known:
                         yield table.source.error(
                             ("contexts", row.id, "actions", action, category.value),
-                            f"context '{row.id}' lists {hazard} for '{action}' {category}, "
-                            "which matches no unsafe control action",
+                            f"{hazard} of '{action}' ({category}) in context '{row.id}' matches no unsafe "
+                            "control action",
                             remedy=f"add one to {analysis.unsafe_source.path.name}, or write null here",
                         )
 

@@ -38,7 +38,7 @@ class Check:
 
     @classmethod
     def of(cls, what: str, count: int, problems: Problems) -> "Check":
-        """Collect all problems in a check. An error that `problems` raises is the last of them."""
+        """Collect all problems in a check. An error that `problems` raises becomes the last problem."""
         found = []
         try:
             for problem in problems:
@@ -52,12 +52,12 @@ class Check:
             ValueError,
             AttributeError,
         ) as err:  # damaged data
-            found.append(MutatorError(f"cannot check {what} ({type(err).__name__}: {err})"))
+            found.append(MutatorError(f"the check '{what}' failed ({type(err).__name__}: {err})"))
         return cls(what=what, count=count, differences=tuple(found))
 
 
 def audit_checks(folder: RunFolder, workspace: Workspace | None) -> list[Check]:
-    """Audit a complete run folder.
+    """Run all checks of an audit.
 
     Trees and patches are compared only if `workspace` has the run's sources; otherwise, a difference is
     reported.
@@ -109,7 +109,7 @@ def _content(folder: RunFolder) -> Problems:
             yield MutatorError(
                 "damaged blocks",
                 where=path,
-                expected="patches as they were appended",
+                expected="patches as a worker appended them",
                 remedy=f"`mutator verify {folder.path} --repair` sets them aside",
             )
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from mutator._common.hashing import digest
+from mutator._common.text import counted
 from mutator.engines.jobs import FAST
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
@@ -79,7 +80,9 @@ def mutants(
             name = one.record.experiment_id
             got = f"a patch of {name} with SHA-256 {found[:16]}" if found else f"no patch of {name}"
             where = folder.patches.file(one.record.experiment_id)
-            yield MutatorError(got, where=where, expected=f"that of the mutant, {patch[:16] or 'none'}")
+            none = "no patch, because the mutant cannot be built"
+            expected = f"the mutant's patch, {patch[:16]}" if patch else none
+            yield MutatorError(got, where=where, expected=expected)
     known = {one.record.experiment_id for one in records}
     for name in folder.patches if folder.verifiable and folder.finished else ():
         if name not in known:
@@ -125,7 +128,8 @@ def _flaws_of_end(record: Record) -> Flaws:
         if not _in_order(events, activation):
             yield f"{what} {events}", "each once, in order, at or after the activation"
     if activation and not (activation.first <= activation.last and activation.count > 0):
-        yield f"active from {activation.first} to {activation.last} s", "a first time, then a last one"
+        got = f"active {counted(activation.count, 'time')}, from {activation.first} s to {activation.last} s"
+        yield got, "at least one time, and a first time that is not after the last"
     if len(record.trace_digest) != _DIGEST:
         yield f"trace digest '{record.trace_digest}'", "that of the recorded trace"
 
@@ -212,7 +216,7 @@ def proof(
         if record is not None and record != one.record:
             yield one.difference(equivalence.difference(one.record, record), "what the run recorded")
         if one.record.experiment_id not in sampled:
-            yield one.difference("in the proof", "only the sample, which follows from the plan")
+            yield one.difference("in the proof", "only experiments of the sample that the plan determines")
     missing = sorted(sampled - {one.record.experiment_id for one in proven})
     if folder.verifiable and folder.finished and missing:
         yield MutatorError(

@@ -26,7 +26,10 @@ def _problems(folder: RunFolder, there: SeriesFolder) -> Iterator[MutatorError]:
     for path in segments(run):
         if read_blocks(path).damaged:
             yield MutatorError(
-                "damaged blocks", where=path, expected="as they were appended", remedy=putting_aside(run)
+                "damaged blocks",
+                where=path,
+                expected="series as a worker appended them",
+                remedy=putting_aside(run),
             )
 
 

@@ -21,7 +21,7 @@ def first_difference(manifest: TargetManifest, one: Path, other: Path) -> str:
         if no_pipe(one / name).read_bytes() != no_pipe(other / name).read_bytes():
             in_trace = name == manifest.trace_file
             found = _in_traces(manifest, one, other) if in_trace else _in_records(one, other, name)
-            return found or f"in bytes of {name} that are not values of a channel, such as a time stamp"
+            return found or f"in bytes of {name} that are not values of a channel, such as a timestamp"
     return ""
 
 

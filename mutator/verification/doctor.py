@@ -102,7 +102,7 @@ def _child() -> Finding:
         done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     except (OSError, subprocess.TimeoutExpired) as e:
         return Finding(
-            name="child process", level=Level.FAIL, found=str(e), remedy="fix the cause in the message"
+            name="child process", level=Level.FAIL, found=str(e), remedy="fix what this message names"
         )
     if done.returncode:
         last = (done.stderr.strip().splitlines() or ["no message"])[-1]
@@ -113,11 +113,11 @@ def _child() -> Finding:
 
 
 def _library(workspace: "Workspace") -> Iterator[Finding]:
-    found = f"{workspace.library}: {len(workspace.spec_files())} specs"
+    found = f"{workspace.library}: {counted(len(workspace.spec_files()), 'spec')}"
     yield Finding(name="library", level=Level.OK, found=found)
     try:
         models = sum(1 for _ in workspace.fault_models())
-        found = f"{workspace.templates}: {models} fault models"
+        found = f"{workspace.templates}: {counted(models, 'fault model')}"
         yield Finding(name="templates", level=Level.OK, found=found)
     except MutatorError as e:
         yield Finding(name="templates", level=Level.FAIL, found=str(e), remedy=e.remedy or "")
@@ -130,7 +130,7 @@ def _library(workspace: "Workspace") -> Iterator[Finding]:
             manifest = workspace.manifest(name)
             check_requirements(manifest)
             overlay = f" and {manifest.overlay}" if manifest.overlay else ""
-            found = f"{manifest.root}{overlay}: {len(manifest.tree.files)} files"
+            found = f"{manifest.root}{overlay}: {counted(len(manifest.tree.files), 'file')}"
             yield Finding(name=f"target {name}", level=Level.OK, found=found)
             yield replace(loading(manifest), name=f"fast engines, {name}")
         except MutatorError as e:

@@ -1,4 +1,5 @@
-"""Find draws that no parameter uses (all their faults are the same), and parameters that no template uses."""
+"""Find draws that no parameter uses, so that all their faults are the same, and parameters that no template
+uses."""
 
 from collections.abc import Iterator
 
@@ -33,7 +34,7 @@ def _of_specs(specs: tuple[FaultSpec, ...], models: FaultModels) -> Iterator[Pla
             draw = variant.draw
             for reading, injections in variant.readings.items():
                 if draw and not any(_uses(one, draw.name, models) for one in injections):
-                    what = f"{spec.name}/{variant.name} draws '{draw.name}', which {reading} does not use"
+                    what = f"{spec.name}/{variant.name} draws '{draw.name}', unused in reading {reading}"
                     yield Place(file=str(spec.path), line=spec.source.line(draw.keys), what=what)
 
 
@@ -58,6 +59,6 @@ def _of_models(models: FaultModels) -> Iterator[Place]:
             used.add("target")  # the expression to change, which the template calls `original`
         for param in model.params:
             if param.name not in used:
-                what = f"parameter '{param.name}' of model {model.name}: its template does not use it"
+                what = f"parameter '{param.name}' of model {model.name}, unused in its template"
                 line = model.source.line(("params", param.name))
                 yield Place(file=str(model.source.path), line=line, what=what)

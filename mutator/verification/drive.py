@@ -41,7 +41,7 @@ _MOST = 20  # places listed in a finding
 
 
 def check_drive(workspace: Workspace, target: str, scenarios: Sequence[str] = ()) -> list[Finding]:
-    """The findings from golden runs of the scenarios (default: those of the library's campaigns, or all).
+    """The findings from golden runs of the scenarios (default: those of the target's campaigns, or else all).
 
     The findings cover differences between equal runs (and likely causes), obstacles to forking, statements of
     fault specs that never run, triggers that never hold, and harmless canaries. Raises MutatorError for an

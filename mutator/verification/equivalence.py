@@ -14,6 +14,7 @@ from pathlib import Path
 
 from mutator._common.files import raising_disk_full, remove_folder
 from mutator._common.hashing import digest
+from mutator._common.text import counted
 from mutator.campaigns.sampling import pick
 from mutator.engines.jobs import RunMode
 from mutator.errors import CheckFailed
@@ -49,7 +50,8 @@ class Proof:
         return self.same == self.sampled
 
     def __str__(self) -> str:
-        return f"{self.same} of {self.sampled} experiments came out the same on the reference engine"
+        sampled = counted(self.sampled, "experiment")
+        return f"{self.same} of {sampled} came out the same on the reference engine"
 
 
 def begin(run: Path) -> None:

@@ -60,6 +60,6 @@ def variants(workspace: Workspace, manifest: TargetManifest) -> Finding:
     return Finding(
         name="faults for fast engines",
         level=Level.WARN,
-        found=f"{left} of {counted(count, 'variant')} need the reference engine: {told}",
+        found=f"{left} of {counted(count, 'variant')} cannot be forked: {told}",
         remedy=_WITHOUT,
     )

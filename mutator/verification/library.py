@@ -39,7 +39,7 @@ def check_library(workspace: Workspace, target: str) -> list[MutatorError]:
     * Manifests, models, specs, hazards and context tables must load.
     * The models' examples must hold.
     * Every spec must expand in every reading, and every anchor must match the target exactly once.
-    * One mutant of every shape must compile and un-splice.
+    * In every reading, one mutant of each variant must compile and un-splice.
     * Campaigns must load, and their studies must find valid data.
     * A hazard analysis, if any, must have no gap.
     """
@@ -100,7 +100,7 @@ def _check_triggers(campaign: Campaign, manifest: TargetManifest) -> None:
 
 
 def _placed(problem: MutatorError, campaign: Campaign) -> MutatorError:
-    """A study's problem, located at the campaign that uses the study unless it names a file."""
+    """Locate a study's problem at the campaign that uses the study, unless the problem names a file."""
     if problem.where:
         return problem
     return campaign.yaml.error(("study",), problem.got, expected=problem.expected, remedy=problem.remedy)
@@ -138,7 +138,7 @@ def check_spec(spec: FaultSpec, models: FaultModels, manifest: TargetManifest) -
 def _unbuildable(
     spec: FaultSpec, variant: Variant, fault: Fault, models: FaultModels, manifest: TargetManifest
 ) -> Iterator[MutatorError]:
-    """Why a fault of a variant cannot be built, located at the first injection that causes it, if any."""
+    """Yield why a fault of a variant cannot be built, located at the injection that is the cause, if any."""
     keys: Keys = (*variant.keys, fault.reading)
     try:
         for i, injection in enumerate(fault.injections):

@@ -177,8 +177,8 @@ class _Checks:
         return read_json(path, SCHEMA) if path.is_file() else None
 
     def _check_same_as_before(self, goldens: dict[str, str]) -> None:
-        """Raise CheckFailed if a run that has records would continue with different golden runs, say on
-        another processor."""
+        """Raise CheckFailed if a run that has records would continue with different golden runs, for example
+        on another processor."""
         run, before = self.folder.path, (self._before() or {}).get("goldens", {})
         known = {key: before.get(key) or digest_of(self.manifest, run / "golden" / key) for key in goldens}
         other = [key for key in goldens if known[key] not in ("", goldens[key])]

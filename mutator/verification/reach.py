@@ -169,7 +169,7 @@ def _triggers(
         for trigger in table.triggers(armed_after_s=manifest.armed_after_s):
             if not campaigns or (name, trigger.name) in armed:
                 after = armed.get((name, trigger.name), manifest.armed_after_s)
-                what = f"{name}, {trigger.name}: {trigger.condition}, from {after:g} s on"
+                what = f"{name}, {trigger.name}: {trigger.condition}, armed after {after:g} s"
                 place = _place(table.source.path, table.source.line(("contexts", trigger.name)), what)
                 yield Awaited(trigger=replace(trigger, armed_after_s=after), place=place)
 

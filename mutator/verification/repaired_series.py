@@ -43,7 +43,7 @@ def repair_series(
             yield f"{name} rebuilt from the golden runs"
         else:
             path.unlink(missing_ok=True)
-            yield f"{name} {found}: {making_again(run)} makes the series of an experiment"
+            yield f"{name} {found}: {making_again(run)} recreates the series of an experiment"
     if index:
         pack_again(run, index)
 

@@ -45,7 +45,7 @@ def repair(folder: RunFolder, workspace: Workspace | None = None) -> list[str]:
             f"{folder.head['schema']} has no checksums",
             where=folder.path,
             expected="a run made with this version",
-            remedy="take the damaged file from a copy of the run folder",
+            remedy="restore the damaged file from a copy of the run folder",
         )
     with owned(folder.path, patience_s=0.0), raising_disk_full(folder.path):
         renewed = list(_renewed_ledger(folder))
@@ -165,8 +165,8 @@ def _in_place(segment: Segment, schema: str, known: Digest | None, data: bytes) 
 def _trusted(segment: Segment, known: Digest | None, data: bytes) -> list[dict[str, Any]]:
     """The content of the trustworthy lines after the head.
 
-    If all checksums match although the file differs from the one that was closed, somebody recomputed the
-    checksums. Then lines are trusted only if the file was merely extended, and only up to the old length.
+    If all checksums match although the file's digest changed, somebody recomputed the checksums. Lines are
+    then trusted only if the file was merely extended, and only up to the old length.
     """
     numbers = list(segment.lines)
     whole = segment.damaged or known is None or known.is_of(Digest.of(data))

@@ -1,8 +1,7 @@
 """Find triggers that no golden run reaches.
 
 A faulty run equals the golden run until its fault is active, so a trigger that never holds in the golden run
-never fires. The run of a null mutant equals its golden run, and records the observed
-values.
+never fires. The run of a null mutant equals its golden run, and it records the observed values.
 """
 
 from collections import Counter

@@ -114,7 +114,7 @@ class Experiment {
     const id = this.text("experiment_id"), run = this.facts.run();
     const tried = this.text("module") === "operators" ? [] // an operator's fault has no spec
       : [el("p", {}, "Try a variation: change the value, trigger or scenario in this command:"), this.command(this.#try())];
-    return el("div", {}, el("p", {}, "Rerun it and compare it with its record; show its diff, times and plot:"),
+    return el("div", {}, el("p", {}, "These commands rerun the experiment and compare it with its record, and show its diff, times and plot:"),
       this.command(`mutator rerun ${id} --run ${run}`), this.command(`mutator show ${id} --run ${run}`), tried);
   }
 
@@ -234,10 +234,10 @@ class Experiment {
     const load = async () => {
       const series = await SeriesFile.load(id, { isNew: true }).catch((error) => error);
       if (this.text("experiment_id") !== id) return;
-      if (!series || series instanceof Error) said.textContent = series ? series.message : "Its series does not exist yet.";
+      if (!series || series instanceof Error) said.textContent = series ? series.message : "The series does not exist yet.";
       else Replay.show(place, series, this.facts);
     };
-    const why = "The run folder does not have this experiment's channels: there was no room for them, or an older version ran it.";
+    const why = "The run folder does not have this experiment's channels: there was no room for them, or an older version of mutator ran the experiment.";
     place.replaceChildren(error ? el("p", { role: "alert" }, error.message) : el("p", {}, why), el("p", {}, "This command reruns it:"),
       this.command(`mutator rerun ${id} --trace --run ${this.facts.run()}`),
       el("p", {}, el("button", { type: "button", onclick: load }, "Show them"), " after the rerun."), said);

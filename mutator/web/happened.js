@@ -39,9 +39,10 @@ class Happened {
   #events() {
     const { el } = Dom;
     const at = (name) => this.table.number(this.row, name), begin = at("t_activation");
-    const happened = [["t_activation", `fault first active (${this.text("activations") || "?"} times in the whole run)`],
-      ["t_manifest", "manifested: an actuator differs from the golden run"], ["t_alert", `alert (of this run: ${this.text("alerts").replaceAll(";", ", ")})`],
-      ...this.table.checked.map((hazard) => [`t_${hazard.toLowerCase()}`, this.#hazard(hazard)]), ["t_end", "end of the drive: later steps count in no metric"]]
+    const count = this.text("activations") || "?", times = `${count} ${count === "1" ? "time" : "times"}`;
+    const happened = [["t_activation", `fault first active (${times} in the whole run)`],
+      ["t_manifest", "manifested: an actuator differs from the golden run"], ["t_alert", `first alert (all alerts: ${this.text("alerts").replaceAll(";", ", ")})`],
+      ...this.table.checked.map((hazard) => [`t_${hazard.toLowerCase()}`, this.#hazard(hazard)]), ["t_end", "end of the drive: metrics ignore later steps"]]
       .map(([name, what]) => [at(name), what]).filter(([t]) => !Number.isNaN(t)).sort((a, b) => a[0] - b[0]);
     if (!happened.length) return el("p", {}, Happened.#nothing(this.text("status"), this.text("outcome")));
     const reaction = at("reaction_time");

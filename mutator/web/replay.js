@@ -4,7 +4,7 @@
 const Replay = (() => {
   const BEFORE = 1; // the replay starts this many s before activation
   const SPOKEN = 4; // maximum number of channels in the description of a time
-  const SILENCE = 500; // ms for which the time must not change before it is read out
+  const SILENCE = 500; // ms without a change of the time, after which the state is read out
 
   const SYMBOLS = {
     play: "M4 2l9 6-9 6z", pause: "M4 2h3v12H4zM9 2h3v12H9z", start: "M3 3h2v10H3zM13 3v10L6 8z", end: "M11 3h2v10h-2zM3 3v10l7-5z",
@@ -111,7 +111,7 @@ const Replay = (() => {
         const places = ReplayData.digits(this.axes[this.channels.indexOf(channel)]), of = (run) => ReplayData.text(ReplayData.held(channel, run, t), places);
         words.push([channel.name, of("faulty"), ReplayData.unit(channel), differ.length ? `(golden ${of("golden")})` : ""].filter(Boolean).join(" "));
       }
-      return `${words.join(", ")}${differ.length ? "" : ", as golden"}`;
+      return `${words.join(", ")}${differ.length ? "" : ", same as golden"}`;
     }
 
     /** [kind, text] of each state at a time: fault active, manifested, earlier alerts and hazards, the end. */

@@ -28,7 +28,7 @@ class ReplayBar {
   #parts() {
     const { el } = Dom, { active, tEnd, end, marks } = this.series, parts = [];
     if (active) parts.push(this.#span("active", active[0], Math.min(active[1], ReplayData.until(this.series)), `fault active, first to last: ${active[0].toFixed(2)} to ${active[1].toFixed(2)} s`));
-    if (tEnd !== null) parts.push(this.#span("after", tEnd, end, "after the end of the drive: counted in no metric"));
+    if (tEnd !== null) parts.push(this.#span("after", tEnd, end, "after the end of the drive: ignored by metrics"));
     return [...parts, ...marks.map(([kind, t]) => {
       const mark = el(`span.mark.${kind}`, { "aria-hidden": "true" }, ReplayScene.SYMBOLS[kind] ?? "•");
       mark.style.left = this.#at(t);

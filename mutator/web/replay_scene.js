@@ -41,7 +41,7 @@ class ReplayScene {
     return { scale, x: (left + right) / 2 - this.width / 2 / scale, y: (low + high) / 2 };
   }
 
-  /** A view that follows an actor. It reaches as far ahead as there are other actors to see. */
+  /** A view that follows an actor and reaches far enough ahead to show the other actors. */
   #following() {
     const own = this.tracks.followed("faulty", this.t), [least, most] = ReplayScene.ZOOM;
     const scale = Math.min(most, Math.max(least, ((1 - ReplayScene.AT) * this.width) / (this.tracks.reachAt(this.t) + 9)));
@@ -84,7 +84,7 @@ class ReplayScene {
     context.setLineDash([]);
   }
 
-  /** Draw a band on the ground that was covered while the fault was active. */
+  /** Draw a band along the ground that the followed actor covered while the fault was active. */
   #active() {
     const { active } = this.series;
     if (!active || this.t < active[0] || !this.pins.length) return;
@@ -121,8 +121,8 @@ class ReplayScene {
     context.fillText(text, x, y);
   }
 
-  /** Lay out an actor's shape, `grow` pixels larger on all sides; or a part, from `back` to `front` and
-   *  `across` of its width. */
+  /** Make the path of an actor's shape, `grow` pixels larger on all sides. `back`, `front` and `across` select a part, as
+   *  shares of its length and width. */
   #shape({ actor, x, y, heading }, grow = 0, { back = -0.5, front = 0.5, across = 1 } = {}) {
     const { context, view } = this, long = actor.length * view.scale + 2 * grow, wide = Math.max(2, actor.width * view.scale) + 2 * grow;
     context.save();

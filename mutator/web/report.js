@@ -47,7 +47,7 @@ const Report = (() => {
   /** A text with the number of experiments that match a state, and with the names in the state that do not exist. */
   function foundText(table, state, count) {
     const all = table.count.toLocaleString("en");
-    const found = state.isFiltered ? `${count.toLocaleString("en")} of ${all} experiments` : `${all} experiment${table.count === 1 ? "" : "s"}`;
+    const noun = `experiment${table.count === 1 ? "" : "s"}`, found = state.isFiltered ? `${count.toLocaleString("en")} of ${all} ${noun}` : `${all} ${noun}`;
     const listed = table.of > table.count ? ` listed, the worst of ${table.of.toLocaleString("en")}` : "";
     return [found + listed, ...missing(table, state), ...table.unknown(state)].join(". ");
   }

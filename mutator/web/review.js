@@ -127,7 +127,7 @@ const Review = (() => {
       this.#apply({ isKept: true });
     }
 
-    /** Mark groups. Returns false if the name of the reviewer is missing. Repeating the decision on a single group withdraws it. */
+    /** Mark groups. Repeating the decision on a single group withdraws it. Returns false if nothing was marked. */
     mark(all, kind, text = "") {
       const outbox = this.data.served && this.marks;
       if (!outbox) return this.marks.mark(all, kind);

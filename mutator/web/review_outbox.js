@@ -1,7 +1,6 @@
 "use strict";
 // Sends each mark on a served page as soon as it is made. Unconfirmed marks survive reloads and server restarts and are
-// sent again.
-// Every few seconds, asks the server for marks of other reviewers.
+// sent again. Every few seconds, asks the server for marks of other reviewers.
 
 class Outbox {
   static EVERY_MS = 5000;
@@ -67,13 +66,13 @@ class Outbox {
       return;
     }
     this.events.offline("");
-    if (sends === this.sends) this.#receive(answer.data.groups); // else it may lack the marks sent since
+    if (sends === this.sends) this.#receive(answer.data.groups); // otherwise, marks sent since might be missing from the answer
     this.#flush();
   }
 
   #gone({ status }) {
     const waiting = this.queue.length ? ` ${this.queue.length === 1 ? "1 mark waits" : `${this.queue.length} marks wait`} in this tab and will be sent.` : "";
-    if (status === 403) return `The server no longer knows this page. Open the address that it printed in another tab, and keep this tab open.${waiting}`;
+    if (status === 403) return `The server no longer knows this page. In another tab, open the address that the server printed, and keep this tab open.${waiting}`;
     return `${status ? `Unexpected answer from the server (${status})` : "The server does not answer"}.${waiting}`;
   }
 
@@ -101,7 +100,7 @@ class Outbox {
       const by = this.queue[0].by;
       const batch = this.queue.filter((item) => item.by === by).slice(0, this.isSingle ? 1 : Outbox.MOST);
       const changes = batch.map(({ group, kind, text }) => ({ group, kind, text }));
-      const seen = Object.fromEntries(batch.map((item) => [item.group, item.seen]).reverse()); // as of a group's first mark
+      const seen = Object.fromEntries(batch.map((item) => [item.group, item.seen]).reverse()); // of the group's first mark in the batch
       const digests = Object.fromEntries(batch.map((item) => [item.group, item.digest]).reverse()); // of the shown diffs
       const answer = await this.#ask(this.address, { changes, by, seen, digests });
       if (!this.#answered(answer, batch)) {
@@ -135,7 +134,7 @@ class Outbox {
     this.events.kept([...new Set(batch.map((item) => item.group))]);
   }
 
-  /** Show the reviewer the marks on groups that others have changed, and resend the rest. */
+  /** Tell the reviewer which marks were not saved because somebody else changed the group, and resend the rest. */
   #conflicted(batch, { conflict, groups }) {
     const isOther = (item) => groups[item.group] && groups[item.group].digest !== item.digest;
     const stale = batch.filter((item) => groups[item.group] && (isOther(item) || groups[item.group].revision !== item.seen));

@@ -67,7 +67,7 @@ class Stacks {
     return others.length > lines.length ? [...lines, el("li.quiet", {}, `and ${others.length - lines.length} more`)] : lines;
   }
 
-  /** Each text without the words with which all texts begin and end. */
+  /** Each text without the words that all texts have in common at the beginning and at the end. */
   static differences(texts) {
     const all = texts.map((text) => text.split(" ")), [first] = all;
     const shortest = Math.min(...all.map((words) => words.length));

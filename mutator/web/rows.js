@@ -106,7 +106,7 @@ const Rows = (() => {
       return (row) => found.text(row).toLowerCase().includes(token);
     }
 
-    /** `smallest_ttc<1` as a function of the row; null: not a comparison with a column. An empty cell matches only `alerts=none`. */
+    /** `smallest_ttc<1` as a function of the row; null: not a comparison with a column. An empty cell matches only `=none`. */
     #comparison(token) {
       const [, name, sign, wanted] = COMPARISON.exec(token) || [];
       const found = this.columns.get(name), compare = COMPARED[sign];

@@ -1,6 +1,6 @@
 "use strict";
 // The view's state, kept in the address after #, so that it can be shared and Back works:
-// #e=EXPERIMENT&q=words&kind=sensor%2Fshifted&scenario=S1,S2&sort=-t_hazard&heat=warned&cols=kind,delta_v
+// #e=EXPERIMENT&q=words&kind=sensor%2Fshifted&scenario=S1,S2&sort=-t_hazard&heat=silent&cols=kind,delta_v
 
 class State {
   /** `changed(state)` is called after every change. */

@@ -83,7 +83,7 @@ def test_check_reports_an_unused_draw(cli: Cli, root: Path) -> None:
     assert answer.code == 0
     line = next(n for n, text in enumerate(spec.read_text().splitlines(), 1) if "offset_m:" in text)
     assert (
-        f"lane.yaml:{line} sensor/lane/shifted draws 'offset', which as_described does not use" in answer.out
+        f"lane.yaml:{line} sensor/lane/shifted draws 'offset', unused in reading as_described" in answer.out
     )
 
 

@@ -224,7 +224,7 @@ def test_a_trigger_that_no_scenario_reaches_is_reported(toy: Workspace) -> None:
     whats = {Path(place.file).name: place.what for place in found.places}
     assert whats == {
         "small.yaml": "small: random times until 9 s",
-        "near_far.yaml": "near_far, near: hwt <= 0.01, from 0 s on",
+        "near_far.yaml": "near_far, near: hwt <= 0.01, armed after 0 s",
     }
 
 
