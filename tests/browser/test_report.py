@@ -134,7 +134,7 @@ def test_answers_link_to_their_experiments(page: "Page", rows: list[dict[str, st
     assert len(silent) not in (0, len(hazards))
 
 
-def test_the_list_starts_with_the_worst(page: "Page") -> None:
+def test_the_list_starts_with_the_worst_experiment(page: "Page") -> None:
     endings = page.column("ending")
     assert endings == sorted(
         endings, key=["hazard", "crashed", "sdc", "not activated", "harness error"].index

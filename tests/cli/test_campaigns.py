@@ -268,7 +268,7 @@ def test_show_prints_diff_times_verdict_and_plot(cli: Cli, run: Path) -> None:
     assert f'"series": {{"packed": true, "kept": ["{name}"]}}' in page
 
 
-def test_show_without_an_experiment_lists_the_worst(cli: Cli, run: Path) -> None:
+def test_show_without_an_experiment_lists_the_worst_ones(cli: Cli, run: Path) -> None:
     listed = cli("show", "--json").json
     endings = [line["ending"] for line in listed["worst"]]
     assert endings == sorted(endings, key=lambda ending: ending != "hazard")

@@ -70,12 +70,12 @@ def run(tmp_path: Path) -> ReportedRun:
 
 
 @pytest.fixture
-def said(run: ReportedRun) -> dict[str, Answer]:
+def answer_by_name(run: ReportedRun) -> dict[str, Answer]:
     return {answer.name: answer for answer in answers_of(run)}
 
 
-def test_the_worst_experiment_is_first(said: dict[str, Answer]) -> None:
-    answer = said["dangerous"]
+def test_the_worst_experiment_is_first(answer_by_name: dict[str, Answer]) -> None:
+    answer = answer_by_name["dangerous"]
     assert (
         answer.says
         == "4 of 7 activated faults (57 %) led to a hazard. 2 of 4 hazards (50 %) involved contact."
@@ -98,8 +98,8 @@ def test_the_worst_experiment_is_first(said: dict[str, Answer]) -> None:
     assert answer.links == (Link("All 4 hazards", "outcome=hazard&sort=rank"),)
 
 
-def test_an_alert_after_the_hazard_is_not_a_warning(said: dict[str, Answer]) -> None:
-    answer = said["unwarned"]
+def test_an_alert_after_the_hazard_is_not_a_warning(answer_by_name: dict[str, Answer]) -> None:
+    answer = answer_by_name["unwarned"]
     assert answer.says == (
         "3 of 4 hazards (75 %) were silent (no alert before the hazard): 2 with no alert at all, 1 with an "
         "alert only after the hazard."
@@ -113,8 +113,8 @@ def test_an_alert_after_the_hazard_is_not_a_warning(said: dict[str, Answer]) -> 
     ]
 
 
-def test_without_severity_the_number_of_silent_hazards_decides(said: dict[str, Answer]) -> None:
-    answer = said["first"]
+def test_without_severity_the_number_of_silent_hazards_decides(answer_by_name: dict[str, Answer]) -> None:
+    answer = answer_by_name["first"]
     assert answer.says.startswith("Start with car/speed: 2 of 3 silent hazards (67 %). The rule: ")
     silent = "warning=no%20alert%20at%20all,alert%20only%20after%20the%20hazard"
     assert [line[:3] for line in answer.listings[0].lines] == [
@@ -188,8 +188,8 @@ def test_six_contacts_and_four_other_hazards_are_listed() -> None:
     assert len(dangerous(frame[:12], [], has_alerts=True).listings[0].lines) == 10
 
 
-def test_tolerated_faults_are_a_share_of_the_activated_ones(said: dict[str, Answer]) -> None:
-    answer = said["survived"]
+def test_tolerated_faults_are_a_share_of_the_activated_ones(answer_by_name: dict[str, Answer]) -> None:
+    answer = answer_by_name["survived"]
     assert answer.says == (
         "3 of 7 activated faults (43 %) led to no hazard: 2 changed no actuator (masked), 1 did (sdc). "
         "1 of 3 fault types (33 %) never led to a hazard."
@@ -199,8 +199,8 @@ def test_tolerated_faults_are_a_share_of_the_activated_ones(said: dict[str, Answ
     assert never.lines == [(Link("car/steer", "kind=car%2Fsteer&outcome=masked,sdc"), "1")]
 
 
-def test_cpu_time_is_added_up_by_fault_type(said: dict[str, Answer]) -> None:
-    answer = said["time"]
+def test_cpu_time_is_added_up_by_fault_type(answer_by_name: dict[str, Answer]) -> None:
+    answer = answer_by_name["time"]
     assert answer.says == (
         "The experiments took 2 min 07 s of CPU time on 2 workers: 7 of 8 experiments (88 %) were "
         "simulated; for 1, the trigger never held, so the golden run's result was used. Median 8.00 s, "

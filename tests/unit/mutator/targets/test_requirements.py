@@ -16,7 +16,7 @@ from mutator.verification.doctor import Level, examine
 from mutator.verification.library import check_library
 from mutator.workspace import Workspace
 
-SAID = (
+MESSAGE = (
     r"toycar.yaml:3: no-such-thing: not installed; numpy: \S+, wanted >=999; expected the packages that "
     r"target toycar requires; pip install 'no-such-thing==1.0' 'numpy>=999'"
 )
@@ -30,24 +30,26 @@ def requiring(workspace: Workspace, *requirements: str) -> Workspace:
 
 
 @pytest.fixture
-def lacking(toycar: Workspace) -> Workspace:
+def toycar_without_packages(toycar: Workspace) -> Workspace:
     wanted = ("no-such-thing==1.0", "numpy>=999", "pyyaml", "none; python_version < '3'")
     return requiring(toycar, *wanted)
 
 
-def test_missing_packages_are_reported_before_anything_runs(lacking: Workspace, tmp_path: Path) -> None:
-    with pytest.raises(MutatorError, match=SAID):
-        try_fault("sensor/lane", "A", 1.0, workspace=lacking)
-    with pytest.raises(MutatorError, match=SAID):
-        mutator.run("small", out=tmp_path / "run", workspace=lacking)
+def test_missing_packages_are_reported_before_anything_runs(
+    toycar_without_packages: Workspace, tmp_path: Path
+) -> None:
+    with pytest.raises(MutatorError, match=MESSAGE):
+        try_fault("sensor/lane", "A", 1.0, workspace=toycar_without_packages)
+    with pytest.raises(MutatorError, match=MESSAGE):
+        mutator.run("small", out=tmp_path / "run", workspace=toycar_without_packages)
     assert not (tmp_path / "run" / "checks.json").exists()
 
 
-def test_check_and_doctor_report_a_missing_package(lacking: Workspace) -> None:
-    problem, *_ = check_library(lacking, "toycar")
-    with pytest.raises(MutatorError, match=SAID):
+def test_check_and_doctor_report_a_missing_package(toycar_without_packages: Workspace) -> None:
+    problem, *_ = check_library(toycar_without_packages, "toycar")
+    with pytest.raises(MutatorError, match=MESSAGE):
         raise problem
-    (found,) = [finding for finding in examine(lacking) if finding.name == "target toycar"]
+    (found,) = [finding for finding in examine(toycar_without_packages) if finding.name == "target toycar"]
     assert found.level is Level.FAIL
     assert found.remedy == "pip install 'no-such-thing==1.0' 'numpy>=999'"
 
