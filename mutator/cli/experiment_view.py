@@ -163,7 +163,7 @@ def _events(record: "Record", manifest: "TargetManifest | None") -> list[tuple[f
     events: list[tuple[float, str]] = []
     if record.activation:
         times = counted(record.activation.count, "time")
-        events.append((record.activation.first, f"fault first active ({times} in all)"))
+        events.append((record.activation.first, f"fault first active ({times} in the whole run)"))
         events.append((record.activation.last, "fault last active"))
     if record.t_manifest is not None:
         events.append((record.t_manifest, "manifested: an actuator differs from the golden run"))

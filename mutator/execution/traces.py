@@ -74,7 +74,7 @@ class Traces:
             raise MutatorError(
                 f"no series of {experiment_id}",
                 where=self.folder.path,
-                remedy=f"rerun it: {making_again(self.folder.path, experiment_id)}",
+                remedy=f"rerun the experiment: {making_again(self.folder.path, experiment_id)}",
             )
         return sampled_traces(*found, self.manifest.time_channel)
 

@@ -130,7 +130,8 @@ class Content:
                 f"the kept trace of {experiment_id} does not match its record",
                 where=faulty,
                 expected="the complete trace of the campaign's run",
-                remedy=f"rerun it: {making_again(self._folder.path, experiment_id)}, or delete {kept}",
+                remedy=f"rerun the experiment: {making_again(self._folder.path, experiment_id)}, "
+                f"or delete {kept}",
             )
         return self._traces.of(experiment_id)
 
