@@ -196,8 +196,8 @@ class FaultModelModel(StrictModel, title="The file"):
     )
     expression: str | None = Field(
         None,
-        description="For kind `insert` only: a template that applies the same change to the value of an "
-        "expression, `original`.",
+        description="For kind `insert` only: a second template, which applies the same change to the value "
+        "of an expression, passed as `original`.",
     )
     about: str = Field(description="What the model does, in one sentence.")
     raises: bool = Field(

@@ -89,7 +89,7 @@ OF_PATHS = (
     ),
 )
 EXTRA = (
-    Column("variant", "text", "", "the variant of the spec; for an operator's mutant, its place and change"),
+    Column("variant", "text", "", "the variant of the spec; for a mutation operator, the place and change"),
     Column("aim", "text", "", "the hazard that the fault aims at"),
     Column("condition", "text", "", "the condition of the trigger"),
     Column("detail", "text", "", "why the status is not `ok`"),

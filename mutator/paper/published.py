@@ -124,6 +124,6 @@ def _check(tally: Tally, source: Source, row: int) -> None:
         raise source.error(
             ("rows", row),
             f"counts that contradict each other: {tally}",
-            expected="parts no larger than their whole",
+            expected="no count larger than one that includes it",
             remedy="compare with the published table",
         )

@@ -85,7 +85,7 @@ def _unknown_variables(analysis: Analysis, manifest: TargetManifest) -> Iterator
                 yield analysis.structure_source.error(
                     ("components", name, "process_model", variable, "observed"),
                     f"variable '{model.observed}'",
-                    expected=f"one that the target observes: {', '.join(known)}",
+                    expected=f"one of the values observed in the target: {', '.join(known)}",
                     remedy="correct the name" + suggestion(model.observed, list(known)),
                 )
 

@@ -83,7 +83,7 @@ class ContextTable:
 
 @dataclass(frozen=True, kw_only=True)
 class HazardList:
-    """Accidents and hazards: id -> description; and the accidents that each hazard can cause."""
+    """Accidents and hazards (id -> description), and the accidents that each hazard can cause."""
 
     source: Source
     accidents: Mapping[str, str]
@@ -91,8 +91,8 @@ class HazardList:
     leads_to: Mapping[str, tuple[str, ...]]
 
 
-class _VerdictsModel(StrictModel, title="A verdict"):
-    """The verdicts on one control action in one context; `null` means no hazard."""
+class _VerdictsModel(StrictModel, title="The hazards of an action"):
+    """The hazards that follow from one control action in one context; `null` means no hazard."""
 
     provided: str | None = Field(description="The hazard that occurs if the action is provided.")
     not_provided: str | None = Field(description="The hazard that occurs if the action is not provided.")
@@ -100,11 +100,11 @@ class _VerdictsModel(StrictModel, title="A verdict"):
 
 class _RowModel(StrictModel, title="A context"):
     when: str = Field(
-        description="A condition. It may use `t` (s), the values that the target observes, and the constants."
+        description="A condition. It may use `t` (s), the values observed in the target, and the constants."
     )
     about: str = Field(description="A description.")
     actions: dict[str, _VerdictsModel] = Field(
-        description="Control action -> verdict. All contexts must judge the same actions."
+        description="Control action -> its hazards. All contexts must have the same actions."
     )
 
 
@@ -132,8 +132,7 @@ class HazardsModel(StrictModel, title="hazards.yaml"):
 
 
 def load_context_table(path: Path, variables: Collection[str] | None = None) -> ContextTable:
-    """Read a context table. Conditions are checked as triggers over `variables` (None: any names, to be
-    checked later).
+    """Read a context table. Conditions may use only `variables` (None: any names, to be checked later).
 
     MutatorError also if contexts provably overlap or leave a gap, or if rows judge different control actions.
     """
@@ -143,7 +142,8 @@ def load_context_table(path: Path, variables: Collection[str] | None = None) -> 
             raise source.error(
                 ("constants", name),
                 f"constant '{name}'",
-                expected=f"a name of lowercase letters, digits and _ that begins with a letter, not '{TIME}'",
+                expected=f"a name other than '{TIME}' that begins with a letter and has only "
+                "lowercase letters, digits and _",
             )
     rows = tuple(
         ContextRow(
@@ -178,7 +178,7 @@ def _check_names(rows: Iterable[ContextRow], variables: Collection[str], source:
             raise source.error(
                 ("contexts", row.id, "when"),
                 f"unknown name '{unknown[0]}' in '{row.condition}'",
-                expected=f"a value that the target observes: {', '.join(variables)}",
+                expected=f"one of the values observed in the target: {', '.join(variables)}",
                 remedy="correct the name, or add it to `observation` in the target's manifest",
             )
 
@@ -229,7 +229,7 @@ def load_hazards(path: Path) -> HazardList:
                     ("hazards", name, "leads_to", i),
                     f"accident '{accident}'",
                     expected=f"one of {', '.join(model.accidents)}",
-                    remedy="correct the name, or describe the accident",
+                    remedy="correct the name, or add the accident to `accidents`",
                 )
     return HazardList(
         source=source,

@@ -23,7 +23,7 @@ def check_file(manifest: TargetManifest, named: str) -> None:
     if path in manifest.tree.overlaid:
         raise MutatorError(
             f"file '{path}' is in the overlay of target {manifest.name}",
-            expected="a file of the controller, because no fault may be injected into glue",
+            expected="a file of the controller, because no fault may be injected into the overlay",
             remedy="inject somewhere else",
         )
     if matches(path, manifest.forbid):

@@ -45,7 +45,7 @@ _NUMBERS = 9  # for three lines
 
 
 class StatedDetector(LaneDetector, Protocol):
-    """A detector whose lines depend only on the picture and its `state`, as numbers."""
+    """A detector whose lines depend only on the picture and on the detector's own `state`."""
 
     state: tuple[float, ...]
 

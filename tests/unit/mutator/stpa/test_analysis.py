@@ -164,7 +164,7 @@ def test_an_inconsistent_analysis_is_refused(folder: Path, file: str, old: str, 
             STRUCTURE,
             "observed: rs",
             "observed: ttc",
-            "variable 'ttc'; expected one that the target observes: t",
+            "variable 'ttc'; expected one of the values observed in the target: t",
         ),
     ],
 )

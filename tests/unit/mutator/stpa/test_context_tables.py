@@ -30,7 +30,7 @@ def test_an_unknown_row_is_refused(toy: Workspace) -> None:
     ("old", "new", "said"),
     [
         ("when: hwt <= safe_hwt_s", "when: hwt", "6: 'hwt' is not a truth value"),
-        ("safe_hwt_s: 2.0", "t: 2.0", "3: constant 't'; expected a name of lowercase letters"),
+        ("safe_hwt_s: 2.0", "t: 2.0", "3: constant 't'; expected a name other than 't'"),
         ("safe_hwt_s: 2.0", "safe_hwt_s: two", "3: 'two' for 'safe_hwt_s'; expected a number"),
         ("provided: H1,", "provided: 1,", "9: 1 for 'provided'; expected text"),
     ],
