@@ -56,7 +56,7 @@ DIFFERENCES = {
     LATCHING: "an effect stays to the end of the run",
     REDRAWING: "every picture is drawn anew, whereas otherwise marks as coded do not move",
     MARKS: "streaks, fog and flakes as coded",
-    RIM: "occlusion by black blobs with a gray rim, instead of soft dark ones",
+    RIM: "occlusion by black blobs with a grey rim, instead of soft dark ones",
     PLACE: "effects are drawn before the picture is moved to the car's pose",
     CLUSTERS: "the detector as coded: windows, edges and clusters",
     MISSING: "a line that is not seen is sent as 8 m to the left, with full confidence",
