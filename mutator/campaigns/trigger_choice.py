@@ -51,7 +51,8 @@ class _ListedModel(StrictModel, title="A trigger"):
         None,
         gt=0.0,
         allow_inf_nan=False,
-        description="The longest time that the fault stays active once triggered, in s.",
+        description="How long the fault stays active after the trigger first fires, in s. Default: the "
+        "campaign's `hold_s`.",
     )
 
     @model_validator(mode="after")
