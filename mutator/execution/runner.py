@@ -250,8 +250,10 @@ def _not_by_the_fault(t_first: float | None, activation: Activation | None) -> s
     """Return why the fault cannot have caused a difference from the golden run; empty if it can."""
     if t_first is None or (activation is not None and t_first >= activation.first):
         return ""
-    when = "although the fault was never active" if activation is None else f"before {activation.first} s"
-    return f"differs from golden at {t_first} s, {when}"
+    when = "although the fault was never active"
+    if activation is not None:
+        when = f"before the fault was first active ({activation.first} s)"
+    return f"differs from the golden run at {t_first} s, {when}"
 
 
 def _bare(

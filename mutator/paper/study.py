@@ -10,7 +10,7 @@ from mutator.statistics.published import Published
 
 
 def published(run: ReportedRun) -> Published | None:
-    """Return the counts of the paper, if the library cites them and the run has any of its fault types."""
+    """Return the paper's counts if the library cites them and the run has any of the paper's fault types."""
     references = run.workspace.library / "references" if run.workspace else None
     if references is None or not has_paper(references):
         return None

@@ -27,7 +27,7 @@ _ENDINGS = {
     "masked": "the fault was activated but changed no actuator, without a hazard",
     "not activated": "no changed statement ran while the trigger held",
     "crashed, timeout": "the fault crashed the program, or prevented it from finishing in time",
-    "harness error, invalid mutant": "no result about the fault; counted only here",
+    "harness error, invalid mutant": "the experiment says nothing about the fault, so no share includes it",
 }
 _ALERTS = {
     "silent hazard": "a hazard with no alert before it: either no alert at all, or only a later one",

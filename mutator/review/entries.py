@@ -39,7 +39,7 @@ class Bound:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Decision:
-    """The decision of `by` about a group, and the group's state at that time.
+    """A decision about a group, made by the reviewer `by`, and the group's state at that time.
 
     `at` is the time (UTC, ISO 8601), `commit` the commit of the library, `tool` the version of mutator. In
     decisions from older files, `at`, `commit`, `tool`, `values` and `bound.calls` are None.
@@ -85,7 +85,7 @@ class Flag:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Entry:
-    """The review of a group: its block in the file."""
+    """The review of a group: its block in the target's review file."""
 
     group: str
     what: str

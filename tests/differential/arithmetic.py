@@ -1,5 +1,6 @@
-"""Digests of everything that a run's bytes depend on. `python tests/differential/arithmetic.py [FOLDER]`
-prints them as JSON for the current Python and processor, with the compiled code in FOLDER if given."""
+"""Digests of frames, detections and traces, on which all results depend.
+
+`python tests/differential/arithmetic.py [FOLDER]` prints them as JSON for the current Python and processor, with the compiled code in FOLDER if given."""
 
 import json
 import sys
@@ -43,7 +44,7 @@ def digests() -> Iterator[tuple[str, str]]:
         for level in (4, 9):
             yield from seen(detector, level)
     for path in sorted(SCENARIOS.glob("*.yaml")):
-        for plant in PLANTS if path.stem[0] != "L" else PLANTS[:1]:  # the other plant has no bends
+        for plant in PLANTS if path.stem[0] != "L" else PLANTS[:1]:  # the other has only straight roads
             yield f"{path.stem} on the {plant} plant", trace(path, plant, None)
     for detector in DETECTORS:
         pictures = Pictures(detector=detector, marks=vision.DASHED)

@@ -78,7 +78,7 @@ class ClusterFile:
 
     @asynccontextmanager
     async def open(self, *, insecure: bool) -> AsyncIterator["Client"]:
-        """Start the cluster, as in `Where`; on exit, end it with all its jobs or pods."""
+        """Start the cluster. On exit, end it and all its jobs or pods."""
         if not insecure:
             self._check_closed()
         cluster_class = _class(self.model.kind)

@@ -106,7 +106,7 @@ def sharing(toycar: Workspace, tmp_path: Path) -> Workspace:
     [
         ("0.0 0.0", ""),
         ("5.7 0.01", "differs on the reference engine"),
-        ("0.5 0.01", "in the proof: differs from golden at 0."),
+        ("0.5 0.01", "in the proof: differs from the golden run at 0."),
     ],
 )
 def test_an_error_that_runs_share_fails_the_campaign(
