@@ -1,6 +1,8 @@
 """Digests of frames, detections and traces, on which all results depend.
 
-`python tests/differential/arithmetic.py [FOLDER]` prints them as JSON for the current Python and processor, with the compiled code in FOLDER if given."""
+`python tests/differential/arithmetic.py [FOLDER]` prints them as JSON for the current Python and
+processor, with the compiled code in FOLDER if given.
+"""
 
 import json
 import sys
