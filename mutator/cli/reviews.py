@@ -42,8 +42,9 @@ Examples:
   mutator review page --out review.html
 
 \b
-`mutator review` without a verb means `mutator review list`. Decisions are kept in fault_library/reviews/; put
-them under version control. `mutator run --require-reviewed` runs only mutants that are approved there.
+`mutator review` without a subcommand means `mutator review list`. Decisions are kept in
+fault_library/reviews/; put them under version control. `mutator run --require-reviewed` runs only mutants
+that are approved there.
 """
 
 

@@ -15,7 +15,7 @@ from mutator.model import Injection
 IMPORT_TAG = "probe"  # on the line that imports the probe
 OBSERVE_TAG = "observe"  # on the statement that passes the ground truth to the probe
 ORIGINAL = "original"  # name of the original value in a line that sets a value
-# an id in quotes, in a name or in a tag, which can have several ids; not a number of eight digits
+# an id in quotes, in a name or in a tag (a tag can have several ids), but not a number of eight digits
 INJECTION_ID = (
     r"(?:(?:(?<=[\"'_])|(?<=fi:))[0-9a-f]{8}(?![0-9A-Za-z.])"
     r"|(?<=[0-9a-f]\+)[0-9a-f]{8}(?=(?:\+[0-9a-f]{8})* was:))"

@@ -135,7 +135,7 @@ def load_record(manifest: TargetManifest, out: Path) -> dict[str, Any]:
 
 
 def _check_is_of_output(err: Exception) -> None:
-    """Raise Shortage if mutator ran out of memory or file handles, which is not the fault of the run."""
+    """Raise Shortage if mutator itself ran out of memory or file handles, so the output can be valid."""
     if short := shortage(err):
         if isinstance(err, MemoryError):
             with suppress(MemoryError):

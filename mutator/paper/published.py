@@ -19,7 +19,7 @@ class Paper:
     summary: dict[tuple[str, str], Tally]  # by method and scenario
     coverage: dict[tuple[str, str], Tally]  # by method and module/fault type
     driver_reaction_s: float
-    least_alert_to_hazard_s: float  # least and most: the smallest and largest mean of a scenario
+    least_alert_to_hazard_s: float  # the scenarios' smallest and largest mean
     most_alert_to_hazard_s: float
 
     def published(self) -> Published:
@@ -31,7 +31,7 @@ class Paper:
             scenario_title="the paper's table II",
             kind_title="the paper's table III",
             counts_note="The paper gives the counts; their intervals are computed here.",
-            kind_note="The paper has only hazards/activated; hazards/injected relates to all experiments.",
+            kind_note="The paper has only hazards/activated; hazards/injected is computed here.",
             times_note=f"The paper's mean times from alert to hazard lie between {least:g} and {most:g} s.",
             driver_s=self.driver_reaction_s,
         )

@@ -64,7 +64,7 @@ def first_ones(marks: Iterable[Mark]) -> list[Mark]:
 
 
 def _lines(axis: "Axes", pair: Pair, channel: str, shown: np.ndarray) -> None:
-    """Draw the golden line dashed above the solid faulty line, so that both show where they coincide."""
+    """Draw the golden line dashed above the solid faulty line, so that both are visible if they coincide."""
     t = pair.t[shown]
     axis.plot(t, finite(pair.faulty[channel][shown]), "-", color=FAULTY_COLOUR, linewidth=1.6, label="faulty")
     axis.plot(
@@ -81,7 +81,7 @@ def _shade(axis: "Axes", t: np.ndarray, steps: Steps) -> None:
 
 
 def _mark(axes: Sequence["Axes"], marks: Sequence[Mark], width: float) -> None:
-    """Draw a line through all panels for each mark, with the mark's name above, as low as possible."""
+    """Draw a line through all panels for each mark. Its name is above, on the lowest free level."""
     free: list[float] = []  # the end of the last name on each level
     end, room = axes[0].get_xlim()[1], LABEL_SHARE * width
     for mark in marks:

@@ -15,7 +15,8 @@ from mutator.reference.tables import generated
 from mutator.workspace import Workspace
 
 _PLACES = (
-    "These options say where the library, templates and target are. Write them before or after the verb.\n"
+    "These options say where the library, templates and target are. Write them before or after the "
+    "subcommand.\n"
 )
 
 
@@ -23,7 +24,7 @@ def command_line(workspace: Workspace) -> str:
     command: Any = get_command(app)
     parts = [
         generated("Command line"),
-        "`mutator --help` and `mutator VERB --help` print the same information.\n",
+        "`mutator --help` and `mutator SUBCOMMAND --help` print the same information.\n",
         *(f"* {title}: {', '.join(f'[{name}](#{name})' for name in names)}" for title, names in GROUPS),
         "\n## Exit codes\n",
         _markdown(("code", "meaning"), [(str(code), meaning) for code, meaning in EXIT_CODES.items()]),
@@ -32,9 +33,9 @@ def command_line(workspace: Workspace) -> str:
         "Errors go to standard error: file and line, what was found, what was expected, and what to do. "
         "Progress also goes\nto standard error. With `--json`, standard output is one JSON document.\n",
         "## Completion\n",
-        "`mutator --install-completion` installs completion for the current shell: verbs, options, "
-        "campaigns, specs,\nscenarios, targets, run folders in `runs/`, and experiments of the run that "
-        "`--run` names or of the newest run.\n`mutator --show-completion` prints its script.\n",
+        "`mutator --install-completion` installs completion for the current shell: subcommands, options, "
+        "campaigns,\nspecs, scenarios, targets, run folders in `runs/`, and experiments of the run that "
+        "`--run` names or of the newest\nrun. `mutator --show-completion` prints its script.\n",
         "## Library, templates and target\n",
         _PLACES,
         *_options(command, [p for p in command.params if p.name in PLACE_OPTIONS]),

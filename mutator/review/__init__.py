@@ -1,2 +1,2 @@
-"""Review of generated diffs: groups of mutants, decisions, the review page and the gate. This package
-runs no experiments."""
+"""Review of generated diffs: groups of mutants, decisions, the review page, `--require-reviewed`. This
+package runs no experiments."""
