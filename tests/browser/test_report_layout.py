@@ -52,7 +52,7 @@ def test_axe_finds_no_serious_fault(
         page.page.evaluate("document.querySelector('#grid tr[data-at]').click()")
         page.page.wait_for_selector("#experiment .diff")
         assert serious_faults(page.page) == []
-        assert page.page.evaluate(TITLES) == ["Experiment of toy"]
+        assert page.page.evaluate(TITLES) == ["Experiment from toy"]
         page.page.keyboard.press("Escape")
         assert page.page.evaluate(TITLES) == ["toy"]
 
