@@ -63,7 +63,7 @@ def upgrade_manifest(path: str | Path) -> Upgrade | None:
 
 
 def check_library(workspace: WorkspaceLike = None, *, target: str | None = None) -> list[MutatorError]:
-    """Return every problem of library, templates and target, in the order of the files.
+    """Return every problem of the library, templates and target, in the order of the files.
 
     `target` names a manifest; default: the library's only one.
     """
@@ -114,7 +114,8 @@ def check_hazard_analysis(
 ) -> list[MutatorError]:
     """Return every gap and contradiction of the hazard analysis, in the order of the files.
 
-    `target` names a manifest; default: the library's only one. MutatorError for a library without analysis.
+    `target` names a manifest; default: the library's only one. MutatorError for a library without an
+    analysis.
     """
     found = open_workspace(workspace)
     analysis = _analysis(found)

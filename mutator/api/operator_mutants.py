@@ -21,7 +21,8 @@ class OperatorChoice:
     """
 
     operators: Sequence[str]  #: names of mutation operators
-    places: Sequence[str]  #: `PATH::FUNCTION` or `PATH`, with `*` in a name and `**` for folders
+    #: `PATH::FUNCTION` or `PATH`; `*` is a wildcard, and `**` also matches across folders
+    places: Sequence[str]
     #: only lines that the golden run of this scenario executes; None: all lines
     scenario: str | None = None
     sample: int | None = None  #: number of mutants to draw; None: all

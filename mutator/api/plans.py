@@ -19,8 +19,8 @@ def plan(
     """Expand a campaign (a name in the library, or a file) into its experiments, without running any.
 
     With `out`, the plan is frozen there, and `run` with the same folder runs exactly these experiments.
-    MutatorError for a mistake in campaign or choices, if no experiment is left, and for a folder with other
-    content.
+    MutatorError for a mistake in the campaign or choices, if no experiment is left, and for a folder with
+    other content.
     """
     found = open_workspace(workspace)
     if out is None:

@@ -49,8 +49,8 @@ class RunExperiment(ExperimentResult):
         experiment is rerun, and the frames have all channels in every step. An experiment without a series is
         also rerun, and its series is then kept.
 
-        MutatorError if the experiment has not run. For a rerun, MutatorError if target, templates or scenario
-        have changed, or if the result differs from the campaign's.
+        MutatorError if the experiment has not run. For a rerun, MutatorError if the target, templates or
+        scenario have changed, or if the result differs from the campaign's.
         """
         if exact:
             trial = self.rerun(keep=True)
@@ -68,8 +68,8 @@ class RunExperiment(ExperimentResult):
     def rerun(self, *, keep: bool = False) -> Trial:
         """Rerun the experiment; `Trial.same_as_record` says whether the record equals the campaign's.
 
-        With `keep`, the trace, series and plot stay in the run folder. MutatorError if target, templates or
-        scenario have changed.
+        With `keep`, the trace, series and plot stay in the run folder. MutatorError if the target, templates
+        or scenario have changed.
         """
         run, folder = self.run, self.run.folder
         temporary = None if keep else ScratchFolder("mutator-rerun-")

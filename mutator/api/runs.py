@@ -66,8 +66,9 @@ def merge_runs(shards: Sequence[str | Path], out: str | Path, *, accept_versions
     """Merge the shards of a plan into the run folder `out`, with the same results as a run on a single
     machine.
 
-    MutatorError unless the shards are finished and make up one whole plan, and, without `accept_versions`, if
-    their versions of Python or packages differ. CheckFailed if their golden runs differ.
+    MutatorError if the shards are unfinished or do not make up one whole plan, or, without
+    `accept_versions`, if their versions of Python or packages differ. CheckFailed if their golden runs
+    differ.
     """
     if isinstance(shards, str | Path):
         raise MutatorError(repr(str(shards)), argument="shards", expected="a list of run folders")

@@ -1,1 +1,1 @@
-"""The command line: each verb reads its options, calls the public API and prints the result."""
+"""The command line: each subcommand reads its options, calls the public API and prints the result."""

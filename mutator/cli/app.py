@@ -1,4 +1,4 @@
-"""The program `mutator`: collects the verbs and reports errors."""
+"""The program `mutator`: collects the subcommands and reports errors."""
 
 import errno
 import io
@@ -79,7 +79,7 @@ environment variables, the nearest parent folder with a fault_library/, the copi
 
 
 class Verbs(TyperGroup):
-    """The verbs, grouped by purpose in the help."""
+    """The subcommands, grouped by purpose in the help."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         for title, names in GROUPS:

@@ -63,7 +63,7 @@ def _line(row: "Row") -> dict[str, object]:
 def print_experiment(
     terminal: Terminal, experiment: "Experiment", patch: str, *, tried: bool = False
 ) -> None:
-    """Print what was injected, and the diff. An experiment that was only `tried` has no method."""
+    """Print what was injected, and the diff. An experiment run by `try` has no method."""
     facts = describe(experiment)
     if tried:
         del facts["method"]

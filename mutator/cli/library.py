@@ -163,7 +163,7 @@ def check(
     *,
     place: Place,
 ) -> None:
-    """Check library, templates and anchors against the target.
+    """Check the library, templates and anchors against the target.
 
     Prints each problem with its file and line. If there is none, lists what prevents the target or its faults
     from running on the fork engines, and entries of `draw` that no injection uses. The exit code is 1 if

@@ -1,4 +1,4 @@
-"""Options that several verbs share, and the place (library, templates, target) that they name."""
+"""Options that several subcommands share, and the place (library, templates, target) that they name."""
 
 import dataclasses
 import functools
@@ -144,7 +144,7 @@ PLACE_OPTIONS = {"root": Root, "library": Library, "templates": Templates, "targ
 
 
 def with_place(verb: Callable[..., None]) -> Callable[..., None]:
-    """Add the four options of a place to a verb, so that users can also write them after the verb."""
+    """Add the four options of a place to a subcommand, so that users can also write them after it."""
     signature = inspect.signature(verb, eval_str=True)
     own = [p for p in signature.parameters.values() if p.name != "place"]
     context = inspect.Parameter("ctx", inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context)

@@ -1,4 +1,4 @@
-"""The verbs of `review` that record decisions: approve, reject, clear, remark, flag, unflag."""
+"""The subcommands of `review` that record decisions: approve, reject, clear, remark, flag, unflag."""
 
 import sys
 from collections.abc import Callable, Sequence

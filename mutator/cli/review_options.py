@@ -1,4 +1,4 @@
-"""Options that the verbs of `review` share: which groups, and who reviews."""
+"""Options that the subcommands of `review` share: which groups, and who reviews."""
 
 from collections.abc import Sequence
 from typing import Annotated

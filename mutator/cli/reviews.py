@@ -49,10 +49,10 @@ that are approved there.
 
 
 class Verbs(TyperGroup):
-    """The verbs of `review`; the default is `list`."""
+    """The subcommands of `review`; the default is `list`."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Insert `list` unless the first argument is a verb or asks for help."""
+        """Insert `list` unless the first argument is a subcommand or asks for help."""
         if not args or (args[0].startswith("-") and args[0] not in ("-h", "--help")):
             args = ["list", *args]
         return super().parse_args(ctx, args)

@@ -1,7 +1,7 @@
 """Read YAML strictly, and keep the line of every value for error messages.
 
-The dialect is the core of YAML 1.2, without tags, anchors or aliases (a small file could expand to
-gigabytes), and without multiple documents or duplicate keys.
+The dialect is the core of YAML 1.2, without tags, anchors or aliases (with which a small file could
+expand to gigabytes), and without multiple documents or duplicate keys.
 """
 
 import re

@@ -183,7 +183,7 @@ class ForkEngine:
             "stop": stop_source(self._manifest) if job.stop else None,
             "watch": [value.name for value in self._manifest.observation.values] if watch else None,
         }
-        # the child must begin the run; with `watch`, its arguments are those of the waiting processes
+        # the child must begin the run; a watched run has the arguments of the waiting processes
         if waiting.key is None:
             request["args"] = self._arguments(job, self._running().home if watch else out)
         limits = {"wall_s": self._limits.wall_s, "disk_mb": self._limits.disk_mb}

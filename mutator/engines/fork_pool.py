@@ -24,7 +24,7 @@ from mutator.targets.manifest import TargetManifest
 
 _SERVER = Path(__file__).parent / "in_target" / "fork_server.py"
 _MOST = 8  # maximum number of waiting processes, because each takes about 20 MB
-_NEAR = 100  # in steps: a process at most this far behind is advanced, not copied: its state is soon remade
+_NEAR = 100  # steps; a process at most this far behind is advanced, not copied: it is quickly remade
 _LOOK_UP_S = 0.5  # interval between two checks that the parent is alive
 _START_S = 120.0
 

@@ -54,7 +54,7 @@ class Traces:
         if not (golden.is_dir() and self.is_kept(experiment_id)):
             single, same = rerun(self.workspace, self.folder.path, experiment_id)
             if not same:
-                raise MutatorError(f"the rerun of {experiment_id} differs from the campaign")
+                raise MutatorError(f"the rerun of {experiment_id} differs from the campaign's record")
             golden = single.golden
         return load_trace(self.manifest, golden), load_trace(self.manifest, kept / "faulty")
 

@@ -33,7 +33,7 @@ T = TypeVar("T")
 
 
 def check_library(workspace: Workspace, target: str) -> list[MutatorError]:
-    """Every problem of library, templates and target, in file order.
+    """Every problem of the library, templates and target, in file order.
 
     * All placeholders must be filled in.
     * Manifests, models, specs, hazards and context tables must load.

@@ -6,7 +6,7 @@ from typing import Any
 
 
 def drive(run: Any, source: str | None) -> bool:
-    """Make the steps of a run; return whether it was stopped early.
+    """Execute the steps of a run; return whether it was stopped early.
 
     `source` defines a function that decides after each step whether to stop; None: run to the end.
     """
