@@ -13,8 +13,9 @@ from mutator.statistics.sheet import Cell, Sheet
 BySeed = Mapping[str, Sequence[JudgedObservation]]
 
 ABOUT = (
-    "Each seed is the whole campaign with different draws. The observations are judged on the runs of one "
-    "seed at a time, by the same rules. One seed has fewer runs than all seeds, so more verdicts lack data."
+    "Each seed repeats the whole campaign with different draws. The observations are judged on the runs of "
+    "one seed at a time, by the same rules. One seed has fewer runs than all seeds, so more verdicts lack "
+    "data."
 )
 
 
