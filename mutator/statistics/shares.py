@@ -9,7 +9,7 @@ _DIGITS = 12
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Share:
-    """A share: `count` of `of`. The rate's interval is `low` to `high`; both are NaN if there is none."""
+    """The share `count`/`of`. The rate's interval is `low` to `high`; both are NaN if there is none."""
 
     count: int
     of: int
@@ -31,7 +31,7 @@ class Share:
 
 
 def share(count: int, of: int) -> Share:
-    """The share of `count` in `of`, with its 95 % Wilson interval (statsmodels)."""
+    """The share `count`/`of`, with its 95 % Wilson interval (statsmodels)."""
     from statsmodels.stats.proportion import proportion_confint  # type: ignore[import-untyped]
 
     if not of:

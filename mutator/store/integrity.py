@@ -224,7 +224,7 @@ def id_problems(
             )
 
 
-_Lines = Iterator[tuple[int, bytes]]  # number from 1, and bytes
+_Lines = Iterator[tuple[int, bytes]]  # line number (from 1) and bytes
 
 
 def _head_problem(segment: Segment, lines: _Lines, plan: str) -> Iterator[MutatorError]:

@@ -35,7 +35,8 @@ FAULTS = "plan/faults.jsonl"
 _REMEDY = "the plan is damaged: restore the file from a copy of the run folder, or plan into a new one"
 
 _ID = re.compile(rb'\{(?:"after_hazard":"[a-z_]+",)?"fault":"[0-9a-f]{16}","id":"([0-9a-f]{16})",')
-_HASHED = ("fault", "scenario", "scenario_digest", "method", "trigger", "seed", "setting")  # as Experiment.id
+# the input of Experiment.id
+_HASHED = ("fault", "scenario", "scenario_digest", "method", "trigger", "seed", "setting")
 _FIELDS = {"id", *_HASHED}
 
 _T = TypeVar("_T")

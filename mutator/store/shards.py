@@ -8,7 +8,7 @@ from mutator.errors import MutatorError
 
 @dataclass(frozen=True, slots=True)
 class Shard:
-    """Share `number` (from 1) of `of` shares. It has every `of`-th chunk, so that it is representative."""
+    """Share `number`/`of`; numbers start at 1. It has every `of`-th chunk, so that it is representative."""
 
     number: int
     of: int

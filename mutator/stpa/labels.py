@@ -56,8 +56,8 @@ def _length(start: Point, end: Point) -> float:
 
 
 def _places(points: Sequence[Point], width: float) -> Iterator[Label]:
-    """Yield places for a label, the best first: around the middle of a horizontal segment, or next to a
-    vertical one, near the tip, where the fewest other arrows cross."""
+    """Yield places for a label, the best first: at a horizontal segment, from its middle outwards, or
+    next to a vertical one, from its tip, where the fewest other arrows cross."""
     (x1, y1), (x2, y2) = _bearer(points)
     if y1 == y2:
         middle, free = (x1 + x2) / 2, max(abs(x1 - x2) - width, 0) / 2

@@ -67,7 +67,7 @@ def _packages() -> Iterator[Finding]:
 def _cores() -> Finding:
     usable = usable_cores()
     return Finding(
-        name="cores", level=Level.OK, found=f"{usable} usable, so `run` has {counted(usable, 'worker')}"
+        name="cores", level=Level.OK, found=f"{usable} usable, so `run` uses {counted(usable, 'worker')}"
     )
 
 

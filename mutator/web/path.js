@@ -63,7 +63,7 @@ const Path = (() => {
     return Dom.el("p", {}, far, stopped ? [" It was stopped at ", Dom.el("strong", {}, all(stopped)), "."] : "");
   }
 
-  /** A component of the path. `t` is when it changed or, with `by`, the latest possible time, inferred from what only it feeds. */
+  /** A component of the path. `t` is when it changed or, with `by`, the latest possible time, inferred from components that only it feeds. */
   function stage(name, state, column, channels, by, begin) {
     const own = first(channels), t = state === "injected" ? begin : by ?? own;
     return { name, state, column, channels, own, t: Number.isNaN(t) ? Infinity : t, by: state !== "injected" && by !== undefined, begin };

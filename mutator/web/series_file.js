@@ -79,7 +79,7 @@ const SeriesFile = (() => {
   const ordered = (word) => word ^ ((word >> 31) & SIGN);
 
   /** A run as store/series_format.py writes it: { about, t, every, rows, points }. `rows` has a row for each channel
-   *  of golden; `every` gives its spacing in samples. */
+   *  of the golden run; `every` gives its spacing in samples. */
   async function decoded(bytes, golden) {
     const raw = await inflated(bytes), view = new DataView(raw);
     const text = 4 + view.getUint32(0, true), about = JSON.parse(new TextDecoder().decode(new Uint8Array(raw, 4, text - 4)));

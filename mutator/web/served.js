@@ -31,7 +31,7 @@
     const button = (text, title, ask) => el("button", { type: "button", title, onclick: () => order(ask()) }, text);
     const time = el("input", { type: "number", min: 0, step: "0.05", value: momentOf(experiment), "aria-label": "Time of the still, in seconds" });
     const pictures = facts.filmed ? [button("Film", "Golden and faulty runs, the whole drive", () => ({ kind: "film" })),
-      el("span.still", {}, button("Still", "One image of that film", () => ({ kind: "still", t: Number(time.value) })), " at ", time, " s")] : [];
+      el("span.still", {}, button("Still", "One image of the golden and faulty runs", () => ({ kind: "still", t: Number(time.value) })), " at ", time, " s")] : [];
     const made = el("section.do", { "data-id": id }, el("h3", {}, "Run it here"),
       el("div.row", {}, button("Rerun", "Check that the result is the same", () => ({ kind: "rerun" })),
         button("Exact plot", "Rerun and record every step of the channels", () => ({ kind: "plot" })), pictures),
