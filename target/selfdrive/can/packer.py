@@ -14,7 +14,7 @@ def half_byte_sum(data: bytes) -> int:
 
 
 def checksum_base(address: int) -> int:
-    """The address's part of the checksum: the half bytes of address and data add up to 8 modulo 16."""
+    """The address's part of the checksum: the nibbles of address and data add up to 8 modulo 16."""
     return 8 - half_byte_sum(address.to_bytes(4, "big"))
 
 
@@ -50,7 +50,7 @@ class Packer:
         self._frames: dict[int, CanFrame] = {}  # by counter, for the current word; values often stay the same
 
     def pack(self, values: tuple[float, ...], counter: int = 0) -> CanFrame:
-        """Return the frame for physical `values`; `counter` is the number of its earlier frames."""
+        """Return the frame for physical `values`; `counter` is the number of earlier frames."""
         if values != self._values:
             word = encode(self._fields, values)
             self._values = values

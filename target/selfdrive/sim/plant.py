@@ -16,7 +16,7 @@ PEAK_POWER = 100_000.0  # W
 GAS_SLOPE = 3.33
 BRAKE_FORCE = 10.0 * MASS
 BRAKE_SLOPE = 0.3
-BASE_SPEED = PEAK_POWER / PEAK_FORCE  # m/s; above this, power limits acceleration, not force
+BASE_SPEED = PEAK_POWER / PEAK_FORCE  # m/s; above this, power, not force, limits acceleration
 CREEP_BP = (0.0, 1.5)  # m/s
 CREEP_V = (1.0, 0.0)  # m/s^2 from an idling automatic gearbox
 

@@ -14,7 +14,7 @@ class Road:
         self._grade, self._curvature = grade, curvature
 
     def grade(self, t: float) -> float:
-        """Acceleration by the slope at time `t` (s)."""
+        """Deceleration due to the slope at time `t` (s)."""
         return interp(t, *self._grade) if self._grade else 0.0
 
     def curvature(self, position: float) -> float:

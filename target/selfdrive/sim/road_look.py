@@ -47,8 +47,8 @@ class OtherCar:
 class Look:
     """All variations between roads. The defaults are a clean highway in daylight.
 
-    `left` and `right` bound the ego lane, `far_left` and `far_right` the adjacent lanes; None is no line. The
-    shoulder begins outside the far lines, the verge outside the shoulder.
+    `left` and `right` bound the ego lane, `far_left` and `far_right` the adjacent lanes; None means no line.
+    The shoulder begins outside the far lines, the verge outside the shoulder.
     """
 
     lane_width: float = 3.7

@@ -1,8 +1,8 @@
 """Runs one scenario: `python -m selfdrive.sim.run --scenario FILE --out DIR`.
 
-Writes DIR/trace.npz (100 Hz channels) and DIR/record.json (hazards, alerts, engagement, digests). Equal
-scenario and seed give equal bytes. Exit code 2 for invalid input. The record is written last and atomically:
-if it exists, the trace is complete.
+Writes DIR/trace.npz (100 Hz channels) and DIR/record.json (hazards, alerts, engagement, digests). The same
+scenario and seed give the same bytes. Exit code 2 for invalid input. The record is written last and
+atomically: if it exists, the trace is complete.
 """
 
 import argparse

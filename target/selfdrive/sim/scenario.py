@@ -55,7 +55,7 @@ BUTTON_KEYS = {
 ROAD_KEYS = {"grade": "slope over time", "curvature": "bends over distance"}
 GRADE_KEYS = {
     "at_s": "times in seconds",
-    "mps2": "deceleration by the slope, uphill positive",
+    "mps2": "deceleration due to the slope, uphill positive",
 }
 CURVATURE_KEYS = {"at_m": "distances along the road in m", "per_m": "curvature in 1/m, left positive"}
 
@@ -80,7 +80,7 @@ class ButtonPress:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scenario:
-    """A scenario in SI units. `lead` None is a free road; `digest` is the file's SHA-256."""
+    """A scenario in SI units. `lead` is None on a free road; `digest` is the file's SHA-256."""
 
     name: str
     title: str

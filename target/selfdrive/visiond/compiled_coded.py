@@ -57,7 +57,7 @@ class CompiledCodedDetector(CodedDetector):
 
     def detect(self, view: CameraView) -> LaneLines:
         part = np.ascontiguousarray(view.picture[PART])
-        if part.dtype != np.uint8 or part.shape != SIZE:  # a fault can change a picture like this
+        if part.dtype != np.uint8 or part.shape != SIZE:  # a fault can cause this
             return super().detect(view)
         address = part.ctypes.data
         self._take_edges(self._at, address)

@@ -17,7 +17,7 @@ from selfdrive.visiond.robust_detector import RobustDetector
 from selfdrive.visiond.voting import BIN, SIDEWAYS, Belief, Pose, vote
 
 CANDIDATES = 512  # for the lines' meeting point; MOST in the C file
-AT_ONCE = 8  # rows, of the C file
+AT_ONCE = 8  # rows that the C file sums at once
 C_SOURCES = [Path(__file__).with_name(name) for name in ("band_filter.c", "voting.c", "road_view.c")]
 
 
@@ -70,7 +70,7 @@ class CompiledCrests:
         self._address = ctypes.addressof(self._bands)
 
     def __call__(self, road: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        if road.shape != self._shape or road.dtype != np.uint8:  # a fault can change a picture like this
+        if road.shape != self._shape or road.dtype != np.uint8:  # a fault can cause this
             return crests(road)
         road = np.ascontiguousarray(road)
         self._bands.road = road.ctypes.data
@@ -130,7 +130,7 @@ class CompiledVote:
         self, view: RoadView, road: np.ndarray, at: np.ndarray, weight: np.ndarray, belief: Belief
     ) -> Pose:
         if road.shape != self._shape or road.dtype != np.uint8 or not road.flags.c_contiguous:
-            return vote(view, road, at, weight, belief)  # a fault can change a picture like this
+            return vote(view, road, at, weight, belief)  # a fault can cause this
         at, weight = np.ascontiguousarray(at, np.int64), np.ascontiguousarray(weight, np.float32)
         self._belief[:] = [*belief.left, *belief.dip, *belief.middle, *belief.width]
         points = at.ctypes.data, weight.ctypes.data, len(at)

@@ -11,7 +11,7 @@ from selfdrive.visiond.hog import BINS, BLOCK_FEATURES, CELL, FEATURES
 from selfdrive.visiond.lane_net import FEATURE_STEPS, HIDDEN, WEIGHT_STEPS, LaneNet
 
 C_SOURCE = Path(__file__).with_name("mark_windows.c")
-FINEST = 2**13  # largest number of weight steps per 1 in the coarse score
+FINEST = 2**13  # largest number of weight steps per unit in the coarse score
 PADDED = 1776  # number of a window's features, padded to whole vectors
 
 
@@ -73,7 +73,7 @@ class MarkWindows:
 
 
 def _coarse_steps(net: LaneNet) -> float:
-    """Largest number of steps per 1 for which weights fit into 16 bits and all sums into 32.
+    """Largest number of steps per unit for which weights fit into 16 bits and all sums into 32.
 
     Features are not negative and a block's norm is at most 1, so the block adds at most the norm of its
     positive weights, or of its negative ones.

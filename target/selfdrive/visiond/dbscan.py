@@ -1,8 +1,8 @@
 """DBSCAN (M. Ester and others, 1996) on the pixels of a mask, exact and fast.
 
 The distance is the larger of rows and columns (Chebyshev), so a box filter counts neighbours. Two core pixels
-are neighbours exactly if their eps x eps squares touch or overlap, so clusters are the connected components
-of a mask of such squares.
+are neighbours if and only if their eps x eps squares touch or overlap, so clusters are the connected
+components of a mask of such squares.
 """
 
 import cv2

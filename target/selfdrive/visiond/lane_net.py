@@ -9,7 +9,7 @@ from selfdrive.common.array_math import each
 
 WEIGHTS = Path(__file__).with_name("lane_net.npz")
 HIDDEN = 10
-FEATURE_STEPS, WEIGHT_STEPS = 2**12, 2**20  # per 1, of features and weights
+FEATURE_STEPS, WEIGHT_STEPS = 2**12, 2**20  # per unit of features and weights
 AT_ONCE = 32  # windows; for more, allocating memory takes longer than the sums
 
 

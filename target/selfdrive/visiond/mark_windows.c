@@ -12,8 +12,8 @@
 
 enum { CELL = 4, BINS = 9, STRIDE = 16, WINDOW = 32, BLOCK = 4 * BINS, ACROSS = 7, ROW = ACROSS * BLOCK };
 enum { FEATURES = ACROSS * ROW, PADDED = 1776, HIDDEN = 10, LANES = 16 };
-enum { STEPS = 4096 };                 /* per 1, of a feature */
-static const double WHOLE = 1048576.0; /* per 1, of a weight */
+enum { STEPS = 4096 };                 /* per unit of a feature */
+static const double WHOLE = 1048576.0; /* per unit of a weight */
 static const float TINY = 1e-10f;
 static const double CLOSE = 1e-9; /* much larger than the rounding error of a sum of ten products */
 static const float TANH_ERROR = 2e-4f;
@@ -110,7 +110,7 @@ INLINE void blocks(const Net *net, long y, long first, long end)
     }
 }
 
-/* tanh with an error below TANH_ERROR: Lambert's continued fraction, as far as it is close to 1. */
+/* tanh with an error below TANH_ERROR: Lambert's continued fraction, up to where it is close to 1. */
 INLINE float about_tanh(float x)
 {
     x = x > 4.9f ? 4.9f : x < -4.9f ? -4.9f : x;

@@ -1,6 +1,6 @@
 """The part of the picture in which the paper's detector searches for lane marks, and its windows.
 
-It is the road from `NEAR` to `FAR` metres ahead and `SIDE` metres to each side (more further ahead, because
+It is the road from `NEAR` to `FAR` metres ahead and `SIDE` metres to each side (wider further ahead, because
 the car can point off the road).
 """
 

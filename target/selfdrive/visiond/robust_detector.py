@@ -13,7 +13,7 @@ from selfdrive.visiond.voting import Belief, Pose, Vote, vote
 
 SEEN = 0.5  # probability above which a found line is used
 FADING = 0.92  # factor on the probability of an unseen line per picture
-FORGET = 20  # pictures without any line until the position is unknown
+FORGET = 20  # pictures without any line after which the position is unknown
 GONE = 0.01  # less probable lines are dropped
 MIDDLE_SIGMA, LEFT_RATE = (0.10, 0.03), 0.012  # m and m per picture; rad: possible motion of the car
 WIDTH_SIGMA, DIP_SIGMA = 0.02, 1.5  # m, px: possible changes of lane width and pitch

@@ -7,7 +7,7 @@ import numpy as np
 
 from selfdrive.common.camera_model import CameraModel
 
-LEAST_BEND = 250.0  # m of a curve's radius
+LEAST_BEND = 250.0  # m, radius of a curve
 NEAR_HORIZON = 4.0  # rows below it, where the road is assumed to end
 
 

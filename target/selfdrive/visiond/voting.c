@@ -201,7 +201,7 @@ static void take_votes(const float *lefts, const float *drops, const float *metr
     for (long i = 0; i < n; i++) {
         float y = (lefts[i] - left) / (metres[i] * (drops[i] + dip));
         float bin = ((float)SIDEWAYS - y) * (float)(1.0 / BIN) + (float)OUTSIDE;
-        long last = BINS + OUTSIDE; /* processors convert values that do not fit to the smallest integer */
+        long last = BINS + OUTSIDE; /* processors convert values out of range to the smallest integer */
         sums[bin >= (float)last ? (bin < 2147483648.0f ? last : 0) : bin > 0.0f ? (long)bin : 0] += weights[i];
     }
     float shares[BINS + 2] = {0.0f};

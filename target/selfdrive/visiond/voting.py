@@ -1,6 +1,6 @@
 """Finds the two parallel lines that explain the points of possible marks, by votes and then a fit.
 
-Lines along the road meet in one point of the picture. The car's heading moves it sideways; an error of the
+Lines along the road meet at one point of the picture. The car's heading moves it sideways; an error of the
 camera's pitch moves it up or down. `drop` px below the known horizon, a line `y` m beside the camera appears
 `left + y * metre * (drop + dip)` px left of the camera's column.
 """

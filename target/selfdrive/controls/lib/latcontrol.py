@@ -16,7 +16,7 @@ class LatControl:
     """Desired steering-wheel angle from the MPC at 20 Hz, tracked by a PI loop at 100 Hz.
 
     As in the original, each angle is kept until the next. If the MPC has no solution and returns NaN, the
-    torque is full left, the limiter's upper end.
+    torque is at its upper limit, full left.
     """
 
     def __init__(self, params: CarParams) -> None:

@@ -35,7 +35,7 @@ class LongControl:
         self.output = 0.0
 
     def reset(self, v_pid: float) -> None:
-        """Reset to the car's speed (m/s), when not in control."""
+        """Restart from the speed `v_pid` (m/s)."""
         self._pid.reset()
         self.v_pid = v_pid
 

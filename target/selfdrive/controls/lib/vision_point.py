@@ -39,7 +39,7 @@ class VisionPoint:
             self._filter.restart(lead.d_rel, variance, RATE_VARIANCE)
 
     def best_match(self, tracks: Iterable[Track], path: Poly) -> Track | None:
-        """Return the track most likely to be the camera's lead, assumed on the path; None if none is near."""
+        """Return the best match for the camera's lead, assumed to be on the path; None if none is near."""
         if not self.valid:
             return None
         d_rel, v_rel = self._filter.value, self._filter.rate

@@ -1,7 +1,7 @@
 """Weather, dirt and light between the road and the camera's picture; only faults import this package.
 
-There are three presets: the paper's effects with its parameters (PaperRain and others), the same as its
-authors coded them (CodedRain and others), and physical ones in real units (Fog and others).
+There are three presets: the paper's effects with its parameters (PaperRain and others), the same effects
+as its authors coded them (CodedRain and others), and physical ones in real units (Fog and others).
 """
 
 from selfdrive.sim.effects.air import Fog

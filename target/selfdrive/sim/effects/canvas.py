@@ -62,6 +62,6 @@ class Tile:
         self._four = np.tile(levels, (2, 2))
 
     def moved(self, right: float, down: float, region: Region) -> np.ndarray:
-        """A region of the window, after moving the content by the nearest whole pixels; read-only."""
+        """A region of the window, after moving the content by whole pixels (rounded); read-only."""
         left, top = -round(right) % self._width, -round(down) % self._rows
         return self._four[top + region.top : top + region.bottom, left + region.left : left + region.right]

@@ -76,7 +76,7 @@ def mirrored(rays: np.ndarray, sun: np.ndarray) -> np.ndarray:
     slope = (1.0 / upright**2 - 1.0) / ASPHALT_SLOPES**2
     facets = each(exp, -slope) / (pi * ASPHALT_SLOPES**2 * (upright * upright) ** 2)
     mirror = MIRROR + (1.0 - MIRROR) * (1.0 - across) * ((1.0 - across) ** 2) ** 2
-    # Rough surfaces shadow themselves at flat angles of view or light.
+    # Rough surfaces shadow themselves at grazing angles of view or light.
     shadow = np.minimum(1.0, 2.0 * upright * np.minimum(down, -sun[1]) / np.maximum(across, 1e-3))
     return np.where(rays[..., 1] > 0.0, POLISHED * mirror * facets * shadow / (4.0 * down), 0.0)
 

@@ -20,7 +20,7 @@ class Mark:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Events:
-    """Data on the faulty run. Times in s; `active` spans its activations, if any.
+    """Data on the faulty run. Times in s; `active` spans the fault's activations, if any.
 
     `names` are short hazard names by id. `end` is the end of the drive; the run can continue after it.
     """
