@@ -3,7 +3,8 @@
 `python benchmarks/against.py CLONE [--campaign NAME]`. CLONE is a checkout of the older commit, installed
 into its .venv as its README says. Both versions run alternately, each time with an empty cache. Code that an
 old version compiles with a separate command is compiled before the measurement. CPU time covers all
-processes. Wall time needs otherwise idle cores. Idle time is the time in which a core has no work.
+processes. Wall times are meaningful only on otherwise idle cores. Idle time is the time in which a core has
+no work.
 """
 
 import argparse

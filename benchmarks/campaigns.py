@@ -2,7 +2,7 @@
 
 `python benchmarks/campaigns.py [--campaign paper_smoke]`. A first run fills the caches (frames, detections,
 passed checks) and is not compared. Then runs with one worker and with two alternate. CPU time covers all
-processes. Wall time needs otherwise idle cores.
+processes. Wall times are meaningful only on otherwise idle cores.
 """
 
 import argparse

@@ -3,8 +3,9 @@
 `python benchmarks/converged.py RUN [--json FILE]`. Once the fault is over and a fork's state equals the
 golden run's, the fork could end and copy the rest from the golden run. This prints an upper bound on the
 saving, as a share of the CPU of all runs. If a trace has the golden run's bytes, everything after the last
-activation counts as saved; otherwise, everything after the last difference from golden in any channel of the
-series (six digits, 20 values a second). Equal channels are necessary for equal states, but not sufficient.
+activation counts as saved; otherwise, everything after the last difference from the golden run in any channel
+of the series (six digits, 20 values a second). Equal channels are necessary for equal
+states, but not sufficient.
 """
 
 import argparse
@@ -40,7 +41,7 @@ class Saved:
 
 
 def last_difference(golden: Series, faulty: Series) -> float:
-    """Return the time (s) of the last sample or point where a channel differs from golden, or -inf."""
+    """Return the last time (s) at which a channel differs from the golden run, or -inf."""
     last = -math.inf
     for number, (one, other) in enumerate(zip(golden.rows, faulty.rows, strict=True)):
         times, known = faulty.times(number), golden.times(number)
@@ -81,7 +82,7 @@ def _saved(record: Record, golden: str, series: SeriesFolder) -> tuple[str, floa
     end = float(found[0].about["end"])
     same = record.trace_digest == golden
     over = max(active.last, -math.inf if same else last_difference(*found))
-    kind = "equal to golden throughout" if same else "equal to golden again"
+    kind = "equal to the golden run throughout" if same else "equal to the golden run again"
     if over >= end - _LAST_S:
         return f"{kind}, fault active to the end" if same else "different or fault active to the end", 0.0
     return f"{kind}, fault over before the end", (end - over) / (end - active.first)

@@ -39,7 +39,7 @@ GOAL_OF_REFERENCE = 1 / 3
 @dataclass
 class Measured:
     cpu_s: float = 0.0
-    children_s: float = 0.0  # the part for the runs themselves
+    children_s: float = 0.0  # of which the runs themselves
     steps: int = 0
     how: Counter[str] = field(default_factory=Counter)
     why: Counter[str] = field(default_factory=Counter)

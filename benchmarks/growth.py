@@ -1,9 +1,9 @@
 """Measure how time and memory grow with the campaign.
 
 `python benchmarks/growth.py [--json FILE]`. It measures plans of 1,000 to 50,000 experiments, a table of
-100,000 and opening the paper's 11,280. Each size runs in its own process, which plans and freezes, or does a
-worker's work before and after each run (read the chunk, build the mutant, append the record). Times are CPU
-times.
+100,000 and opening a run of the paper's 11,280. Each size runs in its own process, which plans and freezes,
+or does a worker's work before and after each run (read the chunk, build the mutant, append the record). Times
+are CPU times.
 """
 
 import argparse

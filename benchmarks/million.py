@@ -1,11 +1,11 @@
 """Measure the cost of a million experiments without their runs.
 
 `python benchmarks/million.py [--sizes N ...] [--keep DIR]`. It measures plan, tables, resume, report and page
-at three sizes. The runs are synthetic (`made_up_run.py`) and kept in DIR for later calls. Each row is a
-separate process, with CPU and wall seconds and the peak memory of the process and its children, sampled twice
-a second. Shared pages count once. The page opens in a headless Chromium; its wall time ends when its list is
-usable. Growth is the CPU time per experiment relative to that of the smallest size. `new here` means a
-machine that has not verified the run before; afterwards only its bytes are compared.
+at three sizes. The runs are synthetic (`made_up_run.py`) and kept in DIR for later calls. Each row is
+measured in a separate process: CPU and wall seconds, and the peak memory of the process and its children,
+sampled twice a second. Shared pages count once. The page opens in a headless Chromium; its wall time ends
+when its list is usable. Growth is the CPU time per experiment relative to that of the smallest size. `new
+here` means a machine that has not verified the run before; afterwards only its bytes are compared.
 """
 
 import argparse

@@ -2,10 +2,10 @@
 
 `python benchmarks/overhead.py [--experiments 200] [--against CLONE] [--json FILE]`. The fork engine runs
 faults of the paper's campaign with ideal vision, each of which first acts at a different time in the last
-steps of a 30 s run. All of a worker's steps are included: mutant, run, comparison with golden, patch, record.
-It prints the CPU of the worker, of its children and of the processes from which they fork, and the CPU of 30
-s of the same simulation. With `--against`, a checkout of an older commit runs alternately. Compare the
-ratios, not the times.
+steps of a 30 s run. All of a worker's steps are included: mutant, run, comparison with the golden run, patch,
+record. It prints the CPU of the worker, of its children and of the processes from which they fork, and the
+CPU of 30 s of the same simulation. With `--against`, this version and a checkout of an older commit
+alternate. Compare the ratios, not the times.
 """
 
 import argparse

@@ -2,9 +2,9 @@
 
 `python benchmarks/pictures.py CLONE`. CLONE is a checkout of the older commit. Each version has its own
 interpreter, compiled helpers and empty cache. The versions process new frames alternately. It prints the CPU
-time of moving a frame to the car's pose, image effect and detection together, and the ratio. A detector or
-effect that the older version lacks is left out. A case in which the versions find different lines is
-reported.
+time of moving a frame to the car's pose, applying the image effect and detecting lines, and the ratio. A
+detector or effect that the older version lacks is left out. A case in which the versions find different lines
+is reported.
 """
 
 import argparse

@@ -232,7 +232,7 @@ class Reach:
         return _spot(site.node) in self.spots or (bool(site.name) and self.is_assigned(site))
 
     def sets(self, site: Site) -> bool:
-        """Build the edit against the whole package, and return whether the probe can set the place."""
+        """Return whether the probe can set the constant or default."""
         function, _, name = site.name.rpartition(":")
         kind = AnchorKind.DEFAULT if site.kind == "default" else AnchorKind.CONSTANT
         location = FaultLocation(path=self.file.path, function=function, anchor=Anchor(kind=kind, name=name))

@@ -1,8 +1,8 @@
 """Measure the CPU time of the work around the paper's 11,280 experiments.
 
-`python benchmarks/planning.py`. It measures planning, freezing, reaching the first experiment and resuming a
-complete run. The complete run, in which every fault is masked, and the cached checks are synthetic. The start
-uses no workers and ends before the first mutant runs.
+`python benchmarks/planning.py`. It measures planning, freezing, reaching the first experiment, making the
+tables and resuming a complete run. The complete run, in which every fault is masked, and the cached checks
+are synthetic. The start uses no workers and ends before the first mutant runs.
 """
 
 import argparse

@@ -1,8 +1,8 @@
 """Measure the cost of a probe that never acts: the null mutant against the pristine program.
 
 `python benchmarks/probe.py [--rounds N]`. Both simulate the same scenario for 30 s in one interpreter,
-alternating every 20 steps, so that other work on the machine affects both. The result is the median of the
-ratios of such pairs.
+alternating every 20 steps, so that other work on the machine affects both. The result is the median ratio
+of all pairs of 20-step stretches.
 """
 
 import argparse

@@ -54,7 +54,7 @@ MOVE, LABELS = "move", "labels"
 DIFFERENCES = {
     ARMING: "triggers are armed at the start instead of at 1.5 s",
     LATCHING: "an effect stays to the end of the run",
-    REDRAWING: "every picture is drawn anew, whereas otherwise marks as coded do not move",
+    REDRAWING: "every picture is drawn anew; otherwise, marks as coded do not move",
     MARKS: "streaks, fog and flakes as coded",
     RIM: "occlusion by black blobs with a grey rim, instead of soft dark ones",
     PLACE: "effects are drawn before the picture is moved to the car's pose",
@@ -205,7 +205,7 @@ class MixedDetector:
         return line._replace(prob=0.0) if line.y == self._nowhere[side] else line
 
     def _sent(self, lines: list[RoadLine]) -> list[RoadLine]:
-        """Return the lines, with a missing one 8 m to the left. Without any line, return the last ones."""
+        """Return the lines, a missing one 8 m to the left. If both are missing, return the last ones."""
         if any(line.prob > 0.0 for line in lines):
             pairs = zip(lines, self._nowhere, strict=True)
             self._last = [line if line.prob > 0.0 else RoadLine(y=nowhere) for line, nowhere in pairs]

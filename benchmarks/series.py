@@ -1,9 +1,9 @@
 """Measure the cost of series and patches: bytes per experiment and their share of its CPU.
 
 `python benchmarks/series.py [--campaign paper_sample] [--experiments 60] [--json FILE]`. It runs that many
-experiments of a campaign in this process and prints the time for building and appending series and patch,
-relative to the CPU time of the same experiments. Bytes are those of the finished run folder. The parts that
-grow with the experiments are scaled to 11,280.
+experiments of a campaign in this process and prints the time for building and appending the series and the
+patch, relative to the CPU time of the same experiments. Bytes are those of the finished run folder. The
+parts that grow with the experiments are scaled to 11,280.
 """
 
 import argparse

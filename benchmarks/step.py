@@ -4,8 +4,8 @@
 because measuring slows it down. Times are CPU times of this process. It uses the code compiled at
 installation unless given `--plain`.
 
-With `--against CLONE` it instead compares the times of imports, building and loop with a checkout of an older
-commit. The versions alternate, each time in a fresh interpreter with bytecode and compiled code ready.
+With `--against CLONE` it instead compares the times of imports, building and loop with those of an older
+checkout. The versions alternate, each time in a fresh interpreter with bytecode and compiled code ready.
 """
 
 import argparse

@@ -25,7 +25,7 @@ names the variable. Types of parameters:
 * A *variable* is a name that the anchor's function knows.
 * An *import* is a dotted name: a module of the target, then a name that the module defines. The injected
   lines import it.
-* A *constant* is a number, `true`, `false`, `null` or a text.
+* A *constant* is a number, `true`, `false`, `null` or a string.
 * A *unit* is a suffix from [the table of units](fault-spec.md#units).
 
 An integer variable stays an integer if the parameters are whole numbers.
