@@ -267,7 +267,7 @@ class RunError:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Record:
-    """The stored result of one experiment. Times are in s of simulation time; None: no such event."""
+    """The stored result of one experiment. Times are simulation times in s; None: no such event."""
 
     experiment_id: str  #: id of the experiment
     status: Status  #: whether the experiment itself worked

@@ -11,7 +11,7 @@ from mutator._common.files import check_is_text
 from mutator._common.places import environment_path, library_files, library_folder, templates_folder
 from mutator._common.shipped import shipped_folder
 from mutator._common.tables import Table
-from mutator._common.text import counted, suggestion
+from mutator._common.text import counted, one_of, suggestion
 from mutator.errors import MutatorError
 from mutator.faults.expansion import expand
 from mutator.faults.fault_models import FaultModels, load_fault_models
@@ -248,7 +248,7 @@ class Workspace:
             if not Path(name).is_file():
                 raise MutatorError(
                     f"no file {name}",
-                    expected=f"a {what}: the path of a YAML file, or one of {', '.join(known) or 'none'}",
+                    expected=f"a {what}: the path of a YAML file, or {one_of(known)}",
                     remedy="correct the path" + suggestion(str(Path(name).with_suffix("")), list(known)),
                 )
             check_is_text(Path(name))
@@ -263,7 +263,7 @@ class Workspace:
         raise MutatorError(
             f"no {what} '{name}'",
             where=self.library / folder,
-            expected=f"one of {', '.join(known) or 'none'}, or the path of a YAML file",
+            expected=f"{one_of(known)}, or the path of a YAML file",
             remedy="correct the name" + suggestion(str(name), list(known)),
         )
 

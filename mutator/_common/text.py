@@ -3,12 +3,19 @@
 import difflib
 import re
 import textwrap
+from collections.abc import Iterable
 from typing import Any
 
 
 def counted(count: int, noun: str, plural: str = "") -> str:
     """Return a count with its noun: 1 run, 2 runs. Give irregular plurals."""
     return f"{count} {noun}" if count == 1 else f"{count} {plural or noun + 's'}"
+
+
+def one_of(names: Iterable[str]) -> str:
+    """Return what is expected of a name that must be one of these."""
+    known = ", ".join(names)
+    return f"one of {known}" if known else "a known name, but there is none"
 
 
 def shown(value: Any) -> str:

@@ -37,7 +37,7 @@ def run(
     apply where you give none.
 
     * `workers`: number of processes; 0: only this one.
-    * `engine`: a name from `mutator.engines.kinds`; None: the fastest that is worthwhile.
+    * `engine`: a name from `mutator.engines.kinds`; None: the fastest for this many experiments.
     * `reviewed`: refuse to run mutants without an approval.
     * `accept_versions`: resume even if versions of Python or packages have changed, and record the change.
     * `cluster`: the address of a Dask scheduler, its scheduler file, `local:N`, or a cluster file. Its

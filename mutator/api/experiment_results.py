@@ -99,7 +99,7 @@ class ExperimentResult(ABC):
 
     @property
     def verdict(self) -> dict[str, Any]:
-        """The verdict as plain data. Times are in s of simulation time; None: no such event."""
+        """The verdict as plain data. Times are simulation times in s; None: no such event."""
         return verdict(self.record, self.scale) if self.record else {"status": None}
 
     @property
@@ -165,7 +165,7 @@ def trace_frame(trace: Trace, manifest: TargetManifest) -> "pd.DataFrame":
 
 
 def describe(experiment: Experiment) -> dict[str, Any]:
-    """Describe the experiment, for printing and as JSON."""
+    """Describe the experiment as plain data."""
     fault, trigger = experiment.fault, experiment.trigger
     hold = fault.hold or trigger.hold
     return {
@@ -183,7 +183,7 @@ def describe(experiment: Experiment) -> dict[str, Any]:
 
 
 def verdict(record: Record, scale: Scale | None) -> dict[str, Any]:
-    """Return the verdict, for printing and as JSON. Times are in s of simulation time; None: no such event.
+    """Return the verdict as plain data. Times are simulation times in s; None: no such event.
 
     `largest_difference` covers the whole run, `difference_in_drive` only the time up to the end of the drive.
     """

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from mutator._common.arguments import check_type
 from mutator._common.places import run_folders
 from mutator._common.tables import Table
-from mutator._common.text import seeds_text
+from mutator._common.text import one_of, seeds_text
 from mutator.api.audits import Audit, verify
 from mutator.api.experiment_results import trace_frame
 from mutator.api.html import facts_html, text_html
@@ -162,7 +162,7 @@ class Run(RunContents):
             raise MutatorError(
                 f"no golden run {wanted.key}",
                 where=self.path,
-                expected=f"one of {', '.join(known) or 'none'}",
+                expected=one_of(known),
             )
         return trace_frame(load_trace(self.bench.manifest, folder), self.bench.manifest)
 

@@ -9,6 +9,7 @@ from itertools import chain
 from pathlib import Path
 
 from mutator._common.hashing import digest
+from mutator._common.text import one_of
 from mutator.campaigns.campaign_files import Campaign
 from mutator.campaigns.operator_faults import OperatorFault, OperatorFaults
 from mutator.campaigns.operator_selection import When
@@ -96,7 +97,7 @@ class Expansion:
                 raise self.campaign.error(
                     (*keys, i),
                     f"change '{change}'",
-                    expected=f"one of {', '.join(self.manifest.changes) or 'none'}",
+                    expected=one_of(self.manifest.changes),
                     remedy="name a change of the target's manifest",
                 )
 
@@ -222,7 +223,7 @@ class Expansion:
     ) -> Iterator[Experiment]:
         """Yield the experiments of each mutant in the scenarios that execute its changed line.
 
-        Permanent mutants are always active; transient ones follow the other triggers.
+        Permanent mutants are always active; transient ones follow the campaign's triggers.
         """
         permanent = always(armed_after_s=self.armed_after_s)
         for one in mutants:
@@ -279,7 +280,7 @@ class Expansion:
             raise self.campaign.error(
                 self._scenario_keys(scenario),
                 f"no scenario '{scenario}' in the library",
-                expected=f"one of {', '.join(known) or 'none'}",
+                expected=one_of(known),
                 remedy="correct the name, or add the file to the library's scenarios/",
             )
         return self.workspace.scenario(scenario)

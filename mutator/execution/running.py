@@ -1,6 +1,6 @@
 """Run a campaign: plan if needed, check, run experiments without a record, build the table of results.
 
-`mutator run` and `pytest --campaign FILE --campaign-out DIR -n N` differ only in what starts pytest.
+`mutator run` starts pytest itself; otherwise, `pytest --campaign FILE --campaign-out DIR -n N` does the same.
 """
 
 from pathlib import Path
@@ -36,7 +36,8 @@ def run_campaign(
     Another thread calls `notify` about twice a second.
 
     Raises MutatorError for wrong input, choices that differ from the frozen ones, or a changed campaign file
-    or target. Raises CheckFailed if something is not approved, or if a preflight or equivalence check fails.
+    or target. Raises CheckFailed if an unapproved mutant would run with `reviewed`, or if a
+    preflight or equivalence check fails.
     """
     with open_session(
         workspace,

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator
 
 from mutator._common.random_streams import generator
+from mutator._common.text import one_of
 from mutator.config import units
 from mutator.config.yaml_files import Keys
 from mutator.errors import MutatorError
@@ -143,6 +144,6 @@ class _Expander:
         return self.spec.source.error(
             keys,
             got,
-            expected=f"one of {', '.join(known) or 'none'}, as in {self.manifest.path.name}",
+            expected=f"{one_of(known)}, as in {self.manifest.path.name}",
             remedy="correct it",
         )

@@ -1,7 +1,7 @@
 """Check an injection's parameters and convert them from the spec's form to the template's."""
 
 from mutator._common.random_streams import generator
-from mutator._common.text import shown, suggestion
+from mutator._common.text import one_of, shown, suggestion
 from mutator.config import units
 from mutator.config.locations import assignable, dotted_name
 from mutator.config.yaml_files import Source
@@ -94,7 +94,7 @@ class _Resolver:
             raise self.source.error(
                 param.keys,
                 f"unknown parameter '{param.key}' of model {self.model.name}",
-                expected=f"one of {', '.join(map(self.key, known)) or 'none'}",
+                expected=one_of(map(self.key, known)),
                 remedy="correct or remove it" + suggestion(param.key, names),
             )
         unit = None if self.is_plain(param, schema) else self.unit(schema)

@@ -272,7 +272,7 @@ def _no_single_hit(
 
 
 def _range(hits: Sequence[object]) -> str:
-    return f"from 1 to {len(hits)}" if len(hits) > 1 else "1, or leave it out"
+    return f"a number from 1 to {len(hits)}" if len(hits) > 1 else "1, or leave it out"
 
 
 def _what(verb: str, name: str) -> str:

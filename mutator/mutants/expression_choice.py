@@ -26,7 +26,7 @@ def choose_expression(
 ) -> Expression:
     """Choose from a function's expressions the one that the location's anchor names.
 
-    The function begins at `line` (from 0). MutatorError with candidates unless exactly one matches.
+    The function begins at `line`, counted from 0. MutatorError with candidates unless exactly one matches.
     """
     anchor, kind = location.anchor, location.anchor.kind
     name = as_written(anchor.name)
@@ -37,7 +37,7 @@ def choose_expression(
     what = " ".join(filter(None, (f"`{kind.value}: {anchor.name}`".replace(": `", "`"), _which(anchor))))
     if hits:
         lines = ", ".join(str(one.start[0] + 1) for one in hits)
-        take = f"from 1 to {len(hits)}" if len(hits) > 1 else "1, or leave it out"
+        take = f"a number from 1 to {len(hits)}" if len(hits) > 1 else "1, or leave it out"
         raise MutatorError(
             f"{what} names {counted(len(hits), 'expression')} in {location.function}: "
             f"{'lines' if len(hits) > 1 else 'line'} {lines}",

@@ -4,6 +4,7 @@ from collections.abc import Collection
 
 from pydantic import Field
 
+from mutator._common.text import one_of
 from mutator.config.yaml_files import Source, StrictModel
 from mutator.targets.manifest import Film
 from mutator.targets.placeholders import OF_FILMED_RUNS, OF_FILMS, OF_RUNS, check_placeholders
@@ -101,7 +102,7 @@ def _check_films(film: FilmModel, changes: Collection[str], source: Source) -> N
             raise source.error(
                 ("film", "pictures", i),
                 f"'{name}'",
-                expected=f"one of the entry's changes: {', '.join(changes) or 'none'}",
+                expected=f"{one_of(changes)}, the entry's changes",
                 remedy="correct the name",
             )
     check_placeholders(film.run, OF_FILMED_RUNS, source, ("film", "run"))

@@ -59,8 +59,8 @@ def recorded(folder: RunFolder, kind: str) -> list[Recorded]:
 def mutants(
     folder: RunFolder, records: Sequence[Recorded], manifest: TargetManifest, models: FaultModels
 ) -> Iterator[MutatorError]:
-    """Yield trees and patches of records that differ from those of the rebuilt mutants, and stored patches
-    that are missing, differ, or belong to no experiment."""
+    """Rebuild the mutants. Yield an error for each record with another tree or patch, and for each stored
+    patch that differs, is missing, or belongs to no experiment."""
     experiments = {experiment.id: experiment for experiment in plan_file.read_all(folder.path)}
     built: dict[tuple[str, Trigger], tuple[str, str]] = {}
     for one in records:
@@ -105,7 +105,7 @@ def _built(manifest: TargetManifest, models: FaultModels, fault: Fault, trigger:
 def verdicts(
     head: Mapping[str, Any], records: Sequence[Recorded], manifest: TargetManifest | None
 ) -> Iterator[MutatorError]:
-    """Yield fields of records that contradict each other, the head of the run, or the manifest."""
+    """Yield an error for each field that contradicts another field, run.json or the manifest."""
     tolerances = {channel.name: channel.tolerance for channel in manifest.compared} if manifest else {}
     for one in records:
         flaws = _flaws_of_end(one.record) if one.record.status is Status.OK else _flaws_of_bad_end(one.record)
@@ -129,7 +129,7 @@ def _flaws_of_end(record: Record) -> Flaws:
             yield f"{what} {events}", "each once, in order, at or after the activation"
     if activation and not (activation.first <= activation.last and activation.count > 0):
         got = f"active {counted(activation.count, 'time')}, from {activation.first} s to {activation.last} s"
-        yield got, "at least one time, and a first time that is not after the last"
+        yield got, "at least one activation, the first not after the last"
     if len(record.trace_digest) != _DIGEST:
         yield f"trace digest '{record.trace_digest}'", "that of the recorded trace"
 
@@ -180,14 +180,15 @@ def _flaws_of_path(record: Record, head: Mapping[str, Any]) -> Flaws:
         if name not in known:
             yield f"channel {name} left golden", f"one of {', '.join(known)}"
         elif first > end:
-            yield f"{name} left golden at {first} s", f"a time before the drive ended, {record.t_end} s"
+            yield (
+                f"{name} left golden at {first} s",
+                f"a time up to the end of the drive, {record.t_end} s",
+            )
     times = [first for name, first, _ in record.left if name in head["compared"]]
     manifested = record.t_manifest if record.t_manifest is not None and record.t_manifest <= end else None
     if record.status is Status.OK and min(times, default=None) != manifested:
-        yield (
-            f"actuators left golden at {times or 'no time'}",
-            f"first at {manifested}, as recorded",
-        )
+        first = f"first at {manifested} s" if manifested is not None else "at no time"
+        yield f"actuators left golden at {times or 'no time'}", f"{first}, as recorded"
 
 
 def _in_order(events: Events, activation: Activation | None) -> bool:
@@ -220,5 +221,5 @@ def proof(
     missing = sorted(sampled - {one.record.experiment_id for one in proven})
     if folder.verifiable and folder.finished and missing:
         yield MutatorError(
-            f"no record of {missing[0]}", where=place, expected="one of each sampled experiment"
+            f"no record of {missing[0]}", where=place, expected="a record of each sampled experiment"
         )

@@ -133,9 +133,9 @@ def test_a_function_is_found_by_its_qualified_name() -> None:
         ),
         (
             AnchorKind.AFTER_ASSIGN, "a", "A.run", None,
-            ["m.py:15: assignment to 'a' matches 2 statements", "lines 15, 21", "give `nth`, from 1 to 2"],
+            ["m.py:15: assignment to 'a' matches 2 statements", "lines 15, 21", "give `nth`, a number"],
         ),
-        (AnchorKind.AFTER_ASSIGN, "a", "A.run", 3, ["`nth` is 3: give from 1 to 2"]),
+        (AnchorKind.AFTER_ASSIGN, "a", "A.run", 3, ["`nth` is 3: give a number from 1 to 2"]),
         (AnchorKind.AFTER_ASSIGN, "g", "A.run", None, ["no assignment to 'g'"]),
         (AnchorKind.BEFORE_ASSIGN, "i", "A.run", None, ["m.py:20:", "is the head of a block"]),
         (AnchorKind.BEFORE_ASSIGN, "h", "A.run", None, ["m.py:22:", "is the head of a block"]),

@@ -115,7 +115,7 @@ def test_an_anchor_matches_regardless_of_spaces_and_quotes(place: FaultLocation,
 @pytest.mark.parametrize(
     ("place", "pieces"),
     [
-        (location("value", "gap"), ["m.py:8:", "`value: gap` names", "give `nth`, from 1 to"]),
+        (location("value", "gap"), ["m.py:8:", "`value: gap` names", "give `nth`, a number from 1 to"]),
         (location("value", "gap", nth=9), ["`nth` is 9"]),
         (location("condition", "gap > low"), ["no `condition: gap > low`", "`gap < low` (line 8)"]),
         (

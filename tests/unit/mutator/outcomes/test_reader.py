@@ -69,7 +69,7 @@ print(*(path.read_text().strip() for path in Path("/proc/self/task").glob("*/com
 
 
 def test_reading_tables_leaves_no_thread(run: Path) -> None:
-    """A thread of pyarrow that returns bytes to Python during shutdown kills the process. Threads of the
+    """A pyarrow thread that releases Python memory during shutdown kills the process. Threads of the
     allocator and of BLAS do not use Python."""
     results.build(run)
     words, env = [sys.executable, "-c", ALONE, str(run)], os.environ | dict.fromkeys(THREADS, "1")

@@ -31,9 +31,12 @@ def flaws(record: Record) -> list[str]:
         ({"left": (("seen", 2.5, 1.0),)}, ""),
         ({"left": (), "t_manifest": 2.5, "t_end": 2.4, "outcome": Outcome.SDC}, ""),
         ({"left": (("spare", 2.5, 1.0),)}, "channel spare left golden; expected one of gas, brake, seen"),
-        ({"left": (("seen", 2.5, 1.0),), "t_end": 2.4}, "seen left golden at 2.5 s; expected a time before"),
+        (
+            {"left": (("seen", 2.5, 1.0),), "t_end": 2.4},
+            "seen left golden at 2.5 s; expected a time up to the end",
+        ),
         ({"left": (), "t_manifest": 2.5, "outcome": Outcome.SDC}, "actuators left golden at no time"),
-        ({"left": (("gas", 2.5, 1.0),)}, "actuators left golden at [2.5]; expected first at None"),
+        ({"left": (("gas", 2.5, 1.0),)}, "actuators left golden at [2.5]; expected at no time, as recorded"),
     ],
 )
 def test_deviations_must_fit_the_target_and_the_drive(
