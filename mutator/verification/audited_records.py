@@ -187,8 +187,8 @@ def _flaws_of_path(record: Record, head: Mapping[str, Any]) -> Flaws:
     times = [first for name, first, _ in record.left if name in head["compared"]]
     manifested = record.t_manifest if record.t_manifest is not None and record.t_manifest <= end else None
     if record.status is Status.OK and min(times, default=None) != manifested:
-        first = f"first at {manifested} s" if manifested is not None else "at no time"
-        yield f"actuators left golden at {times or 'no time'}", f"{first}, as recorded"
+        when = f"first at {manifested} s" if manifested is not None else "at no time"
+        yield f"actuators left golden at {times or 'no time'}", f"{when}, as recorded"
 
 
 def _in_order(events: Events, activation: Activation | None) -> bool:
