@@ -29,6 +29,7 @@ def found(toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path]) -> 
     )
 
 
+@pytest.mark.slow
 def test_a_long_comparison_is_cut_and_can_be_filtered(
     browser: Any,
     found: Comparison,

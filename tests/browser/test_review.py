@@ -127,7 +127,8 @@ def test_wide_content_scrolls_in_its_own_box(open_page: Callable[..., Any]) -> N
     assert page.evaluate("document.documentElement.scrollWidth") == 400
 
 
-@pytest.mark.parametrize("scheme", [pytest.param("light", marks=pytest.mark.slow), "dark"])
+@pytest.mark.slow
+@pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_axe_finds_no_serious_fault(
     open_page: Callable[..., Any], serious_faults: Callable[[Any], list[str]], scheme: str
 ) -> None:

@@ -25,6 +25,7 @@ def address(
         yield found
 
 
+@pytest.mark.slow
 def test_a_served_report_works(address: str, visit: Callable[..., Any], run: Path, tmp_path: Path) -> None:
     """The server's policy allows the report's scripts, styles and series."""
     series = json.loads((tmp_path / "runs/night/plan/experiments.jsonl").read_text().splitlines()[1])

@@ -91,6 +91,7 @@ def test_pytest_distributes_experiments_to_a_cluster(
     assert tables["results.csv"] == undisturbed[0]["results.csv"]
 
 
+@pytest.mark.slow
 def test_workers_that_do_not_reproduce_the_golden_run_are_refused(
     toy: Workspace, tmp_path: Path, two: Machines, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -28,6 +28,7 @@ def manifest() -> TargetManifest:
 
 @settings(max_examples=1000, deadline=None)
 @given(steps=STEPS)
+@pytest.mark.slow
 def test_manifest_and_checker_find_the_same_hazards(
     manifest: TargetManifest, steps: list[tuple[float, float, float]]
 ) -> None:

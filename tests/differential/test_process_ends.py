@@ -193,6 +193,7 @@ def test_an_exit_handler_of_the_target_runs_once_per_run(misbehave: Misbehave, t
     assert folders == ["out"] * 5  # the golden run, three mutants, the golden run's observations
 
 
+@pytest.mark.slow
 def test_an_exit_handler_that_never_returns_is_a_timeout(misbehave: Misbehave) -> None:
     waits = "import atexit, time\natexit.register(time.sleep, 100)"
     told = misbehave(waits, limits=replace(LIMITS, wall_s=2))

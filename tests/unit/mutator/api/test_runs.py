@@ -188,6 +188,7 @@ def test_only_a_rerun_that_equals_the_record_is_kept(driven: Run) -> None:
     assert kept.exists()
 
 
+@pytest.mark.slow
 def test_two_processes_can_request_the_same_series(driven: Run) -> None:
     [name] = driven.results.index
     library = driven.workspace.library

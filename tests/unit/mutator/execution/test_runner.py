@@ -111,7 +111,7 @@ def test_a_mutant_whose_fault_never_ran_is_not_activated(judged: Callable[..., R
     assert judged(ran=NEVER).outcome is Outcome.NOT_ACTIVATED
 
 
-@pytest.mark.parametrize(("ran", "told"), [(NEVER, "never active"), (RAN, "before 0.2 s")])
+@pytest.mark.parametrize(("ran", "told"), [(NEVER, "never active"), (RAN, "first active (0.2 s)")])
 def test_a_difference_that_the_fault_cannot_cause_is_a_harness_error(
     judged: Callable[..., Record], ran: dict, told: str
 ) -> None:

@@ -91,6 +91,7 @@ def test_an_unsound_target_is_refused(
         run_checks(toycar, folder)
 
 
+@pytest.mark.slow
 def test_an_observation_that_is_not_reached_is_refused(toycar: Workspace, tmp_path: Path) -> None:
     change(toycar, "        drive.step()", "        Drive.other(drive)")
     change(toycar, "    def step(self):", "    def step(self):\n        now = 0\n\n    def other(self):")
@@ -140,6 +141,7 @@ def test_a_missing_anchor_is_reported_before_any_run(
         run_checks(toycar, folder)
 
 
+@pytest.mark.slow
 def test_changed_golden_runs_are_refused(
     toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -131,6 +131,7 @@ def test_a_mutants_tree_finds_all_compiled_code(tmp_path: Path) -> None:
     assert [name for name, (here, there) in found.items() if here != there] == []
 
 
+@pytest.mark.slow
 def test_a_fault_in_a_detector_does_not_depend_on_earlier_runs(drive: Drive) -> None:
     place = ("selfdrive/visiond/paper_detector.py", "PaperDetector._marked", "score")
     early, late = (drive(place, time_s, independent=True) for time_s in (0.3, 0.7))

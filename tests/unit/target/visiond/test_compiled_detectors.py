@@ -39,7 +39,11 @@ DETECTORS = {
 }
 
 
-@pytest.fixture(scope="module", params=["", " -DPLAIN"], ids=["vectors", "plain"])
+@pytest.fixture(
+    scope="module",
+    params=["", pytest.param(" -DPLAIN", marks=pytest.mark.slow)],
+    ids=["vectors", "plain"],
+)
 def helpers(request, tmp_path_factory, all_compiled):
     """A folder with all libraries, compiled with or without vector instructions."""
     if not request.param:
