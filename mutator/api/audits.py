@@ -20,7 +20,7 @@ from mutator.verification.repairing import repair as put_aside
 from mutator.verification.seal import seal_of
 from mutator.workspace import Workspace
 
-SHOWN = 20  # differences listed on the page
+SHOWN = 20  # differences listed in the text of an audit
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)

@@ -53,7 +53,10 @@ _TO_MANIFEST = (
     Column("activations", "count", "", "number of activations in the whole run"),
     Column("manifested", "flag", "", "whether an actuator output differed from golden after the activation"),
     Column(
-        "t_manifest", "number", "s", "time of the first difference of an actuator output after the activation"
+        "t_manifest",
+        "number",
+        "s",
+        "when an actuator output first differed from golden after the activation",
     ),
 )
 _TO_REACTION = (
@@ -133,7 +136,12 @@ def result_columns(
         ),
         *(Column(name, "number", unit, about) for name, unit, about, _ in metrics),
         *(
-            Column(column, "number", "the channel's", f"largest difference of `{name}` up to the drive's end")
+            Column(
+                column,
+                "number",
+                "the channel's",
+                f"largest difference of `{name}` from golden, up to `t_end`",
+            )
             for name, column in driven_columns(compared, metrics).items()
         ),
         *severity,
@@ -155,7 +163,7 @@ def metric_columns(manifest: TargetManifest) -> list[list[str]]:
     If a hazard can end the drive, the end of the drive comes first.
     """
     ends = any(hazard.terminal for hazard in manifest.rules)
-    end = [[T_END, "s", "when a terminal hazard ended the drive: later steps are in no metric", "lower"]]
+    end = [[T_END, "s", "when a terminal hazard ended the drive; metrics do not cover later steps", "lower"]]
     return [*(end if ends else ()), *([m.name, m.unit, m.about, m.worse] for m in manifest.measures)]
 
 

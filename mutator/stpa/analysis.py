@@ -11,7 +11,7 @@ from pathlib import Path
 
 from pydantic import Field
 
-from mutator._common.text import suggestion
+from mutator._common.text import one_of, suggestion
 from mutator.config.yaml_files import Keys, Source, StrictModel, read
 from mutator.stpa.context_tables import ContextTable, HazardList, load_context_table, load_hazards
 
@@ -190,7 +190,7 @@ def _known(source: Source, keys: Keys, what: str, name: str, known: Collection[s
         raise source.error(
             keys,
             f"{what} '{name}'",
-            expected=f"one of {', '.join(known)}" if known else f"a {what}, but there is none",
+            expected=one_of(known),
             remedy="correct the name" + suggestion(name, list(known)),
         )
 

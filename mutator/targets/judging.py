@@ -66,7 +66,7 @@ class Hazard:
             formula=self.margin,
             unit=self.unit,
             worse="lower",
-            about=f"how far the run stayed from {self.name}; negative in it",
+            about=f"smallest distance from the limit of {self.name}; negative beyond the limit",
         )
 
 

@@ -11,11 +11,11 @@ const Jobs = (() => {
   const watchers = [];
   let place = null, timer = null, known = [];
 
-  /** An error of the server as text. */
+  /** A server error as text. */
   const words = ({ got, where, expected, remedy }) =>
     [where ? `${where}: ${got}` : got, expected && `expected ${expected}`, remedy].filter(Boolean).join("; ");
 
-  /** The answer of the server. Throws an Error with a readable message if the server refuses or is unreachable. */
+  /** The server's answer. Throws an Error with a readable message if the server refuses or is unreachable. */
   async function ask(address, body) {
     const post = body && { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) };
     let response = null;

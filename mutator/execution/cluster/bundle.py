@@ -2,7 +2,7 @@
 
 * meta.json: engine, limits, digests of the golden runs, version of mutator
 * manifest/NAME: the target's manifest
-* target/, overlay/: the target's tree, and files in its root that the arguments of a run name (`{root}/...`)
+* target/, overlay/: the target's tree, and files in its root that a run's arguments refer to (`{root}/...`)
 * templates/: the fault models
 * scenarios/: the scenario files of the golden runs
 

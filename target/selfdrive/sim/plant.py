@@ -52,7 +52,7 @@ class Plant:
             self.speed = self.acceleration = 0.0
 
     def distance_to(self, position: float) -> float:
-        """Distance (m) from the front bumper to `position` on the road; negative behind it."""
+        """Distance (m) from the front bumper to `position` on the road; negative if it is behind."""
         return position - self.position
 
     def headway(self, d_rel: float) -> float:
