@@ -84,7 +84,7 @@ def test_items_are_found_by_name_or_path(toy: Workspace) -> None:
         toy.scenario("folow")
     with pytest.raises(
         MutatorError,
-        match="no campaign 'x'; expected a known name, of which there are none, or the path of a YAML file",
+        match="no campaign 'x'; expected a known name, but there is none, or the path of a YAML file",
     ):
         toy.campaign("x")
 
