@@ -4,11 +4,9 @@ import ast
 import dataclasses
 import gc
 import json
-import pickle
 import shutil
 import signal
 from collections.abc import Callable, Iterator, Mapping
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +15,6 @@ import pytest
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plans import Choices, Plan, make_plan
 from mutator.campaigns.provenance import add_stretch
-from mutator.config import yaml_files
-from mutator.config.yaml_files import Source
-from mutator.errors import MutatorError
 from mutator.model import (
     Activation,
     Anchor,
@@ -35,7 +30,6 @@ from mutator.model import (
     Status,
     Trigger,
 )
-from mutator.mutants import anchors
 from mutator.mutants.anchors import ParsedFile, parsed
 from mutator.store import digests
 from mutator.store.digests import Digest
@@ -46,6 +40,8 @@ from mutator.store.run_folder import RunFolder
 from mutator.store.stretches import Stretch
 from mutator.triggers.kinds import always
 from mutator.workspace import Workspace
+
+from .parsed_once import parsed_once
 
 _TESTS = Path(__file__).parent
 _LENS = """\
@@ -119,35 +115,7 @@ def _caches(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 @pytest.fixture(scope="session", autouse=True)
 def _texts_are_parsed_once() -> Iterator[None]:
-    """Remember parsed texts: a worker would otherwise parse the same templates and toys a thousand times."""
-    parse_yaml, parse_python = yaml_files.parse, anchors.parse_file
-
-    @lru_cache(maxsize=1024)
-    def yaml_of(text: str) -> bytes:
-        source = parse_yaml(text, Path("a.yaml"))
-        return pickle.dumps((source.data, source.lines))
-
-    @lru_cache(maxsize=256)
-    def python_of(path: str, data: bytes) -> ParsedFile:
-        return parse_python(path, data, Path("a"))
-
-    def yaml(text: str, path: Path) -> Source:
-        try:
-            data, lines = pickle.loads(yaml_of(text))
-        except MutatorError:
-            return parse_yaml(text, path)  # an error that names the file
-        return Source(path=path, data=data, lines=lines)
-
-    def python(path: str, data: bytes, root: Path) -> ParsedFile:
-        try:
-            found = python_of(path, data)
-        except MutatorError:
-            return parse_python(path, data, root)
-        return dataclasses.replace(found, where=root / path, sound=set(), _sites={})
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(yaml_files, "parse", yaml)
-        patch.setattr(anchors, "parse_file", python)
+    with parsed_once():
         yield
 
 

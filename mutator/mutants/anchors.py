@@ -1,6 +1,6 @@
 """Resolves anchors, such as an assignment in a function, to lines of a source file."""
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -8,7 +8,7 @@ from mutator._common.interrupts import held
 from mutator._common.text import counted, suggestion
 from mutator.errors import MutatorError
 from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS, Anchor, AnchorKind, FaultLocation
-from mutator.mutants.expression_choice import as_written, choose_expression
+from mutator.mutants.expression_choice import as_written, choose_expression, valid_nth
 from mutator.mutants.expressions import Expression, expressions_of
 from mutator.mutants.fixed_values import FixedValue, choose_fixed, find_fixed
 from mutator.mutants.functions_alone import outer_functions
@@ -197,7 +197,7 @@ def _entry(file: ParsedFile, location: FaultLocation, functions: tuple[Function,
             where=file.where,
             line=functions[0].line + 1,
             expected=f"one of those at {places}" if len(functions) > 1 else f"the one at {places}",
-            remedy=f"give `nth`, {_range(functions)}",
+            remedy=f"give `nth`, {valid_nth(len(functions))}",
         )
     function = functions[(nth or 1) - 1]
     if function.entry is None:
@@ -255,7 +255,7 @@ def _no_single_hit(
     what, place = _what(verb, anchor.name), f"in {location.function}"
     if hits:
         lines = ", ".join(str(s.first + 1) for _, s in hits)
-        take = _range(hits)
+        take = valid_nth(len(hits))
         found = counted(len(hits), "statement")
         got = f"{what} matches {found} {place}: {'lines' if len(hits) > 1 else 'line'} {lines}"
         remedy = f"give `nth`, {take}" if anchor.nth is None else f"`nth` is {anchor.nth}: give {take}"
@@ -269,10 +269,6 @@ def _no_single_hit(
         got, line, expected = f"no {what} {place}", functions[0].line, _candidates(functions, verb)
         remedy = "write the name exactly as in the source"
     return MutatorError(got, where=file.where, line=line + 1, expected=expected, remedy=remedy)
-
-
-def _range(hits: Sequence[object]) -> str:
-    return f"a number from 1 to {len(hits)}" if len(hits) > 1 else "1, or leave it out"
 
 
 def _what(verb: str, name: str) -> str:

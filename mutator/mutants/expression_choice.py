@@ -21,6 +21,11 @@ def as_written(name: str) -> str:
         return name
 
 
+def valid_nth(count: int) -> str:
+    """Return which values of `nth` select one of `count` hits."""
+    return f"a number from 1 to {count}" if count > 1 else "1, or leave it out"
+
+
 def choose_expression(
     known: Sequence[Expression], location: FaultLocation, where: Path, line: int
 ) -> Expression:
@@ -37,7 +42,7 @@ def choose_expression(
     what = " ".join(filter(None, (f"`{kind.value}: {anchor.name}`".replace(": `", "`"), _which(anchor))))
     if hits:
         lines = ", ".join(str(one.start[0] + 1) for one in hits)
-        take = f"a number from 1 to {len(hits)}" if len(hits) > 1 else "1, or leave it out"
+        take = valid_nth(len(hits))
         raise MutatorError(
             f"{what} names {counted(len(hits), 'expression')} in {location.function}: "
             f"{'lines' if len(hits) > 1 else 'line'} {lines}",

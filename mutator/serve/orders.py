@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, Field, TypeAdapter
 
 from mutator._common.cores import usable_cores
-from mutator._common.text import suggestion
+from mutator._common.text import one_of, suggestion
 from mutator.campaigns.filters import compile_filter
 from mutator.config.yaml_files import StrictModel
 from mutator.errors import MutatorError
@@ -252,6 +252,6 @@ def _unknown(what: str, name: str, known: Collection[str]) -> MutatorError:
     return MutatorError(
         f"no {what} '{name}'",
         where=what,
-        expected=f"one of {', '.join(known)}" if known else f"a {what}, but the library has none",
+        expected=one_of(known),
         remedy="correct the name" + suggestion(name, list(known)),
     )

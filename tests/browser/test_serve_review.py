@@ -258,7 +258,7 @@ def test_marks_survive_a_stopped_server(library: Workspace, serve: Callable[...,
     assert "1 mark waits" in page.inner_text("#banner")
     assert not load_review(library, "toycar").entries
     with serve(library, port=port, token="second") as address:
-        page.wait_for_selector("#banner:text('does not know this page')")
+        page.wait_for_selector("#banner:text('no longer knows this page')")
         page.context.new_page().goto(address)
         page.bring_to_front()
         saved(page, current(page))
