@@ -1,0 +1,148 @@
+"""Open, write and delete files below a folder that somebody else may have filled.
+
+A run folder, a library, a bundle or a shard can come from anybody. A name in one of its files can point out
+of it (`../../setup.py`), and a link in it can point anywhere. So names are checked, and each folder on the way is
+opened relative to the one before, without following links: nothing can be exchanged between check and use.
+Only `root` itself may be reached through links, because the user named it.
+"""
+
+import errno
+import os
+import stat
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import BinaryIO
+
+from mutator._common.files import raising_disk_full
+from mutator.errors import MutatorError
+
+_FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
+_READ = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
+_NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
+_LONGEST_NAME = 220  # bytes; Linux allows 255, and a half-written file has a longer name
+
+
+class Outside(MutatorError):
+    """A name points out of its folder, or something in a folder is not a plain file or folder."""
+
+
+def check_name(name: object, where: str | Path) -> str:
+    """Return `name` if it is a relative path in its shortest form, such as `golden/S1/trace.npz`.
+
+    Outside for anything else; `where` is the file or folder that the name comes from.
+    """
+    text = name if isinstance(name, str) else ""
+    parts = text.split("/")
+    if all(part not in ("", ".", "..") and part.isprintable() and _fits(part) for part in parts):
+        return text
+    raise Outside(
+        f"the name {name!a}",
+        where=where,
+        expected="the name of a file inside its folder, without `..`, links or unprintable characters",
+        remedy="do not use this folder: whoever made it could reach your other files",
+    )
+
+
+def open_below(root: Path, name: str) -> BinaryIO:
+    """Open a regular file below `root` for reading.
+
+    FileNotFoundError if it is missing; Outside if it is a link or no regular file, or if a folder on the way
+    is a link.
+    """
+    with _parent(root, name) as (parent, last):
+        file = os.open(last, _READ, dir_fd=parent)
+    if not stat.S_ISREG(os.fstat(file).st_mode):
+        os.close(file)
+        raise _not_plain(root / name)
+    return os.fdopen(file, "rb")
+
+
+def read_below(root: Path, name: str) -> bytes:
+    """Return the content of a file; errors are those of `open_below`."""
+    with open_below(root, name) as file:
+        return file.read()
+
+
+def write_below(root: Path, name: str, data: bytes) -> None:
+    """Write a file atomically, and make its folders. What stands in its place is replaced, never written to.
+
+    Outside if a folder on the way is a link; IsADirectoryError if a folder stands in its place.
+    """
+    with raising_disk_full(root / name), _parent(root, name, make=True) as (parent, last):
+        temporary = f".{last}.{threading.get_native_id()}"  # `is_half_written`
+        with suppress(FileNotFoundError):
+            os.unlink(temporary, dir_fd=parent)
+        file = os.open(temporary, _NEW, 0o644, dir_fd=parent)
+        try:
+            with os.fdopen(file, "wb") as writer:
+                writer.write(data)
+                writer.flush()
+                os.fsync(file)
+            os.replace(temporary, last, src_dir_fd=parent, dst_dir_fd=parent)
+        except BaseException:
+            with suppress(OSError):
+                os.unlink(temporary, dir_fd=parent)
+            raise
+
+
+def unlink_below(root: Path, name: str) -> None:
+    """Delete a file or a link, which is not followed; a missing one is ignored."""
+    with suppress(FileNotFoundError), _parent(root, name) as (parent, last):
+        os.unlink(last, dir_fd=parent)
+
+
+def check_plain(root: Path) -> None:
+    """Raise Outside if anything below `root` is neither a regular file nor a folder."""
+    for path in _not_plain_below(root):
+        raise _not_plain(path)
+
+
+def _not_plain_below(root: Path) -> Iterator[Path]:
+    folders = [str(root)]
+    while folders:
+        with suppress(FileNotFoundError), os.scandir(folders.pop()) as entries:
+            for entry in entries:
+                if entry.is_dir(follow_symlinks=False):
+                    folders.append(entry.path)
+                elif not entry.is_file(follow_symlinks=False):
+                    yield Path(entry.path)
+
+
+@contextmanager
+def _parent(root: Path, name: str, *, make: bool = False) -> Iterator[tuple[int, str]]:
+    """Open the folder that contains `name`; yield its descriptor and the last part of the name."""
+    *folders, last = check_name(name, root).split("/")
+    handle = os.open(root, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        for part in folders:
+            if make:
+                with suppress(FileExistsError):
+                    os.mkdir(part, dir_fd=handle)
+            inner = os.open(part, _FOLDER, dir_fd=handle)
+            os.close(handle)
+            handle = inner
+        yield handle, last
+    except OSError as err:
+        if err.errno in (errno.ELOOP, errno.ENOTDIR, errno.ENXIO):
+            raise _not_plain(root / name) from None
+        raise
+    finally:
+        os.close(handle)
+
+
+def _not_plain(path: Path) -> Outside:
+    return Outside(
+        "a link, a pipe or something else that is not a plain file",
+        where=path,
+        expected="only files and folders",
+        remedy="delete it, or use a copy of the folder without it",
+    )
+
+
+def _fits(part: str) -> bool:
+    try:
+        return len(part.encode()) <= _LONGEST_NAME
+    except UnicodeEncodeError:
+        return False

@@ -1,0 +1,124 @@
+"""Files are reached only by plain names, and only below their folder."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from mutator._common.below import (
+    Outside,
+    check_name,
+    check_plain,
+    open_below,
+    read_below,
+    unlink_below,
+    write_below,
+)
+
+OUTSIDE = [
+    "",
+    "..",
+    "../a",
+    "a/../b",
+    "/etc/passwd",
+    "a//b",
+    "./a",
+    "a/",
+    "a\0b",
+    "a\nb",
+    "\u202ea",
+    "\udcff",
+    "x" * 300,
+]
+
+
+@pytest.mark.parametrize("name", [*OUTSIDE, None, 3, ["a"]], ids=ascii)
+def test_a_name_that_leads_outside_is_refused(name: object, tmp_path: Path) -> None:
+    with pytest.raises(Outside, match="the name"):
+        check_name(name, tmp_path)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    inside = tmp_path / "folder"
+    (inside / "a").mkdir(parents=True)
+    (inside / "a" / "b.txt").write_bytes(b"inside")
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere" / "b.txt").write_bytes(b"secret")
+    return inside
+
+
+def test_a_file_is_read(folder: Path) -> None:
+    assert read_below(folder, "a/b.txt") == b"inside"
+
+
+def test_the_root_may_be_a_link(folder: Path) -> None:
+    link = folder.with_name("link")
+    link.symlink_to(folder)
+    assert read_below(link, "a/b.txt") == b"inside"
+
+
+def test_a_missing_file_is_missing(folder: Path) -> None:
+    with pytest.raises(FileNotFoundError):
+        read_below(folder, "a/c.txt")
+    unlink_below(folder, "a/c.txt")
+    unlink_below(folder, "c/c.txt")
+
+
+@pytest.mark.parametrize("kind", ["link", "dangling", "pipe", "folder"])
+def test_only_a_regular_file_is_opened(folder: Path, kind: str) -> None:
+    place = folder / "x"
+    match kind:
+        case "link":
+            place.symlink_to(folder / "a" / "b.txt")
+        case "dangling":
+            place.symlink_to(folder / "nothing")
+        case "pipe":
+            os.mkfifo(place)
+        case "folder":
+            place.mkdir()
+    with pytest.raises(Outside, match="x: a link, a pipe"):
+        open_below(folder, "x")
+
+
+def test_a_linked_folder_is_not_entered(folder: Path) -> None:
+    (folder / "c").symlink_to(folder.parent / "elsewhere")
+    for reach in (read_below, unlink_below, lambda root, name: write_below(root, name, b"new")):
+        with pytest.raises(Outside):
+            reach(folder, "c/b.txt")
+    assert (folder.parent / "elsewhere" / "b.txt").read_bytes() == b"secret"
+
+
+def test_a_file_is_written_with_its_folders(folder: Path) -> None:
+    write_below(folder, "d/e/f.txt", b"new")
+    assert (folder / "d" / "e" / "f.txt").read_bytes() == b"new"
+    assert [path.name for path in (folder / "d" / "e").iterdir()] == ["f.txt"]
+
+
+def test_a_link_is_replaced_and_not_written_through(folder: Path) -> None:
+    (folder / "x").symlink_to(folder.parent / "elsewhere" / "b.txt")
+    write_below(folder, "x", b"new")
+    assert not (folder / "x").is_symlink()
+    assert (folder.parent / "elsewhere" / "b.txt").read_bytes() == b"secret"
+
+
+def test_a_link_is_deleted_and_not_followed(folder: Path) -> None:
+    (folder / "x").symlink_to(folder.parent / "elsewhere" / "b.txt")
+    unlink_below(folder, "x")
+    assert not os.path.lexists(folder / "x")
+    assert (folder.parent / "elsewhere" / "b.txt").exists()
+
+
+def test_a_folder_of_files_is_plain(folder: Path) -> None:
+    check_plain(folder)
+
+
+@pytest.mark.parametrize("kind", ["link", "pipe"])
+def test_a_folder_with_anything_else_is_not_plain(folder: Path, kind: str) -> None:
+    place = folder / "a" / "x"
+    if kind == "link":
+        place.symlink_to(folder.parent)
+    else:
+        os.mkfifo(place)
+    with pytest.raises(Outside, match="a/x: a link, a pipe"):
+        check_plain(folder)
