@@ -1,9 +1,9 @@
 """Open, write and delete files below a folder that somebody else may have filled.
 
 A run folder, a library, a bundle or a shard can come from anybody. A name in one of its files can point out
-of it (`../../setup.py`), and a link in it can point anywhere. So names are checked, and each folder on the way is
-opened relative to the one before, without following links: nothing can be exchanged between check and use.
-Only `root` itself may be reached through links, because the user named it.
+of it (`../../setup.py`), and a link in it can point anywhere. So names are checked, and each folder on the
+way is opened relative to the one before, without following links: nothing can be exchanged between check and
+use. Only `root` itself may be reached through links, because the user named it.
 """
 
 import errno
