@@ -54,6 +54,7 @@ def blas() -> tuple[dict[str, Any], ...]:
     with tempfile.TemporaryDirectory() as folder:
         done = subprocess.run(
             [sys.executable, "-P", "-s", "-c", _BLAS],
+            cwd=folder,
             env=environment(0, Path(folder)),
             capture_output=True,
             check=False,

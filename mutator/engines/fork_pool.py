@@ -137,6 +137,7 @@ class Pool:
         with theirs, (home / "log").open("wb") as log:
             self._process = subprocess.Popen(
                 [sys.executable, "-P", "-s", _SERVER, str(theirs.fileno()), str(home / "start.marshal")],
+                cwd=home,
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=subprocess.STDOUT,

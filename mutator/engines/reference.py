@@ -165,6 +165,7 @@ class ReferenceEngine:
             with theirs, (folder / "log").open("wb") as log:
                 guarding = subprocess.Popen(
                     [sys.executable, "-P", "-s", str(_CHILD), str(request), str(theirs.fileno())],
+                    cwd=folder,
                     stdin=subprocess.DEVNULL,
                     stdout=log,
                     stderr=subprocess.STDOUT,

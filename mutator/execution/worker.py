@@ -181,8 +181,11 @@ def timing_of(finished: Finished, worker: str) -> dict[str, Any]:
 
 
 def dying_python(parent: int) -> list[str]:
-    """Return the beginning of a Python command line whose process dies with `parent`, even while starting."""
-    return [sys.executable, "-I", "-S", guard.__file__, str(parent), sys.executable]
+    """Return the beginning of a Python command line whose process dies with `parent`, even while starting.
+
+    It imports nothing from its working folder.
+    """
+    return [sys.executable, "-I", "-S", guard.__file__, str(parent), sys.executable, "-P"]
 
 
 def bind_to_parent(parent: int) -> None:

@@ -132,6 +132,7 @@ def _show(manifest: TargetManifest, folder: Path, places: Mapping[str, str], sho
     arguments = (*film.args, *(film.still_args if shot.t is not None else ()))
     done = subprocess.run(
         [sys.executable, "-P", "-s", "-m", film.module, *filled(arguments, here)],
+        cwd=made.parent,
         env={**os.environ, **manifest.env, "PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"},
         capture_output=True,
         text=True,

@@ -99,7 +99,7 @@ def _folder() -> Finding:
 def _child() -> Finding:
     command = [sys.executable, "-P", "-s", "-c", "import numpy; print(numpy.__version__)"]
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+        done = subprocess.run(command, cwd="/", capture_output=True, text=True, timeout=60, check=False)
     except (OSError, subprocess.TimeoutExpired) as e:
         return Finding(
             name="child process", level=Level.FAIL, found=str(e), remedy="fix what this message names"

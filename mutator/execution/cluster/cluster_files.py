@@ -7,6 +7,7 @@ import difflib
 import importlib
 import inspect
 import signal
+import sys
 from collections.abc import AsyncIterator, Iterator, Mapping
 from contextlib import asynccontextmanager, contextmanager, suppress
 from dataclasses import dataclass
@@ -165,8 +166,13 @@ class ClusterFile:
 
             defaults = {"worker_command": "dask worker --nthreads 1", "quiet": True}
             return defaults | options | {"shutdown_on_close": True, "loop": IOLoop.current()}
+        import dask
+
         if "cores" in options:
             options["processes"] = options["cores"]
+        python = options.get("python") or dask.config.get(f"jobqueue.{self.model.kind}.python", None)
+        # a job starts in the command's folder, which can be somebody's library
+        options["python"] = f"{python or sys.executable} -P"
         scheduler = options.get("scheduler_options") or {}
         options["scheduler_options"] = {"dashboard_address": "127.0.0.1:0"} | scheduler
         if "security" not in options and str(options.get("protocol")).startswith("tls"):

@@ -88,7 +88,8 @@ def own_scheduler() -> Iterator[None]:
     """Apply Dask settings for a scheduler in this process.
 
     A frozen worker is noticed within a minute. Dask does not profile its threads, which saves CPU time. The
-    link to the dashboard uses the only address on which the dashboard answers.
+    link to the dashboard uses the only address on which the dashboard answers. Processes that Dask starts
+    import nothing from their working folder.
     """
     import dask
 
@@ -98,8 +99,15 @@ def own_scheduler() -> Iterator[None]:
         "distributed.admin.tick.interval": "500ms",
         "distributed.dashboard.link": "{scheme}://127.0.0.1:{port}/status",
     }
-    with dask.config.set(settings):
-        yield
+    before = os.environ.get("PYTHONSAFEPATH")
+    os.environ["PYTHONSAFEPATH"] = "1"
+    try:
+        with dask.config.set(settings):
+            yield
+    finally:
+        os.environ.pop("PYTHONSAFEPATH")
+        if before is not None:
+            os.environ["PYTHONSAFEPATH"] = before
 
 
 def certificates() -> "Security":

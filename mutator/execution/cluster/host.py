@@ -181,6 +181,7 @@ class Host:
             process = subprocess.Popen(
                 [*dying_python(os.getpid()), *words],
                 pass_fds=[its.fileno()],
+                cwd=self.folder,
                 stdin=subprocess.DEVNULL,
                 start_new_session=True,  # signals from the worker's terminal are for the worker only
             )

@@ -111,6 +111,7 @@ def test_jobs_are_submitted_and_cancelled(tmp_path: Path, monkeypatch: pytest.Mo
     assert dashboard.startswith("http://127.0.0.1:")
     jobs = {job.name.removeprefix("job"): job.read_text() for job in tmp_path.glob("job*")}
     assert len(jobs) == 2
+    assert all(f"{sys.executable} -P -m " in job for job in jobs.values()), "a job could import ./json.py"
     assert all(
         "--nthreads 1 " in job and "--nworkers 2" in job and "tcp://127.0.0.1:" in job
         for job in jobs.values()
