@@ -36,6 +36,6 @@ def compiles(text: bytes) -> bool:
     """Return whether normalized source, and so every source that normalizes to it, compiles."""
     try:
         compile(text, "<normalized>", "exec", dont_inherit=True)
-    except (SyntaxError, ValueError, RecursionError):
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
         return False
     return True

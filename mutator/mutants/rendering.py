@@ -1,7 +1,7 @@
 """Renders a fault model's template with parameters as lines of Python.
 
-Templates run in Jinja2's sandbox, where an undefined name is an error. Every printed value is a Python
-literal or a checked name, so it cannot become other code.
+Templates use a small part of Jinja2, in its sandbox (`template_language`); an undefined name is an error.
+Every printed value is a Python literal or a checked name, so it cannot become other code.
 """
 
 import ast
@@ -12,12 +12,9 @@ import tokenize
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import NoReturn
 
-from jinja2 import StrictUndefined, TemplateError, TemplateSyntaxError, Undefined
-from jinja2.exceptions import SecurityError
-from jinja2.runtime import Context
-from jinja2.sandbox import ImmutableSandboxedEnvironment
+from jinja2 import TemplateError, TemplateSyntaxError, Undefined
 
 from mutator.config import units
 from mutator.config.locations import PROBE_NAME, assignable, dotted_name
@@ -25,6 +22,7 @@ from mutator.errors import MutatorError
 from mutator.faults.fault_models import NAMES, FaultModel, ParamSchema, SnippetKind
 from mutator.model import Value
 from mutator.mutants.normalized_source import normalized
+from mutator.mutants.template_language import TemplateEnvironment
 
 _EXACT = 2.0**53  # every integer up to this is exact as a double
 _EXPECTED = {  # by parameter type
@@ -92,25 +90,17 @@ def refuse(why: str) -> NoReturn:
     raise MutatorError(why, remedy="correct the parameters, or anchor elsewhere")
 
 
-class _Sandbox(ImmutableSandboxedEnvironment):
-    """Jinja2's sandbox without the power operator, because 9 ** 9 ** 9 would take forever."""
-
-    intercepted_binops = frozenset({"**"})
-
-    def call_binop(self, context: Context, operator: str, left: Any, right: Any) -> Any:
-        raise SecurityError(f"{operator} is not allowed in a template")
+def joined(items: Sequence[object], between: str = "") -> str:
+    """Join names, texts and numbers."""
+    return between.join(map(literal, items))
 
 
-_ENVIRONMENT = _Sandbox(
-    undefined=StrictUndefined,
-    trim_blocks=True,
-    lstrip_blocks=True,
-    keep_trailing_newline=True,
+_ENVIRONMENT = TemplateEnvironment(
+    functions={"refuse": refuse},
+    filters={"signed": signed, "exchanged": exchanged, "taken_for": taken_for, "join": joined},
     finalize=literal,
 )
-_ENVIRONMENT.filters |= {"signed": signed, "exchanged": exchanged, "taken_for": taken_for}
-_ENVIRONMENT.globals["refuse"] = refuse
-_compiled = lru_cache(maxsize=256)(_ENVIRONMENT.from_string)
+_NOT_PYTHON = (SyntaxError, ValueError, RecursionError, MemoryError)  # what Python's parser raises
 _FAILURES = (TypeError, ValueError, ArithmeticError, AttributeError, LookupError, RecursionError, MemoryError)
 
 
@@ -177,7 +167,7 @@ def _is_expression(text: str) -> bool:
     try:
         tree = ast.parse(text, mode="eval")
         ast.parse(f"({text})", mode="eval")  # a comment would hide the bracket
-    except (SyntaxError, ValueError, RecursionError):
+    except _NOT_PYTHON:
         return False
     return "\n" not in text and not any(isinstance(n, ast.Yield | ast.YieldFrom) for n in ast.walk(tree))
 
@@ -217,7 +207,7 @@ def _checked(param: ParamSchema, params: Mapping[str, Value]) -> Value:
 def render(template: str, names: Mapping[str, object], where: Path) -> str:
     """Render one template; MutatorError with the template's line, if known."""
     try:
-        return _compiled(template).render(names)
+        return _ENVIRONMENT.compiled(template).render(names)
     except TemplateSyntaxError as error:
         raise _template_error(str(error.message), where, error.lineno) from None
     except TemplateError as error:
@@ -231,8 +221,9 @@ def _template_error(what: str, where: Path, line: int | None) -> MutatorError:
         f"the template fails: {what}",
         where=where,
         line=line,
-        expected="names of the model's parameters, `fi`, a loop or a condition",
-        remedy="correct the template",
+        expected="names of the model's parameters, `fi`, a loop over a list, a condition, arithmetic, or one "
+        f"of the filters {', '.join(sorted(_ENVIRONMENT.filter_names))}",
+        remedy="correct the template, or let the code that it writes do the work",
     )
 
 
@@ -268,10 +259,9 @@ def _check_lines(text: str, kind: SnippetKind, where: Path) -> None:
             for token in tokenize.generate_tokens(io.StringIO(text).readline)
             if token.type == tokenize.NEWLINE
         ]
-    except (SyntaxError, tokenize.TokenError) as error:
-        if isinstance(error, tokenize.TokenError) or kind is not SnippetKind.GUARD:
-            problem = error.args[0]
-        else:
+    except (*_NOT_PYTHON, tokenize.TokenError) as error:
+        problem = str(error.args[0]) if error.args else "too many nested operations"
+        if isinstance(error, SyntaxError) and kind is SnippetKind.GUARD:
             problem = f"{error.msg} (a guard's last line must open a block)"
         raise MutatorError(
             f"the template does not give valid Python: {problem}: {text!r}",
