@@ -225,17 +225,24 @@ def json_bytes(data: dict[str, Any]) -> bytes:
 def read_json(path: Path, schema: str) -> dict[str, Any]:
     """Read a JSON object that has the schema `schema` (`name/version`) or an older version of it."""
     try:
-        data = json.loads(no_pipe(path).read_bytes())
+        data = no_pipe(path).read_bytes()
     except OSError as err:
         if not is_no_file(err):
             raise
         got = "no such file" if isinstance(err, FileNotFoundError) else f"not a file ({err.strerror})"
         raise MutatorError(got, where=path) from None
+    return json_object(data, path, schema)
+
+
+def json_object(text: bytes, where: Path, schema: str) -> dict[str, Any]:
+    """Parse the content of the file `where`, as `read_json` does."""
+    try:
+        data = json.loads(text)
     except (ValueError, RecursionError) as err:
-        raise MutatorError(f"not JSON ({err})", where=path, remedy="delete it if it is damaged") from None
+        raise MutatorError(f"not JSON ({err})", where=where, remedy="delete it if it is damaged") from None
     if not isinstance(data, dict):
-        raise MutatorError(f"a {type(data).__name__}", where=path, expected="a JSON object")
-    check_schema(data.get("schema"), schema, path)
+        raise MutatorError(f"a {type(data).__name__}", where=where, expected="a JSON object")
+    check_schema(data.get("schema"), schema, where)
     return data
 
 

@@ -1,20 +1,19 @@
-"""Select the figures of a run by what can be compared, and write them as SVG and PNG."""
+"""Select the figures of a run by what can be compared, as SVG and PNG."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pandas as pd
 
 from mutator.figures import hazards, heat_map, propagation
-from mutator.figures.run_plot import save
+from mutator.figures.run_plot import images
 from mutator.statistics.frame import slim
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FOLDER = "figures"
+FOLDER, FORMATS = "figures", ("svg", "png")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,14 +45,14 @@ def drawings(frame: pd.DataFrame) -> tuple[Drawing, ...]:
     return tuple(made)
 
 
-def write_drawings(made: Sequence[Drawing], out: Path) -> None:
-    for drawing in made:
-        paths = [out / drawing.link(suffix) for suffix in ("svg", "png")]
+def drawing_files(drawings: Sequence[Drawing]) -> dict[str, bytes]:
+    """The figures as files, by name: each as SVG and PNG."""
+    files: dict[str, bytes] = {}
+    for drawing in drawings:
         if drawing.figure is not None:
-            save(drawing.figure, paths)
-        else:  # an earlier report with other results might have written them
-            for path in paths:
-                path.unlink(missing_ok=True)
+            names = [drawing.link(suffix) for suffix in FORMATS]
+            files |= dict(zip(names, images(drawing.figure, FORMATS), strict=True))
+    return files
 
 
 def _hazards(frame: pd.DataFrame) -> Drawing:

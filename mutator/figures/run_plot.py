@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mutator._common.files import half_written
+from mutator._common.files import write_atomic
 from mutator.errors import MutatorError
 from mutator.model import Record
 from mutator.outcomes.golden import Trace, times_of
@@ -162,18 +162,26 @@ def _decorate(
 
 def save(figure: "Figure", paths: Sequence[Path]) -> None:
     """Write a figure to each of `paths` as .svg or .png, by suffix, deterministically."""
+    for path, image in zip(paths, images(figure, [path.suffix[1:] for path in paths]), strict=True):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_atomic(path, image)
+
+
+def images(figure: "Figure", formats: Sequence[str]) -> list[bytes]:
+    """Draw a figure in each format, `svg` or `png`, deterministically."""
     import matplotlib
 
     if figure.get_layout_engine() is not None:  # once for all files, because layout takes as long as drawing
         figure.draw_without_rendering()
         figure.set_layout_engine("none")
+    drawn = []
     # A fixed salt and no date keep the SVG deterministic.
     with matplotlib.rc_context({"svg.hashsalt": "mutator", "svg.fonttype": "none"}):
-        for path in paths:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            no_date = {"Date": None} if path.suffix == ".svg" else None
-            with half_written(path) as temporary:
-                figure.savefig(temporary, format=path.suffix[1:], dpi=PNG_DPI, metadata=no_date)
+        for name in formats:
+            no_date = {"Date": None} if name == "svg" else None
+            figure.savefig(file := io.BytesIO(), format=name, dpi=PNG_DPI, metadata=no_date)
+            drawn.append(file.getvalue())
+    return drawn
 
 
 def finite(values: Any) -> Any:

@@ -4,14 +4,13 @@ import re
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from mutator._common.files import write_atomic
 from mutator._common.text import counted
 from mutator.outcomes.fault_free import own_alerts
 from mutator.paper import observations, observations_page, seeds
 from mutator.paper.observations import Verdict
 from mutator.paper.published import has_paper, load_paper
 from mutator.report.panel import Panel, rendered
-from mutator.report.panels.tables import write_csv
+from mutator.report.panels.tables import csv_files
 from mutator.report.studies import ReportedRun
 from mutator.statistics.frame import slim
 
@@ -51,7 +50,7 @@ _HTML = """\
 
 
 def observations_panel(run: ReportedRun) -> Panel | None:
-    """Write observations.md and tables of the observations that the library cites; return their panel.
+    """The panel of the observations that the library cites, with observations.md and tables.
 
     None if the library cites no observations, if the run has none of the published fault types, or if its
     experiments decide no observation. Decided observations come first.
@@ -77,10 +76,8 @@ def observations_panel(run: ReportedRun) -> Panel | None:
     shown_ends = tuple(sorted(ends.items()))
     by_seed = seeds.judge_by_seed(file, frame, lambda runs: list(_lacks(run, _missing(kinds, runs))))
     of_seeds = seeds.table(judged, by_seed) if by_seed else None
-    write_atomic(run.out / FILE, observations_page.markdown(judged, shown_ends, coverage).encode())
-    write_csv(observations_page.sheet(judged), run.out)
-    if by_seed:
-        write_csv(seeds.sheet(by_seed), run.out)
+    sheets = [observations_page.sheet(judged), *([seeds.sheet(by_seed)] if by_seed else ())]
+    text = observations_page.markdown(judged, shown_ends, coverage)
     parts = [
         "## The paper's observations",
         coverage,
@@ -100,7 +97,12 @@ def observations_panel(run: ReportedRun) -> Panel | None:
         about_seeds=seeds.ABOUT,
     )
     return Panel(
-        anchor="observations", link="Observations", markdown="\n\n".join(parts), html=html, summary=of_seeds
+        anchor="observations",
+        link="Observations",
+        markdown="\n\n".join(parts),
+        html=html,
+        summary=of_seeds,
+        files={FILE: text.encode(), **csv_files(sheets)},
     )
 
 

@@ -20,9 +20,10 @@ from mutator.mutants.readable_diffs import readable
 from mutator.outcomes.columns import is_text
 from mutator.outcomes.ranking import worst
 from mutator.outcomes.rows import Row, lines_of, row_from
+from mutator.report.panel import FOLDER
 from mutator.report.paths import FoundPaths
 from mutator.report.scenes import scene_facts
-from mutator.report.series import sample_kept_traces, series_facts
+from mutator.report.series import series_facts
 from mutator.report.source_lines import SourceLines
 from mutator.report.studies import ReportedRun
 from mutator.report.warnings import warning
@@ -57,12 +58,10 @@ class Browse:
 def browse_data(run: ReportedRun) -> Browse:
     """The page data of a run. Paths in it are relative to the report's folder."""
     folder, workspace = run.folder, run.workspace
-    if workspace:
-        sample_kept_traces(folder, workspace)
     rows, lines = _listed(run)
     table_, details_ = _tables(run, rows, lines)
     data: dict[str, Any] = {"table": table_, "details": details_}
-    data["media"] = media(folder, run.out, STILLS_BYTES)
+    data["media"] = media(folder, folder.path / FOLDER, STILLS_BYTES)
     if run.paths:
         data["paths"] = run.paths.data([row.experiment_id for row in rows])
     facts = {

@@ -3,11 +3,10 @@
 The only inputs are the run folder and the fault library. Equal inputs give equal bytes.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from mutator._common.files import write_atomic
 from mutator._common.processes import beside, processes_for
 from mutator._common.tables import Table
 from mutator._common.text import counted
@@ -15,14 +14,17 @@ from mutator.outcomes.counting import outcome_counts
 from mutator.outcomes.reader import Results
 from mutator.report.browse import Browse, browse_data
 from mutator.report.page import Content, markdown, page_html, study_html, study_markdown
-from mutator.report.panel import FOLDER, Panel
+from mutator.report.panel import FOLDER
 from mutator.report.panels import PANELS, study_panels
 from mutator.report.panels.answers import answers_panel
-from mutator.report.stamp import is_current, made_from, remove_stamp, write_stamp
+from mutator.report.series import sample_kept_traces
+from mutator.report.stamp import is_current, made_from, write_files
 from mutator.report.studies import ReportedRun
 from mutator.report.words import words_of
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
+
+MARKDOWN, PAGE = "REPORT.md", "index.html"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,54 +38,56 @@ class Report:
     summaries: tuple[Table, ...] = ()
 
 
-STUDY_FILES = ("STUDY.md", "study.html")  # written only if the study has panels for this run
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Built:
+    """A report in memory: its `files` by name in the report's folder, of which REPORT.md and index.html
+    always exist."""
+
+    files: Mapping[str, bytes]
+    rows: int
+    summaries: tuple[Table, ...]
 
 
 def ensure(run: Path, workspace: Workspace | None) -> Report:
     """Write the report of a run folder unless it is up to date."""
-    folder, out = RunFolder.open(run), run / FOLDER
-    if is_current(out, made_from(folder, workspace)):
-        text, hypertext = _files(out)
-        return Report(markdown=text, page=hypertext, rows=Results.of_run(run).count())
-    return write(run, workspace)
+    if not is_current(run, made_from(RunFolder.open(run), workspace)):
+        return write(run, workspace)
+    return _report(run, Results.of_run(run).count())
 
 
 def write(run: Path, workspace: Workspace | None) -> Report:
-    """Write the report of a run folder whose results.csv is up to date.
+    """Write the report of a run folder whose results.csv is up to date, and missing series of kept traces.
 
     Without a workspace, no experiments are rerun and no published numbers are shown.
     """
     folder = RunFolder.open(run)
-    out = run / FOLDER
-    out.mkdir(exist_ok=True)
-    remove_stamp(out)
+    if workspace:
+        sample_kept_traces(folder, workspace)
     sources = made_from(folder, workspace)
+    built = build(folder, workspace)
+    write_files(run, sources, built.files)
+    return _report(run, built.rows, built.summaries)
+
+
+def build(folder: RunFolder, workspace: Workspace | None) -> Built:
+    """Build the report of a run folder whose results.csv is up to date, without writing anything."""
     reported = ReportedRun.open(folder, workspace)
     with beside(lambda: browse_data(reported), processes_for(len(reported.texts))) as browse:
         study = study_panels(reported)
         content = _content(replace(reported, compared=bool(study)), browse)
-    text, hypertext = _files(out)
-    _write_study(content, study, out)
-    write_atomic(text, markdown(content).encode())
-    write_atomic(hypertext, page_html(content).encode())
-    write_stamp(out, sources)
-    summaries = tuple(panel.summary for panel in (*content.panels, *study) if panel.summary)
-    return Report(markdown=text, page=hypertext, rows=len(reported.texts), summaries=summaries)
+    panels = (*content.panels, *study)
+    files = {name: data for panel in panels for name, data in panel.files.items()}
+    files |= {MARKDOWN: markdown(content).encode(), PAGE: page_html(content).encode()}
+    if study:
+        files |= {"STUDY.md": study_markdown(content, study).encode()}
+        files |= {"study.html": study_html(content, study).encode()}
+    summaries = tuple(panel.summary for panel in panels if panel.summary)
+    return Built(files=files, rows=len(reported.texts), summaries=summaries)
 
 
-def _write_study(content: Content, panels: Sequence[Panel], out: Path) -> None:
-    """Write the study's page, or remove that of an earlier report."""
-    text, hypertext = (out / name for name in STUDY_FILES)
-    if not panels:
-        text.unlink(missing_ok=True)
-        hypertext.unlink(missing_ok=True)
-        return
-    write_atomic(text, study_markdown(content, panels).encode())
-    write_atomic(hypertext, study_html(content, panels).encode())
-
-
-def _files(out: Path) -> tuple[Path, Path]:
-    return out / "REPORT.md", out / "index.html"
+def _report(run: Path, rows: int, summaries: tuple[Table, ...] = ()) -> Report:
+    out = run / FOLDER
+    return Report(markdown=out / MARKDOWN, page=out / PAGE, rows=rows, summaries=summaries)
 
 
 def _content(run: ReportedRun, browse: Callable[[], Browse]) -> Content:

@@ -1,7 +1,8 @@
 """Panels: the parts of a report, each in Markdown and in HTML."""
 
 import re
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from mutator._common.tables import Table
@@ -15,13 +16,14 @@ FOLDER = "report"  # the report's folder in a run folder
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Panel:
     """One part of a report. `link` is its name in the navigation bar, `summary` the table that the command
-    line shows, `style` a CSS file that it needs."""
+    line shows, `style` a CSS file that it needs. `files` are written next to the report, by name."""
 
     anchor: str  # its id on the page
     link: str
     markdown: str
     html: "Markup"
     summary: Table | None = None
+    files: Mapping[str, bytes] = field(default_factory=dict)
     style: str = ""
 
 

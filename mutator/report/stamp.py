@@ -1,67 +1,106 @@
 """Digests of a report's inputs and files, so that resuming a complete run does not rewrite the report."""
 
+import os
+from collections.abc import Iterator, Mapping
+from functools import cache
 from pathlib import Path
+from typing import Any
 
-from mutator._common.files import read_json, write_json
+from mutator._common.below import check_name, read_below, unlink_below, write_below
+from mutator._common.files import json_bytes, json_object
 from mutator._common.hashing import digest
 from mutator._common.version import VERSION
 from mutator.errors import MutatorError
-from mutator.outcomes.reader import Results
+from mutator.report.panel import FOLDER
 from mutator.report.series import series_facts
-from mutator.review import gate
 from mutator.store import digests
 from mutator.store import series as series_store
 from mutator.store.run_folder import RunFolder
-from mutator.store.run_head import HEAD
-from mutator.verification import equivalence
 from mutator.workspace import Workspace
 
 SCHEMA = "report/1"
-FILE = "made_from.json"
+FILE = f"{FOLDER}/made_from.json"
+_NOT_READ = {
+    FOLDER,
+    "damaged",
+    "exports",
+    "traces",
+    "workers",
+    series_store.FOLDER,
+}  # folders in a run folder
+_LINKED = (".mp4", ".gif")  # the report contains only the names of such files
 
 
 def made_from(folder: RunFolder, workspace: Workspace | None) -> str:
     """The digest of all inputs of a report, including the sources of mutator."""
     run = folder.path
-    plots = sorted(path.name for path in (run / "plots").glob("*"))
-    series = [series_facts(folder), _files(run, f"{series_store.FOLDER}/{series_store.INDEX}.js")]
-    references = _files(workspace.library / "references", "*.yaml") if workspace else None
-    sources = Path(__file__).parents[1]
-    own = [VERSION, _files(sources, "**/*.py"), _files(sources / "web", "*.*")]
-    results = [digests.sha256(run / HEAD), digests.sha256(Results.of_run(run).path)]
-    # Records are inputs because the equivalence check compares more than the results contain.
-    engine = [_files(run / name, "*.jsonl") for name in ("records", "timings", equivalence.FOLDER)]
-    sealed = [_files(run, name) for name in (gate.FILE, digests.FILE)]
-    return digest([SCHEMA, own, results, engine, plots, series, references, *sealed])
+    series = [series_facts(folder), digests.sha256(run / series_store.FOLDER / f"{series_store.INDEX}.js")]
+    return digest([SCHEMA, _sources(), list(_files_of(run)), series, _library(folder, workspace)])
 
 
-def is_current(out: Path, made_from: str) -> bool:
-    """Whether the report in `out` was made from these inputs and has not changed since."""
-    try:
-        stamp = read_json(out / FILE, SCHEMA)
-    except MutatorError:  # unreadable, so the report is written again
+def is_current(run: Path, made_from: str) -> bool:
+    """Whether the report of a run was made from these inputs and has not changed since."""
+    stamp = _stamp(run)
+    if stamp.get("made_from") != made_from or not stamp["files"]:
         return False
-    return (stamp.get("made_from"), stamp.get("files")) == (made_from, _written(out))
+    try:
+        return all(
+            digest(read_below(run, f"{FOLDER}/{name}")) == wanted for name, wanted in stamp["files"].items()
+        )
+    except (OSError, MutatorError):
+        return False
 
 
-def write_stamp(out: Path, made_from: str) -> None:
-    """Record the digests. Call this last."""
-    write_json(out / FILE, {"schema": SCHEMA, "made_from": made_from, "files": _written(out)})
+def write_files(run: Path, made_from: str, files: Mapping[str, bytes]) -> None:
+    """Write a report and its digests. Delete files of the report before that are no longer part of it."""
+    for name in _stamp(run)["files"].keys() - files.keys():
+        unlink_below(run, f"{FOLDER}/{name}")
+    for name, data in files.items():
+        write_below(run, f"{FOLDER}/{name}", data)
+    written = {name: digest(data) for name, data in sorted(files.items())}
+    stamp = {"schema": SCHEMA, "made_from": made_from, "files": written}
+    write_below(run, FILE, json_bytes(stamp))  # last, so that an interrupted report does not pass as current
 
 
-def _written(out: Path) -> dict[str, str]:
-    paths = {path.relative_to(out): path for path in out.rglob("*") if path.is_file()}
-    return {
-        name.as_posix(): digest(path.read_bytes())
-        for name, path in sorted(paths.items())
-        if name.as_posix() != FILE and not name.parts[0].startswith("compare-")
-    }
+def _stamp(run: Path) -> dict[str, Any]:
+    """The stamp of the report before; without files if it cannot be read."""
+    try:
+        stamp = json_object(read_below(run, FILE), run / FILE, SCHEMA)
+        if isinstance(files := stamp.get("files"), dict):
+            for name in files:
+                check_name(name, run / FILE)
+            return stamp
+    except (OSError, MutatorError):
+        pass
+    return {"files": {}}
 
 
-def remove_stamp(out: Path) -> None:
-    """Remove the stamp, so that an interrupted report does not pass as complete."""
-    (out / FILE).unlink(missing_ok=True)
+@cache
+def _sources() -> object:
+    root = Path(__file__).parents[1]
+    return [VERSION, _digests(root, "**/*.py"), _digests(root / "web", "*.*")]
 
 
-def _files(folder: Path, pattern: str) -> list[tuple[str, str]]:
+def _files_of(run: Path) -> Iterator[tuple[str, str]]:
+    for place, folders, names in os.walk(run):
+        inside = Path(place).relative_to(run)
+        folders[:] = sorted({*folders} - _NOT_READ) if inside == Path() else sorted(folders)
+        for path in (inside / name for name in sorted(names) if not name.startswith(".")):
+            yield path.as_posix(), "" if path.suffix in _LINKED else digests.sha256(run / path)
+
+
+def _library(folder: RunFolder, workspace: Workspace | None) -> object:
+    """The digests of what a report reads of a library and of the run's target."""
+    if workspace is None:
+        return None
+    files = [
+        facts for facts in _digests(workspace.library, "**/*.yaml") if not facts[0].startswith("reviews/")
+    ]
+    try:
+        return [files, workspace.manifest(folder.head["target"]).tree.digest]
+    except (MutatorError, KeyError):
+        return [files, None]
+
+
+def _digests(folder: Path, pattern: str) -> list[tuple[str, str]]:
     return sorted((p.relative_to(folder).as_posix(), digests.sha256(p)) for p in folder.glob(pattern))

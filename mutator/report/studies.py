@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 from mutator.campaigns.studies import find_study
@@ -15,7 +14,7 @@ from mutator.outcomes.paths import ways_of
 from mutator.outcomes.reader import Results
 from mutator.outcomes.rows import Row
 from mutator.report.engines import EngineSummary, engine_summary
-from mutator.report.panel import FOLDER, Panel
+from mutator.report.panel import Panel
 from mutator.report.paths import FoundPaths
 from mutator.report.seen import COURSE, PLACE, Seen
 from mutator.report.source_lines import SourceLines
@@ -74,10 +73,6 @@ class ReportedRun:
         return Results.of_run(self.folder.path).rows()
 
     @property
-    def out(self) -> Path:
-        return self.folder.path / FOLDER
-
-    @property
     def done(self) -> int:
         """The number of planned experiments that ran."""
         return int((self.texts["status"] != Status.HARNESS_ERROR.value).sum())
@@ -112,7 +107,7 @@ class Study:
     """Published work with which runs are compared, provided by an entry point in `mutator.studies`. `about`
     cites it. `check` finds problems in its data in a fault library. `published` returns the counts to show
     next to those of a run, or None if they do not apply. Each function in `panels` can return a panel of
-    the study's page and write files next to it. If none returns a panel, there is no page. `drawings`
+    the study's page, with files next to it. If none returns a panel, there is no page. `drawings`
     returns the figures of that page."""
 
     about: str

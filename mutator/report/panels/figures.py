@@ -1,9 +1,8 @@
-"""The panel of a run's figures. The figures are written as files, and both forms of the report show them."""
+"""The panel of a run's figures. They are also files, and both forms of the report show them."""
 
 import base64
-from pathlib import Path
 
-from mutator.figures.figures import Drawing, drawings, write_drawings
+from mutator.figures.figures import Drawing, drawing_files, drawings
 from mutator.figures.style import themed
 from mutator.report.panel import Panel, rendered
 from mutator.report.studies import ReportedRun
@@ -25,28 +24,28 @@ _HTML = """\
 
 def figures_panel(run: ReportedRun) -> Panel | None:
     """The panel of figures over all results; None if there are none."""
-    return _panel(drawings(run.frame), run)
+    return _panel(drawings(run.frame))
 
 
 def study_figures(run: ReportedRun) -> Panel | None:
     """The panel of figures that the run's study adds; None if there are none."""
-    return _panel(run.study.drawings(run), run) if run.study else None
+    return _panel(run.study.drawings(run)) if run.study else None
 
 
-def _panel(made: tuple[Drawing, ...], run: ReportedRun) -> Panel | None:
-    write_drawings(made, run.out)
+def _panel(made: tuple[Drawing, ...]) -> Panel | None:
     if not made:
         return None
+    files = drawing_files(made)
     parts = ["## Figures"]
     for drawing in made:
         parts += [f"### {drawing.title}", drawing.note]
         parts += [f"{what}: `{code}`" for what, code in drawing.codes]
         if drawing.figure is not None:
             parts.append(f"![{drawing.title}]({drawing.link('svg')})")
-    html = rendered(_HTML, drawings=made, picture=lambda drawing: _embedded(run.out / drawing.link("svg")))
-    return Panel(anchor="figures", link="Figures", markdown="\n\n".join(parts), html=html)
+    html = rendered(_HTML, drawings=made, picture=lambda drawing: _embedded(files[drawing.link("svg")]))
+    return Panel(anchor="figures", link="Figures", markdown="\n\n".join(parts), html=html, files=files)
 
 
-def _embedded(path: Path) -> str:
-    svg = themed(path.read_text(encoding="utf-8"))
+def _embedded(image: bytes) -> str:
+    svg = themed(image.decode())
     return f"data:image/svg+xml;base64,{base64.b64encode(svg.encode()).decode()}"

@@ -6,7 +6,7 @@ from dataclasses import replace
 from mutator.model import OPERATORS
 from mutator.outcomes.fault_free import alerts_by_drive
 from mutator.report.panel import Panel, rendered
-from mutator.report.panels.tables import write_sheets
+from mutator.report.panels.tables import sheet_files
 from mutator.report.studies import ReportedRun
 from mutator.statistics.mutation_score import score_sheet
 from mutator.statistics.sheet import Sheet
@@ -24,7 +24,7 @@ _HTML = """\
 
 
 def score_panel(run: ReportedRun) -> Panel | None:
-    """The panel with the shares in total and by operator. This also writes tables/mutation_score.csv."""
+    """The panel with the shares in total and by operator."""
     if not (run.texts["module"] == OPERATORS).any():
         return None
     runs = run.fault_free()
@@ -34,10 +34,14 @@ def score_panel(run: ReportedRun) -> Panel | None:
         alerts_by_drive(runs) if runs else None,
         run.folder.head.get("operators", ()),
     )
-    write_sheets([score], run.out)
     html = rendered(_HTML, score=score, general=_part(score, False), functions=_part(score, True))
     return Panel(
-        anchor="score", link="Score", markdown=score.markdown().rstrip(), html=html, style="source.css"
+        anchor="score",
+        link="Score",
+        markdown=score.markdown().rstrip(),
+        html=html,
+        style="source.css",
+        files=sheet_files([score]),
     )
 
 

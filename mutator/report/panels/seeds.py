@@ -2,7 +2,7 @@
 
 from mutator._common.tables import Table
 from mutator.report.panel import Panel, rendered
-from mutator.report.panels.tables import write_sheets
+from mutator.report.panels.tables import sheet_files
 from mutator.report.studies import ReportedRun
 from mutator.statistics.seeds import ALL, kinds_sheet, seeds_of, seeds_sheet
 from mutator.statistics.sheet import Sheet, text_of
@@ -21,16 +21,22 @@ _HTML = """\
 
 
 def seeds_panel(run: ReportedRun) -> Panel | None:
-    """The panel with the spread of each share between seeds. This also writes its tables."""
+    """The panel with the spread of each share between seeds."""
     seeds = seeds_of(run.frame)
     if len(seeds) < 2:
         return None
     sheets = (seeds_sheet(run.frame, alerts=run.folder.has_alerts), kinds_sheet(run.frame))
-    write_sheets(sheets, run.out)
     about = f"{len(seeds)} seeds ({seeds[0]} to {seeds[-1]}). Each seed repeats the campaign with new draws."
     markdown = "\n\n".join(["## Seeds", about, *(f"#{sheet.markdown().rstrip()}" for sheet in sheets)])
     html = rendered(_HTML, about=about, sheets=sheets)
-    return Panel(anchor="seeds", link="Seeds", markdown=markdown, html=html, summary=_summary(sheets[0]))
+    return Panel(
+        anchor="seeds",
+        link="Seeds",
+        markdown=markdown,
+        html=html,
+        summary=_summary(sheets[0]),
+        files=sheet_files(sheets),
+    )
 
 
 def _summary(sheet: Sheet) -> Table:

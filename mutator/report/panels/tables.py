@@ -1,11 +1,9 @@
-"""The panels of counts and statistics. The statistics are also written as files."""
+"""The panels of counts and statistics. The statistics are also files."""
 
-from collections.abc import Sequence
+from collections.abc import Collection
 from dataclasses import replace
 from operator import itemgetter
-from pathlib import Path
 
-from mutator._common.files import write_atomic
 from mutator._common.tables import Table
 from mutator.outcomes.counting import counts_by, hazard_names, kinds
 from mutator.outcomes.fault_free import fault_free_table, own_alerts
@@ -70,7 +68,6 @@ def tables_panel(run: ReportedRun) -> Panel:
     note = own_alerts(runs)
     own = () if run.compared else _statistics(run, None)
     counts, sheets = _counts(run), [_noted(sheet, note) for sheet in (*own, *_spreads(run))]
-    write_sheets(sheets, run.out)
     parts = [notes(run.folder)]
     for title, table in counts:
         parts += filter(None, (f"## {title}", note, table.as_markdown()))
@@ -87,7 +84,13 @@ def tables_panel(run: ReportedRun) -> Panel:
         about=FAULT_FREE,
         sheets=sheets,
     )
-    return Panel(anchor="tables", link="Tables", markdown="\n\n".join(parts), html=html)
+    return Panel(
+        anchor="tables",
+        link="Tables",
+        markdown="\n\n".join(parts),
+        html=html,
+        files=sheet_files(sheets),
+    )
 
 
 def published_panel(run: ReportedRun) -> Panel | None:
@@ -97,11 +100,10 @@ def published_panel(run: ReportedRun) -> Panel | None:
     sheets = [_noted(sheet, note) for sheet in _statistics(run, published)]
     if not sheets:
         return None
-    write_sheets(sheets, run.out)
     title = "Tables next to the published ones"
     markdown = "\n\n".join([f"## {title}", *(f"#{sheet.markdown().rstrip()}" for sheet in sheets)])
     html = rendered(_HTML, title=title, counts=(), fault_free=None, sheets=sheets)
-    return Panel(anchor="tables", link="Tables", markdown=markdown, html=html)
+    return Panel(anchor="tables", link="Tables", markdown=markdown, html=html, files=sheet_files(sheets))
 
 
 def _counts(run: ReportedRun) -> list[tuple[str, Table]]:
@@ -135,13 +137,11 @@ def _noted(sheet: Sheet, note: str) -> Sheet:
     return replace(sheet, note=f"{sheet.note} {note}")
 
 
-def write_sheets(sheets: Sequence[Sheet], out: Path) -> None:
-    """Write each table as `out`/tables/<name>.csv and <name>.md."""
-    for sheet in sheets:
-        write_csv(sheet, out)
-        write_atomic(out / FOLDER / f"{sheet.name}.md", sheet.markdown().encode())
+def sheet_files(sheets: Collection[Sheet]) -> dict[str, bytes]:
+    """Each table as tables/<name>.csv and <name>.md."""
+    texts = {f"{FOLDER}/{sheet.name}.md": sheet.markdown().encode() for sheet in sheets}
+    return texts | csv_files(sheets)
 
 
-def write_csv(sheet: Sheet, out: Path) -> None:
-    (out / FOLDER).mkdir(parents=True, exist_ok=True)
-    write_atomic(out / FOLDER / f"{sheet.name}.csv", sheet.csv().encode())
+def csv_files(sheets: Collection[Sheet]) -> dict[str, bytes]:
+    return {f"{FOLDER}/{sheet.name}.csv": sheet.csv().encode() for sheet in sheets}

@@ -11,7 +11,7 @@ import pytest
 
 from mutator.campaigns.plans import Choices
 from mutator.execution.running import run_campaign
-from mutator.figures.figures import Drawing, write_drawings
+from mutator.figures.figures import Drawing, drawing_files
 from mutator.paper.actions import WANTED, Pair, Wanted
 from mutator.paper.examples import candidates, example_drawings
 from mutator.report import building
@@ -89,19 +89,16 @@ def test_rewriting_a_report_starts_no_process(place: Path, monkeypatch: pytest.M
     assert not (place / "run" / "traces").exists()
 
 
-def test_a_figure_needs_only_the_stored_series(place: Path, tmp_path: Path) -> None:
+def test_a_figure_needs_only_the_stored_series(place: Path) -> None:
     contents = []
     for _ in range(2):
-        write_drawings([drawn(place, BRAKE)], tmp_path)
-        contents.append([(tmp_path / "figures" / f"brake.{kind}").read_bytes() for kind in ("svg", "png")])
+        contents.append(drawing_files([drawn(place, BRAKE)]))
         edit_target(place)
     assert contents[0] == contents[1]
+    assert contents[0].keys() == {"figures/brake.svg", "figures/brake.png"}
 
 
-def test_a_missing_input_is_reported_instead_of_a_figure(place: Path, tmp_path: Path) -> None:
-    for kind in ("svg", "png"):
-        (tmp_path / "figures").mkdir(exist_ok=True)
-        (tmp_path / "figures" / f"brake.{kind}").touch()
+def test_a_missing_input_is_reported_instead_of_a_figure(place: Path) -> None:
     series = place / "run" / "series"
     for path in series.glob(f"{16 * '[0-9a-f]'}.js"):
         path.write_bytes(path.read_bytes()[:-40])
@@ -109,8 +106,7 @@ def test_a_missing_input_is_reported_instead_of_a_figure(place: Path, tmp_path: 
     shutil.rmtree(series)
     without = drawn(place, BRAKE)
     assert "no series of " in without.note
-    write_drawings([without], tmp_path)
-    assert list((tmp_path / "figures").iterdir()) == []
+    assert drawing_files([without]) == {}
     shutil.rmtree(place / "toy" / "tree")
     assert drawn(place, BRAKE).note.startswith("No figure: ")
     run = place / "run"

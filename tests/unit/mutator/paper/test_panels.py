@@ -29,7 +29,6 @@ def test_claims_about_all_faults_need_the_whole_plan(
     shutil.copytree(REFERENCES, toycar.library / "references")
     freeze(make_plan(toycar, "small", Choices(shard=shard)), tmp_path / "run", toycar)
     folder = RunFolder.open(tmp_path / "run")
-    (folder.path / "report").mkdir()
     kinds = [kind.split("/") for _, kind in load_paper(REFERENCES).coverage]
     against = {
         "module": "vision_output",
@@ -50,8 +49,9 @@ def test_claims_about_all_faults_need_the_whole_plan(
     for done in (folder.planned - 1, folder.planned):
         texts = pd.DataFrame({"status": ["ok"] * done})
         run = ReportedRun(folder=folder, workspace=toycar, texts=texts, frame=frame, study=None, seen=SEEN)
-        assert observations_panel(run) is not None
-        text = (folder.path / "report" / "observations.md").read_text()
+        panel = observations_panel(run)
+        assert panel is not None
+        text = panel.files["observations.md"].decode()
         why = f"not enough data: only {done} of 12 planned experiments were run"
         assert text.count(why) == (0 if done == 12 else of_all)
 
@@ -65,4 +65,3 @@ def test_a_report_without_activated_faults_of_the_paper_has_no_observations(
     frame = results({"module": "radar", "fault_type": "chaff"})
     run = ReportedRun(folder=folder, workspace=toycar, texts=frame, frame=frame, study=None, seen=SEEN)
     assert observations_panel(run) is None
-    assert not (folder.path / "report").exists()

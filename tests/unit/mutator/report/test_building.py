@@ -5,22 +5,25 @@ import csv
 import gzip
 import json
 import re
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from mutator._common.below import Outside
 from mutator._common.files import write_json
 from mutator.errors import MutatorError
 from mutator.figures.style import themed
 from mutator.report import building
 from mutator.report.panels import failed
 from mutator.review import gate
-from mutator.store.run_folder import STOP_NOTE
+from mutator.store.run_folder import STOP_NOTE, RunFolder
 from mutator.workspace import Workspace
 
 from .made_run import COLUMNS, HEAD, OK, PATCH, Page, make_run
 
+STAMPS = ('{"schema": "report/1", "files": 1}', '{"schema": "report/1", "files": {"../run.json": ""}}')
 HERE = Workspace.find(Path(__file__).parents[4])
 
 
@@ -165,21 +168,51 @@ def test_an_up_to_date_report_is_not_written_again(run: Path) -> None:
     assert drawn_again(run, HERE)
 
 
-@pytest.mark.parametrize("name", ["REPORT.md", "index.html", "figures/a.svg", "tables/a.csv"])
+@pytest.mark.parametrize("name", ["REPORT.md", "index.html", "tables/fault_tolerant_times.csv"])
 def test_a_report_that_was_edited_is_written_again(run: Path, name: str) -> None:
     out = run / "report"
-    for folder in ("figures", "tables", "compare-other"):
-        (out / folder).mkdir(parents=True)
-    for folder, file in (("figures", "a.svg"), ("tables", "a.csv")):
-        (out / folder / file).write_text("written")
     building.write(run, None)
+    (out / "compare-other").mkdir()
     (out / "compare-other" / "index.html").write_text("another command's")
     assert not drawn_again(run, None)
     (out / name).write_text((out / name).read_text() + "edited")
     assert drawn_again(run, None)
 
 
-@pytest.mark.parametrize("text", ["{", "[1]", '{"schema": "report/1"}', '{"schema": "report/1", "files": 1}'])
+def test_a_report_can_be_built_without_writing(run: Path) -> None:
+    built = building.build(RunFolder.open(run), None)
+    assert not (run / "report").exists()
+    building.write(run, None)
+    out = run / "report"
+    written = {path.relative_to(out).as_posix(): path.read_bytes() for path in out.rglob("*.*")}
+    del written["made_from.json"]
+    assert written == built.files
+
+
+def test_files_of_an_earlier_report_are_deleted(run: Path) -> None:
+    """A report of other results can have fewer tables. Files that no report wrote are kept."""
+    out = run / "report"
+    building.write(run, None)
+    (out / "tables" / "mine.csv").touch()
+    results = run / "results.csv"
+    results.write_text("".join(results.read_text().splitlines(keepends=True)[:1]))
+    building.write(run, None)
+    assert [path.name for path in (out / "tables").iterdir()] == ["mine.csv"]
+
+
+@pytest.mark.parametrize("name", ["report", "report/tables", "report/index.html"])
+def test_a_report_is_not_written_through_a_link(run: Path, tmp_path: Path, name: str) -> None:
+    elsewhere = tmp_path / "elsewhere"
+    building.write(run, None)
+    (run / name).rename(elsewhere)
+    (run / name).symlink_to(elsewhere)
+    before = {path: path.stat().st_mtime_ns for path in (elsewhere, *elsewhere.rglob("*"))}
+    with suppress(Outside):
+        building.write(run, None)
+    assert before == {path: path.stat().st_mtime_ns for path in (elsewhere, *elsewhere.rglob("*"))}
+
+
+@pytest.mark.parametrize("text", ["{", "[1]", '{"schema": "report/1"}', *STAMPS])
 def test_a_damaged_list_of_inputs_causes_a_new_report(run: Path, text: str) -> None:
     building.write(run, None)
     (run / "report" / "made_from.json").write_text(text)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from markupsafe import escape
 
+from mutator.report.panel import Panel
 from mutator.report.panels.tables import tables_panel
 from mutator.report.studies import ReportedRun
 from mutator.store import plan_file
@@ -32,31 +33,27 @@ def run(tmp_path: Path) -> RunFolder:
     return RunFolder.unverified(tmp_path)
 
 
-def names(run: RunFolder, suffix: str) -> set[str]:
-    return {file.stem for file in (run.path / "report" / "tables").glob(f"*.{suffix}")}
+def names(panel: Panel, suffix: str) -> set[str]:
+    return {Path(name).stem for name in panel.files if name.endswith(suffix)}
 
 
 def test_every_table_is_written_in_csv_and_markdown(run: RunFolder) -> None:
-    markdown = tables_panel(ReportedRun.open(run, HERE)).markdown
-    assert "alert_to_hazard" in names(run, "md") == names(run, "csv")
-    for file in (run.path / "report" / "tables").glob("*.md"):
-        assert file.read_text().rstrip() in markdown
+    panel = tables_panel(ReportedRun.open(run, HERE))
+    assert "alert_to_hazard" in names(panel, "md") == names(panel, "csv")
+    for name, data in panel.files.items():
+        assert name.endswith(".csv") or data.decode().rstrip() in panel.markdown
 
 
 def test_without_a_library_no_time_is_censored(run: RunFolder) -> None:
     """Without the target's manifest, the ends of runs are unknown."""
-    tables_panel(ReportedRun.open(run, None))
-    assert "propagation" in names(run, "csv")
-    assert "alert_to_hazard" not in names(run, "csv")
+    panel = tables_panel(ReportedRun.open(run, None))
+    assert "propagation" in names(panel, "csv")
+    assert "alert_to_hazard" not in names(panel, "csv")
 
 
 def test_tables_are_reproducible(run: RunFolder) -> None:
-    contents = []
-    for _ in range(2):
-        tables_panel(ReportedRun.open(run, HERE))
-        files = (run.path / "report" / "tables").iterdir()
-        contents.append({file.name: file.read_bytes() for file in files})
-    assert contents[0] == contents[1]
+    panel, again = (tables_panel(ReportedRun.open(run, HERE)) for _ in range(2))
+    assert panel.files == again.files
 
 
 def test_tables_of_alerts_mention_the_alerts_of_fault_free_runs(run: RunFolder) -> None:
@@ -70,8 +67,8 @@ def test_tables_of_alerts_mention_the_alerts_of_fault_free_runs(run: RunFolder) 
     note = "Not every alert is caused by a fault: fault-free runs raise steer_saturated in S1."
     assert panel.html.count(str(escape(note))) == panel.markdown.count(note) >= 6
     assert "| S1 | steer_saturated at 12.29 s | none | 1 to 1 |" in panel.markdown
-    assert note in (run.path / "report" / "tables" / "summary_guided.md").read_text()
-    assert note not in (run.path / "report" / "tables" / "hazard_orders.md").read_text()
+    assert note in panel.files["tables/summary_guided.md"].decode()
+    assert note not in panel.files["tables/hazard_orders.md"].decode()
 
 
 @pytest.mark.parametrize("alerts", [["fcw"], []])
