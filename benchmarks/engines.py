@@ -23,7 +23,7 @@ sys.path.insert(0, str(ROOT))
 from mutator.campaigns.plans import Choices, Plan, make_plan  # noqa: E402
 from mutator.engines.fork import ForkEngine  # noqa: E402
 from mutator.engines.jobs import Engine, Job  # noqa: E402
-from mutator.engines.reference import ReferenceEngine, prepare_base  # noqa: E402
+from mutator.engines.reference import ReferenceEngine  # noqa: E402
 from mutator.execution.runner import Finished, Goldens, Runner  # noqa: E402
 from mutator.model import Experiment, Record  # noqa: E402
 from mutator.mutants.building import build  # noqa: E402
@@ -54,9 +54,8 @@ class Bench:
         self.plan = plan
         work = folder / "work"
         work.mkdir()
-        base = prepare_base(self.manifest, folder / "base")
         null = build(self.manifest, self.models, None, always()).files
-        arguments = (self.manifest, base, work, plan.campaign.limits)
+        arguments = (self.manifest, work, plan.campaign.limits)
         self.engines: dict[str, Callable[[], Engine]] = {
             "reference": lambda: ReferenceEngine(*arguments),
             "warm": lambda: ForkEngine(*arguments, null=null, warm=True),

@@ -28,7 +28,7 @@ sys.path.insert(0, str(ROOT))
 from mutator.campaigns.plans import Choices, make_plan  # noqa: E402
 from mutator.engines.fork import ForkEngine  # noqa: E402
 from mutator.engines.jobs import Job  # noqa: E402
-from mutator.engines.reference import ReferenceEngine, prepare_base  # noqa: E402
+from mutator.engines.reference import ReferenceEngine  # noqa: E402
 from mutator.execution.runner import Goldens, Runner  # noqa: E402
 from mutator.model import Experiment, Hold, Trigger  # noqa: E402
 from mutator.mutants.building import build  # noqa: E402
@@ -73,7 +73,7 @@ class Bench:
         self.work = folder / "work"
         self.work.mkdir()
         limits = make_plan(workspace, "paper", Choices(limit=1)).campaign.limits
-        self.common = (self.manifest, prepare_base(self.manifest, folder / "base"), self.work, limits)
+        self.common = (self.manifest, self.work, limits)
 
     def golden(self) -> float:
         """Return the CPU time (s) of the golden run minus that of a two-step run."""

@@ -16,7 +16,7 @@ from statistics import median
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from mutator.engines import bytecode  # noqa: E402
+from mutator.engines.base_tree import BaseTree  # noqa: E402
 from mutator.mutants.building import build  # noqa: E402
 from mutator.mutants.probe import probe_path  # noqa: E402
 from mutator.triggers.kinds import always  # noqa: E402
@@ -61,9 +61,10 @@ def main() -> int:
     null = build(manifest, workspace.fault_models(), None, always()).files
     (changed,) = null.keys() - {probe_path(manifest.package)}
     with tempfile.TemporaryDirectory() as folder:
+        base = BaseTree(manifest.tree, Path(folder))
         trees = {"pristine": Path(folder, "pristine"), "null mutant": Path(folder, "null")}
-        bytecode.write_compiled(manifest.tree.files, trees["pristine"])
-        bytecode.write_compiled({**manifest.tree.files, **null}, trees["null mutant"])
+        base.lay_out(trees["pristine"], {})
+        base.lay_out(trees["null mutant"], null)
         files = [str(tree / changed) for tree in trees.values()]
         command = [sys.executable, "-c", DRIVE, str(workspace.scenario("S1")), str(options.rounds), *files]
         environment = os.environ | {"PYTHONPATH": str(trees["null mutant"]), "OPENBLAS_NUM_THREADS": "1"}

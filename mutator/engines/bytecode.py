@@ -4,36 +4,55 @@ An ordinary .pyc is trusted if the source's size and modification time match, so
 after a change that keeps the file's size.
 """
 
-from collections.abc import Mapping
-from importlib.util import cache_from_source
+import marshal
+import sys
+from collections.abc import Iterable, Mapping
+from importlib.util import MAGIC_NUMBER, source_hash
 from pathlib import Path
-from py_compile import PycInvalidationMode, PyCompileError, compile
+
+from mutator.targets.source_tree import SourceTree
+
+_CHECKED_HASH = (0b11).to_bytes(4, "little")
 
 
-def write_compiled(files: Mapping[str, bytes], dest: Path) -> None:
-    """Write files (relative path -> content) to `dest`, with the bytecode of its Python files."""
+def with_bytecode(tree: SourceTree) -> dict[str, bytes]:
+    """Return the files of a tree (relative path -> content) and the bytecode of its Python files."""
+    found = dict(tree.files)
+    for name in tree.files:
+        if name.endswith(".py") and (code := tree.derived(name, _compiled)):
+            found[bytecode_of(name)] = code
+    return found
+
+
+def bytecode_of(name: str) -> str:
+    """Return the path of a Python file's bytecode."""
+    path = Path(name)
+    return str(path.parent / "__pycache__" / f"{path.stem}.{sys.implementation.cache_tag}.pyc")
+
+
+def write(files: Mapping[str, bytes], dest: Path) -> None:
+    """Write files to the folder `dest`, which can exist."""
+    for folder in {dest, *((dest / name).parent for name in files)}:
+        folder.mkdir(parents=True, exist_ok=True)
     for name, data in files.items():
-        path = dest / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(data)
-        if path.suffix == ".py":
-            _compile(path, name)
+        (dest / name).write_bytes(data)
 
 
 def put(files: Mapping[str, bytes], tree: Path) -> None:
-    """Replace files (or links) of a tree and delete their bytecode."""
-    for name, data in files.items():
-        path = tree / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.unlink(missing_ok=True)
-        path.write_bytes(data)
-        if path.suffix == ".py":
-            Path(cache_from_source(str(path))).unlink(missing_ok=True)
+    """Replace files of a tree and delete their bytecode."""
+    remove((*files, *map(bytecode_of, files)), tree)
+    write(files, tree)
 
 
-def _compile(path: Path, name: str) -> None:
+def remove(names: Iterable[str], tree: Path) -> None:
+    for name in names:
+        (tree / name).unlink(missing_ok=True)
+
+
+def _compiled(name: str, data: bytes, _: Path) -> bytes:
     """Compile a file. Errors are ignored, because importing the file reports them."""
     try:
-        compile(str(path), dfile=name, doraise=True, invalidation_mode=PycInvalidationMode.CHECKED_HASH)
-    except PyCompileError:
-        return
+        code = compile(data, name, "exec", dont_inherit=True, optimize=0)
+    except Exception:
+        return b""
+    return MAGIC_NUMBER + _CHECKED_HASH + source_hash(data) + marshal.dumps(code)

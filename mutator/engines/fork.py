@@ -48,7 +48,6 @@ class ForkEngine:
     def __init__(
         self,
         manifest: TargetManifest,
-        base: Path,
         work: Path,
         limits: Limits,
         parent: int | None = None,
@@ -56,7 +55,7 @@ class ForkEngine:
         null: Mapping[str, bytes],
         warm: bool = False,
     ) -> None:
-        self.reference = ReferenceEngine(manifest, base, work, limits, parent)
+        self.reference = ReferenceEngine(manifest, work, limits, parent)
         self._manifest = manifest
         self._limits = limits
         self._work = self.reference.work
@@ -137,7 +136,7 @@ class ForkEngine:
             self._pools += 1
             home = self._work / f"{os.getpid()}-server-{self._pools}"
             try:
-                self._pool = Pool(self._manifest, self.reference.base, home, self._parent)
+                self._pool = Pool(self._manifest, home, self._parent)
             except Refused as why:
                 self._unfit = why
                 raise
@@ -331,6 +330,4 @@ def make_warm(setting: Setting) -> ForkEngine:
 
 def _make(setting: Setting, *, warm: bool) -> ForkEngine:
     null = build(setting.manifest, setting.models, None, always()).files
-    return ForkEngine(
-        setting.manifest, setting.base, setting.work, setting.limits, setting.parent, null=null, warm=warm
-    )
+    return ForkEngine(setting.manifest, setting.work, setting.limits, setting.parent, null=null, warm=warm)

@@ -5,7 +5,6 @@ The target's side is fork_server.py.
 
 import marshal
 import os
-import shutil
 import socket
 import struct
 import subprocess
@@ -17,7 +16,9 @@ from pathlib import Path
 from typing import Any
 
 from mutator._common.files import remove_folder
-from mutator._common.hashing import digest
+from mutator._common.unchanged_files import UnchangedFiles
+from mutator.engines import bytecode
+from mutator.engines.base_tree import RunTree
 from mutator.engines.processes import end, environment, raised_in
 from mutator.engines.threads import too_many, turned_off
 from mutator.targets.manifest import TargetManifest
@@ -114,17 +115,19 @@ class Waiting:
 class Pool:
     """A fork server with its waiting processes, in the new scratch folder `home`.
 
-    The server uses a copy of the pristine tree `base`. Raises Refused if the target cannot be loaded or has
-    more than one thread, and Lost if the server ends without an answer.
+    Its tree has no bytecode, which a mutant could exchange before the server loads one more module. Raises
+    Refused if the target cannot be loaded or has more than one thread, and Lost if the server ends without an
+    answer, or if its tree is not the pristine one.
     """
 
-    def __init__(self, manifest: TargetManifest, base: Path, home: Path, parent: int | None) -> None:
+    def __init__(self, manifest: TargetManifest, home: Path, parent: int | None) -> None:
         assert manifest.stepwise is not None
         self.home = home
         self.tree = home / "tree"
         self._parent = parent
         self._waiting: list[Waiting] = []
-        shutil.copytree(base, self.tree)
+        bytecode.write(manifest.tree.files, self.tree)
+        self._files = RunTree(self.tree, manifest.tree.files, {})
         start = {
             "tree": str(self.tree),
             "home": str(home),
@@ -132,11 +135,13 @@ class Pool:
             "module": manifest.entry_module,
             "stepwise": manifest.stepwise,
         }
-        (home / "start.marshal").write_bytes(marshal.dumps(start))
+        told, data = home / "start.marshal", marshal.dumps(start)
+        told.write_bytes(data)
+        self._told = UnchangedFiles({str(told): data})
         ours, theirs = socket.socketpair()
         with theirs, (home / "log").open("wb") as log:
             self._process = subprocess.Popen(
-                [sys.executable, "-P", "-s", _SERVER, str(theirs.fileno()), str(home / "start.marshal")],
+                [sys.executable, "-P", "-s", _SERVER, str(theirs.fileno()), str(told)],
                 cwd=home,
                 stdin=subprocess.DEVNULL,
                 stdout=log,
@@ -147,21 +152,19 @@ class Pool:
             )
         self.first = Waiting(ours, parent)
         try:
-            self._welcome(manifest)
+            self._welcome()
         except BaseException:
             self.close()
             raise
 
-    def _welcome(self, manifest: TargetManifest) -> None:
+    def _welcome(self) -> None:
         said, _ = self.first.reply(_START_S)
         if "failed" in said:
             raise Refused(f"it cannot be loaded: {_why(said['failed'])}")
         if said["threads"]:
             others = said["threads"]
             raise Refused(f"once it is loaded, {too_many(others)}", turned_off(others))
-        pristine = {path: digest(data) for path, data in manifest.tree.files.items()}
-        loaded = {path: found for path, found in said["files"].items() if path in pristine}
-        if loaded != pristine:
+        if self._files.first_changed() or self._told.first_changed():
             raise Lost("the tree of the fork server is not the pristine one")
 
     def before(self, step: int, golden: Golden, modules: Sequence[str], patience_s: float) -> Waiting:

@@ -23,15 +23,15 @@ def unfit(manifest: TargetManifest) -> Refused | None:
     return Refused(why, stepwise) if why else None
 
 
-def not_loadable(manifest: TargetManifest, base: Path, home: Path) -> Refused | None:
+def not_loadable(manifest: TargetManifest, home: Path) -> Refused | None:
     """Load the target, and return why it cannot be forked; None if it can.
 
-    `base` is a pristine tree made by `prepare_base`, `home` a new scratch folder.
+    `home` is a new scratch folder.
     """
     if found := unfit(manifest):
         return found
     try:
-        Pool(manifest, base, home, None).close()
+        Pool(manifest, home, None).close()
     except Refused as why:
         return why
     except Lost as why:

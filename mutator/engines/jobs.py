@@ -125,13 +125,12 @@ class Engine(Protocol):
 class Setting:
     """The arguments of an engine's factory.
 
-    `base` is a pristine tree made by `prepare_base`, and never written to. `work` is an existing scratch
-    folder. If `parent` is a process id, the engine exits once that process is no longer its parent.
+    `work` is an existing scratch folder. If `parent` is a process id, the engine exits once that process is
+    no longer its parent.
     """
 
     manifest: TargetManifest
     models: FaultModels
-    base: Path
     work: Path
     limits: Limits
     parent: int | None = None

@@ -2,7 +2,6 @@
 
 import json
 import os
-import shutil
 import socket
 import subprocess
 import sys
@@ -13,7 +12,7 @@ from typing import Any
 
 from mutator._common.files import disk_full, raising_disk_full, remove_folder
 from mutator._common.hashing import digest
-from mutator.engines import bytecode
+from mutator._common.unchanged_files import UnchangedFiles
 from mutator.engines.base_tree import BaseTree
 from mutator.engines.jobs import Execution, Job, Raised, Setting
 from mutator.engines.processes import (
@@ -53,7 +52,6 @@ class ReferenceEngine:
     def __init__(
         self,
         manifest: TargetManifest,
-        base: Path,
         work: Path,
         limits: Limits,
         parent: int | None = None,
@@ -62,9 +60,8 @@ class ReferenceEngine:
     ) -> None:
         check_limits(limits)
         self.manifest = manifest
-        self.base = base.resolve()
-        self._base_tree = BaseTree(self.base)
         self.work = work.resolve()
+        self._base_tree = BaseTree(manifest.tree, self.work)
         self.limits = limits
         self._pristine = {path: digest(data) for path, data in manifest.tree.files.items()}
         self._parent = parent
@@ -79,18 +76,18 @@ class ReferenceEngine:
                 remove_folder(folder)
 
     def close(self) -> None:
-        """Do nothing, because no process is kept between jobs."""
+        self._base_tree.close()
 
     def execute(self, job: Job, folder: Path) -> Execution:
         """Run one job in the new scratch folder `folder`, which the caller deletes."""
         with raising_disk_full(self.work):
-            ended = self._run(self._prepare(job, folder), folder, job.hash_seed)
-            if self._base_tree.was_changed():  # by this run, or by another one at the same time
+            ended, changed = self._try(job, folder)
+            if changed:  # by this run, or by another one at the same time
                 remove_folder(folder)
-                ended = self._run(self._prepare(job, folder, linked=False), folder, job.hash_seed)
+                ended, changed = self._try(job, folder, new=True)
         log = tail(folder / "log")
         report = read_report(folder / "report.json", files=dict, modules=list)
-        status, detail = self._judge(job, ended, report)
+        status, detail = self._judge(job, ended, report, changed)
         if status is not Status.OK and is_full(self.work, report):
             raise disk_full(self.work)
         raised = raised_in(report) if report and status is Status.CRASHED else None
@@ -110,12 +107,26 @@ class ReferenceEngine:
             lines=report.get("lines", {}) if report else {},
         )
 
-    def _prepare(self, job: Job, folder: Path, *, linked: bool = True) -> Path:
-        tree, out = folder / "tree", folder / "out"
-        self._base_tree.lay_out(tree, linked=linked)
-        bytecode.put(job.files, tree)
-        out.mkdir()
+    def _try(self, job: Job, folder: Path, *, new: bool = False) -> tuple[Ended, str]:
+        """Run a job; return how it ended, and a file of its input that was changed meanwhile (or nothing).
+
+        With `new`, the job gets a tree that no earlier run has used.
+        """
+        tree = self._base_tree.lay_out(folder / "tree", job.files, new=new)
+        (folder / "out").mkdir()
         inactive(folder).touch()
+        request = json.dumps(self._request(job, folder)).encode()
+        path = folder / "job.json"
+        path.write_bytes(request)
+        given = UnchangedFiles({str(path): request})
+        ended = self._run(path, folder, job.hash_seed)
+        changed = tree.first_changed() or given.first_changed().removeprefix(f"{folder}/")
+        if not changed:
+            self._base_tree.take_back(tree)
+        return ended, changed
+
+    def _request(self, job: Job, folder: Path) -> dict[str, Any]:
+        out = folder / "out"
         arguments = self.manifest.arguments(
             scenario=job.scenario.resolve(),
             seed=job.seed,
@@ -123,9 +134,9 @@ class ReferenceEngine:
             changes=job.changes,
             independent=self._independent or self.manifest.reads_any(job.files),
         )
-        request = {
+        return {
             "home": str(folder),
-            "tree": str(tree),
+            "tree": str(folder / "tree"),
             "packages": list(self.manifest.import_names),
             "module": self.manifest.entry_module,
             "args": list(arguments),
@@ -144,9 +155,6 @@ class ReferenceEngine:
             "observe": self._observed() if job.watch or job.observe else None,
             "lines": self._observation() if job.lines else None,
         }
-        path = folder / "job.json"
-        path.write_text(json.dumps(request), encoding="utf-8")
-        return path
 
     def _observation(self) -> tuple[str, list[int]]:
         location = self.manifest.observation.location
@@ -194,8 +202,10 @@ class ReferenceEngine:
                     raise SystemExit("the process that started this one is gone") from None
         return b""
 
-    def _judge(self, job: Job, ended: Ended, report: dict[str, Any] | None) -> tuple[Status, str]:
-        if report is not None and (problem := self._wrong_tree(job, report)):
+    def _judge(
+        self, job: Job, ended: Ended, report: dict[str, Any] | None, changed: str
+    ) -> tuple[Status, str]:
+        if report is not None and (problem := self._wrong_tree(job, report, changed)):
             return Status.HARNESS_ERROR, problem
         status, detail = judge(self.limits, ended, report)
         if report is None or (status is not Status.OK and report["probe"] is None):
@@ -203,7 +213,7 @@ class ReferenceEngine:
         problem = job.problem_of(report["probe"])
         return (Status.HARNESS_ERROR, problem) if problem else (status, detail)
 
-    def _wrong_tree(self, job: Job, report: dict[str, Any]) -> str:
+    def _wrong_tree(self, job: Job, report: dict[str, Any], changed: str) -> str:
         """Return the problem with the tree that ran; empty if it was the job's."""
         if report["outside"]:
             return f"the target was also imported from {', '.join(report['outside'])}"
@@ -213,7 +223,7 @@ class ReferenceEngine:
         for path in sorted(expected.keys() | more):
             if report["files"].get(path) != expected.get(path):
                 return f"{path} in the tree that ran is not the one of this job"
-        return ""
+        return f"{changed} was changed while it was in use" if changed else ""
 
 
 def _steady(raised: Raised, folder: Path) -> Raised:
@@ -224,15 +234,4 @@ def _steady(raised: Raised, folder: Path) -> Raised:
 
 
 def make_reference(setting: Setting) -> ReferenceEngine:
-    return ReferenceEngine(setting.manifest, setting.base, setting.work, setting.limits, setting.parent)
-
-
-def prepare_base(manifest: TargetManifest, dest: Path) -> Path:
-    """Make the pristine tree with its bytecode in the folder `dest`, unless it exists; return it."""
-    if not dest.is_dir():
-        half = dest.with_name(f"{dest.name}.{os.getpid()}")
-        with raising_disk_full(dest):
-            shutil.rmtree(half, ignore_errors=True)
-            bytecode.write_compiled(manifest.tree.files, half)
-            half.rename(dest)
-    return dest
+    return ReferenceEngine(setting.manifest, setting.work, setting.limits, setting.parent)

@@ -24,7 +24,6 @@ from mutator.campaigns.freezing import make_run_folder
 from mutator.campaigns.plans import Choices
 from mutator.campaigns.provenance import add_machine, begin_stretch, check_versions
 from mutator.engines.kinds import REFERENCE
-from mutator.engines.reference import prepare_base
 from mutator.engines.registry import choose_engine, not_worth_forking
 from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK, MutatorError, MutatorWarning
 from mutator.execution.ended_runs import Ended, ended_before, keep_end
@@ -118,7 +117,7 @@ class Session:
         self._known: Ended | None = None
 
     def prepare(self) -> None:
-        """Find the work to do. If there is any, run the checks, create the pristine tree and begin a stretch.
+        """Find the work to do. If there is any, run the checks and begin a stretch.
 
         Unless `accept_versions`, raises MutatorError if versions of Python or packages have changed.
         """
@@ -139,7 +138,6 @@ class Session:
             run_checks(self.workspace, self.folder, workers=self.workers, notify=self.notify)
             for remark in unreached_triggers(self.workspace, self.folder):
                 warnings.warn(remark, MutatorWarning, stacklevel=2)
-            prepare_base(self.manifest, self.folder.base)
             begin_stretch(
                 self.folder,
                 self.workspace,

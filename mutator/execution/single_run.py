@@ -11,7 +11,7 @@ from mutator._common.files import make_folder, raising_disk_full, remove_folder,
 from mutator._common.locks import alone_in
 from mutator.campaigns.provenance import check_sources, sources
 from mutator.engines.jobs import Job
-from mutator.engines.reference import ReferenceEngine, prepare_base
+from mutator.engines.reference import ReferenceEngine
 from mutator.errors import CheckFailed
 from mutator.execution.runner import Finished, Goldens, Runner
 from mutator.model import Experiment, Limits, Record, Status
@@ -126,7 +126,7 @@ def _engine(manifest: TargetManifest, out: Path, limits: Limits) -> Iterator[Ref
         try:
             with raising_disk_full(work):
                 work.mkdir()
-            yield ReferenceEngine(manifest, prepare_base(manifest, work / "base"), work, limits)
+            yield ReferenceEngine(manifest, work, limits)
         finally:
             remove_folder(work)
 

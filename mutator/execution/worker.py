@@ -136,7 +136,6 @@ class Worker:
         setting = Setting(
             manifest=self._manifest,
             models=self._workspace.fault_models(),
-            base=folder.base,
             work=folder.work,
             limits=folder.limits,
             parent=self._parent,
@@ -145,9 +144,7 @@ class Worker:
 
     def _independent_engine(self) -> Engine:
         folder = self.folder
-        return ReferenceEngine(
-            self._manifest, folder.base, folder.work, folder.limits, self._parent, independent=True
-        )
+        return ReferenceEngine(self._manifest, folder.work, folder.limits, self._parent, independent=True)
 
     def _keep(self, finished: Finished) -> None:
         """Append the patch first and the record last, so that each record's other data exist."""

@@ -15,7 +15,7 @@ from mutator._common import caches
 from mutator._common.files import ScratchFolder, json_bytes, no_pipe, write_atomic
 from mutator._common.hashing import digest
 from mutator.engines.jobs import Job
-from mutator.engines.reference import ReferenceEngine, prepare_base
+from mutator.engines.reference import ReferenceEngine
 from mutator.errors import MutatorError
 from mutator.model import Limits, Status
 from mutator.targets.manifest import TargetManifest
@@ -39,8 +39,7 @@ def lines_of(manifest: TargetManifest, drives: Sequence[GoldenDrive], limits: Li
     if any(lines is None for lines in found):
         with ScratchFolder("mutator-lines-") as scratch:
             (scratch / "work").mkdir()
-            base = prepare_base(manifest, scratch / "base")
-            engine = ReferenceEngine(manifest, base, scratch / "work", limits)
+            engine = ReferenceEngine(manifest, scratch / "work", limits)
             for i, drive in enumerate(drives):
                 if found[i] is None:
                     found[i] = _measured(engine, drive, scratch / "work" / f"lines-{i}")

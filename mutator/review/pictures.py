@@ -24,7 +24,7 @@ from mutator._common.files import ScratchFolder, json_bytes, no_pipe, write_atom
 from mutator._common.hashing import content_id, digest
 from mutator.engines.in_target import picture_probe
 from mutator.engines.jobs import Job
-from mutator.engines.reference import ReferenceEngine, prepare_base
+from mutator.engines.reference import ReferenceEngine
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Fault, FaultLocation, Injection, Limits, Status
@@ -190,8 +190,7 @@ def _drawn_anew(
     found = {}
     with ScratchFolder("mutator-pictures-") as scratch:
         (scratch / "work").mkdir()
-        base = prepare_base(manifest, scratch / "base")
-        engine = ReferenceEngine(manifest, base, scratch / "work", LIMITS)
+        engine = ReferenceEngine(manifest, scratch / "work", LIMITS)
         for i, names in enumerate(places.values()):
             groups = [wanted[name] for name in names]
             before, *rest = _run(engine, models, scenario, groups, scratch / "work" / f"pictures-{i}")

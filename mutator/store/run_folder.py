@@ -270,11 +270,6 @@ class RunFolder:
         """Scratch folder. It can be deleted while no command owns the run folder."""
         return self.path / SCRATCH
 
-    @property
-    def base(self) -> Path:
-        """The pristine tree, from which the trees of runs are made."""
-        return self.work / "base"
-
     def find(self, prefix: str) -> str:
         """Return the only planned experiment whose id starts with `prefix`; MutatorError if not unique."""
         hits = [name for name in plan_file.ids(self.path) if name.startswith(prefix)]

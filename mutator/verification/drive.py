@@ -20,7 +20,7 @@ from mutator.engines.fork import ForkEngine
 from mutator.engines.fork_pool import Refused
 from mutator.engines.in_target.watch import CLOCK, THREAD
 from mutator.engines.jobs import Execution, Job
-from mutator.engines.reference import ReferenceEngine, prepare_base
+from mutator.engines.reference import ReferenceEngine
 from mutator.engines.threads import too_many, turned_off
 from mutator.model import Experiment, Limits
 from mutator.mutants.building import build
@@ -82,10 +82,9 @@ class _Drive:
         limits = self.campaigns[0].limits if self.campaigns else Limits()
         self.seed = self.campaigns[0].seed if self.campaigns else 0
         self._scratch = scratch
-        base = prepare_base(self.manifest, scratch / "base")
         work = scratch / "work"
         work.mkdir()
-        self.engine = ReferenceEngine(self.manifest, base, work, limits)
+        self.engine = ReferenceEngine(self.manifest, work, limits)
 
     def findings(self) -> list[Finding]:
         with ThreadPoolExecutor(usable_cores()) as pool:
@@ -223,7 +222,7 @@ class _Drive:
         null = build(self.manifest, self.workspace.fault_models(), None, always()).files
         work = self._scratch / "fork"
         work.mkdir()
-        fork = ForkEngine(self.manifest, self.engine.base, work, self.engine.limits, null=null)
+        fork = ForkEngine(self.manifest, work, self.engine.limits, null=null)
         try:
             return fork.refusal(replace(self._job("fork", scenario, self.setting), golden=golden.first.out))
         finally:

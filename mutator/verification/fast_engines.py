@@ -6,7 +6,6 @@ from mutator._common.files import ScratchFolder
 from mutator._common.text import counted
 from mutator.engines.fork_pool import Refused
 from mutator.engines.forkable import not_forked, not_loadable
-from mutator.engines.reference import prepare_base
 from mutator.errors import MutatorError
 from mutator.faults.expansion import expand
 from mutator.targets.manifest import TargetManifest
@@ -22,8 +21,7 @@ _LISTED = 3  # reasons
 def loading(manifest: TargetManifest) -> Finding:
     """Import the target's modules, and report whether it can then be forked."""
     with ScratchFolder("mutator-check-") as scratch:
-        base = prepare_base(manifest, scratch / "base")
-        told = finding(not_loadable(manifest, base, scratch / "server"))
+        told = finding(not_loadable(manifest, scratch / "server"))
     return replace(told, remedy=f"{told.remedy}; {_DRIVE}") if "thread" in told.found else told
 
 

@@ -9,7 +9,7 @@ from typing import Any
 from mutator._common import caches
 from mutator._common.files import remove_folder
 from mutator.engines.jobs import Job
-from mutator.engines.reference import ReferenceEngine, prepare_base
+from mutator.engines.reference import ReferenceEngine
 from mutator.model import Experiment
 from mutator.mutants.building import build
 from mutator.store.progress import Pace, Progress
@@ -43,8 +43,7 @@ class CheckDriver:
         for scratch in (work, self.kept):
             remove_folder(scratch)
         work.mkdir(parents=True)
-        base = prepare_base(self.manifest, self.folder.base)
-        engine = ReferenceEngine(self.manifest, base, work, self.folder.limits)
+        engine = ReferenceEngine(self.manifest, work, self.folder.limits)
         pool = ThreadPoolExecutor(max(1, workers))
         try:
             judged = pool.submit(self._judge_canary, engine)

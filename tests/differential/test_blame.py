@@ -7,7 +7,7 @@ import pytest
 
 from mutator.engines.jobs import Engine, Job, Setting
 from mutator.engines.kinds import ENGINES
-from mutator.engines.reference import ReferenceEngine, prepare_base
+from mutator.engines.reference import ReferenceEngine
 from mutator.engines.registry import make_engine
 from mutator.execution.runner import Goldens, Runner
 from mutator.model import (
@@ -220,13 +220,12 @@ class Blamed:
         self.manifest = toy.manifest("toycar")
         self.models = toy.fault_models()
         limits = Limits(cpu_s=1, wall_s=900, memory_mb=1024, steps=500)
-        base = prepare_base(self.manifest, folder / "base")
-        self.reference = ReferenceEngine(self.manifest, base, folder, limits)
+        self.reference = ReferenceEngine(self.manifest, folder, limits)
         self.engines: dict[str, Engine] = {}
         for name in ENGINES:
             work = folder / name
             work.mkdir()
-            setting = Setting(manifest=self.manifest, models=self.models, base=base, work=work, limits=limits)
+            setting = Setting(manifest=self.manifest, models=self.models, work=work, limits=limits)
             self.engines[name] = make_engine(name, setting)
 
     def golden(self, experiment: Experiment) -> Path:

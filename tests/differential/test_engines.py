@@ -11,7 +11,6 @@ import pytest
 
 from mutator.engines.jobs import Engine, Execution, Job, RunMode, Setting
 from mutator.engines.kinds import ENGINES
-from mutator.engines.reference import prepare_base
 from mutator.engines.registry import make_engine
 from mutator.model import (
     Anchor,
@@ -112,14 +111,13 @@ class Engines:
         self.manifest = toy.manifest("toycar")
         self.models = toy.fault_models()
         self.limits = limits
-        base = prepare_base(self.manifest, folder / "base")
         self.made: dict[str, Any] = {}
         for name in ENGINES:
             work = folder / name
             work.mkdir()
             self.made[name] = make_engine(
                 name,
-                Setting(manifest=self.manifest, models=self.models, base=base, work=work, limits=limits),
+                Setting(manifest=self.manifest, models=self.models, work=work, limits=limits),
             )
         self._goldens: dict[str, Path] = {}
 

@@ -9,7 +9,7 @@ import pytest
 from mutator.campaigns.plans import Choices, make_plan
 from mutator.engines.jobs import Job, Setting
 from mutator.engines.kinds import ENGINES
-from mutator.engines.reference import ReferenceEngine, prepare_base
+from mutator.engines.reference import ReferenceEngine
 from mutator.engines.registry import make_engine
 from mutator.execution.runner import Goldens, Runner
 from mutator.model import Record
@@ -25,10 +25,9 @@ def test_the_engines_give_the_same_records(tmp_path: Path, campaign: str, limit:
     clone = Workspace.find(root=CLONE)
     plan = make_plan(clone, campaign, Choices(limit=limit))
     manifest, models = clone.manifest("openpilot"), clone.fault_models()
-    base = prepare_base(manifest, tmp_path / "base")
     (tmp_path / "work").mkdir()
     limits = plan.campaign.limits
-    reference = ReferenceEngine(manifest, base, tmp_path / "work", limits)
+    reference = ReferenceEngine(manifest, tmp_path / "work", limits)
     for one in plan.goldens():
         job = Job(name=one.key, scenario=clone.scenario(one.scenario), seed=plan.seed, changes=one.changes)
         reference.execute(job, tmp_path / one.key)
@@ -37,7 +36,7 @@ def test_the_engines_give_the_same_records(tmp_path: Path, campaign: str, limit:
     for name in ENGINES:
         work = tmp_path / name
         work.mkdir()
-        setting = Setting(manifest=manifest, models=models, base=base, work=work, limits=limits)
+        setting = Setting(manifest=manifest, models=models, work=work, limits=limits)
         engine = make_engine(name, setting)
         done = list(Runner(manifest, models, engine, goldens, clone.scenario).run(plan.experiments))
         engine.close()

@@ -281,18 +281,15 @@ def tree_files(tree: str) -> dict[str, str]:
 
 
 def places(tree: str) -> list[str]:
-    """List every folder and file in the tree except bytecode, which Python checks against its source."""
-    found = []
-    for folder, _, files in os.walk(tree):
-        if Path(folder).name != "__pycache__":
-            found += [f"{folder}/{name}" for name in ("", *files)]
-    return found
+    """List every folder and file in the tree."""
+    return [f"{folder}/{name}" for folder, _, files in os.walk(tree) for name in ("", *files)]
 
 
-def stamp(places: list[str]) -> list[tuple[int, int, int]]:
-    """Return a value that changes when a file or folder is written to, added or removed."""
+def stamp(places: list[str]) -> list[tuple[int, int]]:
+    """Return a value that changes when a file or folder is written to, added or removed, even if its size
+    and times are put back, because only the kernel sets ctime."""
     states = map(os.stat, places)
-    return [(state.st_mtime_ns, state.st_size, state.st_ino) for state in states]
+    return [(state.st_ctime_ns, state.st_ino) for state in states]
 
 
 if __name__ == "__main__":

@@ -21,7 +21,7 @@ from mutator._common.hashing import canonical
 from mutator._common.shortages import Shortage, shortage
 from mutator.campaigns.shared_runs import runs
 from mutator.engines.jobs import FAST, Job, Setting
-from mutator.engines.reference import ReferenceEngine, prepare_base
+from mutator.engines.reference import ReferenceEngine
 from mutator.engines.registry import make_engine
 from mutator.errors import MutatorError
 from mutator.execution.cluster.bundle import Site
@@ -52,7 +52,6 @@ class PieceRunner:
         self.place = site.place
         self._work = site.place / f"work-{os.getpid()}"
         self._work.mkdir()
-        self._base = prepare_base(site.manifest, self._work / "base")
         self._goldens = self._work / "golden"
         self._driven = DrivenGoldens(site)
         self._alike: set[str] = set()  # golden runs that equal the campaign's
@@ -86,13 +85,12 @@ class PieceRunner:
             site = self._site
             if kind is Kind.PROVE:
                 engine = ReferenceEngine(
-                    site.manifest, self._base, self._work, site.limits, self._parent, independent=True
+                    site.manifest, self._work, site.limits, self._parent, independent=True
                 )
             else:
                 setting = Setting(
                     manifest=site.manifest,
                     models=site.models,
-                    base=self._base,
                     work=self._work,
                     limits=site.limits,
                     parent=self._parent,
@@ -121,7 +119,7 @@ class PieceRunner:
 
     def _drive_golden(self, golden: GoldenRun, known: str, place: Path) -> None:
         site = self._site
-        engine = ReferenceEngine(site.manifest, self._base, self._work, site.limits, self._parent)
+        engine = ReferenceEngine(site.manifest, self._work, site.limits, self._parent)
         job = Job(
             name=f"golden-{len(self._alike)}",
             scenario=site.scenario(golden.scenario),

@@ -7,7 +7,6 @@ from pathlib import Path
 from mutator.engines.fork import ForkEngine
 from mutator.engines.fork_pool import Pool
 from mutator.engines.jobs import Execution, Job
-from mutator.engines.reference import prepare_base
 from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection, Limits, Trigger
 from mutator.mutants.building import build
 from mutator.targets.manifest import TargetManifest
@@ -32,11 +31,10 @@ class Fork:
         if self._engine is None:
             self.manifest: TargetManifest = self.toy.manifest("toycar")
             self.models = self.toy.fault_models()
-            base = prepare_base(self.manifest, self.folder / "base")
             work = self.folder / "work"
             work.mkdir()
             null = build(self.manifest, self.models, None, always()).files
-            self._engine = ForkEngine(self.manifest, base, work, self.limits, null=null)
+            self._engine = ForkEngine(self.manifest, work, self.limits, null=null)
             golden = Job(name="golden", scenario=self.toy.scenario("A"), seed=7)
             self.golden = self._engine.reference.execute(golden, self.folder / "golden").out
         return self._engine

@@ -16,8 +16,9 @@ from pathlib import Path
 import pytest
 
 from mutator._common.files import DiskFull
+from mutator.engines import bytecode
 from mutator.engines.jobs import Execution, Job
-from mutator.engines.reference import ReferenceEngine, prepare_base
+from mutator.engines.reference import ReferenceEngine
 from mutator.errors import MutatorError
 from mutator.model import Limits, Status
 from mutator.targets.manifest import TargetManifest
@@ -36,10 +37,9 @@ def manifest(toycar: Workspace) -> TargetManifest:
 def run(toycar: Workspace, manifest: TargetManifest, tmp_path: Path) -> Run:
     work = tmp_path / "work"
     work.mkdir()
-    base = prepare_base(manifest, tmp_path / "base")
 
     def execute(files: Mapping[str, str] | None = None, limits: Limits = LIMITS, **job: object) -> Execution:
-        engine = ReferenceEngine(manifest, base, work, limits)
+        engine = ReferenceEngine(manifest, work, limits)
         changed = {name: text.encode() for name, text in (files or {}).items()}
         wanted = Job(name="job", scenario=toycar.scenario("A"), seed=1, files=changed, **job)  # type: ignore[arg-type]
         shutil.rmtree(work / "job", ignore_errors=True)
@@ -57,7 +57,7 @@ def test_a_mutant_of_a_file_that_runs_read_uses_no_shared_caches(
 ) -> None:
     said = 'import json, sys\nfrom pathlib import Path\nPath("words.json").write_text(json.dumps(sys.argv))\n'
     changed = replace(manifest, independent=("--forget",), reads_itself=("toycar/sens*.py",))
-    engine = ReferenceEngine(changed, prepare_base(manifest, tmp_path / "base"), tmp_path, LIMITS)
+    engine = ReferenceEngine(changed, tmp_path, LIMITS)
     for read in ("toycar/sensing.py", "toycar/driver.py"):
         files = {"toycar/go.py": said.encode(), read: b""}
         job = Job(name="job", scenario=toycar.scenario("A"), seed=1, files=files)
@@ -175,11 +175,12 @@ def test_changing_the_tree_during_a_run_is_a_harness_error(run: Run) -> None:
     assert run().status is Status.OK, "the next run must have an intact tree"
 
 
-def test_truncated_bytecode_does_not_affect_later_runs(toycar: Workspace, run: Run, tmp_path: Path) -> None:
-    body = "import toycar.world, os\nos.truncate(toycar.world.__cached__, 20)"
-    assert run(entry(body)).status is Status.OK
-    (kept,) = (tmp_path / "base" / "toycar" / "__pycache__").glob("world.*")
-    assert kept.stat().st_size > 20
+@pytest.mark.parametrize("edit", ["os.truncate(code, 20)", "os.unlink(code)", "open(code, 'ab').write(b'x')"])
+def test_a_run_that_changes_bytecode_is_a_harness_error(run: Run, edit: str) -> None:
+    """Nothing tells it from a run that used the bytecode of somebody else."""
+    execution = run(entry(f"import toycar.world, os\ncode = toycar.world.__cached__\n{edit}"))
+    assert execution.status is Status.HARNESS_ERROR
+    assert execution.detail.startswith("toycar/__pycache__/world.cpython")
     assert run().status is Status.OK
 
 
@@ -242,16 +243,15 @@ def test_a_source_file_that_a_run_adds_to_its_tree_is_a_harness_error(run: Run) 
     assert run(entry(body.replace("left.py", "left.json"))).status is Status.OK
 
 
-def test_stale_bytecode_is_not_run(run: Run, manifest: TargetManifest, tmp_path: Path) -> None:
+def test_stale_bytecode_is_not_run(run: Run, manifest: TargetManifest) -> None:
     """The changed file's size and time equal the original's."""
     pristine = manifest.tree.files["toycar/world.py"].decode()
     changed = pristine.replace("STEP = 0.05", "STEP = 0.06")
     body = "from toycar.world import STEP\nraise ValueError(STEP)"
     execution = run({"toycar/world.py": changed, **entry(body)})
     assert execution.detail.startswith("ValueError: 0.06")
-    cached = list((tmp_path / "base" / "toycar" / "__pycache__").glob("world.*.pyc"))
-    assert cached, "expected bytecode in the pristine tree, which the mutant could load"
-    assert int.from_bytes(cached[0].read_bytes()[4:8], "little") == 0b11, "expected a check by hash"
+    cached = bytecode.with_bytecode(manifest.tree)[bytecode.bytecode_of("toycar/world.py")]
+    assert int.from_bytes(cached[4:8], "little") == 0b11, "expected a check by hash"
 
 
 def test_the_users_environment_does_not_reach_a_run(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -302,19 +302,16 @@ from mutator.model import Limits
 from mutator.workspace import Workspace
 library, templates, folder, note = map(Path, sys.argv[1:])
 toycar = Workspace(library=library, templates=templates)
-engine = ReferenceEngine(toycar.manifest("toycar"), folder / "base", folder / "work", Limits())
+engine = ReferenceEngine(toycar.manifest("toycar"), folder / "work", Limits())
 body = f"import os, pathlib, time; pathlib.Path({str(note)!r}).write_text(str(os.getpid())); time.sleep(60)"
 job = Job(name="x", scenario=toycar.scenario("A"), seed=1, files={"toycar/go.py": body.encode()})
 engine.execute(job, folder / "work" / "x")
 """
 
 
-def test_a_run_ends_when_its_engine_is_killed(
-    toycar: Workspace, manifest: TargetManifest, tmp_path: Path
-) -> None:
+def test_a_run_ends_when_its_engine_is_killed(toycar: Workspace, tmp_path: Path) -> None:
     note = tmp_path / "pid"
     (tmp_path / "work").mkdir()
-    prepare_base(manifest, tmp_path / "base")
     arguments = [toycar.library, toycar.templates, tmp_path, note]
     engine = subprocess.Popen([sys.executable, "-c", SLEEPER, *map(str, arguments)])
     try:
@@ -354,12 +351,13 @@ def test_jobs_run_in_order_and_their_folders_are_deleted(
 ) -> None:
     work = tmp_path / "work"
     work.mkdir()
-    engine = ReferenceEngine(manifest, prepare_base(manifest, tmp_path / "base"), work, LIMITS)
+    engine = ReferenceEngine(manifest, work, LIMITS)
     jobs = [Job(name=name, scenario=toycar.scenario(name), seed=1) for name in ("A", "B")]
     names = []
     for job, execution in engine.run(jobs):
         assert (execution.out / "said.json").is_file()
         names.append(job.name)
+    engine.close()
     assert names == ["A", "B"]
     assert list(work.iterdir()) == []
 
@@ -369,7 +367,7 @@ def test_two_threads_can_use_one_engine(
 ) -> None:
     work = tmp_path / "side"
     work.mkdir()
-    engine = ReferenceEngine(manifest, prepare_base(manifest, tmp_path / "base"), work, LIMITS)
+    engine = ReferenceEngine(manifest, work, LIMITS)
     found: list[Status] = []
 
     def one(name: str) -> None:
@@ -411,4 +409,4 @@ def test_resource_limits_below_those_of_the_campaign_are_refused(
 
     monkeypatch.setattr(resource, "setrlimit", refuse)
     with pytest.raises(MutatorError, match=rf"the limit is 1 here \(`ulimit -.`\).*{name}.*raise the limit"):
-        ReferenceEngine(manifest, tmp_path, tmp_path, LIMITS)
+        ReferenceEngine(manifest, tmp_path, LIMITS)

@@ -79,7 +79,7 @@ def test_a_stopped_run_equals_the_beginning_of_the_complete_run(stopping: Fork) 
     null = build(stopping.manifest, stopping.models, None, always()).files
     work = stopping.folder / "warm"
     work.mkdir()
-    warm = ForkEngine(stopping.manifest, fork.reference.base, work, stopping.limits, null=null, warm=True)
+    warm = ForkEngine(stopping.manifest, work, stopping.limits, null=null, warm=True)
     engines: tuple[Engine, ...] = (fork.reference, fork, warm)
     stopped, *others = (drive(stopping, one, AfterHazard.STOP) for one in engines)
     assert others == [stopped, stopped]

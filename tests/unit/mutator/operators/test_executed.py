@@ -6,7 +6,7 @@ import pytest
 
 from mutator._common import caches
 from mutator.engines.jobs import Job
-from mutator.engines.reference import ReferenceEngine, prepare_base
+from mutator.engines.reference import ReferenceEngine
 from mutator.errors import MutatorError
 from mutator.model import Limits, Status
 from mutator.operators import executed
@@ -22,8 +22,7 @@ def _number(path: Path, text: str) -> int:
 
 def test_lines_are_recorded_from_the_first_observation(toycar: Workspace, tmp_path: Path) -> None:
     manifest = toycar.manifest("toycar")
-    base = prepare_base(manifest, tmp_path / "base")
-    engine = ReferenceEngine(manifest, base, tmp_path, LIMITS)
+    engine = ReferenceEngine(manifest, tmp_path, LIMITS)
     plain, noted = (
         engine.execute(
             Job(name=name, scenario=toycar.scenario("A"), seed=7, lines=name == "noted"), tmp_path / name

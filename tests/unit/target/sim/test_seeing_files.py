@@ -17,8 +17,9 @@ from selfdrive.sim.remembering_detector import SEEING
 from selfdrive.sim.road_renderer import RoadRenderer
 
 from mutator._common import caches
+from mutator.engines.base_tree import BaseTree
 from mutator.engines.jobs import Job
-from mutator.engines.reference import ReferenceEngine, prepare_base
+from mutator.engines.reference import ReferenceEngine
 from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection, Limits, Status
 from mutator.mutants.building import build
 from mutator.targets.source_tree import matches
@@ -46,7 +47,7 @@ def drive(tmp_path: Path) -> Drive:
     manifest, models = workspace.manifest("openpilot"), workspace.fault_models()
     more = ("--pictures", "--frames", str(frames), "--max-steps", "100")
     manifest = replace(manifest, entry_args=(*manifest.entry_args, *more))
-    base, numbers = prepare_base(manifest, tmp_path / "base"), count()
+    numbers = count()
 
     def driven(place: tuple[str, str, str], time_s: float, *, independent: bool = False) -> tuple[str, str]:
         path, function, name = place
@@ -56,7 +57,7 @@ def drive(tmp_path: Path) -> Drive:
         injection = Injection(location=location, model="offset", params=params)
         fault = Fault("s", "m", "f", "as_described", None, "", "H1", (injection,))
         made = build(manifest, models, fault, at_time(time_s))
-        engine = ReferenceEngine(manifest, base, work, Limits(), independent=independent)
+        engine = ReferenceEngine(manifest, work, Limits(), independent=independent)
         job = Job(
             name="job",
             scenario=workspace.scenario("S1"),
@@ -122,9 +123,9 @@ def test_a_mutants_tree_finds_all_compiled_code(tmp_path: Path) -> None:
     If a header were missing, for example, the slow Python code would run.
     """
     manifest, target = Workspace.find(root=ROOT).manifest("openpilot"), ROOT / "target"
-    base = prepare_base(manifest, tmp_path / "base")
+    tree = BaseTree(manifest.tree, tmp_path).lay_out(tmp_path / "tree", {}).place
     found = {
-        source.name: (compiled.file_name(source), compiled.file_name(base / source.relative_to(target)))
+        source.name: (compiled.file_name(source), compiled.file_name(tree / source.relative_to(target)))
         for source in target.rglob("*.c")
     }
     assert len(found) > 6
