@@ -15,6 +15,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
+from mutator._common.bounded import MOST_WHOLE, read_open
 from mutator._common.files import raising_disk_full
 from mutator.errors import MutatorError
 
@@ -59,10 +60,10 @@ def open_below(root: Path, name: str) -> BinaryIO:
     return os.fdopen(file, "rb")
 
 
-def read_below(root: Path, name: str) -> bytes:
-    """Return the content of a file; errors are those of `open_below`."""
+def read_below(root: Path, name: str, most: int = MOST_WHOLE) -> bytes:
+    """Return the content of a file; errors as in `open_below`, and TooLarge for more than `most` bytes."""
     with open_below(root, name) as file:
-        return file.read()
+        return read_open(file, root / name, most)
 
 
 def write_below(root: Path, name: str, data: bytes) -> None:

@@ -14,6 +14,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from mutator._common.bounded import MOST_JSON, read_bounded
 from mutator.errors import EXIT_HARNESS_ERRORS, MutatorError
 
 _NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
@@ -225,7 +226,7 @@ def json_bytes(data: dict[str, Any]) -> bytes:
 def read_json(path: Path, schema: str) -> dict[str, Any]:
     """Read a JSON object that has the schema `schema` (`name/version`) or an older version of it."""
     try:
-        data = no_pipe(path).read_bytes()
+        data = read_bounded(path, MOST_JSON)
     except OSError as err:
         if not is_no_file(err):
             raise

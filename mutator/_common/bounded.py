@@ -1,0 +1,123 @@
+"""Read files, and unpack data, of which somebody else may have chosen the size.
+
+A sparse file of terabytes occupies no disk, and a few bytes can unpack to gigabytes. So every reader of a
+whole file has a limit, lines have a longest length, and large files must not have holes.
+"""
+
+import errno
+import os
+import stat
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO
+
+from mutator.errors import MutatorError
+
+MOST_WHOLE = 64_000_000  # bytes of a file that is read as a whole; a reader can have another limit
+MOST_JSON = 6_000_000  # bytes of a JSON object; as Python objects they can take 30 times as much memory
+MOST_DATA = 8_000_000_000  # bytes of a file that grows with the number of experiments
+MOST_LINE = 4_000_000  # bytes of a line
+_DENSE = 64_000_000  # from this size, a file must not have holes
+_GZIP = zlib.MAX_WBITS | 16
+
+
+class TooLarge(MutatorError, ValueError):
+    """A file is larger than anything that belongs there.
+
+    Also a ValueError, so that readers that skip a damaged file (of a cache) skip it as well.
+    """
+
+
+def read_bounded(path: Path, most: int = MOST_WHOLE) -> bytes:
+    """Return the content of a regular file, following links; TooLarge if it has more than `most` bytes.
+
+    OSError as `Path.read_bytes`, and for a pipe, socket or device (`is_no_file`).
+    """
+    with open_regular(path) as file:
+        return read_open(file, path, most)
+
+
+def open_regular(path: Path) -> BinaryIO:
+    """Open a regular file for reading, without waiting for a pipe; OSError as in `read_bounded`."""
+    file = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    mode = os.fstat(file).st_mode
+    if stat.S_ISREG(mode):
+        return os.fdopen(file, "rb")
+    os.close(file)
+    number = errno.EISDIR if stat.S_ISDIR(mode) else errno.ENXIO
+    raise OSError(number, os.strerror(number), str(path))
+
+
+def read_open(file: BinaryIO, where: Path, most: int = MOST_WHOLE) -> bytes:
+    """Return the rest of an open file; TooLarge if it has more than `most` bytes."""
+    check_open(file, where, most)
+    data = file.read(most + 1)
+    if len(data) > most:  # it grows, or does not have a size
+        raise _too_large(len(data), where, most)
+    return data
+
+
+def check_open(file: BinaryIO, where: Path, most: int = MOST_DATA) -> None:
+    """Raise TooLarge if an open file has more than `most` bytes, or if it is large and has holes."""
+    size = os.fstat(file.fileno()).st_size
+    if size > most:
+        raise _too_large(size, where, most)
+    if size >= _DENSE and _has_hole(file.fileno(), size):
+        raise TooLarge(
+            f"{size:,} bytes with holes",
+            where=where,
+            expected="a file that occupies the disk space of its size",
+            remedy="delete it, or restore it from a copy",
+        )
+
+
+def bounded_lines(file: BinaryIO, where: Path, most: int = MOST_LINE) -> Iterator[bytes]:
+    """Yield the lines of an open file, with their newlines; TooLarge for a line of more than `most` bytes."""
+    check_open(file, where)
+    number = 0
+    while line := file.readline(most + 1):
+        number += 1
+        if len(line) > most:
+            raise TooLarge(
+                f"a line of more than {most:,} bytes",
+                where=where,
+                line=number,
+                expected="shorter lines",
+                remedy="restore the file from a copy",
+            )
+        yield line
+
+
+def unpacked(data: bytes, most: int, dictionary: bytes = b"", *, gzip: bool = False) -> bytes:
+    """Return what zlib (or gzip) data unpacks to. ValueError if that is more than `most` bytes.
+
+    zlib.error for damaged or incomplete data.
+    """
+    unpacker = zlib.decompressobj(_GZIP if gzip else zlib.MAX_WBITS, zdict=dictionary)
+    found = unpacker.decompress(data, most + 1)
+    if len(found) > most:
+        raise ValueError(f"unpacks to more than {most} bytes")
+    if not unpacker.eof or (gzip and unpacker.unused_data):
+        raise zlib.error("incomplete data")
+    return found
+
+
+def _has_hole(file: int, size: int) -> bool:
+    """Return whether a file has a hole; file systems without holes report one at the end."""
+    at = os.lseek(file, 0, os.SEEK_CUR)
+    try:
+        return os.lseek(file, 0, os.SEEK_HOLE) < size
+    except OSError:
+        return False
+    finally:
+        os.lseek(file, at, os.SEEK_SET)
+
+
+def _too_large(size: int, where: Path, most: int) -> TooLarge:
+    return TooLarge(
+        f"{size:,} bytes",
+        where=where,
+        expected=f"at most {most:,} bytes",
+        remedy="shorten or split it, or delete it if it does not belong here",
+    )
