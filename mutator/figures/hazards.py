@@ -29,6 +29,7 @@ def hazard_sets(frame: pd.DataFrame) -> pd.Series:
     return pd.Series(found, index=frame.index, dtype=str)
 
 
+@style.shipped_style()
 def draw(frame: pd.DataFrame) -> "Figure":
     tallies = by_kind(frame)
     methods = sorted({method for method, _ in tallies})

@@ -16,6 +16,7 @@ COLOURS = "cividis"  # perceptually uniform, also for colour-blind people
 DARK_BELOW = 50.0  # %; text is white on cells below this rate, else black
 
 
+@style.shipped_style()
 def draw(frame: pd.DataFrame) -> "Figure":
     kinds, scenarios = sorted(frame["kind"].unique()), sorted(frame["scenario"].unique())
     methods = sorted(frame["method"].unique())

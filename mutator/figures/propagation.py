@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+@style.shipped_style()
 def draw(frame: pd.DataFrame) -> "Figure":
     methods, scenarios = sorted(frame["method"].unique()), sorted(frame["scenario"].unique())
     spreads = {(m, s): propagation(group) for (m, s), group in frame.groupby(["method", "scenario"])}

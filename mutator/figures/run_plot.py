@@ -15,6 +15,7 @@ import numpy as np
 
 from mutator._common.files import write_atomic
 from mutator.errors import MutatorError
+from mutator.figures.style import shipped_style
 from mutator.model import Record
 from mutator.outcomes.golden import Trace, times_of
 from mutator.targets.channels import Channel
@@ -68,6 +69,7 @@ def marks_of(record: Record) -> tuple[Mark, ...]:
     return tuple(sorted(marks, key=lambda m: m.t))
 
 
+@shipped_style()
 def draw_run(
     golden: Trace,
     faulty: Trace,
@@ -105,6 +107,7 @@ def _figure_type() -> type["Figure"]:
     from matplotlib.figure import Figure
 
     class RunFigure(Figure):
+        @shipped_style()
         def _repr_png_(self) -> bytes:
             self.savefig(png := io.BytesIO(), format="png", dpi=PNG_DPI)
             return png.getvalue()
@@ -167,20 +170,17 @@ def save(figure: "Figure", paths: Sequence[Path]) -> None:
         write_atomic(path, image)
 
 
+@shipped_style()
 def images(figure: "Figure", formats: Sequence[str]) -> list[bytes]:
     """Draw a figure in each format, `svg` or `png`, deterministically."""
-    import matplotlib
-
     if figure.get_layout_engine() is not None:  # once for all files, because layout takes as long as drawing
         figure.draw_without_rendering()
         figure.set_layout_engine("none")
     drawn = []
-    # A fixed salt and no date keep the SVG deterministic.
-    with matplotlib.rc_context({"svg.hashsalt": "mutator", "svg.fonttype": "none"}):
-        for name in formats:
-            no_date = {"Date": None} if name == "svg" else None
-            figure.savefig(file := io.BytesIO(), format=name, dpi=PNG_DPI, metadata=no_date)
-            drawn.append(file.getvalue())
+    for name in formats:
+        no_date = {"Date": None} if name == "svg" else None  # keeps the SVG deterministic
+        figure.savefig(file := io.BytesIO(), format=name, dpi=PNG_DPI, metadata=no_date)
+        drawn.append(file.getvalue())
     return drawn
 
 

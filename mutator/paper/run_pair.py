@@ -28,6 +28,7 @@ LEAST_RANGE = 0.1  # minimum range of a vertical axis; less would magnify noise
 LABEL_SHARE = 0.12  # width of a mark's label as a share of the time axis
 
 
+@style.shipped_style()
 def draw(
     pair: Pair, steps: Steps, wanted: Wanted, marks: Iterable[Mark], manifest: TargetManifest
 ) -> "Figure":
