@@ -7,6 +7,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from mutator._common.arguments import check_whole
+from mutator._common.below import check_inside, files_inside
 from mutator._common.files import check_is_text
 from mutator._common.places import environment_path, library_files, library_folder, templates_folder
 from mutator._common.shipped import shipped_folder
@@ -122,7 +123,7 @@ class Workspace:
 
     def spec_files(self) -> tuple[Path, ...]:
         """The file of every fault spec in the library, sorted."""
-        return tuple(sorted((self.library / "faults").rglob("*.yaml")))
+        return tuple(files_inside(self.library, "faults", "*.yaml"))
 
     def spec(self, name: str | Path) -> FaultSpec:
         """The spec with this name, `<module>/<fault_type>`, or path."""
@@ -224,20 +225,27 @@ class Workspace:
 
     def hazards(self) -> HazardList | None:
         """The accidents and hazards in fault_library/stpa/hazards.yaml; None without that file."""
-        path = self.library / "stpa" / "hazards.yaml"
+        path = check_inside(self.library, self.library / "stpa" / "hazards.yaml")
         return load_hazards(path) if os.path.lexists(path) else None
 
     def analysis(self) -> Analysis | None:
         """The hazard analysis in fault_library/stpa/; None without a control structure."""
         folder = self.library / "stpa"
+        files_inside(self.library, "stpa", "*.yaml")  # all that it reads
         return load_analysis(folder) if (folder / "control_structure.yaml").exists() else None
 
     def structure(self, manifest: TargetManifest) -> StructureModel | None:
         """A target's control structure; None if no channel names one of its components."""
-        path = self.library / "stpa" / "control_structure.yaml"
+        path = check_inside(self.library, self.library / "stpa" / "control_structure.yaml")
         structure = load_structure(path) if path.exists() else None
         known = structure.components if structure else {}
         return structure if any(channel.component in known for channel in manifest.channels) else None
+
+    @property
+    def references(self) -> Path:
+        """The folder of published numbers, which need not exist. Outside for a link that leads out of it."""
+        files_inside(self.library, "references", "*.yaml")
+        return self.library / "references"
 
     def _files(self, folder: str) -> dict[str, Path]:
         return library_files(self.library, folder)

@@ -4,6 +4,9 @@ A run folder, a library, a bundle or a shard can come from anybody. A name in on
 of it (`../../setup.py`), and a link in it can point anywhere. So names are checked, and each folder on the
 way is opened relative to the one before, without following links: nothing can be exchanged between check and
 use. Only `root` itself may be reached through links, because the user named it.
+
+What is only read, and only at the user's side, may use links that stay inside: a library, its templates, a
+target's tree (`check_inside`, `files_inside`).
 """
 
 import errno
@@ -29,14 +32,17 @@ class Outside(MutatorError):
     """A name points out of its folder, or something in a folder is not a plain file or folder."""
 
 
-def check_name(name: object, where: str | Path) -> str:
+def check_name(name: object, where: str | Path, *, folders: bool = True) -> str:
     """Return `name` if it is a relative path in its shortest form, such as `golden/S1/trace.npz`.
 
-    Outside for anything else; `where` is the file or folder that the name comes from.
+    Outside for anything else, and without `folders` also for several parts. `where` is the file or folder
+    that the name comes from.
     """
     text = name if isinstance(name, str) else ""
     parts = text.split("/")
-    if all(part not in ("", ".", "..") and part.isprintable() and _fits(part) for part in parts):
+    if (folders or len(parts) == 1) and all(
+        part not in ("", ".", "..") and part.isprintable() and _fits(part) for part in parts
+    ):
         return text
     raise Outside(
         f"the name {name!a}",
@@ -98,6 +104,37 @@ def check_plain(root: Path) -> None:
     """Raise Outside if anything below `root` is neither a regular file nor a folder."""
     for path in _not_plain_below(root):
         raise _not_plain(path)
+
+
+def check_inside(root: Path, path: Path) -> Path:
+    """Return `path`, a place below `root`; Outside if a link on the way leads out of `root`."""
+    if not is_inside(root, path):
+        raise Outside(
+            "a link that leads out of its folder",
+            where=path,
+            expected=f"only files and folders of {root}, and links to them",
+            remedy="put a copy in its place, or delete it; it would show somebody else's library your files",
+        )
+    return path
+
+
+def is_inside(root: Path, path: Path) -> bool:
+    """Whether `path`, with all links followed, is `root` or below it. The path need not exist."""
+    return Path(os.path.realpath(path)).is_relative_to(os.path.realpath(root))
+
+
+def files_inside(root: Path, folder: str, pattern: str) -> list[Path]:
+    """Return the files below `root`/`folder` whose names match a glob, sorted; linked folders are skipped.
+
+    Outside for a name that `check_name` refuses, and for a link that leads out of `root`.
+    """
+    base = check_inside(root, root / folder)
+    files = sorted(path for path in base.rglob(pattern) if not path.is_dir())
+    for path in files:
+        check_name(path.relative_to(root).as_posix(), base)
+        if path.is_symlink():
+            check_inside(root, path)
+    return files
 
 
 def _not_plain_below(root: Path) -> Iterator[Path]:

@@ -3,6 +3,7 @@
 import os
 from pathlib import Path
 
+from mutator._common.below import check_name, files_inside
 from mutator._common.shipped import shipped_folder
 
 RUNS = Path("runs")
@@ -33,9 +34,10 @@ def environment_path(variable: str) -> Path | None:
 
 
 def library_files(library: Path, folder: str) -> dict[str, Path]:
-    """The YAML files in a folder of the library by name, sorted."""
+    """The YAML files in a folder of the library by name, sorted; errors are those of `files_inside`."""
     base = library / folder
-    files = {p.relative_to(base).with_suffix("").as_posix(): p for p in base.rglob("*.yaml")}
+    paths = files_inside(library, folder, "*.yaml")
+    files = {check_name(p.relative_to(base).with_suffix("").as_posix(), p): p for p in paths}
     return dict(sorted(files.items()))
 
 

@@ -19,6 +19,7 @@ from mutator.faults.readings import FILE, Readings
 from mutator.model import AfterHazard, Limits, Method
 
 SCHEMA = "campaign/1"
+_SUFFIXES = (".yaml", ".yml")
 _Told = TypeVar("_Told")
 
 
@@ -105,6 +106,7 @@ def load_campaign(path: Path) -> Campaign:
     model, source = read(path, CampaignModel, SCHEMA, older={SCHEMA: with_list})
     _check_once(model, source)
     triggers = model.triggers
+    _check_names(source, {("target",): model.target, ("triggers", "table"): triggers.table})
     return Campaign(
         name=model.name,
         about=model.about.strip(),
@@ -174,8 +176,17 @@ def _check_once(model: CampaignModel, source: Source) -> None:
             seen.add(value)
 
 
+def _check_names(source: Source, names: Mapping[Keys, str | None]) -> None:
+    """Refuse paths where only names of the library's files are allowed."""
+    for keys, name in names.items():
+        if name is not None and name.endswith(_SUFFIXES):
+            raise source.error(
+                keys, f"'{name}'", expected="a name in the library", remedy="leave out folder and suffix"
+            )
+
+
 def _spec_file(campaign: Path, spec: str) -> Path | None:
-    return campaign.parent / spec if spec.endswith((".yaml", ".yml")) else None
+    return campaign.parent / spec if spec.endswith(_SUFFIXES) else None
 
 
 def load_study(campaign: Campaign) -> Study | None:

@@ -23,7 +23,7 @@ class SelectionModel(StrictModel, title="A selection"):
     spec: str | None = Field(
         None,
         description="A glob over `<module>/<fault_type>/<variant>`, such as `sensor/*`, or the path of a "
-        "spec file outside the library, relative to the campaign's folder: `my_fault.yaml`.",
+        "spec file, relative to the campaign's folder and below it, or in the library: `my_fault.yaml`.",
     )
     values: int | None = Field(
         None, ge=1, description="How many values to take from each variant, spread evenly. Default: all."

@@ -8,6 +8,7 @@ from fnmatch import fnmatchcase
 from itertools import chain
 from pathlib import Path
 
+from mutator._common.below import is_inside
 from mutator._common.hashing import digest
 from mutator._common.text import one_of
 from mutator.campaigns.campaign_files import Campaign
@@ -117,6 +118,14 @@ class Expansion:
                 f"no file {file}",
                 expected="the path of a spec file, relative to the campaign's folder",
                 remedy="correct the path",
+            )
+        places = (self.campaign.path.parent, self.workspace.library)
+        if not any(is_inside(place, file) for place in places):
+            raise self.campaign.error(
+                keys,
+                f"'{file}' is neither below the campaign's folder nor in the library",
+                expected="a file in one of them, because a campaign can come from somebody else",
+                remedy="copy it there",
             )
         spec = self.workspace.spec(file)
         known = self.workspace.library / "faults" / f"{spec.name}.yaml"

@@ -18,7 +18,10 @@ def names_in(folder: str) -> Completer:
     """Return a completer for the library's files in this folder."""
 
     def complete(ctx: typer.Context, incomplete: str) -> list[str]:
-        return _starting(library_files(_library(ctx), folder), incomplete)
+        try:
+            return _starting(library_files(_library(ctx), folder), incomplete)
+        except MutatorError:  # a library that no command would use
+            return []
 
     return complete
 

@@ -181,6 +181,7 @@ def _construct(node: yaml.Node, keys: Keys, lines: dict[Keys, int], path: Path) 
         return _construct_mapping(node, keys, lines, path)
     if isinstance(node, yaml.SequenceNode):
         return [_construct(item, (*keys, i), lines, path) for i, item in enumerate(node.value)]
+    _check_text(node, path)
     return _scalar(node.tag.rpartition(":")[2], node.value)
 
 
@@ -194,6 +195,7 @@ def _construct_mapping(
             raise MutatorError(
                 f"key {key_node.value!r}", where=path, line=line, expected="text", remedy="put it in quotes"
             )
+        _check_text(key_node, path)
         key = key_node.value
         if key in result:
             raise MutatorError(
@@ -206,6 +208,15 @@ def _construct_mapping(
         lines[(*keys, key)] = line
         result[key] = _construct(value_node, (*keys, key), lines, path)
     return result
+
+
+def _check_text(node: yaml.Node, path: Path) -> None:
+    """Refuse NUL, which no file name, argument or variable can contain."""
+    if "\0" in node.value:
+        line = node.start_mark.line + 1
+        raise MutatorError(
+            f"{node.value!a}", where=path, line=line, expected="text without NUL", remedy="remove it"
+        )
 
 
 def _scalar(kind: str, text: str) -> Any:

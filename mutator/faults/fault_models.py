@@ -11,6 +11,7 @@ from typing import Literal
 from pydantic import Field
 
 from mutator._common import hashing
+from mutator._common.below import check_inside
 from mutator._common.files import no_pipe
 from mutator._common.text import suggestion
 from mutator.config import units
@@ -20,6 +21,7 @@ from mutator.errors import MutatorError
 from mutator.faults.injections import InjectionModel, InjectionSpec
 
 SCHEMA = "fault_model/1"
+FILES = ("*.yaml", "*.j2")  # what a templates folder consists of
 PROBE_TEMPLATE = f"{PROBE_NAME}.py.j2"
 TARGET_UNIT = "target"
 # `variable`: a name known at the anchor; `import`: the dotted name of something in a module of the target;
@@ -217,7 +219,7 @@ class FaultModelModel(StrictModel, title="The file"):
 
 def load_fault_models(folder: Path) -> FaultModels:
     """Load the fault models of a templates folder, from memory unless a file has changed."""
-    paths = sorted([*folder.glob("*.yaml"), *folder.glob("*.j2")])
+    paths = [check_inside(folder, path) for kind in FILES for path in sorted(folder.glob(kind))]
     try:
         contents = tuple((path, no_pipe(path).read_bytes()) for path in paths)
     except OSError:

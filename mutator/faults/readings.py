@@ -6,6 +6,7 @@ from pathlib import Path
 
 from pydantic import Field
 
+from mutator._common.below import check_inside
 from mutator.config.yaml_files import StrictModel, read
 from mutator.errors import MutatorError
 
@@ -60,7 +61,7 @@ class ReadingsModel(StrictModel, title="readings.yaml"):
 
 
 def load_readings(library: Path) -> Readings:
-    path = library / FILE
+    path = check_inside(library, library / FILE)
     if not path.is_file():
         return UNDECLARED
     model, source = read(path, ReadingsModel, SCHEMA)

@@ -51,7 +51,7 @@ def _matplotlib() -> Any:
     """Import matplotlib without ./matplotlibrc: the current folder can be somebody's library."""
     if _NAME not in sys.modules:
         exists = os.path.exists
-        os.path.exists = lambda path: path != _RC_FILE and exists(path)  # type: ignore[assignment]
+        os.path.exists = lambda path: path != _RC_FILE and exists(path)
         try:
             importlib.import_module(_NAME)
         except (ValueError, OSError) as err:

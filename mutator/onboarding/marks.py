@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from pathlib import Path
 
+from mutator._common.below import files_inside
 from mutator.errors import MutatorError
 
 MARK = "TODO(init)"
@@ -10,7 +11,7 @@ MARK = "TODO(init)"
 
 def unfilled(library: Path) -> Iterator[MutatorError]:
     """Yield an error for each mark in the library's YAML and Python files, in file order."""
-    for path in sorted(library.rglob("*")):
+    for path in files_inside(library, "", "*"):
         if path.suffix not in (".yaml", ".py") or not path.is_file():
             continue
         lines = path.read_text(encoding="utf-8", errors="replace").splitlines()

@@ -57,7 +57,7 @@ def observations_panel(run: ReportedRun) -> Panel | None:
     """
     if run.workspace is None:
         return None
-    references = run.workspace.library / "references"
+    references = run.workspace.references
     file = references / observations.FILE
     if not (file.is_file() and has_paper(references)):
         return None

@@ -22,7 +22,7 @@ def check_paper(workspace: Workspace) -> Iterator[MutatorError]:
     Problems are missing files, impossible numbers (`load_paper`), duplicate rows, unknown methods, scenarios
     and fault types, and sums over scenarios that differ from those over fault types.
     """
-    references = workspace.library / "references"
+    references = workspace.references
     if missing := [name for name in FILES if not (references / name).is_file()]:
         yield MutatorError(
             f"the published numbers are not in this library: no {', '.join(missing)}",

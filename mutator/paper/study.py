@@ -11,7 +11,7 @@ from mutator.statistics.published import Published
 
 def published(run: ReportedRun) -> Published | None:
     """Return the paper's counts if the library cites them and the run has any of the paper's fault types."""
-    references = run.workspace.library / "references" if run.workspace else None
+    references = run.workspace.references if run.workspace else None
     if references is None or not has_paper(references):
         return None
     paper = load_paper(references)

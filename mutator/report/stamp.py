@@ -1,12 +1,12 @@
 """Digests of a report's inputs and files, so that resuming a complete run does not rewrite the report."""
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from mutator._common.below import check_name, read_below, unlink_below, write_below
+from mutator._common.below import check_name, files_inside, read_below, unlink_below, write_below
 from mutator._common.files import json_bytes, json_object
 from mutator._common.hashing import digest
 from mutator._common.version import VERSION
@@ -93,14 +93,18 @@ def _library(folder: RunFolder, workspace: Workspace | None) -> object:
     """The digests of what a report reads of a library and of the run's target."""
     if workspace is None:
         return None
-    files = [
-        facts for facts in _digests(workspace.library, "**/*.yaml") if not facts[0].startswith("reviews/")
-    ]
+    files: list[tuple[str, str]] = []
     try:
+        paths = files_inside(workspace.library, "", "*.yaml")
+        files += [one for one in _named(workspace.library, paths) if not one[0].startswith("reviews/")]
         return [files, workspace.manifest(folder.head["target"]).tree.digest]
     except (MutatorError, KeyError):
         return [files, None]
 
 
 def _digests(folder: Path, pattern: str) -> list[tuple[str, str]]:
-    return sorted((p.relative_to(folder).as_posix(), digests.sha256(p)) for p in folder.glob(pattern))
+    return _named(folder, folder.glob(pattern))
+
+
+def _named(folder: Path, paths: Iterable[Path]) -> list[tuple[str, str]]:
+    return sorted((p.relative_to(folder).as_posix(), digests.sha256(p)) for p in paths)

@@ -36,5 +36,3 @@ def check_environment(env: Mapping[str, str], source: Source) -> None:
                 expected=f"a variable that the harness does not set{fixed}",
                 remedy="leave it out",
             )
-        if "\0" in value or value != value.encode("utf-8", "ignore").decode():
-            raise source.error(("env", name), f"{value!a} for '{name}'", expected="text without NUL")

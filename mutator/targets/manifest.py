@@ -56,6 +56,7 @@ class TargetManifest:
     packages: tuple[str, ...]  # import packages (`pkg`) and flat modules (`b.py`) in it
     files: tuple[str, ...]  # globs, relative to the root: the files of the tree
     overlay: Path | None  # absolute: a folder of glue files laid over the root
+    is_installed: bool  # whether the root is where pip installs packages, so that links may lead anywhere
     forbid: tuple[str, ...]  # globs: files in which no fault may be injected
     env: Mapping[str, str]
     requires: tuple[Requirement, ...]
@@ -97,7 +98,8 @@ class TargetManifest:
 
     @cached_property
     def tree(self) -> SourceTree:
-        tree = read_tree(self.root, self.files, self.overlay)
+        library = self.path.parent.parent
+        tree = read_tree(self.root, self.files, self.overlay, library=library, any_links=self.is_installed)
         for name in self.packages:
             if name not in tree.files and not any(path.startswith(f"{name}/") for path in tree.files):
                 raise MutatorError(

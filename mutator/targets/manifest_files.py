@@ -5,6 +5,7 @@ from pathlib import Path
 
 from pydantic import Field
 
+from mutator._common.below import check_name
 from mutator._common.shipped import SHIPPED_TARGET
 from mutator.config.yaml_files import Source, StrictModel, load, read
 from mutator.targets.channels import ChannelModel, TraceModel, read_channels
@@ -13,6 +14,7 @@ from mutator.targets.environment import check_environment
 from mutator.targets.judging import HazardModel, MetricModel, read_hazards, read_metrics
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.observation import ObservationModel, read_observation
+from mutator.targets.paths import inside
 from mutator.targets.requirements import read_requirements
 from mutator.targets.roots import INSTALLED, check_installed, find_overlay, find_root, read_packages
 from mutator.targets.scene import SceneModel, read_scene
@@ -48,13 +50,15 @@ class ManifestModel(StrictModel, title="The file"):
         min_length=1,
         description="Globs, relative to the root: the files of the tree. `**` also matches across folders. "
         "Default: all files of the packages, including data, and the modules. A link is treated as "
-        "the file or folder to which it points.",
+        "the file or folder to which it points, which must be in the root. (An `installed:` package can "
+        "consist of links to anywhere.)",
     )
     overlay: str | None = Field(
         None,
         description="A folder of glue files, relative to this file or to the library, laid over the root. "
-        "All its files are part of the tree, and no fault may be injected there. It can contain "
-        "the entry module and the statement at which values are observed.",
+        "All its files are part of the tree, and no fault may be injected there. It must be in the "
+        "library, and its links must stay in it. It can contain the entry module and the statement at which "
+        "values are observed.",
     )
     forbid: list[str] = Field(
         default_factory=list, description="Globs: files in which no fault may be injected."
@@ -134,6 +138,7 @@ def load_manifest(path: Path, root: Path | None = None, overlay: Path | None = N
             f"{INSTALLED}NAME",
             remedy="correct `root`, or give the target with --target or MUTATOR_TARGET",
         )
+    _check_names(model, source)
     check_commands(model.entry, model.film, source)
     _check_record(model, source)
     _check_events(model, source)
@@ -155,6 +160,7 @@ def load_manifest(path: Path, root: Path | None = None, overlay: Path | None = N
         packages=packages,
         files=tuple(model.files or (p if p.endswith(".py") else f"{p}/**" for p in packages)),
         overlay=overlay or find_overlay(model.overlay, source),
+        is_installed=root is None and model.root.startswith(INSTALLED),
         forbid=tuple(model.forbid),
         env=model.env,
         requires=requires,
@@ -180,6 +186,19 @@ def load_manifest(path: Path, root: Path | None = None, overlay: Path | None = N
         source=source,
         film=read_film(model.film),
     )
+
+
+def _check_names(model: ManifestModel, source: Source) -> None:
+    """Refuse names that would lead out of the folders to which they belong."""
+    with source.placing(("name",)):
+        check_name(model.name, source.path)
+    for name in model.entry.changes:
+        with source.placing(("entry", "changes", name)):
+            check_name(name, source.path, folders=False)
+    for key in ("files", "forbid", "reads_itself"):
+        for i, glob in enumerate(getattr(model, key) or ()):
+            with source.placing((key, i)):
+                inside(glob)
 
 
 def _check_record(model: ManifestModel, source: Source) -> None:

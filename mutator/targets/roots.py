@@ -6,6 +6,7 @@ from pathlib import Path
 
 from packaging.requirements import Requirement
 
+from mutator._common.below import is_inside
 from mutator._common.shipped import SHIPPED_TARGET, shipped_folder
 from mutator.config.locations import PROBE_NAME
 from mutator.config.yaml_files import Source
@@ -40,6 +41,13 @@ def find_overlay(overlay: str | None, source: Source) -> Path | None:
     if overlay is None:
         return None
     for folder in (path.parent / overlay, path.parent.parent / overlay):
+        if not is_inside(path.parent.parent, folder):
+            raise source.error(
+                ("overlay",),
+                f"'{overlay}' leads out of the library",
+                expected=f"a folder in {path.parent.parent}, because its files become part of the tree",
+                remedy="put the glue into the library",
+            )
         if folder.is_dir():
             return folder.resolve()
     raise source.error(

@@ -2,12 +2,13 @@
 
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
+from mutator._common.below import check_inside, check_name, is_inside
 from mutator._common.files import check_is_text
 from mutator._common.hashing import canonical, digest
 from mutator.errors import MutatorError
@@ -75,14 +76,22 @@ def _digest(entries: Mapping[str, str]) -> str:
     return digest(f"[{','.join(entries[path] for path in sorted(entries))}]".encode())
 
 
-def read_tree(root: Path, globs: Iterable[str], overlay: Path | None = None) -> SourceTree:
+def read_tree(
+    root: Path,
+    globs: Iterable[str],
+    overlay: Path | None = None,
+    *,
+    library: Path | None = None,
+    any_links: bool = False,
+) -> SourceTree:
     """Read the files of `root` that match `globs` and all files of `overlay`, except bytecode. Links are
-    followed.
+    followed as long as they stay in the root, or for the overlay in the `library` that contains it; with
+    `any_links`, those of the root may lead anywhere.
 
-    MutatorError for a dangling link, and for a path that is in both folders.
+    MutatorError for any other link, and for a path that is in both folders.
     """
-    files = _read(root, tuple(globs))
-    laid_over = _read(overlay, ("**",)) if overlay else {}
+    files = _read(root, tuple(globs), None if any_links else root)
+    laid_over = _read(overlay, ("**",), library or overlay) if overlay else {}
     for path in laid_over:
         if os.path.lexists(root / path):
             raise MutatorError(
@@ -103,12 +112,27 @@ def read_tree(root: Path, globs: Iterable[str], overlay: Path | None = None) -> 
     )
 
 
-def _read(root: Path, globs: tuple[str, ...]) -> dict[str, bytes]:
+def _read(root: Path, globs: tuple[str, ...], bounds: Path | None) -> dict[str, bytes]:
+    """Read the files of `root` that match; Outside for a link that leads out of the folder `bounds`."""
+
+    def enters(folder: Path) -> bool:
+        """Whether to read a folder; Outside if its files could be part of the tree but are elsewhere."""
+        if bounds is None or is_inside(bounds, folder):
+            return True
+        if any(_may_match_below(folder.relative_to(root).parts, glob.split("/")) for glob in globs):
+            check_inside(bounds, folder)
+        return False
+
     folders = {_SPECIAL.split(glob)[0].rpartition("/")[0] for glob in globs}
-    found = {path: path.relative_to(root).as_posix() for name in folders for path in _below(root / name)}
+    found = {
+        path: path.relative_to(root).as_posix() for name in folders for path in _below(root / name, enters)
+    }
     files = {}
     for path in sorted(path for path, name in found.items() if matches(name, globs)):
         check_is_text(path)
+        check_name(found[path], root)
+        if bounds is not None and path.is_symlink():
+            check_inside(bounds, path)
         if path.is_symlink() and not path.exists():
             raise MutatorError(
                 f"a link to {path.readlink()}, which does not exist",
@@ -121,19 +145,29 @@ def _read(root: Path, globs: tuple[str, ...]) -> dict[str, bytes]:
     return files
 
 
-def _below(folder: Path, above: tuple[Path, ...] = ()) -> Iterator[Path]:
+def _below(folder: Path, enters: Callable[[Path], bool], above: tuple[Path, ...] = ()) -> Iterator[Path]:
     """Yield all files below a folder except bytecode; a link to a folder above it is not followed."""
     here = folder.resolve()
     try:
-        inside = list(folder.iterdir()) if folder.is_dir() and here not in above else []
+        inside = list(folder.iterdir()) if folder.is_dir() and here not in above and enters(folder) else []
     except PermissionError:
         return
     for path in inside:
         if path.is_dir():
             if path.name != "__pycache__":
-                yield from _below(path, (*above, here))
+                yield from _below(path, enters, (*above, here))
         elif path.suffix != ".pyc":
             yield path
+
+
+def _may_match_below(folder: Sequence[str], glob: Sequence[str]) -> bool:
+    """Whether a glob, split at `/`, can match a file below a folder."""
+    for part, pattern in zip(folder, glob, strict=False):
+        if "**" in pattern:
+            return True
+        if not _pattern(pattern).match(part):
+            return False
+    return len(glob) > len(folder)
 
 
 def matches(path: str, globs: Iterable[str]) -> bool:

@@ -1,10 +1,13 @@
 """Where the library, the templates and the targets are found."""
 
+import shutil
 from pathlib import Path
 
 import pytest
 
+from mutator._common.below import Outside
 from mutator.errors import MutatorError
+from mutator.onboarding.marks import unfilled
 from mutator.workspace import Workspace
 
 CLONE = Path(__file__).parents[3]
@@ -137,3 +140,64 @@ def test_the_only_target_is_the_default(toycar: Workspace) -> None:
         path.unlink()
     with pytest.raises(MutatorError, match=r"targets: no target manifest"):
         Workspace(library=toycar.library, templates=toycar.templates).target_name()
+
+
+READS = {  # a file of the library or its templates -> what reads it
+    "faults/sensor/lane.yaml": lambda found: found.specs(),
+    "scenarios/A.yaml": lambda found: found.scenario("A"),
+    "campaigns/small.yaml": lambda found: found.campaign("small"),
+    "targets/toycar.yaml": lambda found: found.manifest("toycar"),
+    "stpa/contexts/near_far.yaml": lambda found: found.context_table("near_far"),
+    "stpa/hazards.yaml": lambda found: found.hazards(),
+    "stpa/control_structure.yaml": lambda found: found.analysis(),
+    "references/paper_summary.yaml": lambda found: found.references,
+    "severity/mine.yaml": lambda found: found._files("severity"),
+    "readings.yaml": lambda found: found.readings(),
+    "notes/any.py": lambda found: list(unfilled(found.library)),
+    "../templates/offset.yaml": lambda found: found.fault_models(),
+    "../templates/offset.py.j2": lambda found: found.fault_models(),
+}
+
+
+FOLDERS = [  # those that are not entered through a link, and those that the user names, are left out
+    name for name in READS if name.count("/") and name not in ("faults/sensor/lane.yaml", "notes/any.py")
+][:-2]
+
+
+@pytest.mark.parametrize(
+    ("name", "is_folder"), [*((name, False) for name in READS), *((name, True) for name in FOLDERS)]
+)
+def test_a_library_reads_nothing_outside_through_its_links(
+    toycar: Workspace, tmp_path: Path, name: str, is_folder: bool
+) -> None:
+    """An error must not show the file's content either."""
+    path, mine = toycar.library / name, tmp_path / "mine"
+    mine.mkdir()
+    content = path.read_bytes() if path.exists() else b"# TODO(init): my secret\n"
+    (mine / path.name).write_bytes(content + b"# my secret\n")
+    link, end = (path.parent, mine) if is_folder else (path, mine / path.name)
+    link.parent.mkdir(parents=True, exist_ok=True)
+    if link.is_dir():
+        shutil.rmtree(link)
+    link.unlink(missing_ok=True)
+    link.symlink_to(end)
+    with pytest.raises(Outside, match="a link that leads out of its folder") as caught:
+        READS[name](toycar)
+    assert "secret" not in str(caught.value)
+
+
+def test_links_that_stay_in_the_library_are_followed(toycar: Workspace) -> None:
+    scenario = toycar.library / "scenarios" / "A.yaml"
+    (toycar.library / "shared.yaml").write_bytes(scenario.read_bytes())
+    scenario.unlink()
+    scenario.symlink_to("../shared.yaml")
+    assert toycar.scenario("A").read_bytes() == (toycar.library / "shared.yaml").read_bytes()
+
+
+@pytest.mark.parametrize("name", ["...yaml", "a\u202eb.yaml", "a\nb.yaml", "a\x1b[2J.yaml"])
+def test_a_scenarios_name_is_a_plain_name(toycar: Workspace, name: str) -> None:
+    """Names become folders of golden runs, and are printed."""
+    (toycar.library / "scenarios" / name).write_bytes((toycar.library / "scenarios" / "A.yaml").read_bytes())
+    with pytest.raises(Outside) as caught:
+        _ = toycar.scenarios
+    assert str(caught.value).isprintable()

@@ -45,6 +45,37 @@ def test_a_missing_spec_file_is_reported(toycar: Workspace, mine: Path) -> None:
         make_plan(toycar, mine)
 
 
+@pytest.mark.parametrize("linked", [True, False])
+def test_a_spec_file_outside_the_campaigns_folder_and_the_library_is_refused(
+    toycar: Workspace, mine: Path, tmp_path_factory: pytest.TempPathFactory, linked: bool
+) -> None:
+    other = tmp_path_factory.mktemp("other") / "notes.yaml"
+    other.write_text("secret: [\n")
+    if linked:
+        (mine.parent / "specs" / "drifting.yaml").unlink()
+        (mine.parent / "specs" / "drifting.yaml").symlink_to(other)
+    else:
+        mine.write_text(mine.read_text().replace("specs/drifting.yaml", str(other)))
+    with pytest.raises(
+        MutatorError, match=r"mine\.yaml:9: .* is neither below the campaign's folder"
+    ) as caught:
+        make_plan(toycar, mine)
+    assert "secret" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [("target: toycar", "target: ../toycar.yaml"), ("table: near_far", "table: /etc/near_far.yml")],
+)
+def test_a_campaign_names_only_targets_and_tables_of_the_library(
+    toycar: Workspace, mine: Path, old: str, new: str
+) -> None:
+    assert old in mine.read_text()
+    mine.write_text(mine.read_text().replace(old, new))
+    with pytest.raises(MutatorError, match=r"mine\.yaml:\d+: .* expected a name in the library"):
+        make_plan(toycar, mine)
+
+
 def test_two_specs_with_the_same_name_are_refused(toycar: Workspace, mine: Path) -> None:
     """Otherwise, tables could not distinguish their faults."""
     file = mine.parent / "specs" / "drifting.yaml"

@@ -17,12 +17,7 @@ CLONE = Path(__file__).parents[4]
 @pytest.fixture
 def workspace(tmp_path: Path) -> Workspace:
     library = tmp_path / "fault_library"
-    library.mkdir()
-    for folder in (CLONE / "fault_library").iterdir():
-        if folder.name == "references":
-            shutil.copytree(folder, library / folder.name)
-        else:
-            (library / folder.name).symlink_to(folder)
+    shutil.copytree(CLONE / "fault_library", library)
     return Workspace(library=library, templates=CLONE / "templates")
 
 

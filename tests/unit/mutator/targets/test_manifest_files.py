@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from mutator._common import caches
+from mutator._common.below import Outside
 from mutator.errors import MutatorError
 from mutator.faults.expansion import expand
 from mutator.model import AnchorKind
@@ -295,8 +296,8 @@ def test_globs_match_the_whole_path(glob: str, hits: set[str]) -> None:
     assert {p for p in paths if matches(p, [glob])} == hits
 
 
-def test_linked_files_are_part_of_the_tree(toy: Workspace, tmp_path: Path) -> None:
-    outside = tmp_path / "outside"
+def test_linked_files_are_part_of_the_tree(toy: Workspace) -> None:
+    outside = toy.manifest("toy").root / "outside"
     outside.mkdir()
     root = toy.manifest("toy").root / "toycar"
     (root / "sensor.py").rename(outside / "sensor.py")
@@ -316,11 +317,55 @@ def test_linked_files_are_part_of_the_tree(toy: Workspace, tmp_path: Path) -> No
 
 def test_a_dangling_link_is_reported_with_its_target(toy: Workspace) -> None:
     link = toy.manifest("toy").root / "toycar" / "glue.py"
-    link.symlink_to("/nowhere/glue.py")
-    with pytest.raises(
-        MutatorError, match=r"toycar/glue.py: a link to /nowhere/glue.py, which does not exist"
-    ):
+    link.symlink_to("nowhere.py")
+    with pytest.raises(MutatorError, match=r"toycar/glue.py: a link to nowhere.py, which does not exist"):
         _ = toy.manifest("toy").tree
+
+
+@pytest.mark.parametrize("end", ["notes.py", "folder", "nowhere"])
+def test_a_link_out_of_the_root_is_refused_where_the_tree_would_contain_it(
+    toy: Workspace, tmp_path: Path, end: str
+) -> None:
+    mine = tmp_path / "mine"
+    (mine / "folder").mkdir(parents=True)
+    for place in (mine, mine / "folder"):
+        (place / "notes.py").write_text("secret = 1\n")
+    root = toy.manifest("toy").root
+    (root / "data").symlink_to(mine / end)  # no glob matches it or anything below it
+    before = toy.manifest("toy").tree.digest
+    link = root / "toycar" / ("linked" if end == "folder" else "linked.py")
+    link.symlink_to(mine / end)
+    with pytest.raises(Outside, match=rf"{link}: a link that leads out of its folder") as caught:
+        _ = toy.manifest("toy").tree
+    assert "secret" not in str(caught.value)
+    link.unlink()
+    assert toy.manifest("toy").tree.digest == before
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line"),
+    [
+        ("name: toy\n", 'name: "../../toy"\n', 2),
+        ("name: toy\n", 'name: "a\\u202eb"\n', 2),
+        ("toycar/**/*.py", "../**", 5),
+        ("toycar/**/*.py", "/etc/host*", 5),
+        ("toycar/judge.py", "../x.py", 6),
+        ("package: toycar\n", 'package: toycar\noverlay: "../../.."\n', 5),
+        ("package: toycar\n", "package: toycar\noverlay: /usr\n", 5),
+        ("package: toycar\n", 'package: "toycar\\0"\n', 4),
+        ("{alone: ", '{"/../../x": [], alone: ', 11),
+        ("{alone: ", "{..: [], alone: ", 11),
+    ],
+)
+def test_names_that_lead_out_are_refused_at_their_line(toy: Workspace, old: str, new: str, line: int) -> None:
+    path = toy.library / "targets" / "toy.yaml"
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(MutatorError) as caught:
+        _ = toy.manifest("toy").tree
+    assert caught.value.where == str(path)
+    assert caught.value.line == line
 
 
 def test_digests_do_not_depend_on_order(tmp_path: Path) -> None:

@@ -86,9 +86,9 @@ def test_an_overlay_cannot_have_the_probes_name(pole: Workspace) -> None:
         build(pole.manifest("pole"), pole.fault_models(), None, always())
 
 
-def test_a_linked_overlay_works_like_the_original(pole: Workspace, tmp_path: Path) -> None:
+def test_a_linked_overlay_works_like_the_original(pole: Workspace) -> None:
     whole = pole.manifest("pole").tree
-    overlay, elsewhere = pole.library / "overlays" / "pole", tmp_path / "elsewhere"
+    overlay, elsewhere = pole.library / "overlays" / "pole", pole.library / "overlays" / "common"
     shutil.move(overlay / "glue_parts", elsewhere / "glue_parts")
     shutil.move(overlay / "drive.py", elsewhere / "drive.py")
     for name in ("drive.py", "glue_parts"):
@@ -98,6 +98,19 @@ def test_a_linked_overlay_works_like_the_original(pole: Workspace, tmp_path: Pat
     shutil.rmtree(overlay)
     overlay.symlink_to(elsewhere)
     assert pole.manifest("pole").tree.digest == whole.digest
+
+
+def test_a_link_out_of_the_library_is_refused(pole: Workspace, tmp_path: Path) -> None:
+    overlay, mine = pole.library / "overlays" / "pole", tmp_path / "mine"
+    mine.mkdir()
+    (mine / "notes.txt").write_text("secret")
+    (overlay / "data").symlink_to(mine)
+    with pytest.raises(MutatorError, match=r"overlays/pole/data: a link that leads out of its folder"):
+        _ = pole.manifest("pole").tree
+    shutil.rmtree(overlay)
+    overlay.symlink_to(mine)
+    with pytest.raises(MutatorError, match=r"pole\.yaml:5: '\.\./overlays/pole' leads out of the library"):
+        pole.manifest("pole")
 
 
 def test_errors_name_the_file_of_the_overlay(pole: Workspace) -> None:
