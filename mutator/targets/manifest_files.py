@@ -189,7 +189,7 @@ def load_manifest(path: Path, root: Path | None = None, overlay: Path | None = N
 
 
 def _check_names(model: ManifestModel, source: Source) -> None:
-    """Refuse names that would lead out of the folders to which they belong."""
+    """Refuse names that point out of the folders to which they belong."""
     with source.placing(("name",)):
         check_name(model.name, source.path)
     for name in model.entry.changes:

@@ -86,7 +86,7 @@ def read_tree(
 ) -> SourceTree:
     """Read the files of `root` that match `globs` and all files of `overlay`, except bytecode. Links are
     followed as long as they stay in the root, or for the overlay in the `library` that contains it; with
-    `any_links`, those of the root may lead anywhere.
+    `any_links`, those of the root may end anywhere.
 
     MutatorError for any other link, and for a path that is in both folders.
     """
