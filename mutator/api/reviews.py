@@ -5,13 +5,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mutator.api.selection import WorkspaceLike, open_workspace
+from mutator.campaigns.clones import user_name
 from mutator.campaigns.filters import compile_filter
 from mutator.campaigns.plans import Choices, make_plan
 from mutator.errors import MutatorError
 from mutator.review import catalogue, gate
 from mutator.review.catalogue import Group
 from mutator.review.columns import COLUMNS
-from mutator.review.commits import user_name
 from mutator.review.decisions import Change, Kind, Review, State, record
 from mutator.review.decisions import load_review as load_decisions
 from mutator.review.page import write_page
@@ -158,5 +158,5 @@ def facts(review: Review, group: Group) -> dict[str, object]:
 
 
 def reviewer_name(workspace: WorkspaceLike = None) -> str | None:
-    """Return git's `user.name`; None if it is not set."""
-    return user_name(open_workspace(workspace))
+    """Return `user.name` of the user's own git configuration; None if it is not set."""
+    return user_name(open_workspace(workspace).library)

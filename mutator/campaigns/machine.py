@@ -1,7 +1,6 @@
-"""Finds what a run depends on: Python, operating system, processor, BLAS, packages and git commits."""
+"""Finds what a run depends on: Python, operating system, processor, BLAS and packages."""
 
 import json
-import os
 import platform
 import re
 import subprocess
@@ -118,22 +117,3 @@ def packages_of(modules: Iterable[str]) -> tuple[str, ...]:
 def _providers() -> dict[str, list[str]]:
     """Return the packages of each top-level module; cached, because it reads every package's file list."""
     return dict(metadata.packages_distributions())
-
-
-def clone_state(folder: Path) -> dict[str, Any] | None:
-    """Return the git commit of a folder, and whether the folder has changed since; None if unknown."""
-    head = git(folder, "rev-parse", "HEAD", "HEAD:./")
-    changes = git(folder, "status", "--porcelain", "--", ".")
-    if head is None or changes is None:
-        return None
-    return {"commit": head.split()[0], "changed": bool(changes.strip())}
-
-
-def git(folder: Path, *words: str) -> str | None:
-    outside = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
-    command = ["git", "--no-optional-locks", "-C", str(folder), *words]
-    try:
-        done = subprocess.run(command, env=outside, capture_output=True, text=True, check=False)
-    except OSError:
-        return None
-    return done.stdout if done.returncode == 0 else None

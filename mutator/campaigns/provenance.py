@@ -11,6 +11,7 @@ from mutator._common.files import json_bytes
 from mutator._common.hashing import digest, plain
 from mutator._common.version import VERSION
 from mutator.campaigns import machine
+from mutator.campaigns.clones import clone_state
 from mutator.errors import MutatorError
 from mutator.store import digests
 from mutator.store.check_results import loaded_packages
@@ -98,7 +99,7 @@ def begin_stretch(folder: RunFolder, workspace: Workspace, *, records: str, acce
     places = {"library": workspace.library, "templates": workspace.templates, "target": manifest.root}
     places |= {"overlay": manifest.overlay} if manifest.overlay else {}
     packages = _packages(folder, (canonicalize_name(wanted.name) for wanted in manifest.requires))
-    states = {name: machine.clone_state(place) for name, place in ({"mutator": _OWN} | places).items()}
+    states = {name: clone_state(place) for name, place in ({"mutator": _OWN} | places).items()}
     add_stretch(
         folder,
         Stretch(

@@ -30,7 +30,8 @@ Groups = Annotated[
     list[str], typer.Argument(metavar="GROUP...", help="Ids of groups, or the start of each id.")
 ]
 By = Annotated[
-    str | None, typer.Option("--by", metavar="NAME", help="The reviewer. Default: git's user.name.")
+    str | None,
+    typer.Option("--by", metavar="NAME", help="The reviewer. Default: user.name of your git config."),
 ]
 
 
@@ -66,6 +67,6 @@ def reviewer(place: Place, by: str | None) -> str:
             "no reviewer",
             argument="by",
             expected="the reviewer's name",
-            remedy="add `by`, or set git's user name: `git config user.name NAME`",
+            remedy="add `by`, or set git's user name: `git config --global user.name NAME`",
         )
     return name

@@ -1,20 +1,23 @@
-"""Git data for reviews: the library's commit, the user's name, and who last changed a group."""
+"""Git data for reviews: the library's commit, and who last changed a group."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from mutator.campaigns.machine import git
+from mutator.campaigns.clones import Clone
 from mutator.errors import MutatorError
 from mutator.review.catalogue import Group
 from mutator.workspace import Workspace
 
-_FORMAT = "--format=%H%x00%aN <%aE>%x00%(trailers:key=Co-authored-by,valueonly,separator=%x00)"
+_FORMAT = "--format=%H%x00%an <%ae>%x00%(trailers:key=Co-authored-by,valueonly,separator=%x00)"
 
 
 @dataclass(frozen=True, slots=True)
 class _Commit:
-    """A commit with its author (as in `.mailmap`) and the co-authors that its message names."""
+    """A commit with its author and the co-authors that its message names.
+
+    `.mailmap` is not read: whoever wrote it could give a change to somebody else.
+    """
 
     id: str
     author: str  # such as `Jane Doe <jane@x.org>`
@@ -30,16 +33,12 @@ def _names(person: str) -> set[str]:
     return {" ".join(text.split()).casefold() for text in (person, name, rest.rstrip("> "))} - {""}
 
 
-def user_name(workspace: Workspace) -> str | None:
-    """Git's `user.name` for the library."""
-    return (git(workspace.library, "config", "user.name") or "").strip() or None
-
-
 def library_commit(workspace: Workspace) -> str | None:
     """The library's commit, with `-dirty` if anything but its reviews changed since; None outside git."""
-    head = git(workspace.library, "rev-parse", "HEAD")
-    changes = git(workspace.library, "status", "--porcelain", "--", ".", ":(exclude)reviews")
-    return None if head is None or changes is None else head.strip() + "-dirty" * bool(changes.strip())
+    clone = Clone.of(workspace.library)
+    if clone is None:
+        return None
+    return clone.commit + "-dirty" * (clone.differs(workspace.library, leave_out="reviews") is not False)
 
 
 def check_four_eyes(approvals: Sequence[tuple[Group, str]]) -> None:
@@ -61,31 +60,29 @@ def check_four_eyes(approvals: Sequence[tuple[Group, str]]) -> None:
 
 def _last_changes(group: Group) -> dict[Path, _Commit]:
     """The last commit that changed the group's sources, for each clone."""
-    clones: dict[Path, list[Path]] = {}
+    clones: dict[Clone, list[Path]] = {}
     for path in group.made_from:
-        top = git(path.parent, "rev-parse", "--show-toplevel")
-        if top is None:
+        clone = Clone.of(path.resolve().parent)
+        if clone is None:
             raise _refusal(
                 f"cannot determine who last changed group {group.id}: its file is not in a git clone",
                 path,
                 "put the file under git",
             )
-        clones.setdefault(Path(top.strip()), []).append(path)
-    return {top: _last_change(group, top, paths) for top, paths in clones.items()}
+        clones.setdefault(clone, []).append(path)
+    return {clone.top: _last_change(group, clone, paths) for clone, paths in clones.items()}
 
 
-def _last_change(group: Group, top: Path, paths: Sequence[Path]) -> _Commit:
-    names = [str(path.resolve()) for path in paths]
-    changes = git(top, "--literal-pathspecs", "status", "--porcelain", "--", *names)
-    told = git(top, "--literal-pathspecs", "log", "-1", "--no-merges", _FORMAT, "--", *names) or ""
-    if changes is None or changes.strip() or not told.strip():
-        first = (changes or "").strip().partition("\n")[0].split(maxsplit=1)[-1:]
+def _last_change(group: Group, clone: Clone, paths: Sequence[Path]) -> _Commit:
+    changed = clone.changed(paths)
+    commit = (clone.last_change(paths, _FORMAT) or "").strip("\n")
+    if changed is not None or not commit:
         raise _refusal(
             f"cannot determine who last changed group {group.id}: its latest change is not committed",
-            Path(top, *first),
+            changed or clone.top,
             "commit the change first",
         )
-    sha, author, *others = filter(None, told.strip("\n").split("\0"))
+    sha, author, *others = filter(None, commit.split("\0"))
     return _Commit(sha, author, tuple(others))
 
 

@@ -10,12 +10,12 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
+from mutator.campaigns.clones import user_name
 from mutator.campaigns.plans import Choices, make_plan
 from mutator.config.yaml_files import StrictModel
 from mutator.errors import MutatorError
 from mutator.review import catalogue, pictures, typical
 from mutator.review.catalogue import Group
-from mutator.review.commits import user_name
 from mutator.review.decisions import Change, Conflict, Kind, Review, load_review, record
 from mutator.review.page import page_html, state_of
 from mutator.serve.runs import Absent
@@ -77,7 +77,7 @@ class Reviews:
 
     @property
     def reviewer(self) -> str:
-        return user_name(self.workspace) or ""
+        return user_name(self.workspace.library) or ""
 
     def selection(self, target: str, campaign: str | None, specs: Sequence[str]) -> Selection:
         if target not in self.workspace.targets:

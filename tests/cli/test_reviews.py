@@ -108,7 +108,7 @@ def test_a_decision_needs_a_reviewer(
     for words in ((), ("--by", " ")):
         answer = cli("review", "approve", group, *words)
         assert (answer.code, "expected: the reviewer's name" in answer.err) == (2, True)
-        assert "add --by, or set git's user name: `git config user.name NAME`" in answer.err
+        assert "add --by, or set git's user name: `git config --global user.name NAME`" in answer.err
     assert not (root / "fault_library/reviews").exists()
     (root / ".gitconfig").write_text("[user]\nname = Git Smith\n")
     assert " approved by Git Smith on " in cli("review", "approve", group).out

@@ -1,20 +1,11 @@
 """The description of the machine in a run folder."""
 
-import os
-import subprocess
 from importlib import metadata
 from pathlib import Path
 
 import pytest
 
 from mutator.campaigns import machine
-
-IDENTITY = ("-c", "user.name=x", "-c", "user.email=x@example.org", "-c", "commit.gpgsign=false")
-
-
-def git(folder: Path, *words: str) -> None:
-    clean = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
-    subprocess.run(["git", "-C", folder, *IDENTITY, *words], env=clean, check=True, capture_output=True)
 
 
 def test_required_packages_include_indirect_requirements() -> None:
@@ -59,25 +50,3 @@ def test_the_processor_model_is_read_from_cpuinfo() -> None:
     lines = Path("/proc/cpuinfo").read_text().splitlines()
     models = {line.partition(":")[2].strip() for line in lines if line.startswith("model name")}
     assert not models or machine.cpu() in models
-
-
-def test_only_changes_in_the_folder_itself_make_a_commit_dirty(tmp_path: Path) -> None:
-    library, other = tmp_path / "library", tmp_path / "other"
-    for folder in (library, other):
-        folder.mkdir()
-        (folder / "a.yaml").write_text("a")
-    assert machine.clone_state(library) is None
-    git(tmp_path, "init", "-q")
-    assert machine.clone_state(library) is None  # no commit yet
-    git(tmp_path, "add", "library")
-    git(tmp_path, "commit", "-qm", "one")
-    found = machine.clone_state(library)
-    assert found is not None and len(found["commit"]) == 40 and found["changed"] is False
-    assert machine.clone_state(other) is None  # inside the clone, but not in any commit
-    (library / "b.yaml").write_text("new")
-    assert machine.clone_state(library) == found | {"changed": True}
-
-
-def test_without_git_there_is_no_commit(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setenv("PATH", str(tmp_path))
-    assert machine.clone_state(Path(__file__).parent) is None

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from mutator.campaigns import machine
+from mutator.campaigns.clones import clone_state
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plans import make_plan
 from mutator.campaigns.provenance import begin_stretch, check_versions
@@ -48,7 +49,7 @@ def test_a_session_records_everything_that_affects_results(folder: RunFolder, to
 
 def _clone() -> dict[str, object] | None:
     """Return the git state of the harness; the toy is outside any clone."""
-    state = machine.clone_state(Path(machine.__file__).parents[1])
+    state = clone_state(Path(machine.__file__).parents[1])
     return {"mutator": state} if state else None
 
 

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from mutator.campaigns.clones import user_name
 from mutator.errors import MutatorError
 from mutator.review.catalogue import Group, of_library
-from mutator.review.commits import library_commit, user_name
+from mutator.review.commits import library_commit
 from mutator.review.decisions import Change, Kind, Review, State, load_review, record
 from mutator.workspace import Workspace
 
@@ -125,9 +126,29 @@ def test_a_decision_stores_the_librarys_commit(toycar: Workspace, root: Path) ->
     assert library_commit(toycar) == f"{sha}-dirty"
 
 
-def test_the_user_name_comes_from_git(toycar: Workspace, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("HOME", str(root))
+def test_mailmap_gives_no_change_to_somebody_else(toycar: Workspace, root: Path) -> None:
+    commit(root, LANE, "Jane Doe <jane@example.org>")
+    (root / ".mailmap").write_text("Joe <joe@example.org> <jane@example.org>\n")
+    git(root, "add", ".mailmap")
+    git(root, "commit", "-qm", "names")
+    with pytest.raises(MutatorError, match="Jane Doe changed"):
+        say(toycar, "Jane Doe")
+    assert say(toycar, "Joe").decision(lane(toycar).id)
+
+
+def test_the_user_name_never_comes_from_the_library(
+    toycar: Workspace, root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    home = tmp_path / "home"
+    home.mkdir()
+    monkeypatch.setenv("HOME", str(home))
     monkeypatch.delenv("XDG_CONFIG_HOME", raising=False)
-    assert user_name(toycar) is None
+    git(root, "config", "extensions.worktreeConfig", "true")
     git(root, "config", "user.name", "Jane Doe")
-    assert user_name(toycar) == "Jane Doe"
+    git(root, "config", "--worktree", "user.name", "Jane Doe")
+    assert user_name(toycar.library) is None
+    git(root, "config", "--global", "user.name", "A User")
+    assert user_name(toycar.library) == "A User"
+    (home / "at-work").write_text("[user]\n\tname = At Work\n")
+    git(root, "config", "--global", f"includeIf.gitdir:{root}/.path", str(home / "at-work"))
+    assert user_name(toycar.library) == "At Work", "the user's own file names two names"
