@@ -19,8 +19,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
 
+from mutator._common.hashing import content_id
+
 CHECKS, GOLDENS, RUNS = "checks", "goldens", "runs"
 LINES, PICTURES, TARGETS = "lines", "pictures", "targets"
+_LONGEST_NAME = 200
 TARGET_BYTES = 4_000_000_000  # size limit for one target, enforced between seeds
 
 
@@ -79,7 +82,8 @@ def of_pictures() -> Path:
 
 def of_target(name: str) -> Path:
     """The folder that all runs of a target share."""
-    return folder() / TARGETS / quote(name, safe="").replace(".", "%2E")
+    quoted = quote(name, safe="").replace(".", "%2E")
+    return folder() / TARGETS / (quoted if len(quoted) <= _LONGEST_NAME else content_id(name))
 
 
 def entries() -> list[Entry]:

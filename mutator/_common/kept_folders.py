@@ -5,6 +5,7 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
+from mutator._common.below import Outside, check_plain
 from mutator._common.hashing import digest
 
 _SUM = "sum"  # the file with the digest of all others
@@ -16,7 +17,11 @@ def fetch(place: Path, to: Path) -> None:
     OSError if the cached folder is missing or damaged.
     """
     shutil.rmtree(to, ignore_errors=True)
-    shutil.copytree(place, to)
+    shutil.copytree(place, to, symlinks=True)
+    try:
+        check_plain(to)
+    except Outside as err:  # the copy of a link would be the file at its end
+        raise OSError(str(err)) from None
     kept = to / _SUM
     said = kept.read_bytes()
     kept.unlink()

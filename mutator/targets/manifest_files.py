@@ -50,8 +50,8 @@ class ManifestModel(StrictModel, title="The file"):
         min_length=1,
         description="Globs, relative to the root: the files of the tree. `**` also matches across folders. "
         "Default: all files of the packages, including data, and the modules. A link is treated as "
-        "the file or folder to which it points, which must be in the root. (An `installed:` package can "
-        "consist of links to anywhere.)",
+        "the file or folder to which it points, which must be in the root unless the root is "
+        "`installed:NAME`.",
     )
     overlay: str | None = Field(
         None,

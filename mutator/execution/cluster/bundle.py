@@ -6,21 +6,24 @@
 * templates/: the fault models
 * scenarios/: the scenario files of the golden runs
 
+A bundle contains nothing from outside these folders, and is written nowhere else: both sides check its names.
 Each machine makes the golden runs itself; their digests show whether its results equal those of the campaign.
 """
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from mutator._common.below import Outside, check_inside, check_name, files_inside
 from mutator._common.files import raising_disk_full, read_json
 from mutator._common.version import VERSION
+from mutator.errors import MutatorError
 from mutator.execution.cluster.parcel import pack, unpack
-from mutator.faults.fault_models import FaultModels, load_fault_models
+from mutator.faults.fault_models import FILES, FaultModels, load_fault_models
 from mutator.model import Limits
 from mutator.outcomes.columns import check_names
 from mutator.store.check_results import FILE as CHECKS
@@ -31,6 +34,9 @@ from mutator.targets.manifest_files import load_manifest
 from mutator.workspace import Workspace
 
 SCHEMA = "bundle/1"
+MOST_BYTES = 2_000_000_000
+_META = "meta.json"
+_FOLDERS = ("manifest", "target", "overlay", "templates", "scenarios")
 _ROOT = "{root}/"
 
 
@@ -41,9 +47,42 @@ class Bundle:
 
     @classmethod
     def of(cls, workspace: Workspace, folder: RunFolder, engine: str) -> "Bundle":
-        """Pack what workers need for a run that has passed its checks."""
-        data = pack(dict(_parts(workspace, folder, engine)))
+        """Pack what workers need for a run that has passed its checks.
+
+        MutatorError for a file outside the folders of library and target, and for too many bytes.
+        """
+        parts = dict(_parts(workspace, folder, engine))
+        _check(parts, workspace.library)
+        data = pack(parts)
         return cls(data, sha256(data).hexdigest())
+
+
+def _check(parts: Mapping[str, bytes], where: Path) -> None:
+    """Raise MutatorError unless the parts can be written into a bundle's folders, on any file system."""
+    seen: dict[str, str] = {}
+    for name in parts:
+        folder = check_name(name, where).partition("/")[0]
+        if name != _META and (folder == name or folder not in _FOLDERS):
+            raise Outside(f"the name {name!a}", where=where, expected=f"a name in {', '.join(_FOLDERS)}")
+        if other := seen.get(name.casefold()):
+            raise MutatorError(
+                f"{other} and {name}",
+                where=where,
+                expected="names that differ in more than upper and lower case, on any worker's disk",
+                remedy="rename one of them",
+            )
+        seen[name.casefold()] = name
+    _check_size(sum(map(len, parts.values())), where)
+
+
+def _check_size(size: int, where: Path) -> None:
+    if size > MOST_BYTES:
+        raise MutatorError(
+            f"{size / 1e9:.1f} GB for each worker of the cluster",
+            where=where,
+            expected=f"at most {MOST_BYTES / 1e9:.0f} GB of tree, templates and scenarios",
+            remedy="put large files where all workers can read them, and give their path in `entry.args`",
+        )
 
 
 def _parts(workspace: Workspace, folder: RunFolder, engine: str) -> Iterator[tuple[str, bytes]]:
@@ -61,7 +100,7 @@ def _parts(workspace: Workspace, folder: RunFolder, engine: str) -> Iterator[tup
         "goldens": [{"golden": one.plain(), "digest": digests[one.key]} for one in folder.goldens],
         "manifest": manifest.path.name,
     }
-    yield "meta.json", json.dumps(meta).encode()
+    yield _META, json.dumps(meta).encode()
     yield f"manifest/{manifest.path.name}", manifest.path.read_bytes()
     tree = manifest.tree
     for path, data in tree.files.items():
@@ -69,29 +108,33 @@ def _parts(workspace: Workspace, folder: RunFolder, engine: str) -> Iterator[tup
     for file in _read_in_root(manifest):
         name = file.relative_to(manifest.root).as_posix()
         if name not in tree.files:
+            _check_size(file.stat().st_size, file)
             yield f"target/{name}", file.read_bytes()
-    yield from _below(workspace.templates, "templates")
+    for kind in FILES:
+        for file in sorted(workspace.templates.glob(kind)):
+            yield f"templates/{file.name}", check_inside(workspace.templates, file).read_bytes()
     for name in sorted(folder.scenarios):
         yield f"scenarios/{name}.yaml", workspace.scenario(name).read_bytes()
 
 
-def _read_in_root(manifest: TargetManifest) -> list[Path]:
-    named = [word.removeprefix(_ROOT) for word in manifest.entry_args if word.startswith(_ROOT)]
-    places = [manifest.root / name for name in named]
-    return sorted(path for place in places for path in (place, *place.rglob("*")) if path.is_file())
-
-
-def _below(folder: Path, name: str) -> Iterator[tuple[str, bytes]]:
-    for path in sorted(folder.rglob("*")):
-        if path.is_file() and "__pycache__" not in path.parts:
-            yield f"{name}/{path.relative_to(folder).as_posix()}", path.read_bytes()
+def _read_in_root(manifest: TargetManifest) -> Iterator[Path]:
+    """Yield the files that a run's arguments name, or that are in folders that they name."""
+    for i, word in enumerate(manifest.entry_args):
+        if word.startswith(_ROOT):
+            with manifest.source.placing(("entry", "args", i)):
+                name = check_name(word.removeprefix(_ROOT).removesuffix("/"), manifest.path)
+                place = check_inside(manifest.root, manifest.root / name)
+                inside = files_inside(manifest.root, name, "*")
+            yield from (path for path in (place, *inside) if path.is_file())
 
 
 def lay_out(data: bytes, place: Path) -> None:
-    """Write the files of a bundle into the folder `place`; MutatorError if the bundle is damaged."""
+    """Write the files of a bundle into the new folder `place`; MutatorError if a bundle cannot have them."""
+    parts = unpack(data)
+    _check(parts, place)
     with raising_disk_full(place):
-        for name, content in unpack(data).items():
-            path = place / name
+        for name, content in parts.items():
+            path = place / name  # checked, and a new folder has no links
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(content)
 
@@ -104,7 +147,19 @@ class Site:
 
     @cached_property
     def meta(self) -> dict[str, Any]:
-        return read_json(self.place / "meta.json", SCHEMA)
+        """The content of meta.json; MutatorError if it is not what `Bundle.of` writes."""
+        path = self.place / _META
+        meta = read_json(path, SCHEMA)
+        try:
+            check_name(meta["manifest"], path, folders=False)
+            goldens = [(GoldenRun.from_plain(one["golden"]), one["digest"]) for one in meta["goldens"]]
+            for golden, _ in goldens:
+                check_name(golden.key, path)
+            if Limits(**meta["limits"]) and meta.keys() >= {"engine", "seed", "series", "several_seeds"}:
+                return meta
+        except (KeyError, TypeError, ValueError):
+            pass
+        raise MutatorError("not the description of a bundle", where=path, remedy="start the workers again")
 
     @cached_property
     def manifest(self) -> TargetManifest:
@@ -124,7 +179,7 @@ class Site:
         return Limits(**self.meta["limits"])
 
     def scenario(self, name: str) -> Path:
-        return self.place / "scenarios" / f"{name}.yaml"
+        return self.place / "scenarios" / f"{check_name(name, self.place)}.yaml"
 
     @cached_property
     def goldens(self) -> dict[str, tuple[GoldenRun, str]]:

@@ -21,14 +21,30 @@ def unpack(data: bytes) -> dict[str, bytes]:
     begin = len(_MARK) + _DIGEST
     view = memoryview(data)
     if data[: len(_MARK)] != _MARK or sha256(view[begin:]).digest() != data[len(_MARK) : begin]:
-        raise MutatorError(
-            f"a damaged parcel of {len(data)} bytes",
-            expected="the bytes that were sent",
-            remedy="check the network, then run the same command",
-        )
+        raise _damaged(data)
     end = begin + _LENGTH + int.from_bytes(data[begin : begin + _LENGTH], "little")
     parts = {}
-    for name, length in json.loads(data[begin + _LENGTH : end]):
+    for name, length in _head(data, begin + _LENGTH, end):
         parts[name] = bytes(view[end : end + length])
         end += length
     return parts
+
+
+def _head(data: bytes, begin: int, end: int) -> list[tuple[str, int]]:
+    """Return the names and lengths of a parcel's parts, which begin at `end`."""
+    try:
+        head = [(str(name), int(length)) for name, length in json.loads(data[begin:end])]
+    except (ValueError, TypeError, RecursionError):
+        raise _damaged(data) from None
+    names, lengths = [name for name, _ in head], [length for _, length in head]
+    if len({*names}) < len(names) or min(lengths, default=0) < 0 or end + sum(lengths) != len(data):
+        raise _damaged(data)
+    return head
+
+
+def _damaged(data: bytes) -> MutatorError:
+    return MutatorError(
+        f"a damaged parcel of {len(data)} bytes",
+        expected="the bytes that were sent",
+        remedy="check the network, then run the same command",
+    )

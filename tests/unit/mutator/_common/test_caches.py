@@ -46,10 +46,12 @@ def test_without_a_home_folder_the_cache_is_empty(monkeypatch: pytest.MonkeyPatc
     assert (caches.entries(), caches.prune(0), caches.clear()) == ([], [], [])
 
 
-@pytest.mark.parametrize("name", ["..", "a/b", "/", ".hidden", "plain"])
+@pytest.mark.parametrize("name", ["..", "a/b", "/", ".hidden", "plain", "ä" * 100])
 def test_any_target_name_gives_a_folder_directly_below_targets(name: str) -> None:
     place = caches.of_target(name)
     assert place.resolve().parent == (caches.folder() / "targets").resolve()
+    place.mkdir(parents=True)
+    assert caches.make_room(name) == []
 
 
 def test_checks_form_one_entry_and_each_target_file_has_its_own(filled: Path) -> None:

@@ -1,6 +1,7 @@
 """Data sent between the command and its workers arrives unchanged or is refused."""
 
 import random
+from hashlib import sha256
 
 import pytest
 
@@ -23,6 +24,26 @@ def test_any_damage_is_detected() -> None:
         for wrong in (changed, data[:at], data + b"x"):
             with pytest.raises(MutatorError, match="damaged parcel"):
                 unpack(wrong)
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        b"x",
+        b"{}",
+        b"[1]",
+        b'[["a"]]',
+        b'[["a", -1], ["b", 3]]',
+        b'[["a", 9]]',
+        b'[["a", 1], ["a", 1]]',
+        b"[" * 9999,
+    ],
+)
+def test_a_parcel_whose_head_does_not_fit_is_refused(head: bytes) -> None:
+    """Its digest is right: somebody made it so."""
+    body = len(head).to_bytes(4, "little") + head + b"xx"
+    with pytest.raises(MutatorError, match="damaged parcel"):
+        unpack(b"FIP1" + sha256(body).digest() + body)
 
 
 def test_a_result_is_read_back_unchanged() -> None:

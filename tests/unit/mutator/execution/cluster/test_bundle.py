@@ -1,0 +1,195 @@
+"""A bundle contains only files of the library and the target, and is written only into its own folder."""
+
+import json
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from mutator.campaigns.plans import Choices
+from mutator.errors import MutatorError
+from mutator.execution.cluster import bundle
+from mutator.execution.cluster.bundle import Bundle, Site, lay_out
+from mutator.execution.cluster.parcel import pack, unpack
+from mutator.execution.session import open_session
+from mutator.store.run_folder import RunFolder
+from mutator.workspace import Workspace
+
+Prepared = tuple[Workspace, RunFolder]
+
+
+@pytest.fixture(scope="module")
+def checked(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]) -> Path:
+    """A folder with the toy, and a run of its small campaign that has passed its checks."""
+    folder = tmp_path_factory.mktemp("checked")
+    toy = copy_toycar(folder / "home" / "lib")
+    run = folder / "home" / "run"
+    with open_session(toy, "small", run, workers=1, choices=Choices(), engine="reference") as session:
+        session.prepare()
+    return folder / "home"
+
+
+@pytest.fixture
+def prepared(checked: Path, tmp_path: Path) -> Prepared:
+    shutil.copytree(checked, tmp_path / "home", symlinks=True)
+    home = tmp_path / "home"
+    (home / "notes.txt").write_text("my secret")
+    [library] = home.glob("lib/**/fault_library")
+    return Workspace(library=library, templates=library.parent / "templates"), RunFolder.open(home / "run")
+
+
+def with_argument(workspace: Workspace, text: str) -> None:
+    path = workspace.library / "targets" / "toycar.yaml"
+    old = 'args: ["{scenario}", '
+    assert old in path.read_text()
+    path.write_text(path.read_text().replace(old, f"{old}{json.dumps(text)}, "))
+
+
+def test_a_bundle_has_the_tree_the_templates_and_what_arguments_name(prepared: Prepared) -> None:
+    workspace, folder = prepared
+    root = workspace.manifest("toycar").root
+    (root / "data").mkdir()
+    (root / "data" / "map.npz").write_bytes(b"road")
+    (root / "data" / "linked.npz").symlink_to("map.npz")
+    (root / "other.txt").write_text("not named")
+    (workspace.templates / ".env").write_text("TOKEN=1")
+    with_argument(workspace, "{root}/data")
+    parts = unpack(Bundle.of(workspace, folder, "reference").data)
+    tree = workspace.manifest("toycar").tree
+    assert {name for name in parts if name.startswith("target/")} == {
+        *(f"target/{name}" for name in tree.files),
+        "target/data/map.npz",
+        "target/data/linked.npz",
+    }
+    assert parts["target/data/linked.npz"] == b"road"
+    assert {Path(name).suffix for name in parts if name.startswith("templates/")} == {".yaml", ".j2"}
+
+
+@pytest.mark.parametrize(
+    "argument",
+    [
+        "{root}/../../../notes.txt",
+        "{root}//etc/hostname",
+        "{root}/",
+        "{root}/.",
+        "{root}/x/../../..",
+        "{root}/link",
+        "{root}/data",
+    ],
+)
+def test_a_file_outside_the_root_is_not_packed(prepared: Prepared, argument: str) -> None:
+    workspace, folder = prepared
+    root = workspace.manifest("toycar").root
+    notes = folder.path.parent / "notes.txt"
+    (root / "link").symlink_to(notes)
+    (root / "data").mkdir()
+    (root / "data" / "link").symlink_to(notes.parent)
+    (root / "data" / "more").symlink_to(notes)
+    with_argument(workspace, argument)
+    with pytest.raises(MutatorError, match=r"toycar\.yaml:\d+: ") as caught:
+        Bundle.of(workspace, folder, "reference")
+    assert "secret" not in str(caught.value)
+
+
+def test_a_linked_template_is_not_packed(prepared: Prepared) -> None:
+    workspace, folder = prepared
+    (workspace.templates / "more.py.j2").symlink_to(folder.path.parent / "notes.txt")
+    with pytest.raises(MutatorError, match="a link that leads out of its folder"):
+        Bundle.of(workspace, folder, "reference")
+
+
+def test_two_names_that_differ_only_in_case_are_refused(prepared: Prepared) -> None:
+    workspace, folder = prepared
+    root = workspace.manifest("toycar").root
+    for name in ("Map.npz", "map.npz"):
+        (root / "data").mkdir(exist_ok=True)
+        (root / "data" / name).write_bytes(b"1")
+    with_argument(workspace, "{root}/data")
+    with pytest.raises(MutatorError, match=r"target/data/Map\.npz and target/data/map\.npz"):
+        Bundle.of(workspace, folder, "reference")
+
+
+def test_a_huge_file_is_refused_unread(prepared: Prepared) -> None:
+    workspace, folder = prepared
+    data = workspace.manifest("toycar").root / "data"
+    data.touch()
+    os.truncate(data, 4_000_000_000_000)
+    with_argument(workspace, "{root}/data")
+    with pytest.raises(MutatorError, match=r"data: 4000\.0 GB for each worker .* expected at most 2 GB"):
+        Bundle.of(workspace, folder, "reference")
+
+
+def names_below(folder: Path) -> Iterator[str]:
+    return (path.relative_to(folder).as_posix() for path in folder.rglob("*"))
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "../x",
+        "target/../../x",
+        "/tmp/x",
+        "target//x",
+        "target/./x",
+        "x",
+        "target",
+        "other/x",
+        "",
+        "target/a\0b",
+        "target/a\nb",
+        "meta.json/x",
+        "target/\ud800",
+        "target/" + "a" * 300,
+        "Target/x",
+    ],
+)
+def test_a_bundle_that_arrives_with_another_name_is_not_written(tmp_path: Path, name: str) -> None:
+    place = tmp_path / "work" / "place"
+    place.mkdir(parents=True)
+    with pytest.raises(MutatorError):
+        lay_out(pack({"meta.json": b"{}", name: b"x"}), place)
+    assert list(names_below(tmp_path)) == ["work", "work/place"]
+
+
+@pytest.mark.parametrize(
+    "parts", [{"target/a": b"", "target/A": b""}, {"target/a": b"x" * 10}], ids=["case", "size"]
+)
+def test_a_bundle_that_no_command_packs_is_not_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, parts: dict[str, bytes]
+) -> None:
+    monkeypatch.setattr(bundle, "MOST_BYTES", 5)
+    with pytest.raises(MutatorError):
+        lay_out(pack(parts), tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("manifest", "../../notes.yaml"),
+        ("manifest", "/etc/hostname"),
+        ("manifest", None),
+        ("manifest", "a/b.yaml"),
+        ("limits", {"no": 1}),
+        ("limits", None),
+        ("goldens", [1]),
+        ("goldens", None),
+        ("goldens", [{"golden": ["/tmp/x", []], "digest": ""}]),
+        ("goldens", [{"golden": ["S1", ["/../../x"]], "digest": ""}]),
+        ("goldens", [{"golden": ["S1", [1]], "digest": ""}]),
+    ],
+)
+def test_a_description_that_names_other_files_is_refused(
+    prepared: Prepared, tmp_path: Path, key: str, value: object
+) -> None:
+    data = unpack(Bundle.of(*prepared, "reference").data)
+    data["meta.json"] = json.dumps(json.loads(data["meta.json"]) | {key: value}).encode()
+    place = tmp_path / "place"
+    place.mkdir()
+    lay_out(pack(data), place)
+    with pytest.raises(MutatorError, match=r"meta\.json"):
+        _ = Site(place).manifest
+    with pytest.raises(MutatorError):
+        Site(place).scenario("../../notes")
