@@ -13,7 +13,7 @@ import errno
 import os
 import stat
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
@@ -23,7 +23,7 @@ from mutator._common.files import raising_disk_full
 from mutator.errors import MutatorError
 
 _FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
-_READ = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
+_CAREFULLY = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
 _NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
 _LONGEST_NAME = 220  # bytes; Linux allows 255, and a half-written file has a longer name
 
@@ -52,18 +52,40 @@ def check_name(name: object, where: str | Path, *, folders: bool = True) -> str:
     )
 
 
+def check_library_name(name: str, where: str | Path) -> str:
+    """Return the name of a target or scenario of the library; Outside for the path of a YAML file."""
+    if not name.endswith((".yaml", ".yml")):
+        return name
+    raise Outside(
+        f"the path {name!a}",
+        where=where,
+        expected="the name of a file in the library",
+        remedy="add the file to the library, and name it without its folder and `.yaml`",
+    )
+
+
+def inside(root: Path, name: object) -> Path:
+    """Join a name that is not a constant of the code to `root`; Outside as in `check_name`."""
+    return root / check_name(name, root)
+
+
 def open_below(root: Path, name: str) -> BinaryIO:
     """Open a regular file below `root` for reading.
 
     FileNotFoundError if it is missing; Outside if it is a link or no regular file, or if a folder on the way
     is a link.
     """
-    with _parent(root, name) as (parent, last):
-        file = os.open(last, _READ, dir_fd=parent)
+    file = open_descriptor(root, name, os.O_RDONLY)
     if not stat.S_ISREG(os.fstat(file).st_mode):
         os.close(file)
-        raise _not_plain(root / name)
+        raise not_plain(root / name)
     return os.fdopen(file, "rb")
+
+
+def open_descriptor(root: Path, name: str, flags: int) -> int:
+    """Return a descriptor of anything but a link, for the caller to check and close. Opening never blocks."""
+    with _parent(root, name) as (parent, last):
+        return os.open(last, flags | _CAREFULLY, 0o644, dir_fd=parent)
 
 
 def read_below(root: Path, name: str, most: int = MOST_WHOLE) -> bytes:
@@ -73,9 +95,17 @@ def read_below(root: Path, name: str, most: int = MOST_WHOLE) -> bytes:
 
 
 def write_below(root: Path, name: str, data: bytes) -> None:
-    """Write a file atomically, and make its folders. What stands in its place is replaced, never written to.
+    """Write a file as `writing_below` does."""
+    with writing_below(root, name) as writer:
+        writer.write(data)
 
-    Outside if a folder on the way is a link; IsADirectoryError if a folder stands in its place.
+
+@contextmanager
+def writing_below(root: Path, name: str) -> Iterator[BinaryIO]:
+    """Yield a file to write. It takes its name at the end of the block, and its folders are made.
+
+    What stands in its place is replaced, never written to. Outside if a folder on the way is a link;
+    IsADirectoryError if a folder stands in its place.
     """
     with raising_disk_full(root / name), _parent(root, name, make=True) as (parent, last):
         temporary = f".{last}.{threading.get_native_id()}"  # `is_half_written`
@@ -84,7 +114,7 @@ def write_below(root: Path, name: str, data: bytes) -> None:
         file = os.open(temporary, _NEW, 0o644, dir_fd=parent)
         try:
             with os.fdopen(file, "wb") as writer:
-                writer.write(data)
+                yield writer
                 writer.flush()
                 os.fsync(file)
             os.replace(temporary, last, src_dir_fd=parent, dst_dir_fd=parent)
@@ -100,10 +130,17 @@ def unlink_below(root: Path, name: str) -> None:
         os.unlink(last, dir_fd=parent)
 
 
+def move_below(root: Path, name: str, to: str) -> None:
+    """Rename a file, folder or link, which is not followed; make the folders of `to`."""
+    with _parent(root, name) as (parent, last), _parent(root, to, make=True) as (there, final):
+        os.rename(last, final, src_dir_fd=parent, dst_dir_fd=there)
+
+
 def check_plain(root: Path) -> None:
     """Raise Outside if anything below `root` is neither a regular file nor a folder."""
-    for path in _not_plain_below(root):
-        raise _not_plain(path)
+    for _, entry in entries_below(root):
+        if not is_plain(entry):
+            raise not_plain(Path(entry.path))
 
 
 def check_inside(root: Path, path: Path) -> Path:
@@ -137,15 +174,28 @@ def files_inside(root: Path, folder: str, pattern: str) -> list[Path]:
     return files
 
 
-def _not_plain_below(root: Path) -> Iterator[Path]:
-    folders = [str(root)]
+def entries_below(
+    root: Path, closed: Callable[[str], bool] = lambda name: False
+) -> Iterator[tuple[str, os.DirEntry[str]]]:
+    """Yield everything below `root` with its path from there, but nothing in links and `closed` folders.
+
+    What disappears meanwhile is left out.
+    """
+    folders = [""]
     while folders:
-        with suppress(FileNotFoundError), os.scandir(folders.pop()) as entries:
+        folder = folders.pop()
+        with suppress(FileNotFoundError), os.scandir(f"{root}/{folder}") as entries:
             for entry in entries:
-                if entry.is_dir(follow_symlinks=False):
-                    folders.append(entry.path)
-                elif not entry.is_file(follow_symlinks=False):
-                    yield Path(entry.path)
+                name = f"{folder}{entry.name}"
+                yield name, entry
+                if entry.is_dir(follow_symlinks=False) and not closed(name):
+                    folders.append(f"{name}/")
+
+
+def is_plain(entry: os.DirEntry[str]) -> bool:
+    """Whether an entry is a regular file or a folder, or has disappeared."""
+    kinds = entry.is_file(follow_symlinks=False), entry.is_dir(follow_symlinks=False)
+    return any(kinds) or not os.path.lexists(entry.path)
 
 
 @contextmanager
@@ -164,13 +214,14 @@ def _parent(root: Path, name: str, *, make: bool = False) -> Iterator[tuple[int,
         yield handle, last
     except OSError as err:
         if err.errno in (errno.ELOOP, errno.ENOTDIR, errno.ENXIO):
-            raise _not_plain(root / name) from None
+            raise not_plain(root / name) from None
         raise
     finally:
         os.close(handle)
 
 
-def _not_plain(path: Path) -> Outside:
+def not_plain(path: Path) -> Outside:
+    """Return the error about a link, a pipe and the like, for the caller to raise."""
     return Outside(
         "a link, a pipe or something else that is not a plain file",
         where=path,

@@ -3,12 +3,14 @@ when the process ends."""
 
 import fcntl
 import os
+import stat
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from mutator._common.files import is_no_file, no_pipe, raising_disk_full
+from mutator._common.below import Outside, open_descriptor, unlink_below
+from mutator._common.files import raising_disk_full
 from mutator.errors import MutatorError
 
 OWNER = "owner.lock"
@@ -20,7 +22,7 @@ _PATIENCE_S = 15.0  # workers of a dead command exit well within this time
 def owned(run: Path, patience_s: float = _PATIENCE_S) -> Iterator[None]:
     """Lock the existing folder `run`; MutatorError while another command or its workers use it."""
     with raising_disk_full(run):
-        fd = _opened(run / OWNER, os.O_CREAT)
+        fd = _opened(run, OWNER, os.O_CREAT)
     try:
         if not _try_lock(fd):
             raise MutatorError(
@@ -44,7 +46,7 @@ def owned(run: Path, patience_s: float = _PATIENCE_S) -> Iterator[None]:
         finally:
             living_workers(run)
             with suppress(OSError):  # some workers are still ending, or there were none
-                (run / WORKERS).rmdir()
+                (run / WORKERS).rmdir()  # never follows a link
     finally:
         os.close(fd)
 
@@ -63,9 +65,8 @@ def alone_in(folder: Path) -> Iterator[None]:
 def register_worker(run: Path) -> int:
     """Register this process as a worker in `run` until the returned descriptor is closed."""
     with raising_disk_full(run):
-        folder = run / WORKERS
-        folder.mkdir(exist_ok=True)
-        fd = _opened(folder / str(os.getpid()), os.O_CREAT)
+        (run / WORKERS).mkdir(exist_ok=True)
+        fd = _opened(run, f"{WORKERS}/{os.getpid()}", os.O_CREAT)
     fcntl.flock(fd, fcntl.LOCK_EX)
     return fd
 
@@ -73,16 +74,17 @@ def register_worker(run: Path) -> int:
 def living_workers(run: Path) -> list[int]:
     """Return the process ids of the workers in `run`, and remove the entries of dead workers."""
     living = []
-    for path in sorted((run / WORKERS).glob("[0-9]*")):
+    names = (path.name for path in (run / WORKERS).glob("[0-9]*"))
+    for name in sorted(filter(str.isdecimal, names)):
         try:
-            fd = _opened(path)
+            fd = _opened(run, f"{WORKERS}/{name}")
         except FileNotFoundError:  # another process removed it
             continue
         try:
             if _try_lock(fd):
-                path.unlink(missing_ok=True)
+                unlink_below(run, f"{WORKERS}/{name}")
             else:
-                living.append(int(path.name))
+                living.append(int(name))
         finally:
             os.close(fd)
     return living
@@ -96,19 +98,26 @@ def wait_for_workers(run: Path, patience_s: float = _PATIENCE_S) -> list[int]:
     return living
 
 
-def _opened(path: Path, more: int = 0) -> int:
-    """Open a file; MutatorError for a folder, a pipe or a link."""
+def _opened(run: Path, name: str, more: int = 0) -> int:
+    """Open a lock; MutatorError unless it is a file with no other name, because it is written in place."""
     try:
-        return os.open(no_pipe(path), os.O_RDWR | os.O_NOFOLLOW | more, 0o644)
-    except OSError as err:
-        if isinstance(err, FileNotFoundError) or not is_no_file(err):
-            raise
-        raise MutatorError(
-            f"not a regular file ({err.strerror})",
-            where=path,
-            expected="a file of the run folder",
-            remedy="delete it: it holds no results",
-        ) from None
+        fd = open_descriptor(run, name, os.O_RDWR | more)
+    except (Outside, IsADirectoryError):
+        raise _no_lock(run / name) from None
+    found = os.fstat(fd)
+    if not stat.S_ISREG(found.st_mode) or found.st_nlink > 1:
+        os.close(fd)
+        raise _no_lock(run / name)
+    return fd
+
+
+def _no_lock(path: Path) -> MutatorError:
+    return MutatorError(
+        "not a regular file with a single name",
+        where=path,
+        expected="a file of the run folder",
+        remedy="delete it: it holds no results",
+    )
 
 
 def _try_lock(fd: int) -> bool:

@@ -29,6 +29,7 @@ from mutator.outcomes.columns import PLAN_COLUMNS, metric_columns, plan_row
 from mutator.outcomes.propagation import channel_facts
 from mutator.store import digests, plan_file
 from mutator.store.digests import Digest, DigestingFile, Ledger
+from mutator.store.opening import check_contents
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN, HEAD, SCHEMA
 from mutator.workspace import Workspace
@@ -60,7 +61,9 @@ def freeze_and_tell(plan: Plan | Planning, out: Path, workspace: Workspace) -> t
 
 
 def make_run_folder(out: Path) -> None:
-    """Create `out` unless it is a run folder; MutatorError if it contains anything else."""
+    """Create `out` unless it is a run folder; MutatorError if it contains anything else, such as links."""
+    if out.is_dir():
+        check_contents(out.resolve())
     if out.exists() and not RunFolder.exists(out):
         names = [path.name for path in out.iterdir()] if out.is_dir() else [out.name]
         strangers = [name for name in names if name not in _OURS and not is_half_written(name)]
@@ -113,8 +116,8 @@ def _written(plan: Plan | Planning, out: Path) -> tuple[Tally, str, list[plan_fi
     write_atomic(out / CAMPAIGN, plan.campaign.source)
     with ExitStack() as stack:
         rows, lines, faults = (
-            DigestingFile(stack.enter_context(writing_atomic(out / name)))
-            for name in (CSV, plan_file.EXPERIMENTS, plan_file.FAULTS)
+            DigestingFile(stack.enter_context(writing_atomic(path)))
+            for path in (out / CSV, out / plan_file.EXPERIMENTS, out / plan_file.FAULTS)
         )
         writer = plan_file.PlanWriter(lines, faults)
         rows.write(csv_bytes([], head=True))

@@ -9,7 +9,8 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from mutator._common.files import json_bytes, raising_disk_full, read_json, write_atomic
+from mutator._common.below import inside, open_below
+from mutator._common.files import json_bytes, raising_disk_full, read_json, write_atomic, writing_atomic
 from mutator._common.hashing import plain
 from mutator._common.locks import owned
 from mutator._common.text import counted
@@ -26,6 +27,7 @@ from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.digests import Digest, Ledger
 from mutator.store.lines import verified_lines, write_copy
+from mutator.store.opening import check_contents
 from mutator.store.patches import PatchWriter
 from mutator.store.records import SCHEMA, TIMINGS_SCHEMA, endings
 from mutator.store.run_folder import RunFolder
@@ -71,7 +73,7 @@ def merge(shards: Sequence[Path], out: Path, *, accept_versions: bool = False) -
         stack.enter_context(owned(out))
         try:
             with raising_disk_full(out):
-                (out / f"{_MARK}{os.getpid()}").touch()
+                inside(out, f"{_MARK}{os.getpid()}").touch()
                 _copy(folders, out, stretches)
             return results.build(out)
         except BaseException:
@@ -81,6 +83,8 @@ def merge(shards: Sequence[Path], out: Path, *, accept_versions: bool = False) -
 
 def _make_empty(out: Path) -> None:
     """Make the folder to merge into. Delete files that a killed merge left there."""
+    if out.is_dir():
+        check_contents(out.resolve())
     if any(out.glob(f"{_MARK}*")):
         with owned(out, patience_s=0.0):
             cleaning.clear(out)
@@ -203,8 +207,10 @@ def _copy(folders: Sequence[RunFolder], out: Path, stretches: Sequence[dict[str,
         if one.lines is None and name != HEAD and (reviewed or name != REVIEWED)
     }
     for name in files:
-        (out / name).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(first.path / name, out / name)
+        place = inside(out, name)
+        place.parent.mkdir(parents=True, exist_ok=True)
+        with open_below(first.path, name) as source, writing_atomic(place) as copy:
+            shutil.copyfileobj(source, copy)
     for folder in folders:
         _copy_patches(folder, out)
         _copy_segments(folder, out)
@@ -253,7 +259,7 @@ def _copy_segments(folder: RunFolder, out: Path) -> None:
         if (folder.path / kind).is_dir():
             (out / kind).mkdir(exist_ok=True)
         for path in sorted((folder.path / kind).glob("*.jsonl")):
-            place = out / kind / f"{path.stem}-shard{folder.shard.number}.jsonl"
+            place = inside(out / kind, f"{path.stem}-shard{folder.shard.number}.jsonl")
             head = {"schema": schema, "plan": folder.head["plan"]}
             lines = verified_lines(path, schema, checksums=True)
             write_copy(place, head, (line for _, _, line in lines))

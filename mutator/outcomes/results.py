@@ -124,9 +124,8 @@ def _made_from(folder: RunFolder) -> str:
     """Return the digest of all inputs of the tables, including the version of mutator."""
     run = folder.path
     lines = sorted(path for kind in ("records", "timings") for path in (run / kind).glob("*.jsonl"))
-    files = [run / plan_file.EXPERIMENTS, run / plan_file.FAULTS, *lines]
-    names = (path.relative_to(run).as_posix() for path in files)
-    found = list(zip(names, digests.of_files(files), strict=True))
+    files = [plan_file.EXPERIMENTS, plan_file.FAULTS, *(path.relative_to(run).as_posix() for path in lines)]
+    found = list(digests.of_files(run, files).items())
     head = folder.head
     told = [head["hazards"], head["compared"], head.get("metrics", [])]
     told += [head[key] for key in ("severity", "channels", "structure") if key in head]
@@ -134,8 +133,7 @@ def _made_from(folder: RunFolder) -> str:
 
 
 def _found(folder: RunFolder) -> dict[str, str | None]:
-    known = names(folder)
-    found = dict(zip(known, digests.of_files([folder.path / name for name in known]), strict=True))
+    found = digests.of_files(folder.path, names(folder))
     return {name: one.sha256 if one else None for name, one in found.items()}
 
 

@@ -7,13 +7,14 @@ from contextlib import suppress
 from fnmatch import fnmatchcase
 from pathlib import Path
 
-from mutator._common.files import complete, is_half_written, read_json
+from mutator._common.below import unlink_below
+from mutator._common.files import complete, is_half_written, read_json, remove_folder
 from mutator._common.locks import owned
 from mutator.errors import MutatorError
-from mutator.store.run_folder import CONTENT, SCRATCH, RunFolder
+from mutator.store.opening import CONTENT, FOLDERS, check_contents, is_closed
+from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import HEAD, SCHEMA
 
-_FOLDERS = {pattern.partition("/")[0] for pattern in CONTENT if "/" in pattern}
 _SHOWN = 3
 _TRIES, _PAUSE_S = 50, 0.1
 
@@ -57,7 +58,10 @@ def finish_deletion(path: Path) -> bool:
 
 def _delete(path: Path, files: Iterable[Path]) -> None:
     for file in files:
-        file.unlink()
+        if is_closed(file.relative_to(path).as_posix()):
+            remove_folder(file)
+        else:
+            unlink_below(path, file.relative_to(path).as_posix())
     for folder, _, _ in os.walk(path, topdown=False):
         with suppress(OSError):
             Path(folder).rmdir()
@@ -82,6 +86,7 @@ def check(path: Path) -> list[Path]:
             expected="a run folder",
             remedy="delete it yourself",
         )
+    check_contents(path)
     read_json(path / HEAD, SCHEMA)
     ours, strangers = _sorted_out(path)
     if strangers:
@@ -102,19 +107,20 @@ def _is_known(name: str) -> bool:
 
 
 def _sorted_out(path: Path) -> tuple[list[Path], list[Path]]:
-    """Separate the files below `path` that a run wrote from other entries. Links are not followed."""
+    """Separate the files and scratch folders below `path` that a run wrote from other entries. Links are
+    not followed."""
     ours: list[Path] = []
     strangers: list[Path] = []
     for folder, folders, files in os.walk(path):
         for name in (*files, *folders):
             entry = Path(folder, name)
             words = entry.relative_to(path).as_posix()
-            is_link = entry.is_symlink()
-            if name in folders and not is_link and words.partition("/")[0] in _FOLDERS:
+            is_folder = name in folders and not entry.is_symlink()
+            if is_folder and not is_closed(words) and words.partition("/")[0] in FOLDERS:
                 continue
-            if _is_known(words) and (not is_link or words.startswith(f"{SCRATCH}/")):
+            if is_closed(words) if is_folder else _is_known(words) and not entry.is_symlink():
                 ours.append(entry)
             else:
                 strangers.append(entry)
-                folders[:] = [other for other in folders if other != name]
+            folders[:] = [other for other in folders if other != name]
     return ours, strangers

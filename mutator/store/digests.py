@@ -6,20 +6,21 @@ afterwards the new one is confirmed. If the process is killed in between, each f
 
 import hashlib
 import os
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from mutator._common.below import Outside, check_name, inside, open_below, write_below
 from mutator._common.cores import usable_cores
 from mutator._common.files import (
     is_no_file,
     json_bytes,
-    raising_disk_full,
     read_json,
-    write_atomic,
     write_json,
 )
 from mutator._common.hashing import digest
@@ -29,6 +30,10 @@ from mutator.store.lines import read_segment
 SCHEMA, FILE = "digests/1", "digests.json"
 _WORTH_THREADS = 20_000_000  # the least number of bytes for which threads save time
 SEGMENTS = ("records", "proof")  # folders of append-only files; digests are added when the files are closed
+_NAMES = re.compile(  # what the ledger may name
+    r"(run\.json|campaign\.yaml|plan\.csv|plan/(experiments|faults)\.jsonl|(checks|reviewed)\.json"
+    r"|golden/.+/.+|(records|proof)/[^/]+\.jsonl)"
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,30 +55,52 @@ class Digest:
             return None
         try:
             with path.open("rb") as file:
-                return cls(
-                    sha256=hashlib.file_digest(file, "sha256").hexdigest(),
-                    size=os.fstat(file.fileno()).st_size,
-                )
+                return cls._of_open(file)
         except OSError as err:
             if not is_no_file(err):
                 raise
             return None
 
+    @classmethod
+    def below(cls, run: Path, name: str) -> "Digest | None":
+        """Compute the digest of a file below `run`; None if it is missing, or not a plain file."""
+        try:
+            with open_below(run, name) as file:
+                return cls._of_open(file)
+        except Outside:
+            return None
+        except OSError as err:
+            if not is_no_file(err):
+                raise
+            return None
+
+    @classmethod
+    def _of_open(cls, file: BinaryIO) -> "Digest":
+        return cls(
+            sha256=hashlib.file_digest(file, "sha256").hexdigest(), size=os.fstat(file.fileno()).st_size
+        )
+
     def is_of(self, found: "Digest | None") -> bool:
         return found is not None and (found.size, found.sha256) == (self.size, self.sha256)
 
 
-def of_files(paths: Sequence[Path]) -> list[Digest | None]:
-    """Compute the digest of each file in parallel, because hashing releases the interpreter lock."""
-    sizes = [path.stat().st_size if path.is_file() else 0 for path in paths]
-    if sum(sizes) < _WORTH_THREADS:
-        return [Digest.of_file(path) for path in paths]
-    largest_first = sorted(range(len(paths)), key=lambda at: -sizes[at])
+def of_files(run: Path, names: Sequence[str]) -> dict[str, Digest | None]:
+    """Compute the digests of files of a run folder, in parallel: hashing releases the interpreter lock."""
+    sizes = {name: _size(inside(run, name)) for name in names}
+    if sum(sizes.values()) < _WORTH_THREADS:
+        return {name: Digest.below(run, name) for name in names}
+    largest_first = sorted(names, key=lambda name: -sizes[name])
     with ThreadPoolExecutor(usable_cores()) as pool:
-        found = dict(
-            zip(largest_first, pool.map(lambda at: Digest.of_file(paths[at]), largest_first), strict=True)
-        )
-    return [found[at] for at in range(len(paths))]
+        digests = pool.map(partial(Digest.below, run), largest_first)
+        found = dict(zip(largest_first, digests, strict=True))
+    return {name: found[name] for name in names}
+
+
+def _size(path: Path) -> int:
+    try:
+        return path.lstat().st_size
+    except OSError:
+        return 0
 
 
 class DigestingFile:
@@ -139,6 +166,9 @@ def read(run: Path) -> Ledger:
             remedy=remedy,
         )
     try:
+        for name in (*data["files"], *data["rewriting"]):
+            if not may_name(check_name(name, path)):
+                raise Outside(f"names {name!a}", where=path, expected="files of a run", remedy=remedy)
         return Ledger(
             files={name: Digest(**value) for name, value in data["files"].items()},
             rewriting={name: value and Digest(**value) for name, value in data["rewriting"].items()},
@@ -146,6 +176,11 @@ def read(run: Path) -> Ledger:
         )
     except (KeyError, TypeError, AttributeError) as err:
         raise MutatorError(f"not a list of digests ({err})", where=path, remedy=remedy) from None
+
+
+def may_name(name: str) -> bool:
+    """Whether the ledger has the digest of the file of this name in a run folder."""
+    return bool(_NAMES.fullmatch(name))
 
 
 def write(run: Path, ledger: Ledger) -> None:
@@ -181,7 +216,7 @@ def rewriting(
 
 def rewrite(run: Path, name: str, data: bytes) -> None:
     with rewriting(run, {name: Digest.of(data)}):
-        write_atomic(run / name, data)
+        write_below(run, name, data)
 
 
 def settled(run: Path) -> Ledger:
@@ -189,7 +224,7 @@ def settled(run: Path) -> Ledger:
     known = read(run)
     files = dict(known.files)
     for name, coming in known.rewriting.items():
-        found = Digest.of_file(run / name)
+        found = Digest.below(run, name)
         if found is None:
             files.pop(name, None)
         elif coming is not None and coming.is_of(found):
@@ -206,7 +241,7 @@ def close_segments(run: Path, *, finished: bool | None = None) -> None:
     files = dict(before.files)
     for name in segments(run):
         if name not in files:
-            files[name] = _closed(run / name)
+            files[name] = _closed(run, name)
     after = replace(before, files=files, finished=before.finished if finished is None else finished)
     if after != read(run):
         write(run, after)
@@ -216,12 +251,13 @@ def segments(run: Path) -> list[str]:
     return sorted(f"{kind}/{path.name}" for kind in SEGMENTS for path in (run / kind).glob("*.jsonl"))
 
 
-def _closed(path: Path) -> Digest:
-    with raising_disk_full(path), path.open("rb+") as file:
+def _closed(run: Path, name: str) -> Digest:
+    with open_below(run, name) as file:
         data = file.read()
-        segment = read_segment(path, data)
-        if segment.damaged:
-            raise segment.problem(segment.damaged[0])
-        file.truncate(segment.end)
         os.fsync(file.fileno())
+    segment = read_segment(inside(run, name), data)
+    if segment.damaged:
+        raise segment.problem(segment.damaged[0])
+    if segment.end < len(data):  # not cut in place: the file can have a second name elsewhere
+        write_below(run, name, data[: segment.end])
     return Digest.of(data[: segment.end], lines=len(segment.lines))

@@ -9,6 +9,7 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
+from mutator._common.below import inside
 from mutator._common.files import is_half_written
 from mutator._common.hashing import digest
 from mutator._common.text import counted
@@ -80,7 +81,7 @@ def content_key(run: Path) -> str:
 
 def digests_of(run: Path, ledger: Ledger) -> dict[str, Digest | None]:
     names = list(dict.fromkeys((*ledger.names, *verified_runs.other_files(run))))
-    return dict(zip(names, digests.of_files([run / name for name in names]), strict=True))
+    return digests.of_files(run, names)
 
 
 def key_of(run: Path, found: Mapping[str, Digest | None]) -> str:
@@ -126,7 +127,7 @@ def file_problems(
         if found is None:
             yield MutatorError(
                 "missing",
-                where=run / name,
+                where=inside(run, name),
                 expected=f"the file named in {digests.FILE}",
                 remedy=_remedy(run, name),
             )
@@ -135,7 +136,7 @@ def file_problems(
 
 
 def _changed(run: Path, name: str, known: Digest, found: Digest) -> Iterator[MutatorError]:
-    path = run / name
+    path = inside(run, name)
     if known.lines is not None:
         segment = read_segment(path)
         if segment.damaged:
@@ -171,7 +172,7 @@ def _open_segments(run: Path, ledger: Ledger) -> Iterator[MutatorError]:
     for name in digests.segments(run):
         if name not in ledger.files:
             try:
-                segment = read_segment(run / name)
+                segment = read_segment(inside(run, name))
             except MutatorError as err:
                 yield err
                 continue

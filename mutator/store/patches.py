@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+from mutator._common.below import inside
 from mutator._common.files import write_atomic
 from mutator._common.hashing import digest
 from mutator.store.blocks import Block, BlockWriter, as_block, intact_blocks, read_blocks
@@ -43,7 +44,7 @@ class PatchWriter:
     """Append the patches of a worker."""
 
     def __init__(self, run: Path, worker: str) -> None:
-        self._path = run / FOLDER / f"{worker}{SUFFIX}"
+        self._path = inside(run / FOLDER, f"{worker}{SUFFIX}")
         self._blocks: BlockWriter | None = None  # nothing appended yet
         self._packer = _Packer()
 
@@ -137,11 +138,11 @@ class Patches:
         if path.exists():
             return path
         damaged = (one for one in self.files() if not one.is_file() or read_blocks(one).damaged)
-        lost = self.run / FOLDER / f"{worker}{SUFFIX}" if worker else self.run / FOLDER
+        lost = inside(self.run / FOLDER, f"{worker}{SUFFIX}") if worker else self.run / FOLDER
         return next(damaged, lost)
 
     def old_file(self, experiment_id: str) -> Path:
-        return self.run / FOLDER / experiment_id[:2] / f"{experiment_id}.patch"
+        return inside(self.run / FOLDER, f"{experiment_id[:2]}/{experiment_id}.patch")
 
     def files(self) -> list[Path]:
         """Return the block files, oldest session first. A folder with such a name is included."""

@@ -12,6 +12,7 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any, Protocol, TypeVar, overload
 
+from mutator._common.below import check_library_name
 from mutator._common.files import no_pipe, raising_disk_full, writing_atomic
 from mutator._common.hashing import added_values, canonical, content_id, plain
 from mutator._common.text import counted
@@ -35,6 +36,7 @@ FAULTS = "plan/faults.jsonl"
 _REMEDY = "the plan is damaged: restore the file from a copy of the run folder, or plan into a new one"
 
 _ID = re.compile(rb'\{(?:"after_hazard":"[a-z_]+",)?"fault":"[0-9a-f]{16}","id":"([0-9a-f]{16})",')
+_AN_ID = re.compile(r"[0-9a-f]{16}")
 # the input of Experiment.id
 _HASHED = ("fault", "scenario", "scenario_digest", "method", "trigger", "seed", "setting")
 _FIELDS = {"id", *_HASHED}
@@ -194,6 +196,7 @@ def experiment_on(path: Path, number: int, line: bytes, faults: Mapping[str, Fau
 def _experiments(path: Path, lines: _Lines, faults: Mapping[str, Fault]) -> Iterator[Experiment]:
     for number, line in lines:
         if experiment := experiment_as_written(line, faults):
+            check_library_name(experiment.scenario, path)
             yield experiment
         else:
             yield from _read(path, [(number, line)], partial(experiment_from, faults=faults))
@@ -206,7 +209,7 @@ def ids(run: Path) -> Iterator[str]:
         if found and line.count(b'"id":') == 1:  # the line as written, if it contains a single id
             yield found[1].decode()
         else:
-            yield from _read(path, [(number, line)], lambda data: str(data["id"]))
+            yield from _read(path, [(number, line)], lambda data: check_id(data["id"]))
 
 
 def problems(run: Path) -> Iterator[MutatorError]:
@@ -244,12 +247,20 @@ def _line(experiment: Experiment) -> dict[str, Any]:
     }
 
 
+def check_id(name: object) -> str:
+    """Return the id of an experiment, which is used in names of files; ValueError for anything else."""
+    if isinstance(name, str) and _AN_ID.fullmatch(name):
+        return name
+    raise ValueError(f"not an id: {name!a}")
+
+
 def experiment_from(data: Mapping[str, Any], faults: Mapping[str, Fault]) -> Experiment:
     """Read the experiment on a line; MutatorError if its id does not match, or for an unknown field."""
     if data["fault"] not in faults:
         raise MutatorError(
             f"fault {data['fault']} is missing from {FAULTS}, or was changed there", remedy=_REMEDY
         )
+    check_library_name(str(data["scenario"]), FAULTS)
     trigger = data["trigger"]
     values = {name: value for name, value in data.items() if name != "id"}
     read = {

@@ -5,15 +5,18 @@ docs/reference/run-folder.md describes its files.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from mutator._common.below import inside
 from mutator._common.files import check_is_text
 from mutator._common.hashing import plain
 from mutator.errors import MutatorError
 from mutator.model import AfterHazard, Experiment, Limits, Record
 from mutator.store import digests, integrity, plan_file
+from mutator.store.opening import SCRATCH, TRACES, check_contents
 from mutator.store.patches import Patches
 from mutator.store.records import read_records, read_timings
 from mutator.store.run_head import FIRST_SCHEMA, HEAD, Head, read_head
@@ -24,28 +27,6 @@ from mutator.targets.severity import Scale
 STOP_NOTE = "Runs end at their first terminal hazard: later hazards and alerts are not recorded."
 SERIES_MB = 500  # budget of a run's series, unless the plan sets another
 _LOOKS = 3  # attempts to read a folder that its owner is writing
-SCRATCH = "work"
-_TABLES = ("results", "propagation", "timings")
-CONTENT = (  # all files that a run folder can contain; * matches any text, including folders
-    *(HEAD, digests.FILE, "campaign.yaml", "plan.csv", "plan/*.jsonl", "reviewed.json", "checks.json"),
-    *(
-        "golden/*/*",
-        "patches/*.blocks",
-        "patches/*.patch",
-        "records/*.jsonl",
-        "timings/*.jsonl",
-        "proof/*.jsonl",
-    ),
-    *("series/*.js", "series/*.blocks"),
-    *("traces/*/*", *(f"plots/*.{kind}" for kind in ("svg", "jpg", "png", "mp4", "gif"))),
-    *("results.csv", "results.parquet", "propagation.parquet", "timings.parquet", "results.json"),
-    *("report/*.md", "report/*.html", "report/made_from.json", "report/series/*.js"),
-    *("report/tables/*.csv", "report/figures/*.svg", "report/figures/*.png", "report/compare-*/*.csv"),
-    *("exports/mutation-elements.json", "exports/junit.xml"),
-    *(f"exports/{name}.{kind}" for name in _TABLES for kind in ("csv", "parquet")),
-    "exports/mcap/*.mcap",
-    *("damaged/*", "owner.lock", "workers/*", f"{SCRATCH}/*"),
-)
 
 
 class GoldenRun(NamedTuple):
@@ -85,8 +66,8 @@ class RunFolder:
     def open(cls, path: Path) -> "RunFolder":
         """Open and verify an existing run folder.
 
-        MutatorError if there is none, if it has a newer schema, or if anything in it is damaged, missing or
-        not in its plan.
+        MutatorError if there is none, if it has a newer schema, if it contains links or the like
+        (`check_contents`), or if anything in it is damaged, missing or not in its plan.
         """
         folder = cls.unverified(path)
         for problem in folder.problems():
@@ -95,7 +76,7 @@ class RunFolder:
 
     @classmethod
     def unverified(cls, path: Path) -> "RunFolder":
-        """Like `open`, but checks only the head."""
+        """Like `open`, but without comparing the files with their digests."""
         if not cls.exists(path):
             raise MutatorError(
                 "not a run folder (it has no run.json)",
@@ -105,6 +86,7 @@ class RunFolder:
             )
         folder = cls(path.resolve())
         check_is_text(folder.path)
+        check_contents(folder.path)
         _ = folder.head  # read it here, so that a wrong schema fails early
         return folder
 
@@ -162,10 +144,10 @@ class RunFolder:
 
     def stretch_of(self, experiment_id: str) -> Stretch | None:
         """Return the newest stretch of work that has a record of an experiment."""
-        files = self.path / "records"
+        files = sorted((self.path / "records").glob("*.jsonl"))
         for stretch in reversed(self.stretches):
-            for path in files.glob(f"{stretch.records}.jsonl"):
-                if experiment_id.encode() in path.read_bytes():
+            for path in files:
+                if fnmatchcase(path.stem, stretch.records) and experiment_id.encode() in path.read_bytes():
                     return stretch
         return None
 
@@ -224,10 +206,14 @@ class RunFolder:
         return GoldenRun.of(experiment, several_seeds=len(self.seeds) > 1)
 
     def golden(self, scenario: str, changes: tuple[str, ...] = (), seed: int | None = None) -> Path:
-        return self.path / "golden" / GoldenRun(scenario, changes, seed).key
+        return inside(self.path / "golden", GoldenRun(scenario, changes, seed).key)
 
     def golden_folder(self, experiment: Experiment) -> Path:
         return self.golden(*self.golden_of(experiment))
+
+    def traces_of(self, experiment_id: str) -> Path:
+        """Return the folder of the traces that `rerun --trace` keeps."""
+        return inside(self.path / TRACES, experiment_id)
 
     @cached_property
     def patches(self) -> Patches:

@@ -6,6 +6,7 @@ from pathlib import Path
 from types import NoneType
 from typing import Any
 
+from mutator._common.below import check_library_name, check_name
 from mutator._common.files import read_json
 from mutator._common.places import RUN_HEAD
 from mutator.errors import MutatorError
@@ -79,9 +80,18 @@ def read_head(run: Path) -> Head:
     head = Head(path, read_json(path, SCHEMA))
     if wrong := next(_wrong(head), ""):
         raise MutatorError(f"damaged at '{wrong}'", where=path, remedy=REMEDY)
+    _check_names(head)
     if "provenance" in head:
         head["provenance"] = Head(path, head["provenance"])
     return head
+
+
+def _check_names(head: Head) -> None:
+    """Raise Outside for the path of a file where the name of a file belongs."""
+    for name in head.get("golden_files", ()):
+        check_name(name, head.path)
+    for name in (head.get("target", ""), *(str(golden[0]) for golden in head.get("goldens", ()))):
+        check_library_name(name, head.path)
 
 
 def _wrong(head: Head) -> Iterator[str]:

@@ -2,6 +2,7 @@
 
 import gzip
 import json
+import re
 import struct
 import zlib
 from collections.abc import Mapping
@@ -11,6 +12,7 @@ from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
+from mutator._common.below import check_name, inside
 from mutator._common.hashing import canonical
 from mutator.errors import MutatorError
 from mutator.store.series_format import Series, decode
@@ -59,6 +61,8 @@ class Index:
     @classmethod
     def of(cls, data: Mapping[str, Any]) -> "Index":
         text, names = data["ids"], list(data["goldens"])
+        if not re.fullmatch("[0-9a-f]*", text):
+            raise ValueError("ids that are not hexadecimal")
         ids = [text[i : i + _ID] for i in range(0, len(text), _ID)]
         golden_of = (names[code] for code in data["golden_of"])
         return cls(
@@ -143,14 +147,14 @@ class SeriesFolder:
 
     def chunk(self, name: str) -> bytes:
         """Return the bytes of a chunk; MutatorError if it is missing or damaged."""
-        path = self.path / f"{name}.js"
+        path = inside(self.path, f"{name}.js")
         data = read_script(path)
         if name_of(data) != name:
             raise MutatorError("damaged", where=path, expected="content that matches its name")
         return data
 
     def kept(self, experiment_id: str) -> Path:
-        return self.path / KEPT / f"{experiment_id}.js"
+        return inside(self.path / KEPT, f"{experiment_id}.js")
 
 
 def making_again(run: Path, experiment_id: str = "ID") -> str:
@@ -171,6 +175,8 @@ def read_index(path: Path) -> Index:
         if data["schema"] != SCHEMA:
             raise MutatorError(f"schema {data['schema']!r}", where=path, expected=SCHEMA, remedy=remedy)
         index = Index.of(data)
+        for name in (*(name for name, _ in index.chunks), *index.goldens):
+            check_name(name, path)
         for number in (*index.goldens.values(), *index.entries.values()):
             if number not in range(len(index.places)):
                 raise ValueError(f"no entry {number}")

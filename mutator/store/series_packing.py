@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from mutator._common.below import inside
 from mutator._common.files import raising_disk_full
 from mutator.errors import MutatorError
 from mutator.store.blocks import BlockWriter, read_blocks
@@ -33,7 +34,7 @@ class SeriesWriter:
     """Append a worker's series, and each golden run once."""
 
     def __init__(self, run: Path, worker: str) -> None:
-        self._path = run / FOLDER / f"{worker}{SUFFIX}"
+        self._path = inside(run / FOLDER, f"{worker}{SUFFIX}")
         self._blocks: BlockWriter | None = None  # nothing appended yet
         self._known: set[str] = set()
 
@@ -255,6 +256,6 @@ def _chunks(folder: Path, entries: Iterable[_Entry]) -> Iterator[tuple[str, list
 
 def _chunk(folder: Path, parts: list[bytes]) -> tuple[str, list[int]]:
     data = b"".join(parts)
-    path = folder / f"{name_of(data)}.js"
+    path = inside(folder, f"{name_of(data)}.js")
     write_script(path, data)
     return path.stem, [len(part) for part in parts]

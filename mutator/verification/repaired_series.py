@@ -7,13 +7,14 @@ import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+from mutator._common.below import check_name, inside, unlink_below, write_below
 from mutator.errors import MutatorError
 from mutator.outcomes.judging import load_channels
 from mutator.outcomes.sampling import Sampler
 from mutator.store.run_folder import RunFolder
 from mutator.store.series import INDEX, Index, SeriesFolder, making_again
 from mutator.store.series_packing import SUFFIX, pack_again
-from mutator.store.series_script import name_of, write_script
+from mutator.store.series_script import name_of, script_of
 from mutator.verification.audited_series import series
 from mutator.workspace import Workspace
 
@@ -34,15 +35,16 @@ def repair_series(
         index = there.index
     for path in sorted(paths):
         name = path.relative_to(run).as_posix()
+        check_name(name, run)
         found = "set aside" if os.path.lexists(path) else "is gone"
         put_aside(name)
         if path.suffix == SUFFIX:
             yield f"{name}: damaged blocks set aside; `mutator run` packs the others"
         elif index and (data := _golden_chunk(folder, workspace, index, path.stem)):
-            write_script(path, data)
+            write_below(run, name, script_of(path.stem, data))
             yield f"{name} rebuilt from the golden runs"
         else:
-            path.unlink(missing_ok=True)
+            unlink_below(run, name)
             yield f"{name} {found}: {making_again(run)} recreates the series of an experiment"
     if index:
         pack_again(run, index)
@@ -56,7 +58,9 @@ def _golden_chunk(folder: RunFolder, workspace: Workspace | None, index: Index, 
         return None
     try:
         manifest = workspace.manifest(folder.head["target"])
-        goldens = [load_channels(manifest, folder.path / "golden" / keys[number]) for number in numbers]
+        goldens = [
+            load_channels(manifest, inside(folder.path / "golden", keys[number])) for number in numbers
+        ]
     except MutatorError:
         return None
     data = b"".join(Sampler(manifest, golden).encoded for golden in goldens)

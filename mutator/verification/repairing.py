@@ -11,7 +11,16 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from mutator._common.files import make_folder, raising_disk_full, write_atomic
+from mutator._common.below import (
+    Outside,
+    inside,
+    move_below,
+    open_below,
+    unlink_below,
+    write_below,
+    writing_below,
+)
+from mutator._common.files import raising_disk_full
 from mutator._common.locks import owned
 from mutator._common.text import counted
 from mutator.campaigns.freezing import CSV, plan_csv
@@ -22,6 +31,7 @@ from mutator.store import digests, integrity
 from mutator.store.blocks import read_blocks
 from mutator.store.digests import Digest, Ledger
 from mutator.store.lines import Segment, read_segment, written
+from mutator.store.opening import ASIDE
 from mutator.store.patches import rewrite
 from mutator.store.records import SCHEMA, TIMINGS_SCHEMA
 from mutator.store.run_folder import RunFolder
@@ -29,7 +39,6 @@ from mutator.verification.audited_records import recorded
 from mutator.verification.repaired_series import repair_series
 from mutator.workspace import Workspace
 
-ASIDE = "damaged"  # folder for damaged content
 SCHEMAS = {"records": SCHEMA, "proof": SCHEMA, "timings": TIMINGS_SCHEMA}
 _Change = tuple[str, bytes | None, str]  # file, new content (None: removed), sentence about the change
 
@@ -68,10 +77,12 @@ def _renewed_ledger(folder: RunFolder) -> Iterator[str]:
     run = folder.path
     try:
         digests.read(run)
+    except Outside:
+        raise  # somebody wrote this on purpose
     except MutatorError:
-        inside = (path for name in ("plan", "golden") for path in (run / name).rglob("*"))
-        paths = [*(run / name for name in integrity.TOP), *inside]
-        found = {path.relative_to(run).as_posix(): Digest.of_file(path) for path in paths}
+        below = (path for name in ("plan", "golden") for path in (run / name).rglob("*"))
+        names = [*integrity.TOP, *(path.relative_to(run).as_posix() for path in below)]
+        found = digests.of_files(run, [name for name in names if digests.may_name(name)])
         _put_aside(run, digests.FILE)
         digests.write(run, Ledger(files={name: one for name, one in found.items() if one}))
         yield f"{digests.FILE} rebuilt from the current files: only an earlier seal can confirm them"
@@ -81,7 +92,7 @@ def _files(folder: RunFolder, ledger: Ledger) -> Iterator[_Change]:
     """Damaged files, rebuilt or set aside, and files that do not belong in the folder."""
     run = folder.path
     for name, known in ledger.files.items():
-        if known.lines is not None or name in integrity.WHOLE or known.is_of(Digest.of_file(run / name)):
+        if known.lines is not None or name in integrity.WHOLE or known.is_of(Digest.below(run, name)):
             continue
         if name == CSV and known.is_of(Digest.of(data := plan_csv(load_plan(folder)))):
             yield name, data, f"{name} rebuilt from the plan"
@@ -94,9 +105,11 @@ def _files(folder: RunFolder, ledger: Ledger) -> Iterator[_Change]:
 
 
 def _lost_patches(folder: RunFolder) -> list[str]:
-    """Experiments whose stored patch does not match their record."""
-    lost = []
+    """Planned experiments whose stored patch does not match their record."""
+    lost, planned = [], folder.share()
     for one in recorded(folder, "records"):
+        if one.record.experiment_id not in planned:
+            continue
         try:
             folder.read_patch(one.record.experiment_id, one.record)
         except MutatorError:
@@ -109,9 +122,9 @@ def _drop_patches(folder: RunFolder, lost: Collection[str]) -> list[str]:
     file with damaged blocks. Other patches in these files are kept."""
     run, patches, said = folder.path, folder.patches, []
     for one in lost:
-        old = patches.old_file(one)
-        _put_aside(run, old.relative_to(run).as_posix())
-        old.unlink(missing_ok=True)
+        name = patches.old_file(one).relative_to(run).as_posix()
+        _put_aside(run, name)
+        unlink_below(run, name)
     for path in patches.files():
         name = path.relative_to(run).as_posix()
         if not path.is_file():
@@ -150,7 +163,7 @@ def _segments(folder: RunFolder, ledger: Ledger, lost: Collection[str]) -> Itera
                 said = f"{name}: {counted(gone, 'line')} set aside, {len(kept)} kept"
                 yield name, written(path, head, kept), said
     for name, known in ledger.files.items():
-        if known.lines is not None and not os.path.lexists(run / name):
+        if known.lines is not None and not os.path.lexists(inside(run, name)):
             yield name, None, f"{name} is gone"
 
 
@@ -194,19 +207,19 @@ def _kept(
 
 
 def _put_aside(run: Path, name: str) -> None:
-    """Copy a file to a free name in `damaged/`; move anything else."""
-    if not os.path.lexists(run / name):
+    """Copy a file to a free name in `damaged/`; move a folder."""
+    path = inside(run, name)
+    if not os.path.lexists(path):
         return
-    place = run / ASIDE / name
-    make_folder(place.parent)
-    number = 1
-    while os.path.lexists(place):
+    place, number = f"{ASIDE}/{name}", 1
+    while os.path.lexists(inside(run, place)):
         number += 1
-        place = (run / ASIDE / name).with_name(f"{Path(name).name}.{number}")
-    if (run / name).is_file():
-        shutil.copy2(run / name, place)
+        place = f"{ASIDE}/{name}.{number}"
+    if path.is_dir():
+        move_below(run, name, place)
     else:
-        (run / name).rename(place)
+        with open_below(run, name) as file, writing_below(run, place) as copy:
+            shutil.copyfileobj(file, copy)
 
 
 def _carry_out(run: Path, changes: list[_Change], ledger: Ledger) -> None:
@@ -222,7 +235,7 @@ def _carry_out(run: Path, changes: list[_Change], ledger: Ledger) -> None:
     with digests.rewriting(run, coming, finished=finished):
         for name, data, _ in changes:
             if data is None:
-                (run / name).unlink(missing_ok=True)
+                unlink_below(run, name)
             else:
-                write_atomic(run / name, data)
+                write_below(run, name, data)
     digests.close_segments(run)

@@ -18,7 +18,7 @@ import pytest
 from mutator.cli import campaigns
 from mutator.errors import MutatorError
 from mutator.review import gate
-from mutator.store.run_folder import CONTENT
+from mutator.store.opening import CONTENT
 from mutator.store.series import SeriesFolder, read_kept
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json

@@ -8,11 +8,14 @@ from typing import Any
 import pytest
 
 from mutator._common import files
+from mutator._common.below import Outside
 from mutator._common.files import write_atomic
 from mutator.errors import MutatorError
 from mutator.store import digests
 from mutator.store.digests import Digest, Ledger
 from mutator.store.lines import LineWriter
+
+NAMES = FIRST, SECOND = "plan.csv", "checks.json"
 
 
 class Killed(BaseException):
@@ -21,9 +24,9 @@ class Killed(BaseException):
 
 @pytest.fixture
 def run(tmp_path: Path) -> Path:
-    for name in ("a", "b"):
+    for name in NAMES:
         (tmp_path / name).write_text(f"old {name}")
-    known = {name: Digest.of((tmp_path / name).read_bytes()) for name in ("a", "b")}
+    known = {name: Digest.of((tmp_path / name).read_bytes()) for name in NAMES}
     digests.write(tmp_path, Ledger(files=known))
     return tmp_path
 
@@ -43,7 +46,9 @@ def segment(run: Path, name: str, *values: int) -> Path:
 
 def test_a_ledger_is_read_as_written(run: Path) -> None:
     one = Digest(size=3, sha256="ab" * 32, lines=2)
-    ledger = Ledger(files={"records/x.jsonl": one}, rewriting={"a": one, "b": None}, finished=True)
+    ledger = Ledger(
+        files={"records/x.jsonl": one}, rewriting={"checks.json": one, "plan.csv": None}, finished=True
+    )
     digests.write(run, ledger)
     assert digests.read(run) == ledger
 
@@ -75,6 +80,29 @@ def test_a_forged_ledger_is_refused(run: Path) -> None:
         digests.read(run)
 
 
+@pytest.mark.parametrize("key", ["files", "rewriting"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("../setup.py", "/etc/passwd", "golden/../../x/y", "plan/./faults.jsonl", "", "golden//x", "a\0b"),
+        *("setup.py", "records/x/y.jsonl", "records/x.py", "golden/x", "work/base/x", "series/index.js"),
+    ],
+)
+def test_a_ledger_names_only_files_that_a_run_writes(run: Path, key: str, name: str) -> None:
+    one = Digest.of(b"")
+    digests.write(run, Ledger(**{"files": {}, "rewriting": {}} | {key: {name: one}}))  # type: ignore[arg-type]
+    with pytest.raises(Outside, match=r"digests\.json"):
+        digests.read(run)
+
+
+def test_a_segment_with_a_second_name_is_not_cut_in_place(run: Path) -> None:
+    path = segment(run, "records/0001-gw0.jsonl", 1)
+    path.write_bytes(torn := path.read_bytes() + b'{"sum"')
+    (run.parent / "mine").hardlink_to(path)
+    digests.close_segments(run)
+    assert (run.parent / "mine").read_bytes() == torn != path.read_bytes()
+
+
 def kills(run: Path, work: Callable[[], Any], monkeypatch: pytest.MonkeyPatch) -> int:
     """Repeat `work` with a kill before its first, second, ... write, until it completes. Check the folder
     after each kill. Return the number of kills."""
@@ -88,9 +116,12 @@ def kills(run: Path, work: Callable[[], Any], monkeypatch: pytest.MonkeyPatch) -
             left -= 1
             write_atomic(path, data)
 
+        def write_below(run: Path, name: str, data: bytes) -> None:
+            write(run / name, data)
+
         with monkeypatch.context() as patch:
             patch.setattr(files, "write_atomic", write)
-            patch.setattr(digests, "write_atomic", write)
+            patch.setattr(digests, "write_below", write_below)
             try:
                 work()
                 return survived
@@ -100,26 +131,26 @@ def kills(run: Path, work: Callable[[], Any], monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_a_kill_during_a_rewrite_leaves_a_valid_folder(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert kills(run, lambda: digests.rewrite(run, "a", b"new a"), monkeypatch) == 3
-    assert accepted(run) and (run / "a").read_text() == "new a"
+    assert kills(run, lambda: digests.rewrite(run, FIRST, b"new"), monkeypatch) == 3
+    assert accepted(run) and (run / FIRST).read_text() == "new"
     assert digests.read(run).rewriting == {}
 
 
 def test_after_a_kill_a_file_is_old_or_new(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with monkeypatch.context() as patch, pytest.raises(Killed):
-        patch.setattr(digests, "write_atomic", lambda path, data: (_ for _ in ()).throw(Killed))
-        digests.rewrite(run, "a", b"new a")
+        patch.setattr(digests, "write_below", lambda run, name, data: (_ for _ in ()).throw(Killed))
+        digests.rewrite(run, FIRST, b"new")
     assert accepted(run)
-    (run / "a").write_text("mine")
+    (run / FIRST).write_text("mine")
     assert not accepted(run)
 
 
 def test_a_file_announced_for_deletion_can_be_missing(run: Path) -> None:
-    with digests.rewriting(run, {"a": None}):
+    with digests.rewriting(run, {FIRST: None}):
         assert accepted(run)
-        (run / "a").unlink()
+        (run / FIRST).unlink()
         assert accepted(run)
-    assert digests.read(run).names == ["b"] and accepted(run)
+    assert digests.read(run).names == [SECOND] and accepted(run)
 
 
 def test_a_closed_segment_is_in_the_ledger(run: Path) -> None:

@@ -7,12 +7,16 @@ from pathlib import Path
 
 import pytest
 
+from mutator._common.below import Outside
 from mutator._common.locks import owned
 from mutator.errors import MutatorError
 from mutator.store import digests, plan_file
-from mutator.store.lines import written
+from mutator.store.digests import Digest, Ledger
+from mutator.store.lines import read_segment, written
 from mutator.store.patches import Patches
+from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
+from mutator.store.series import Index, write_index
 from mutator.verification.repairing import repair
 from mutator.workspace import Workspace
 
@@ -196,26 +200,72 @@ def test_a_folder_in_use_or_of_an_earlier_schema_is_refused(run: Path) -> None:
 
 
 @pytest.mark.parametrize("name", NO_FILES)
-@pytest.mark.parametrize("is_link", [False, True])
-def test_a_folder_or_link_in_place_of_a_file_is_moved_aside(run: Path, name: str, is_link: bool) -> None:
+def test_a_folder_in_place_of_a_file_is_moved_aside(run: Path, name: str) -> None:
     (run / name).unlink()
-    if is_link:
-        (run / name).symlink_to(run / "nowhere")
-    else:
-        (run / name).mkdir()
-        (run / name / "thesis.tex").write_text("mine")
+    (run / name).mkdir()
+    (run / name / "thesis.tex").write_text("mine")
     assert any(name in text for text in repaired(run)[0])
-    aside = run / "damaged" / name
-    assert aside.is_symlink() if is_link else (aside / "thesis.tex").read_text() == "mine"
+    assert (run / "damaged" / name / "thesis.tex").read_text() == "mine"
 
 
-def test_a_link_in_place_of_a_patch_file_is_moved_aside(run: Path, put_patches: Callable[..., None]) -> None:
-    name = next(plan_file.ids(run))
-    put_patches(run, {name: b"not the patch of the record"})
-    [file] = Patches(run).files()
-    other = Path(shutil.move(file, run.parent / "elsewhere"))
-    before = other.read_bytes()
-    file.symlink_to(other)
+@pytest.mark.parametrize("name", [*NO_FILES, "damaged", "damaged/records"])
+def test_links_are_not_followed(run: Path, name: str) -> None:
+    """A link in a run folder is refused, and one in `damaged/`, where old damage lies, is not used."""
+    mine = run.parent / "mine"
+    mine.mkdir()
+    edit(run / RECORDS, lambda lines: lines[:-1])
+    if (run / name).exists():
+        shutil.move(run / name, mine / "file")
+        (run / name).symlink_to(mine / "file")
+    else:
+        (run / name).parent.mkdir(exist_ok=True)
+        (run / name).symlink_to(mine)
+    before = {path: path.read_bytes() for path in mine.iterdir()}
+    with pytest.raises(Outside, match="a link, a pipe"):
+        repair(RunFolder.unverified(run))
+    assert {path: path.read_bytes() for path in mine.iterdir()} == before
+
+
+@pytest.mark.parametrize("name", ["../setup.py", "damaged/../../setup.py"])
+def test_a_file_outside_that_the_ledger_names_stays(run: Path, name: str) -> None:
+    """Verifying prints the remedy `--repair`, which must not move a file that somebody else named."""
+    (run.parent / "setup.py").write_text("mine")
+    ledger = digests.read(run)
+    digests.write(run, Ledger(files={**ledger.files, name: Digest.of(b"not mine")}, finished=True))
+    with pytest.raises(Outside, match=r"digests\.json"):
+        repair(RunFolder.unverified(run))
+    assert (run.parent / "setup.py").read_text() == "mine"
+
+
+def test_a_file_outside_that_a_record_names_stays(run: Path) -> None:
+    """The patch of an experiment is, in older folders, in a file of its own that has the experiment's id."""
+    name = "/../../../setup"
+    mine = run.parent / "setup.patch"
+    mine.write_text("mine")
+    segment = read_segment(run / RECORDS)
+    lines = [segment.content(number) for number in segment.lines if number > 1]
+    lines[0] |= {"experiment_id": name, "patch": "ab" * 32}
+    plan = RunFolder.unverified(run).head["plan"]
+    (run / RECORDS).write_bytes(written(run / RECORDS, {"schema": SCHEMA, "plan": plan}, lines))
     repaired(run)
-    assert not file.is_symlink() and name not in Patches(run)
-    assert other.read_bytes() == before
+    assert mine.read_text() == "mine"
+
+
+@pytest.mark.parametrize("name", ["../../mine", "/mine"])
+def test_a_file_outside_that_an_index_of_series_names_stays(run: Path, name: str) -> None:
+    mine = run.parent / "mine.js"
+    mine.write_text("mine")
+    (run / "series").mkdir()
+    index = Index(
+        plan=RunFolder.unverified(run).head["plan"],
+        chunks=((name, 1),),
+        sizes=(4,),
+        goldens={},
+        entries={},
+        golden_of={},
+        left_out=0,
+        budget_mb=1,
+    )
+    write_index(run / "series" / "index.js", index)
+    repaired(run)
+    assert mine.read_text() == "mine"
