@@ -15,6 +15,7 @@ import stat
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from io import BufferedReader
 from pathlib import Path
 from typing import BinaryIO
 
@@ -69,7 +70,7 @@ def inside(root: Path, name: object) -> Path:
     return root / check_name(name, root)
 
 
-def open_below(root: Path, name: str) -> BinaryIO:
+def open_below(root: Path, name: str) -> BufferedReader:
     """Open a regular file below `root` for reading.
 
     FileNotFoundError if it is missing; Outside if it is a link or no regular file, or if a folder on the way

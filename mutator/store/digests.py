@@ -12,6 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
+from io import BufferedReader
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -75,7 +76,7 @@ class Digest:
             return None
 
     @classmethod
-    def _of_open(cls, file: BinaryIO) -> "Digest":
+    def _of_open(cls, file: BufferedReader) -> "Digest":
         return cls(
             sha256=hashlib.file_digest(file, "sha256").hexdigest(), size=os.fstat(file.fileno()).st_size
         )
