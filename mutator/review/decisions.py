@@ -11,6 +11,7 @@ from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
 
+from mutator._common.below import open_below, write_below
 from mutator._common.files import make_folder
 from mutator._common.locks import alone_in
 from mutator._common.shipped import refuse_shipped
@@ -21,6 +22,8 @@ from mutator.review.catalogue import Group
 from mutator.review.commits import check_four_eyes, library_commit
 from mutator.review.entries import Decision, Entry, Flag, Remark, Verdict
 from mutator.workspace import Workspace
+
+_FOLDER = "reviews"  # in the library
 
 
 class State(StrEnum):
@@ -68,15 +71,20 @@ class Conflict(CheckFailed):
 
 @dataclass(frozen=True, kw_only=True)
 class Review:
-    """The reviews of one target's groups, by group; `path` is the file, which might not exist.
+    """The reviews of one target's groups, by group, in a library.
 
     With `four_eyes`, the author of a group's last change cannot approve it.
     """
 
-    path: Path
+    library: Path
     target: str
     entries: Mapping[str, Entry]
     four_eyes: bool = False
+
+    @property
+    def path(self) -> Path:
+        """The file, which might not exist."""
+        return self.library / _name_of(self.target)
 
     def decision(self, group: str) -> Decision | None:
         entry = self.entries.get(group)
@@ -113,11 +121,11 @@ class Review:
         decision = self.decision(group.id)
         if decision is None or not self.changed(group):
             return ""
-        return seen_texts.changes(self.seen_path(group.id), decision.bound, group.seen)
+        return seen_texts.changes(self.library, self.seen_name(group.id), decision.bound, group.seen)
 
-    def seen_path(self, group: str) -> Path:
-        """The file with the text of a group that the reviewer saw."""
-        return self.path.parent / "seen" / self.target / f"{group}.txt"
+    def seen_name(self, group: str) -> str:
+        """The file in the library with the text of a group that the reviewer saw."""
+        return f"{_FOLDER}/seen/{self.target}/{group}.txt"
 
     def in_turn(self, groups: Iterable[Group]) -> list[Group]:
         """The groups in list order: new and changed ones first."""
@@ -138,15 +146,18 @@ class Review:
 def load_review(workspace: Workspace, target: str) -> Review:
     """Load the reviews of a target's groups; empty if there is no file. MutatorError, with the line, for a
     mistake. Links are refused: errors would reveal the linked file, and a change would replace the link."""
-    path = workspace.library / "reviews" / f"{target}.yaml"
-    if path.is_symlink():
-        raise MutatorError(
-            "a symbolic link", where=path, expected="a regular file", remedy="replace the link with the file"
-        )
-    if not path.exists():
-        return Review(path=path, target=target, entries={})
-    content = review_file.load(path, target)
-    return Review(path=path, target=target, entries=content.entries, four_eyes=content.four_eyes)
+    library, name = workspace.library, _name_of(target)
+    try:
+        open_below(library, name).close()
+    except FileNotFoundError:
+        return Review(library=library, target=target, entries={})
+    content = review_file.load(library / name, target)
+    return Review(library=library, target=target, entries=content.entries, four_eyes=content.four_eyes)
+
+
+def _name_of(target: str) -> str:
+    """The file of a target's reviews in the library."""
+    return f"{_FOLDER}/{target}.yaml"
 
 
 def record(workspace: Workspace, target: str, changes: Sequence[Change], seen: Mapping[str, str]) -> Review:
@@ -160,7 +171,7 @@ def record(workspace: Workspace, target: str, changes: Sequence[Change], seen: M
     made = [replace(change, by=_line(change.by, "by"), text=_line(change.text, "text")) for change in changes]
     for change in made:
         _check(change)
-    path = workspace.library / "reviews" / f"{target}.yaml"
+    path = load_review(workspace, target).path  # an error here leaves the library unchanged
     refuse_shipped(path)
     make_folder(path.parent)
     with alone_in(path.parent):
@@ -226,9 +237,9 @@ def _written(workspace: Workspace, review: Review, changes: Sequence[Change]) ->
     made = replace(review, entries=kept)
     for change in changes:
         if change.kind in _VERDICTS:
-            seen_texts.keep(made.seen_path(change.group.id), change.group.seen)
+            seen_texts.keep(made.library, made.seen_name(change.group.id), change.group.seen)
     content = review_file.Content(entries=made.entries, four_eyes=made.four_eyes)
-    review_file.write(made.path, made.target, content)
+    write_below(made.library, _name_of(made.target), review_file.text(made.target, content).encode())
     return made
 
 

@@ -1,4 +1,4 @@
-"""Reads and writes the file of a target's reviews: YAML for version control, one sorted block for each group.
+"""The file of a target's reviews: YAML for version control, one sorted block for each group.
 
 Blocks of `review/1`, which had a group for each kind of trigger, are converted.
 """
@@ -12,7 +12,6 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from mutator._common.files import write_atomic
 from mutator._common.hashing import content_id
 from mutator.config.yaml_files import Source, StrictModel, read
 from mutator.review.entries import Bound, Decision, Entry, Flag, Remark, Verdict
@@ -92,12 +91,11 @@ def load(path: Path, target: str) -> Content:
     return Content(entries=entries, four_eyes=model.four_eyes)
 
 
-def write(path: Path, target: str, content: Content) -> None:
-    """Write the file atomically, sorted so that git can merge parallel work."""
+def text(target: str, content: Content) -> str:
+    """The text of a file, sorted so that git can merge parallel work."""
     blocks = [_block(content.entries[name]) for name in sorted(content.entries)]
     head = f"schema: {SCHEMA}\ntarget: {json.dumps(target)}\n" + "four_eyes: true\n" * content.four_eyes
-    text = f"{_HEAD}{head}decisions:" + ("\n" + "".join(blocks) if blocks else " []\n")
-    write_atomic(path, text.encode())
+    return f"{_HEAD}{head}decisions:" + ("\n" + "".join(blocks) if blocks else " []\n")
 
 
 def _entry(block: _BlockModel, source: Source, i: int) -> Entry:

@@ -8,7 +8,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from difflib import unified_diff
 from pathlib import Path
 
-from mutator._common.files import make_folder, no_pipe, write_atomic
+from mutator._common.below import read_below, write_below
+from mutator.errors import MutatorError
 from mutator.review.entries import Bound, Values, values_in_words
 
 _AROUND = 3  # unchanged lines around a change
@@ -22,18 +23,17 @@ def text_of(bound: Bound, values: Values, sections: Mapping[str, str]) -> str:
     return f"{_head(bound)}\n" + "\n".join(named)
 
 
-def keep(path: Path, text: str) -> None:
+def keep(library: Path, name: str, text: str) -> None:
     """Write the text that a reviewer saw, replacing earlier text."""
-    make_folder(path.parent)
-    write_atomic(path, text.encode("utf-8", "surrogateescape"))
+    write_below(library, name, text.encode("utf-8", "surrogateescape"))
 
 
-def changes(path: Path, bound: Bound, text: str) -> str:
+def changes(library: Path, name: str, bound: Bound, text: str) -> str:
     """A unified diff from the stored text to the current `text`; empty if no text was stored for the decision
     with the digests `bound`."""
     try:
-        before = no_pipe(path).read_bytes().decode("utf-8", "surrogateescape")
-    except OSError:
+        before = read_below(library, name).decode("utf-8", "surrogateescape")
+    except (OSError, MutatorError):
         return ""
     if not before.startswith(f"{_head(bound)}\n"):
         return ""

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from mutator._common import shipped
+from mutator._common.below import Outside
 from mutator._common.version import VERSION
 from mutator.errors import MutatorError
 from mutator.review.catalogue import Group
@@ -173,15 +174,43 @@ def test_two_writers_at_once_lose_nothing(toycar: Workspace) -> None:
 
 
 def test_each_hunk_names_its_section_and_function(tmp_path: Path) -> None:
-    path, body = tmp_path / "seen.txt", "".join(f"{i}\n" for i in range(9))
+    body = "".join(f"{i}\n" for i in range(9))
 
     def text(value: int) -> str:
         calls = f"-- car/a.py A\n{body}-- car/b.py B\n{body}y = {value}\n"
         return text_of(BOUND, {}, {"diff": f"-- a\n{body}+x = {value}\n", "calls": calls})
 
-    keep(path, text(1))
-    hunks = [line for line in changes(path, BOUND, text(2)).splitlines() if line.startswith("@@")]
+    keep(tmp_path, "a.txt", text(1))
+    diff = changes(tmp_path, "a.txt", BOUND, text(2))
+    hunks = [line for line in diff.splitlines() if line.startswith("@@")]
     assert [line.rpartition("@@ ")[2] for line in hunks] == ["diff", "calls: car/b.py B"]
+
+
+@pytest.mark.parametrize("name", ["", "toycar.yaml", "seen", "seen/toycar"])
+@pytest.mark.parametrize("is_there", [True, False])
+def test_nothing_is_read_or_written_through_a_link_of_the_library(
+    toycar: Workspace, tmp_path: Path, name: str, is_there: bool
+) -> None:
+    mine, link = tmp_path / "mine", toycar.library / "reviews" / name
+    mine.mkdir()
+    end = mine / "notes.yaml" if name == "toycar.yaml" else mine
+    if is_there:
+        (mine / "notes.yaml").write_text("my secret: [\n")
+    elif name != "toycar.yaml":
+        mine.rmdir()
+    before = sorted((path, path.read_text()) for path in mine.glob("*"))
+    link.parent.mkdir(parents=True, exist_ok=True)
+    link.symlink_to(end)
+    with pytest.raises(Outside) as caught:
+        say(toycar, Kind.APPROVE, "a")
+    assert "secret" not in str(caught.value)
+    assert sorted((path, path.read_text()) for path in mine.glob("*")) == before
+    assert not (toycar.library / "reviews" / "toycar.yaml").is_file() or name == "toycar.yaml"
+
+
+def test_a_target_whose_name_leads_out_has_no_reviews(toycar: Workspace) -> None:
+    with pytest.raises(Outside):
+        load_review(toycar, "../../notes")
 
 
 def test_a_changed_group_shows_the_diff_since_its_approval(toycar: Workspace) -> None:
@@ -225,10 +254,10 @@ def test_a_failed_write_leaves_the_old_file(toycar: Workspace, monkeypatch: pyte
     path = say(toycar, Kind.APPROVE, "a").path
     before = path.read_bytes()
 
-    def full(self: Path, target: Path) -> None:
+    def full(*names: str, **folders: int) -> None:
         raise OSError("no")
 
-    monkeypatch.setattr(Path, "replace", full)
+    monkeypatch.setattr(os, "replace", full)
     with pytest.raises(OSError, match="no"):
         say(toycar, Kind.FLAG, "b")
     assert path.read_bytes() == before

@@ -35,7 +35,7 @@ def entry(name: str) -> Entry:
 
 def written(path: Path, *names: str) -> Path:
     entries = {name * 12: entry(name) for name in names}
-    review_file.write(path, "toycar", Content(entries=entries, four_eyes=True))
+    path.write_text(review_file.text("toycar", Content(entries=entries, four_eyes=True)))
     return path
 
 
@@ -44,7 +44,7 @@ def test_a_review_file_round_trips(tmp_path: Path) -> None:
     found = review_file.load(path, "toycar")
     assert found == Content(entries={name * 12: entry(name) for name in "ab"}, four_eyes=True)
     text = path.read_text()
-    review_file.write(path, "toycar", found)
+    path.write_text(review_file.text("toycar", found))
     assert path.read_text() == text
 
 
@@ -157,6 +157,6 @@ def test_a_mistake_in_an_old_file_is_reported_at_its_line(old: Path) -> None:
 
 def test_writing_upgrades_the_file(old: Path) -> None:
     found = review_file.load(old, "toycar")
-    review_file.write(old, "toycar", found)
+    old.write_text(review_file.text("toycar", found))
     assert f"schema: {review_file.SCHEMA}\n" in old.read_text()
     assert review_file.load(old, "toycar") == found
