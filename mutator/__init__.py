@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from mutator.report.film import Shot
     from mutator.report.history import History
     from mutator.store.progress import Progress
+    from mutator.verification.seal import Seals
     from mutator.workspace import Workspace
 
 __version__ = VERSION
@@ -81,6 +82,7 @@ _HOMES = {
     "mutator.report.film": ("Shot",),
     "mutator.report.history": ("History",),
     "mutator.store.progress": ("Progress",),
+    "mutator.verification.seal": ("Seals",),
     "mutator.workspace": ("Workspace",),
 }
 _LAZY = {name: home for home, names in _HOMES.items() for name in names}
@@ -108,6 +110,7 @@ __all__ = [
     "Run",
     "RunComparison",
     "RunExperiment",
+    "Seals",
     "Shot",
     "Status",
     "Summary",

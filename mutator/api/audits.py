@@ -17,10 +17,14 @@ from mutator.store.run_folder import RunFolder
 from mutator.store.stretches import package_versions, told
 from mutator.verification.audit import Check, audit_checks
 from mutator.verification.repairing import repair as put_aside
-from mutator.verification.seal import seal_of
+from mutator.verification.seal import Seals, seals_of, unsealed_facts
 from mutator.workspace import Workspace
 
 SHOWN = 20  # differences listed in the text of an audit
+NOT_SEEN = (
+    "These checks find damage and contradictions. That nobody wrote other results with matching digests "
+    "shows only an expected seal (--expect)."
+)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -30,27 +34,40 @@ class Audit:
     run: Path  #: the run folder
     facts: Mapping[str, str]  #: facts about the run, by name
     checks: tuple[Check, ...]  #: the checks: `what`, `count` and `differences` of each
-    seal: str | None  #: the seal computed from the content; None if the run is unfinished or not verifiable
+    seals: Seals  #: the digests computed from the content
+    not_sealed: Mapping[str, str]  #: facts that neither the seal nor a check covers, by name
+    compared: bool = False  #: whether the run was compared with an expected digest
     repaired: tuple[str, ...] = ()  #: the damaged parts that were set aside
 
     def __repr__(self) -> str:
         return f"<Audit of {self.run.name}: {self._outcome}>"
 
     def __str__(self) -> str:
-        width = max(map(len, self.facts))
+        width = max(map(len, (*self.facts, *self.not_sealed)))
         rows = [(check.what, str(check.count), str(len(check.differences))) for check in self.checks]
         table = Table(heads=("checked", "count", "differences"), rows=rows, right=(1, 2))
         found = [str(one).replace(f"{self.run}/", "") for one in self.differences[:SHOWN]]
         more = len(self.differences) - SHOWN
         listed = [*found, *([f"and {more} more"] if more > 0 else [])]
+        facts, unsealed = (
+            "\n".join(f"{name.ljust(width)}  {value}" for name, value in facts.items())
+            for facts in (self.facts, self.not_sealed)
+        )
         parts = [
-            "\n".join(f"{name.ljust(width)}  {value}" for name, value in self.facts.items()),
+            facts,
+            f"not sealed:\n{unsealed}",
             table.as_text(),
             "\n".join(f"- {text}" for text in listed),
             "\n".join(f"repaired: {text}" for text in self.repaired),
+            "" if self.compared else NOT_SEEN,
             self._outcome,
         ]
         return "\n\n".join(filter(None, parts))
+
+    @property
+    def seal(self) -> str | None:
+        """The seal computed from the content; None if the run is unfinished or not verifiable."""
+        return self.seals.seal
 
     @property
     def _outcome(self) -> str:
@@ -73,36 +90,64 @@ def verify(
     *,
     rerun: int = 0,
     expect: str | None = None,
+    expect_review: str | None = None,
     repair: bool = False,
     workspace: WorkspaceLike = None,
 ) -> Audit:
     """Audit the run folder at `run`, finished or not, even if `load_run` can no longer open it.
 
     `rerun` is the number of randomly drawn experiments to rerun on the reference engine. `expect` is the seal
-    that the run must have. With `repair`, damaged parts are set aside, and the next run of the campaign in
-    this folder redoes them; otherwise nothing is written. MutatorError if `run` is not a run folder or its
-    run.json cannot be read.
+    or the results digest that the run must have, `expect_review` its review digest. With `repair`, damaged
+    parts are set aside, and the next run of the campaign in this folder redoes them; otherwise nothing is
+    written. MutatorError if `run` is not a run folder or its run.json cannot be read.
     """
     check_whole("rerun", rerun)
-    if expect is not None:
-        check_type("expect", expect, str, "a seal")
-        if not re.fullmatch(r"[0-9a-f]{64}", expect):
-            raise MutatorError(f"'{expect}'", argument="expect", expected="a seal: 64 hex digits")
+    for name, value in (("expect", expect), ("expect_review", expect_review)):
+        _check_digest(name, value)
     folder = RunFolder.unverified(Path(run))
     found = _workspace(workspace)
     checks = audit_checks(folder, found)
     facts = _facts(folder)
     if rerun:
         checks.append(_rerun(folder, found, rerun, facts))
-    seal = _seal(folder, checks)
-    facts["seal"] = seal or "none"
+    seals = _seals(folder, checks)
+    facts |= {"seal": "none"} | seals.texts()
     if expect is not None:
-        wrong = MutatorError(f"seal {seal or 'none'}", where=folder.path, expected=expect)
         facts["expected"] = expect
-        checks.append(Check(what="seal as expected", count=1, differences=() if seal == expect else (wrong,)))
+        checks.append(_as_expected(folder, seals, expect))
+    if expect_review is not None:
+        facts["expected review"] = expect_review
+        checks.append(_compared(folder, "review digest", seals.review_digest, expect_review))
     damaged = any(check.differences for check in checks)
     repaired = put_aside(folder, found) if repair and damaged else []
-    return Audit(run=folder.path, facts=facts, checks=tuple(checks), seal=seal, repaired=tuple(repaired))
+    return Audit(
+        run=folder.path,
+        facts=facts,
+        checks=tuple(checks),
+        seals=seals,
+        not_sealed=unsealed_facts(folder),
+        compared=expect is not None,
+        repaired=tuple(repaired),
+    )
+
+
+def _check_digest(argument: str, value: str | None) -> None:
+    if value is not None:
+        check_type(argument, value, str, "a digest")
+        if not re.fullmatch(r"[0-9a-f]{64}", value):
+            raise MutatorError(f"'{value}'", argument=argument, expected="a digest: 64 hex digits")
+
+
+def _as_expected(folder: RunFolder, seals: Seals, expect: str) -> Check:
+    """Compare with the seal or the results digest, whichever it is."""
+    if expect == seals.results_digest:
+        return _compared(folder, "results digest", expect, expect)
+    return _compared(folder, "seal", seals.seal, expect)
+
+
+def _compared(folder: RunFolder, what: str, found: str | None, expect: str) -> Check:
+    wrong = MutatorError(f"{what} {found or 'none'}", where=folder.path, expected=expect)
+    return Check(what=f"{what} as expected", count=1, differences=() if found == expect else (wrong,))
 
 
 def _workspace(given: WorkspaceLike) -> Workspace | None:
@@ -126,13 +171,13 @@ def _rerun(folder: RunFolder, workspace: Workspace | None, count: int, facts: di
     return Check.of(what, len(ids), driven_again(workspace, folder, ids))
 
 
-def _seal(folder: RunFolder, checks: list[Check]) -> str | None:
+def _seals(folder: RunFolder, checks: list[Check]) -> Seals:
     try:
-        return seal_of(folder)
+        return seals_of(folder)
     except (MutatorError, OSError):
         if not any(check.differences for check in checks):
             raise
-        return None
+        return Seals()
 
 
 def _facts(folder: RunFolder) -> dict[str, str]:
@@ -145,6 +190,6 @@ def _facts(folder: RunFolder) -> dict[str, str]:
         "plan": head["plan"],
         **{f"digest of {name}": value for name, value in head["sources"].items()},
         "mutator": head["provenance"]["mutator"],
-        **told(folder.stretches),
+        "python": told(folder.stretches).get("python", "none"),
         **({"packages": f"{len(packages)}, with digest {digest(packages)}"} if packages else {}),
     }

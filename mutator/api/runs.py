@@ -36,7 +36,7 @@ from mutator.statistics.sheet import Sheet
 from mutator.store import cleaning
 from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.verification import equivalence
-from mutator.verification.seal import not_verifiable, seal_of
+from mutator.verification.seal import Seals, not_verifiable, seals_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -97,9 +97,14 @@ class Run(RunContents):
         return "".join(map(str, (*parts, text_html(note) if note else "")))
 
     @cached_property
+    def seals(self) -> Seals:
+        """The digests to publish, computed now: the seal, the results digest and the review digest."""
+        return seals_of(self.folder)
+
+    @property
     def seal(self) -> str | None:
-        """The run's seal, computed now; None for a run that is unfinished or not verifiable."""
-        return seal_of(self.folder)
+        """The run's seal; None for a run that is unfinished or not verifiable."""
+        return self.seals.seal
 
     def counts(self) -> Table:
         """Count how the experiments of each fault type ended."""

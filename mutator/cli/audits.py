@@ -1,5 +1,6 @@
 """`verify`: audit a run folder."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -30,7 +31,10 @@ def verify(
     run: Annotated[Path, typer.Argument(metavar="DIR", help="A run folder.", autocompletion=completion.runs)],
     rerun: Annotated[int, typer.Option(metavar="N", min=0, help="Rerun N randomly drawn experiments.")] = 0,
     expect: Annotated[
-        str | None, typer.Option(metavar="SEAL", help="The expected seal, 64 hex digits.")
+        str | None, typer.Option(metavar="DIGEST", help="The expected seal or results digest, 64 hex digits.")
+    ] = None,
+    expect_review: Annotated[
+        str | None, typer.Option(metavar="DIGEST", help="The expected review digest, 64 hex digits.")
     ] = None,
     repair: Annotated[
         bool,
@@ -49,15 +53,20 @@ def verify(
     terminal = Terminal(as_json)
     with terminal.wait("verifying"):
         audit = mutator.verify(
-            run, rerun=rerun, expect=expect, repair=repair, workspace=library_if_any(place)
+            run,
+            rerun=rerun,
+            expect=expect,
+            expect_review=expect_review,
+            repair=repair,
+            workspace=library_if_any(place),
         )
     if as_json:
         checks = [
             {"what": c.what, "count": c.count, "differences": [error_text(d) for d in c.differences]}
             for c in audit.checks
         ]
-        facts = {"run": str(run), "passed": audit.passed, "seal": audit.seal, "facts": audit.facts}
-        terminal.emit(facts | {"checks": checks, "repaired": audit.repaired})
+        facts = {"run": str(run), "passed": audit.passed, **asdict(audit.seals), "facts": audit.facts}
+        terminal.emit(facts | {"not_sealed": audit.not_sealed, "checks": checks, "repaired": audit.repaired})
     terminal.say(str(audit))
     if not audit.passed:
         raise typer.Exit(EXIT_CHECK_FAILED)

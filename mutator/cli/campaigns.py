@@ -3,7 +3,7 @@
 import shlex
 import sys
 import warnings
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -265,7 +265,7 @@ def _print_end(
         paths = {"run": str(out), "report": str(report[0]) if report else None}
         errors = [{"experiment": i, "detail": d} for i, d in summary.harness_errors]
         found = {"outcomes": summary.outcomes, "harness_errors": errors, "proof": summary.proof}
-        terminal.emit(counts | paths | found | {"seal": summary.seal, "not_forked": summary.not_forked})
+        terminal.emit(counts | paths | found | asdict(summary.seals) | {"not_forked": summary.not_forked})
     if written:
         show_counts(terminal, run)
     terminal.say(
@@ -276,8 +276,8 @@ def _print_end(
         terminal.say(f"proof: {summary.proof_note}")
     if written:
         terminal.say(f"report: {report[0]} and {report[1]}")
-    if summary.seal:
-        terminal.say(f"seal: {summary.seal}")
+    for name, value in summary.seals.texts().items():
+        terminal.say(f"{name}: {value}")
     if summary.harness_errors:
         terminal.say(
             f"harness errors: {len(summary.harness_errors)} (not in rates; the same command retries them)"

@@ -3,6 +3,7 @@
 import shlex
 import sys
 from contextlib import suppress
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -62,12 +63,14 @@ def merge(
     terminal = Terminal(as_json)
     with terminal.wait("merging"):
         merged = mutator.merge_runs(shards, out, accept_versions=accept_versions)
-        planned, seal = merged.folder.planned, merged.seal
+        planned, seals = merged.folder.planned, merged.seals
     if as_json:
-        terminal.emit({"run": str(out), "shards": len(shards), "experiments": planned, "seal": seal})
+        counts = {"run": str(out), "shards": len(shards), "experiments": planned}
+        terminal.emit(counts | asdict(seals))
     results = short_path(out / "results.csv")
     terminal.say(f"{counted(planned, 'experiment')} of {counted(len(shards), 'shard')}: {results}")
-    terminal.say(f"seal: {seal}")
+    for name, value in seals.texts().items():
+        terminal.say(f"{name}: {value}")
     terminal.say(f"report: {shlex.join(['mutator', 'report', str(out)])}", whole=True)
 
 

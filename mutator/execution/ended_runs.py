@@ -1,11 +1,12 @@
 """Cache the outcome of a finished run, so that later sessions need not read its records."""
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 from mutator.store import integrity, verified_runs
 from mutator.store.run_folder import RunFolder
 from mutator.verification.equivalence import Proof
+from mutator.verification.seal import Seals
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -14,13 +15,13 @@ class Ended:
 
     outcomes: Counter[str]
     proof: Proof | None
-    seal: str
+    seals: Seals
 
 
 def keep_end(folder: RunFolder, ended: Ended) -> None:
     if key := integrity.content_key(folder.path):
         proof = ended.proof and {"sampled": ended.proof.sampled, "same": ended.proof.same}
-        told = {"outcomes": dict(ended.outcomes), "proof": proof, "seal": ended.seal}
+        told = {"outcomes": dict(ended.outcomes), "proof": proof, "seals": asdict(ended.seals)}
         verified_runs.remember(key, ended=told)
 
 
@@ -36,5 +37,5 @@ def ended_before(folder: RunFolder) -> Ended | None:
     return Ended(
         outcomes=Counter(told["outcomes"]),
         proof=Proof(sampled=proof["sampled"], same=proof["same"]) if proof else None,
-        seal=told["seal"],
+        seals=Seals(**told["seals"]),
     )

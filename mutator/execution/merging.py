@@ -21,8 +21,8 @@ from mutator.outcomes import results
 from mutator.outcomes.ranking import worth
 from mutator.outcomes.reader import row_of
 from mutator.outcomes.rows import Row
-from mutator.review.gate import FILE as REVIEWED
 from mutator.store import cleaning, digests, integrity, plan_file
+from mutator.store.approvals import FILE as REVIEWED
 from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.digests import Digest, Ledger
@@ -37,6 +37,7 @@ from mutator.store.series import FOLDER as SERIES
 from mutator.store.series_packing import pack
 from mutator.store.stretches import Stretch, differences
 from mutator.verification import equivalence
+from mutator.verification.seal import OUTSIDE, without
 
 _SEGMENTS = {"records": SCHEMA, "timings": TIMINGS_SCHEMA, equivalence.FOLDER: SCHEMA}
 _MARK = f".{HEAD}."  # followed by a process id: marks an unfinished merge
@@ -114,6 +115,14 @@ def _check_plans(folders: Sequence[RunFolder]) -> None:
                     expected="shards of one plan, with the same target, templates and scenarios",
                     remedy=_REMEDY,
                 )
+        one, other = (without(shard.head, ("schema", *OUTSIDE[HEAD])) for shard in (first, folder))
+        if differ := [key for key in {**one, **other} if one.get(key) != other.get(key)]:
+            raise MutatorError(
+                f"'{differ[0]}' differs from {first.path / HEAD}",
+                where=folder.path / HEAD,
+                expected="shards that were planned with the same library and the same version of mutator",
+                remedy=_REMEDY,
+            )
 
 
 def _check_numbers(folders: Sequence[RunFolder]) -> None:

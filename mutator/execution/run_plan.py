@@ -10,6 +10,7 @@ from mutator.campaigns.plans import Choices, Planning, load_plan, make_plan
 from mutator.campaigns.provenance import check_sources, check_version, sources
 from mutator.errors import MutatorError
 from mutator.review import gate
+from mutator.store.approvals import write_approvals
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -30,7 +31,7 @@ def open_frozen(
         approvals = gate.approvals(workspace, make_plan(workspace, campaign, choices)) if reviewed else None
         folder, _ = freeze_owned(planning, out, workspace)
     if approvals is not None:
-        gate.write_approvals(folder.path, approvals)
+        write_approvals(folder.path, approvals)
     return folder
 
 

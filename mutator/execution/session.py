@@ -40,7 +40,7 @@ from mutator.store.series_packing import pack, segments
 from mutator.targets.requirements import check_requirements
 from mutator.verification import equivalence
 from mutator.verification.preflight import are_there, run_checks, unreached_triggers
-from mutator.verification.seal import seal_of
+from mutator.verification.seal import Seals, seals_of
 from mutator.workspace import Workspace
 
 EXIT_INTERRUPTED = 130
@@ -61,11 +61,16 @@ class Summary:
     interrupted: bool  #: whether a signal ended the session
     results: Path | None  #: path of results.csv; None if the disk was full
     proof: equivalence.Proof | None  #: the equivalence check; None if none was needed
-    seal: str | None  #: the seal; None if the run is not finished
+    seals: Seals  #: the digests to publish: the seal, the results digest and the review digest
     not_forked: (
         str  #: why no experiment was forked; empty if one was, or if the reference engine was requested
     )
     elapsed_s: float  #: duration of the session (s)
+
+    @property
+    def seal(self) -> str | None:
+        """The seal; None if the run is not finished."""
+        return self.seals.seal
 
     @property
     def proof_note(self) -> str:
@@ -194,9 +199,9 @@ class Session:
         outcomes = Counter[str]()
         for (status, outcome), count in ends.items():
             outcomes[label(status, outcome)] += count
-        seal = seal_of(self.folder)
-        if seal:
-            keep_end(self.folder, Ended(outcomes=outcomes, proof=proven, seal=seal))
+        seals = seals_of(self.folder)
+        if seals.seal:
+            keep_end(self.folder, Ended(outcomes=outcomes, proof=proven, seals=seals))
         return Summary(
             planned=self.folder.planned,
             done=done,
@@ -207,7 +212,7 @@ class Session:
             interrupted=self.interrupted,
             results=built,
             proof=proven,
-            seal=seal,
+            seals=seals,
             not_forked=not_forked,
             elapsed_s=time.monotonic() - self._began,
         )
@@ -227,7 +232,7 @@ class Session:
             interrupted=self.interrupted,
             results=built,
             proof=known.proof,
-            seal=known.seal,
+            seals=known.seals,
             not_forked="" if known.proof else self._not_forked,
             elapsed_s=time.monotonic() - self._began,
         )

@@ -1,27 +1,22 @@
 """`--require-reviewed`: a campaign runs only approved mutants, and its run folder records the approvals."""
 
 import shlex
-from collections import Counter
-from pathlib import Path
 from typing import Any
 
-from mutator._common.files import json_bytes, read_json
 from mutator._common.hashing import plain
 from mutator._common.text import counted
 from mutator.campaigns.plans import Plan
 from mutator.errors import CheckFailed
 from mutator.review.catalogue import Group, of_plan
 from mutator.review.decisions import Review, State, load_review
-from mutator.store import digests
+from mutator.store.approvals import SCHEMA
 from mutator.workspace import Workspace
 
-SCHEMA = "reviewed/1"
-FILE = "reviewed.json"
 _MOST_IDS = 10  # maximum number of ids in one printed command
 
 
 def approvals(workspace: Workspace, plan: Plan) -> dict[str, Any]:
-    """The decisions that allow the plan to run (canary and probe included), for `write_approvals`.
+    """The decisions that allow the plan to run (canary and probe included), for `mutator.store.approvals`.
 
     CheckFailed unless every group has a valid approval.
     """
@@ -33,21 +28,6 @@ def approvals(workspace: Workspace, plan: Plan) -> dict[str, Any]:
         raise _refusal(workspace, plan, review, refused)
     decisions = [_kept(review, group) for group in groups]
     return {"schema": SCHEMA, "target": manifest.name, "groups": decisions}
-
-
-def write_approvals(run: Path, approvals: dict[str, Any]) -> None:
-    digests.rewrite(run, FILE, json_bytes(approvals))
-
-
-def approval_summary(run: Path) -> str:
-    """Who approved a run's mutants, as text; empty without `--require-reviewed`."""
-    if not (run / FILE).exists():
-        return ""
-    groups = read_json(run / FILE, SCHEMA)["groups"]
-    names = Counter(group["by"] for group in groups)
-    return f"{counted(len(groups), 'group')} approved by " + ", ".join(
-        f"{name} ({n})" for name, n in sorted(names.items())
-    )
 
 
 def _kept(review: Review, group: Group) -> dict[str, Any]:

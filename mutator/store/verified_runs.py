@@ -16,7 +16,7 @@ from mutator._common.hashing import digest
 from mutator._common.version import VERSION
 from mutator.errors import MutatorError
 
-_SCHEMA = "verified/1"
+_SCHEMA = "verified/2"
 _OTHER_FILES = ("patches/*.blocks", "patches/*/*.patch")  # verified files that are not in the ledger
 Digests = Mapping[str, str | None]  # SHA-256 by name
 

@@ -1,60 +1,110 @@
-"""The seal of a finished run: one digest of its results and everything that determines them.
+"""The digests of a run folder: what somebody publishes or signs, and compares later.
 
-It covers the plan, the choices that made it, the sources, the versions of mutator, Python and packages, the
-checks and golden runs, and each record with its patch. It excludes costs, hosts, processors, the git commit,
-and the division into sessions, workers and shards.
+* The *seal* covers a finished run's results and everything that results and pages are made from: all of
+  run.json and checks.json but `OUTSIDE`, the campaign, the plan, golden runs, records with their patches, and
+  the proof. It includes the versions of Python and packages.
+* The *results digest* covers plan, golden runs and records only, so that it does not depend on versions that
+  compute the same results.
+* The *review digest* covers the decisions that allowed the run, with `--require-reviewed`.
+
+No digest depends on costs, hosts, or the division of the work into sessions, workers and shards.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from mutator._common.files import read_json
 from mutator._common.hashing import canonical, digest
-from mutator.store import digests
+from mutator.campaigns.freezing import CSV
+from mutator.store import digests, plan_file
+from mutator.store.approvals import review_digest
 from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.lines import bare_segment, intact_lines
 from mutator.store.records import ending_on
 from mutator.store.run_folder import RunFolder
+from mutator.store.run_head import CAMPAIGN, HEAD
+from mutator.store.stretches import told
+from mutator.verification.equivalence import FOLDER as PROOF
 
-SCHEMA = "seal/1"
-# the parts of run.json that concern results
-_HEAD = (
-    *("plan", "campaign_digest", "study", "seed", "reading", "runs"),
-    *("hazards", "compared", "sources", "target_files"),
-)
+SCHEMA, RESULTS_SCHEMA = "seal/2", "results-digest/1"
+# Everything else in these files is sealed, including keys that later versions add.
+OUTSIDE = {
+    HEAD: ("stretches", "choices.shard", "choices.series_mb"),
+    CHECKS: ("digest", "run_cpu_s"),  # the key of a cache, which depends on the machine; a cost
+}
+_FILES = (CAMPAIGN, CSV, plan_file.EXPERIMENTS, plan_file.FAULTS)
+_UNSEALED_FILES = "times, engines and hosts of the experiments; series, kept traces, plots, stills, films"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Seals:
+    """The digests of a run to publish or sign, 64 hex digits each."""
+
+    seal: str | None = None  #: the seal; None for a run that is unfinished or not verifiable
+    results_digest: str | None = None  #: the results digest; None like the seal
+    review_digest: str | None = None  #: the review digest; None for a run without `reviewed.json`
+
+    def texts(self) -> dict[str, str]:
+        """The digests that the run has, by name."""
+        names = {
+            "seal": self.seal,
+            "results digest": self.results_digest,
+            "review digest": self.review_digest,
+        }
+        return {name: value for name, value in names.items() if value}
+
+
+def seals_of(folder: RunFolder) -> Seals:
+    """Compute the digests of a run folder from its content."""
+    review = review_digest(folder.path)
+    if not folder.finished:
+        return Seals(review_digest=review)
+    results = digest([RESULTS_SCHEMA, folder.head["plan"], golden_files(folder), _records(folder, "records")])
+    facts = {
+        HEAD: without(folder.head, OUTSIDE[HEAD]),
+        CHECKS: without(read_json(folder.path / CHECKS, CHECKS_SCHEMA), OUTSIDE[CHECKS]),
+        "versions": _versions(folder),
+        "files": {name: digests.sha256(folder.path / name) for name in _FILES},
+        PROOF: _records(folder, PROOF),
+    }
+    return Seals(seal=digest([SCHEMA, results, facts]), results_digest=results, review_digest=review)
 
 
 def seal_of(folder: RunFolder) -> str | None:
-    """The seal of a run folder, computed from its content: 64 hex digits. None if the run is not finished or
-    not verifiable."""
-    if not folder.finished:
-        return None
-    head, checks = folder.head, read_json(folder.path / CHECKS, CHECKS_SCHEMA)
-    facts = {key: head[key] for key in _HEAD}
-    facts |= {"seeds": head["seeds"]} if "seeds" in head else {}
-    facts |= {
-        "choices": _choices(head["choices"]),
-        "mutator": head["provenance"]["mutator"],
-        "checks": checks["results"],
-        "goldens": golden_digests(folder, head["golden_files"]),
-        "versions": _versions(folder),
-    }
-    return digest([SCHEMA, facts, *(_records(folder, kind) for kind in digests.SEGMENTS)])
+    return seals_of(folder).seal
 
 
-def _choices(given: Mapping[str, Any]) -> dict[str, Any]:
-    """The choices, without the division of work and limits on kept data."""
-    return {name: value for name, value in given.items() if name != "series_mb"} | {"shard": None}
-
-
-def seal_or_why_not(folder: RunFolder) -> str:
+def seal_or_why_not(folder: RunFolder) -> dict[str, str]:
+    """The texts of `seals_of`; the seal of a run without one is the reason."""
     none = "the run is not finished" if folder.verifiable else not_verifiable(folder)
-    return seal_of(folder) or f"none: {none}"
+    return {"seal": f"none: {none}"} | seals_of(folder).texts()
 
 
 def not_verifiable(folder: RunFolder) -> str:
     return f"not verifiable, because {folder.head['schema']} has no digests"
+
+
+def without(content: Mapping[str, Any], paths: Iterable[str]) -> dict[str, Any]:
+    """Copy JSON content without the keys at `paths`, such as `choices.shard`."""
+    found = dict(content)
+    for path in paths:
+        key, _, rest = path.partition(".")
+        if rest and isinstance(found.get(key), Mapping):
+            found[key] = without(found[key], [rest])
+        elif not rest:
+            found.pop(key, None)
+    return found
+
+
+def unsealed_facts(folder: RunFolder) -> dict[str, str]:
+    """The facts of a run folder that its seal does not cover, by name: who can write to the folder can change
+    them."""
+    choices = folder.head["choices"]
+    chosen = {f"chosen: {name}": str(choices[name]) for name in ("shard", "series_mb") if choices.get(name)}
+    environment = {name: text for name, text in told(folder.stretches).items() if name != "python"}
+    return {**environment, **chosen, "other files": _UNSEALED_FILES}
 
 
 def golden_digests(folder: RunFolder, names: Sequence[str]) -> dict[str, str]:
@@ -65,6 +115,13 @@ def golden_digests(folder: RunFolder, names: Sequence[str]) -> dict[str, str]:
         files = [digest((place / name).read_bytes()) for name in names]
         found[one.key] = digest(files)
     return found
+
+
+def golden_files(folder: RunFolder) -> dict[str, str]:
+    """SHA-256 of every file of the golden runs, by name in the run folder."""
+    paths = sorted(path for path in (folder.path / "golden").rglob("*") if path.is_file())
+    found = zip(paths, digests.of_files(paths), strict=True)
+    return {path.relative_to(folder.path).as_posix(): one.sha256 for path, one in found if one}
 
 
 def _versions(folder: RunFolder) -> list[str]:

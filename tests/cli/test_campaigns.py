@@ -17,7 +17,7 @@ import pytest
 
 from mutator.cli import campaigns
 from mutator.errors import MutatorError
-from mutator.review import gate
+from mutator.store import approvals
 from mutator.store.opening import CONTENT
 from mutator.store.series import SeriesFolder, read_kept
 
@@ -374,7 +374,7 @@ def test_clean_deletes_everything_that_commands_wrote_into_a_run(cli: Cli, run: 
         ["compare", other, copy],
     ):
         assert cli(*words).code == 0, words
-    gate.write_approvals(copy, {"schema": gate.SCHEMA, "target": "toycar", "groups": []})
+    approvals.write_approvals(copy, {"schema": approvals.SCHEMA, "target": "toycar", "groups": []})
     for file in (next((copy / "records").iterdir()), next((copy / "patches").iterdir())):
         file.write_bytes(file.read_bytes()[:-9])
     assert cli("verify", copy, "--repair").code == 1

@@ -43,16 +43,29 @@ def test_an_audit_is_printed_on_one_page(cli: Cli, sealed: str) -> None:
     assert found.out.rstrip().endswith("no difference") and len(found.out.splitlines()) < 50
     facts = dict(re.findall(r"^(\S[^\n]*?)  +(\S.*)$", found.out.split("\n\n")[0], re.MULTILINE))
     assert facts["seal"] == sealed and "Python 3." in facts["python"] and facts["mutator"].startswith("0.")
-    assert {"platform", "packages", "drawn at random"} <= facts.keys()
+    assert {"packages", "drawn at random", "results digest"} <= facts.keys()
+    assert re.search(r"^not sealed:\n(.+\n)*platform ", found.out, re.MULTILINE)
+    assert "seal as expected" in found.out and "--expect" not in found.out
     as_json = cli("verify", "run", "--json").json
     assert (as_json["passed"], as_json["seal"]) == (True, sealed)
     assert sum(check["count"] for check in as_json["checks"]) > 20
 
 
+def test_an_audit_takes_the_seal_or_the_results_digest_and_says_which(cli: Cli, sealed: str) -> None:
+    found = cli("verify", "run", "--json").json
+    assert found["not_sealed"].keys() >= {"platform", "other files"} and not found["review_digest"]
+    other = cli("verify", "run", "--expect", found["results_digest"])
+    assert other.code == 0 and "results digest as expected" in other.out
+    assert cli("verify", "run", "--expect", "0" * 64).code == 1
+    assert "shows only an expected seal (--expect)" in cli("verify", "run").out
+
+
 def test_the_seal_is_in_the_output_and_the_report(cli: Cli, sealed: str) -> None:
     again = cli("run", "small", "--out", "run", "-n", "0", "--json")
     assert (again.code, again.json["ran"], again.json["seal"]) == (0, 0, sealed)
-    assert f"| seal | {sealed} |" in Path("run/report/REPORT.md").read_text()
+    told = Path("run/report/REPORT.md").read_text()
+    assert f"| seal | {sealed} |" in told and f"| results digest | {again.json['results_digest']} |" in told
+    assert "| platform | " in told.partition("### Not sealed")[2]
     planned = cli("plan", "small", "--out", "planned")
     assert planned.code == 0
     assert cli("verify", "planned").code == 0

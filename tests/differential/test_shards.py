@@ -18,7 +18,7 @@ from mutator.execution.merging import merge
 from mutator.execution.running import run_campaign
 from mutator.execution.session import Session
 from mutator.outcomes import results
-from mutator.review import gate
+from mutator.store import approvals
 from mutator.store.patches import Patches
 from mutator.store.records import read_records
 from mutator.store.run_folder import RunFolder
@@ -101,14 +101,14 @@ def test_the_whole_plan_decides_the_engine_of_a_shard(
 
 
 def test_an_approval_is_merged_if_every_shard_has_it(copies: Runs, tmp_path: Path) -> None:
-    said = {"schema": gate.SCHEMA, "target": "toycar", "groups": [{"group": "0" * 12, "by": "Jane Doe"}]}
+    said = {"schema": approvals.SCHEMA, "target": "toycar", "groups": [{"group": "0" * 12, "by": "Jane Doe"}]}
     shards = [copies["1/2"], copies["2/2"]]
-    gate.write_approvals(shards[0], said)
+    approvals.write_approvals(shards[0], said)
     merge(shards, tmp_path / "half")
-    assert gate.approval_summary(tmp_path / "half") == ""
-    gate.write_approvals(shards[1], said)
+    assert approvals.approval_summary(tmp_path / "half") == ""
+    approvals.write_approvals(shards[1], said)
     merge(shards, tmp_path / "out")
-    assert gate.approval_summary(tmp_path / "out") == "1 group approved by Jane Doe (1)"
+    assert approvals.approval_summary(tmp_path / "out") == "1 group approved by Jane Doe (1)"
 
 
 def test_each_experiment_is_in_exactly_one_shard(runs: Runs) -> None:
@@ -155,6 +155,7 @@ def test_shards_of_other_plans_or_sources_are_refused(
     for change, told in (
         ({"plan": "0" * 64}, "expected 0000000000000000"),
         ({"sources": head["sources"] | {"target": "0" * 64}}, "a different source"),
+        ({"alerts": ["A9"]}, "'alerts' differs from"),
     ):
         change_head(two, **head | change)
         reseal(two)

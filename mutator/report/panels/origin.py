@@ -4,11 +4,13 @@ from mutator._common.tables import Table
 from mutator.campaigns.studies import study_problems
 from mutator.report.panel import Panel, rendered
 from mutator.report.studies import ReportedRun
-from mutator.review import gate
+from mutator.store.approvals import approval_summary
+from mutator.store.run_head import HEAD
 from mutator.store.stretches import package_versions, told
-from mutator.verification.seal import seal_or_why_not
+from mutator.verification.seal import OUTSIDE, seal_or_why_not, unsealed_facts, without
 
 PACKAGES = ("jinja2", "libcst", "numpy")  # packages that build mutants and compare runs; run.json lists all
+_NOTE = "The seal does not cover this. Whoever can write to the run folder can change it unnoticed."
 _HTML = """\
 {% if engines %}
 <h2>How the experiments were run</h2>
@@ -17,29 +19,41 @@ _HTML = """\
 {% endif %}
 <h2>Origin of the results</h2>
 {{ facts.as_html("plain facts") }}
+<h3>Not sealed</h3>
+<p>{{ note }}</p>
+{{ unsealed.as_html("plain facts") }}
 """
 
 
 def origin_panel(run: ReportedRun) -> Panel:
     """The panel with engines, equivalence check, plan, choices, sources and versions."""
     engines, facts = run.engines, _facts(run)
+    unsealed = list(unsealed_facts(run.folder).items())
     parts = []
     if engines:
         parts += ["## How the experiments were run", engines.proof, engines.table.as_markdown()]
     parts += ["## Origin of the results", Table(heads=("what", "value"), rows=facts).as_markdown()]
-    html = rendered(_HTML, engines=engines, facts=Table(heads=("", ""), rows=facts, named=True))
+    parts += ["### Not sealed", _NOTE, Table(heads=("what", "value"), rows=unsealed).as_markdown()]
+    tables = {"facts": facts, "unsealed": unsealed}
+    html = rendered(
+        _HTML,
+        engines=engines,
+        note=_NOTE,
+        **{name: Table(heads=("", ""), rows=rows, named=True) for name, rows in tables.items()},
+    )
     return Panel(anchor="origin", link="Origin", markdown="\n\n".join(parts), html=html)
 
 
 def _facts(run: ReportedRun) -> list[tuple[str, str]]:
     folder = run.folder
-    reviewed = gate.approval_summary(folder.path)
+    reviewed = approval_summary(folder.path)
     head, packages = folder.head, package_versions(folder.stretches)
+    chosen = without(head, OUTSIDE[HEAD])["choices"]
     facts = {
         "experiments": f"{len(run.texts)} of {folder.planned} planned",
         **({"proof": run.engines.state} if run.engines else {}),
         **({"reviewed": reviewed} if reviewed else {}),
-        "seal": seal_or_why_not(folder),
+        **seal_or_why_not(folder),
         "campaign": head["campaign"],
         **_study(run),
         "plan": head["plan"],
@@ -47,10 +61,10 @@ def _facts(run: ReportedRun) -> list[tuple[str, str]]:
             {"seed": seeds[0]} if len(seeds := folder.seeds) == 1 else {"seeds": f"{seeds[0]} to {seeds[-1]}"}
         ),
         "reading": head["reading"],
-        **{f"chosen: {name}": value for name, value in head["choices"].items() if value is not None},
+        **{f"chosen: {name}": value for name, value in chosen.items() if value is not None},
         **{f"digest of {name}": value for name, value in head["sources"].items()},
         "mutator": head["provenance"]["mutator"],
-        **told(folder.stretches),
+        **{name: text for name, text in told(folder.stretches).items() if name == "python"},
         **{name: packages[name] for name in PACKAGES if name in packages},
     }
     return [(name, str(value)) for name, value in facts.items()]

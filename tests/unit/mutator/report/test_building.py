@@ -17,7 +17,7 @@ from mutator.errors import MutatorError
 from mutator.figures.style import themed
 from mutator.report import building
 from mutator.report.panels import failed
-from mutator.review import gate
+from mutator.store import approvals
 from mutator.store.run_folder import STOP_NOTE, RunFolder
 from mutator.workspace import Workspace
 
@@ -97,8 +97,8 @@ def test_the_report_states_its_origin(run: Path) -> None:
 
 def test_the_report_names_the_reviewers(run: Path) -> None:
     assert "reviewed" not in building.write(run, None).markdown.read_text()
-    approvals = {"schema": gate.SCHEMA, "target": "toycar", "groups": [{"by": "Jane"}, {"by": "Joe"}]}
-    write_json(run / gate.FILE, approvals)
+    said = {"schema": approvals.SCHEMA, "target": "toycar", "groups": [{"by": "Jane"}, {"by": "Joe"}]}
+    write_json(run / approvals.FILE, said)
     written = building.ensure(run, None)
     for text in (written.markdown.read_text(), written.page.read_text()):
         assert "2 groups approved by Jane (1), Joe (1)" in text

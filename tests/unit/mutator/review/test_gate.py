@@ -12,6 +12,7 @@ from mutator.execution.running import run_campaign
 from mutator.review import gate
 from mutator.review.catalogue import of_plan
 from mutator.review.decisions import Change, Kind, load_review, record
+from mutator.store.approvals import approval_summary, write_approvals
 from mutator.workspace import Workspace
 
 
@@ -30,15 +31,15 @@ def test_the_run_folder_of_an_approved_plan_names_its_reviewers(
     toycar: Workspace, plan: Plan, tmp_path: Path
 ) -> None:
     run = freeze(plan, tmp_path / "run", toycar).path
-    assert gate.approval_summary(run) == ""
+    assert approval_summary(run) == ""
     decide(toycar, plan)
     decide(toycar, plan, count=1)
-    gate.write_approvals(run, approvals := gate.approvals(toycar, plan))
+    write_approvals(run, approvals := gate.approvals(toycar, plan))
     for kept in approvals["groups"]:
         assert (kept["verdict"], kept["tool"], kept["commit"]) == ("approved", VERSION, None)
         assert kept["at"] and set(kept["bound"]) == {"diff", "function", "template", "calls"}
     total = len(of_plan(toycar, plan))
-    assert gate.approval_summary(run) == (
+    assert approval_summary(run) == (
         f"{total} groups approved by Reviewer 1 (1), Reviewer None ({total - 1})"
     )
 

@@ -3,16 +3,18 @@
 import json
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from mutator._common.hashing import canonical
 from mutator.store import digests
+from mutator.store.approvals import write_approvals
 from mutator.store.lines import written
 from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
-from mutator.verification.seal import seal_of, seal_or_why_not
+from mutator.verification.seal import seal_of, seal_or_why_not, seals_of
 from mutator.workspace import Workspace
 
 Reseal = Callable[..., None]
@@ -45,8 +47,10 @@ def test_the_seal_does_not_depend_on_workers_or_order(made: Path, run: Path, res
     shutil.rmtree(run / "timings")
     data = json.loads((run / "run.json").read_text())
     [stretch] = data["stretches"]
+    data["choices"]["series_mb"] = 3
     data["stretches"] = [stretch, stretch | {"platform": "Linux on another one", "cpu": "Cray 1"}]
     (run / "run.json").write_text(json.dumps(data))
+    edit(run / "checks.json", "{", '{"digest": "of another machine", "run_cpu_s": 3.5, ')
     reseal(run)
     known = sealed(made)
     assert known is not None and len(known) == 64
@@ -70,11 +74,41 @@ def edit(path: Path, old: str, new: str) -> None:
     path.write_text(text.replace(old, new, 1))
 
 
+def add(run: Path, name: str) -> None:
+    (run / name).write_bytes(b"more")
+    ledger = digests.read(run)
+    digests.write(run, replace(ledger, files={**ledger.files, name: digests.Digest.of(b"more")}))
+
+
+def rename(run: Path, name: str, other: str) -> None:
+    (run / name).rename(run / other)
+    ledger = digests.read(run)
+    files = {other if key == name else key: one for key, one in ledger.files.items()}
+    digests.write(run, replace(ledger, files=files))
+
+
 CHANGES: dict[str, Callable[[Path], None]] = {
     "a record": lambda run: edit(run / "records" / "0001-a.jsonl", '"count":5', '"count":6'),
     "a patch": lambda run: edit(run / "records" / "0001-a.jsonl", '"patch":"', '"patch":"0'),
+    "a line of the plan": lambda run: edit(run / "plan" / "experiments.jsonl", '{"', '{ "'),
+    "an unused fault": lambda run: edit(run / "plan" / "faults.jsonl", "{", "{}\n{"),
+    "the campaign's text": lambda run: edit(run / "campaign.yaml", "schema", "# no\nschema"),
+    "the table of the plan": lambda run: edit(run / "plan.csv", ",as_", ",not_as_"),
     "the proof": lambda run: edit(run / "proof" / "0001-a.jsonl", '"count":5', '"count":6'),
     "a golden run": lambda run: (run / "golden" / "A" / "log.npz").write_bytes(b"other"),
+    "another file of a golden run": lambda run: add(run, "golden/A/more.txt"),
+    "the name of a golden run's file": lambda run: rename(run, "golden/A/log.npz", "golden/A/other.npz"),
+    "the checked golden runs": lambda run: edit(run / "checks.json", '"goldens": {', '"goldens": {"A": "0"'),
+    "a key of the checks": lambda run: edit(run / "checks.json", "{", '{"packages": ["numpy"], '),
+    "a key that a later version writes": lambda run: edit(run / "run.json", "{", '{"later": 1, '),
+    "an alert": lambda run: edit(run / "run.json", '"alerts": [', '"alerts": [\n"A9",'),
+    "the severity": lambda run: edit(
+        run / "run.json",
+        '"severity": null',
+        '"severity": {"name": "s", "about": "", "source": "", "classes": []}',
+    ),
+    "a hazard's text": lambda run: edit(run / "run.json", '"about": "', '"about": "not '),
+    "a limit": lambda run: edit(run / "run.json", '"steps": ', '"steps": 1'),
     "a check": lambda run: edit(run / "checks.json", "[]", '["failed"]'),
     "a source": lambda run: edit(run / "run.json", '"templates": "', '"templates": "0'),
     "the campaign": lambda run: edit(run / "run.json", '"campaign_digest": "', '"campaign_digest": "0'),
@@ -106,10 +140,11 @@ def test_any_change_of_the_result_changes_the_seal(
 def test_an_unfinished_run_has_no_seal(run: Path) -> None:
     digests.close_segments(run, finished=False)
     folder = RunFolder.open(run)
-    assert (seal_of(folder), seal_or_why_not(folder)) == (None, "none: the run is not finished")
+    none = {"seal": "none: the run is not finished"}
+    assert (seal_of(folder), seal_or_why_not(folder)) == (None, none)
     edit(run / "run.json", '"run/3"', '"run/1"')
     folder = RunFolder.unverified(run)
-    assert seal_or_why_not(folder) == "none: not verifiable, because run/1 has no digests"
+    assert seal_or_why_not(folder)["seal"] == "none: not verifiable, because run/1 has no digests"
 
 
 def test_the_seal_covers_records_as_they_were_written(made: Path, run: Path) -> None:
@@ -118,3 +153,37 @@ def test_the_seal_covers_records_as_they_were_written(made: Path, run: Path) -> 
     lines = path.read_text().splitlines()
     assert canonical(json.loads(lines[1])) != lines[1]  # the checksum is the first key
     assert sealed(run) == sealed(made)
+
+
+def test_the_results_digest_does_not_depend_on_versions_or_texts(
+    made: Path, run: Path, reseal: Reseal
+) -> None:
+    """Python, packages and a hazard's text are sealed, but change no result."""
+    for change in ("a package", "Python", "mutator", "a hazard's text", "the proof"):
+        CHANGES[change](run)
+    reseal(run)
+    known, found = (seals_of(RunFolder.unverified(path)) for path in (made, run))
+    assert found.results_digest == known.results_digest is not None
+    assert found.seal != known.seal
+
+
+@pytest.mark.parametrize("change", ["a record", "a patch", "a golden run", "another file of a golden run"])
+def test_any_change_of_a_result_changes_the_results_digest(
+    made: Path, run: Path, reseal: Reseal, change: str
+) -> None:
+    CHANGES[change](run)
+    reseal(run)
+    known, found = (seals_of(RunFolder.unverified(path)) for path in (made, run))
+    assert found.results_digest not in (None, known.results_digest)
+
+
+def test_the_review_digest_covers_who_decided_what(made: Path, run: Path) -> None:
+    """Decisions have a digest of their own, so that a review of the same mutants leaves the seal as it is."""
+    said = {"schema": "reviewed/1", "target": "toycar", "groups": [{"group": "0" * 12, "by": "Jane"}]}
+    found = []
+    for by in ("Jane", "Joe"):
+        said["groups"] = [{"group": "0" * 12, "by": by}]
+        write_approvals(run, said)
+        found.append(seals_of(RunFolder.open(run)))
+    assert len({one.review_digest for one in found} | {seals_of(RunFolder.open(made)).review_digest}) == 3
+    assert {one.seal for one in found} == {sealed(made)}

@@ -1,0 +1,35 @@
+"""`reviewed.json`: the decisions that allowed a run with `--require-reviewed`."""
+
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+from mutator._common.files import json_bytes, read_json
+from mutator._common.hashing import digest
+from mutator._common.text import counted
+from mutator.store import digests
+
+SCHEMA, FILE = "reviewed/1", "reviewed.json"
+_DIGEST_SCHEMA = "review-digest/1"
+
+
+def write_approvals(run: Path, approvals: dict[str, Any]) -> None:
+    digests.rewrite(run, FILE, json_bytes(approvals))
+
+
+def review_digest(run: Path) -> str | None:
+    """Return the digest of a run's decisions (who decided what about which diff); None without any."""
+    if not (run / FILE).is_file():
+        return None
+    return digest([_DIGEST_SCHEMA, read_json(run / FILE, SCHEMA)])
+
+
+def approval_summary(run: Path) -> str:
+    """Who approved a run's mutants, as text; empty without `--require-reviewed`."""
+    if not (run / FILE).exists():
+        return ""
+    groups = read_json(run / FILE, SCHEMA)["groups"]
+    names = Counter(group["by"] for group in groups)
+    return f"{counted(len(groups), 'group')} approved by " + ", ".join(
+        f"{name} ({n})" for name, n in sorted(names.items())
+    )
