@@ -17,8 +17,9 @@ def test_a_shard_is_run_and_merged(cli: Cli, root: Path) -> None:
     assert cli("run", "small", "--out", "rest", "-n", "0", "--shard", "2/2", "--limit", 4).code == 0
     merged = cli("merge", "part", "rest", "--out", "whole", "--json")
     assert merged.code == 0, merged.err
-    assert merged.json == {"run": "whole", "shards": 2, "experiments": 4, "seal": merged.json["seal"]}
-    assert len(merged.json["seal"]) == 64
+    digests = {name: merged.json[name] for name in ("seal", "results_digest", "review_digest")}
+    assert merged.json == {"run": "whole", "shards": 2, "experiments": 4, **digests}
+    assert [len(digests[name]) for name in ("seal", "results_digest")] == [64, 64]
     again = cli("merge", "part", "rest", "--out", "whole")
     assert again.code == 2
     assert "holds a run" in again.err
