@@ -120,8 +120,9 @@ def golden_digests(folder: RunFolder, names: Sequence[str]) -> dict[str, str]:
 def golden_files(folder: RunFolder) -> dict[str, str]:
     """SHA-256 of every file of the golden runs, by name in the run folder."""
     paths = sorted(path for path in (folder.path / "golden").rglob("*") if path.is_file())
-    found = zip(paths, digests.of_files(paths), strict=True)
-    return {path.relative_to(folder.path).as_posix(): one.sha256 for path, one in found if one}
+    names = [path.relative_to(folder.path).as_posix() for path in paths]
+    found = zip(names, digests.of_files(folder.path, names), strict=True)
+    return {name: one.sha256 for name, one in found if one}
 
 
 def _versions(folder: RunFolder) -> list[str]:
