@@ -66,7 +66,7 @@ def seals_of(folder: RunFolder) -> Seals:
         HEAD: without(folder.head, OUTSIDE[HEAD]),
         CHECKS: without(read_json(folder.path / CHECKS, CHECKS_SCHEMA), OUTSIDE[CHECKS]),
         "versions": _versions(folder),
-        "files": {name: digests.sha256(folder.path / name) for name in _FILES},
+        "files": _sha256(folder, _FILES),
         PROOF: _records(folder, PROOF),
     }
     return Seals(seal=digest([SCHEMA, results, facts]), results_digest=results, review_digest=review)
@@ -120,9 +120,12 @@ def golden_digests(folder: RunFolder, names: Sequence[str]) -> dict[str, str]:
 def golden_files(folder: RunFolder) -> dict[str, str]:
     """SHA-256 of every file of the golden runs, by name in the run folder."""
     paths = sorted(path for path in (folder.path / "golden").rglob("*") if path.is_file())
-    names = [path.relative_to(folder.path).as_posix() for path in paths]
-    found = zip(names, digests.of_files(folder.path, names), strict=True)
-    return {name: one.sha256 for name, one in found if one}
+    return _sha256(folder, [path.relative_to(folder.path).as_posix() for path in paths])
+
+
+def _sha256(folder: RunFolder, names: Sequence[str]) -> dict[str, str]:
+    found = digests.of_files(folder.path, names)
+    return {name: one.sha256 for name, one in found.items() if one}
 
 
 def _versions(folder: RunFolder) -> list[str]:
