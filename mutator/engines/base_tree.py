@@ -66,19 +66,24 @@ class BaseTree:
     """A target's files, with bytecode that this process compiled. The folder `work` has the unused trees."""
 
     def __init__(self, tree: SourceTree, work: Path) -> None:
+        self._sources = tree.files
         self._files = bytecode.with_bytecode(tree)
         self._work = work
         self._unused: list[Path] = []  # threads share it, which `pop` and `append` allow
         self._numbers = count()
 
     def lay_out(self, place: Path, changed: Mapping[str, bytes], *, new: bool = False) -> RunTree:
-        """Make a tree in `place`, with the files `changed`. With `new`, no earlier run has used it."""
+        """Make a tree in `place`, with the files `changed`.
+
+        With `new`, no earlier run has used it, and it has no bytecode that anybody could exchange.
+        """
         place.parent.mkdir(parents=True, exist_ok=True)
+        pristine = self._sources if new else self._files
         if new or not self._reused(place):
-            bytecode.write(self._files, place)
+            bytecode.write(pristine, place)
         bytecode.put(changed, place)
         stale = set(map(bytecode.bytecode_of, changed))
-        files = {name: data for name, data in self._files.items() if name not in stale}
+        files = {name: data for name, data in pristine.items() if name not in stale}
         return RunTree(place, {**files, **changed}, changed)
 
     def take_back(self, tree: RunTree) -> None:

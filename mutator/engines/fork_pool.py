@@ -5,12 +5,14 @@ The target's side is fork_server.py.
 
 import marshal
 import os
+import signal
 import socket
 import struct
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Hashable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -57,13 +59,20 @@ class Waiting:
     The first waits before any run (`key` None). Others wait before `step` of the golden run `key`.
     """
 
-    def __init__(self, connection: socket.socket, parent: int | None, key: Hashable = None) -> None:
+    def __init__(
+        self,
+        connection: socket.socket,
+        parent: int | None,
+        wake: Callable[[], None],
+        key: Hashable = None,
+    ) -> None:
         self.key = key
         self.step = 0
         self.loaded: set[str] = set()  # modules loaded for mutants
         self.used = 0.0
         self._connection = connection
         self._parent = parent
+        self._wake = wake
         connection.settimeout(_LOOK_UP_S)
 
     def ask(self, request: dict[str, Any], patience_s: float) -> tuple[dict[str, Any], list[int]]:
@@ -98,6 +107,7 @@ class Waiting:
             try:
                 part, found, _, _ = socket.recv_fds(self._connection, count - len(data), 1)
             except TimeoutError:
+                self._wake()
                 if self._parent is not None and os.getppid() != self._parent:
                     raise SystemExit("the process that started this one is gone") from None
                 if time.monotonic() > deadline:
@@ -126,6 +136,7 @@ class Pool:
         self.tree = home / "tree"
         self._parent = parent
         self._waiting: list[Waiting] = []
+        self._group = 0  # the server's process group, once known
         bytecode.write(manifest.tree.files, self.tree)
         self._files = RunTree(self.tree, manifest.tree.files, {})
         start = {
@@ -150,7 +161,7 @@ class Pool:
                 pass_fds=[theirs.fileno()],
                 start_new_session=True,
             )
-        self.first = Waiting(ours, parent)
+        self.first = Waiting(ours, parent, self._wake)
         try:
             self._welcome()
         except BaseException:
@@ -164,6 +175,7 @@ class Pool:
         if said["threads"]:
             others = said["threads"]
             raise Refused(f"once it is loaded, {too_many(others)}", turned_off(others))
+        self._group = said["group"]
         if self._files.first_changed() or self._told.first_changed():
             raise Lost("the tree of the fork server is not the pristine one")
 
@@ -196,7 +208,7 @@ class Pool:
         said, handles = source.ask({"do": "branch", "step": step, "args": arguments}, patience_s)
         if said["threads"] or len(handles) != 1:
             raise Refused(too_many(said["threads"]), turned_off(said["threads"]))
-        made = Waiting(socket.socket(fileno=handles[0]), self._parent, key)
+        made = Waiting(socket.socket(fileno=handles[0]), self._parent, self._wake, key)
         made.loaded |= source.loaded
         reply, _ = made.reply(patience_s)
         if "failed" in reply:
@@ -205,6 +217,13 @@ class Pool:
         made.step = reply["step"]
         self._waiting.append(made)
         return made
+
+    def _wake(self) -> None:
+        """Continue the server's processes, which a mutant can stop. Mutants have other process groups."""
+        self._process.send_signal(signal.SIGCONT)
+        if self._group:
+            with suppress(ProcessLookupError):
+                os.killpg(self._group, signal.SIGCONT)
 
     def close(self) -> None:
         for waiting in (self.first, *self._waiting):

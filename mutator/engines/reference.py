@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 import socket
 import subprocess
 import sys
@@ -110,7 +111,7 @@ class ReferenceEngine:
     def _try(self, job: Job, folder: Path, *, new: bool = False) -> tuple[Ended, str]:
         """Run a job; return how it ended, and a file of its input that was changed meanwhile (or nothing).
 
-        With `new`, the job gets a tree that no earlier run has used.
+        With `new`, the job gets a tree of its own, without bytecode.
         """
         tree = self._base_tree.lay_out(folder / "tree", job.files, new=new)
         (folder / "out").mkdir()
@@ -121,7 +122,7 @@ class ReferenceEngine:
         given = UnchangedFiles({str(path): request})
         ended = self._run(path, folder, job.hash_seed)
         changed = tree.first_changed() or given.first_changed().removeprefix(f"{folder}/")
-        if not changed:
+        if not (changed or new):
             self._base_tree.take_back(tree)
         return ended, changed
 
@@ -182,7 +183,7 @@ class ReferenceEngine:
                     start_new_session=True,  # Ctrl-C at the terminal is for the command, not for the target
                 )
             try:
-                told = self._told(ours, began + self.limits.wall_s + PATIENCE_S)
+                told = self._told(ours, guarding, began + self.limits.wall_s + PATIENCE_S)
             finally:
                 ours.close()
                 end(guarding)
@@ -191,13 +192,14 @@ class ReferenceEngine:
             return Ended(code=guarding.returncode, cpu_s=0.0, wall_s=seconds, stopped=LOST)
         return Ended(**json.loads(told))
 
-    def _told(self, connection: socket.socket, deadline: float) -> bytes:
+    def _told(self, connection: socket.socket, guarding: subprocess.Popen[bytes], deadline: float) -> bytes:
         """Return the guard's report; empty if none arrives in time. Exit if this process's parent is gone."""
         connection.settimeout(_LOOK_UP_S)
         while time.monotonic() < deadline:
             try:
                 return connection.recv(_LONGEST)
             except TimeoutError:
+                guarding.send_signal(signal.SIGCONT)  # a run can stop its guard
                 if self._parent is not None and os.getppid() != self._parent:
                     raise SystemExit("the process that started this one is gone") from None
         return b""

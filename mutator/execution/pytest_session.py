@@ -21,6 +21,7 @@ from mutator.errors import MutatorError
 from mutator.execution.following import followed
 from mutator.execution.phases import Lines
 from mutator.execution.session import Notify, Session, Summary, open_session
+from mutator.execution.stopped_workers import Continuing, on_stop
 from mutator.execution.worker import Assignment, Worker, bind_to_parent, dying_python
 from mutator.verification.equivalence import Sample
 from mutator.workspace import Workspace
@@ -109,6 +110,11 @@ class LazyWorker:
             self._worker = Worker(self._workspace, self._assignment)
         return self._worker
 
+    def note_stop(self) -> None:
+        """Note that this process was stopped and continued."""
+        if self._worker is not None:
+            self._worker.was_stopped = True
+
     def close(self) -> None:
         if self._worker is not None:
             self._worker.close()
@@ -179,6 +185,7 @@ class WorkerSide:
             *(Sample(number, name) for number, name in given["proof"]),
         ]
         self._worker = LazyWorker(workspace, assignment)
+        on_stop(self._worker.note_stop)
 
     def pytest_collection(self, session: pytest.Session) -> bool:
         return _collect(session, self._work, self._worker)
@@ -197,9 +204,11 @@ class Controller:
     def __init__(self, begun: Session | None = None) -> None:
         self.begun = begun
         self._worker: LazyWorker | None = None
+        self._continuing: Continuing | None = None
 
     @pytest.hookimpl(optionalhook=True)
     def pytest_xdist_setupnodes(self, specs: Sequence[Any]) -> None:
+        self._continuing = Continuing()
         for spec in specs:
             if spec.popen and not spec.python:
                 spec.python = shlex.join(dying_python(os.getpid()))
@@ -243,6 +252,8 @@ class Controller:
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
         if self._worker is not None:
             self._worker.close()
+        if self._continuing is not None:
+            self._continuing.end()
 
     def _note(self, problem: str) -> None:
         if self.begun and problem and not self.begun.problem and not self.begun.interrupted:

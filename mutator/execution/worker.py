@@ -4,7 +4,7 @@ import signal
 import socket
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from mutator.engines.in_target import guard
 from mutator.engines.jobs import FAST, Engine, Setting
 from mutator.engines.reference import ReferenceEngine
 from mutator.engines.registry import make_engine
-from mutator.execution.runner import Finished, Goldens, Runner
+from mutator.execution.runner import Finished, Goldens, Runner, without_outcome
 from mutator.model import Experiment, Status
 from mutator.store import plan_file
 from mutator.store.lines import LineWriter
@@ -48,6 +48,7 @@ class Worker:
     """Runs chunks of a run folder and appends their results. Reads the plan chunk by chunk."""
 
     def __init__(self, workspace: Workspace, assignment: Assignment) -> None:
+        self.was_stopped = False  # a signal handler sets it
         self.folder = RunFolder.open(assignment.run)
         self._name = assignment.name
         head = self.folder.head
@@ -80,7 +81,8 @@ class Worker:
         )
         self._make_room(experiments[0].seed)
         errors = []
-        for finished in self._runner.run([experiments[place] for place in pending.places]):
+        for ended in self._runner.run([experiments[place] for place in pending.places]):
+            finished = self._blamed(ended)
             self._keep(finished)
             if finished.mode in FAST:
                 self._needs_proof = True
@@ -110,7 +112,8 @@ class Worker:
             self._proofs = LineWriter(self._file(equivalence.FOLDER), self._head)
             self._planned = Planned(self.folder.path)
         errors = []
-        for finished in self._prover.run([self._planned[sample.id]]):
+        for ended in self._prover.run([self._planned[sample.id]]):
+            finished = self._blamed(ended)
             self._proofs.append(line_of(finished.record))
             if finished.record.status is Status.HARNESS_ERROR:
                 errors.append((finished.experiment.id, finished.record.detail))
@@ -145,6 +148,15 @@ class Worker:
     def _independent_engine(self) -> Engine:
         folder = self.folder
         return ReferenceEngine(self._manifest, folder.work, folder.limits, self._parent, independent=True)
+
+    def _blamed(self, finished: Finished) -> Finished:
+        """Return the experiment; one that ran when this worker was stopped has no outcome."""
+        if not self.was_stopped:
+            return finished
+        self.was_stopped = False
+        made, why = finished.record, "its worker was stopped while it ran"
+        bare = without_outcome(made.experiment_id, Status.HARNESS_ERROR, why)
+        return replace(finished, record=replace(bare, tree=made.tree, patch=made.patch), series=None)
 
     def _keep(self, finished: Finished) -> None:
         """Append the patch first and the record last, so that each record's other data exist."""

@@ -116,6 +116,24 @@ def test_ten_daemons_end_with_the_run(misbehave: Misbehave, tmp_path: Path) -> N
     assert [(e.status, e.mode) for e, _ in told.values()] == [(Status.OK, RunMode(name)) for name in ENGINES]
 
 
+STOPS = """
+import os, signal
+from pathlib import Path
+pid = os.getppid()
+while pid != {engine}:
+    os.kill(pid, signal.SIGSTOP)
+    pid = int(Path(f"/proc/{{pid}}/stat").read_text().rpartition(")")[2].split()[1])
+"""
+
+
+def test_processes_that_a_run_stops_go_on(misbehave: Misbehave) -> None:
+    """They are those between the run and its engine: the guard, or the processes of the fork server."""
+    began = time.monotonic()
+    ends = misbehave(STOPS.format(engine=os.getpid()))
+    assert [(e.status, e.mode) for e, _ in ends.values()] == [(Status.OK, RunMode(name)) for name in ENGINES]
+    assert time.monotonic() - began < 30.0, "the runs were stopped until their limits"
+
+
 @pytest.mark.parametrize("name", ENGINES)
 def test_daemons_end_with_a_killed_engine(
     tmp_path: Path, copy_toycar: Callable[[Path], Workspace], name: str

@@ -54,7 +54,7 @@ def serve_first(connection: int, start: dict[str, Any]) -> None:
         server.send({"failed": child.describe(err, start["tree"], None)})
         return
     gc.collect()
-    server.send({"threads": threads.others()})
+    server.send({"threads": threads.others(), "group": os.getpgrp()})
     server.serve()
 
 

@@ -139,7 +139,7 @@ def _ask_to_end(pid: int, patience_s: float) -> None:
 def _end_what_is_left() -> None:
     """Kill and reap children in other sessions, with all their descendants."""
     session, spared = os.getsid(0), set[int]()  # spared: processes of root, which cannot be killed
-    while left := [pid for pid in _children(os.getpid()) if os.getsid(pid) != session and pid not in spared]:
+    while left := [pid for pid in children(os.getpid()) if os.getsid(pid) != session and pid not in spared]:
         for pid in _with_descendants(left):
             try:
                 os.kill(pid, signal.SIGKILL)
@@ -154,11 +154,11 @@ def _end_what_is_left() -> None:
 def _with_descendants(pids: Iterable[int]) -> list[int]:
     found = list(pids)
     for pid in found:
-        found += _children(pid)
+        found += children(pid)
     return found
 
 
-def _children(pid: int) -> list[int]:
+def children(pid: int) -> list[int]:
     """Return the children of `pid`, including dead ones that are not reaped."""
     found: list[int] = []
     with suppress(OSError), os.scandir(f"/proc/{pid}/task") as threads:  # the process can end meanwhile

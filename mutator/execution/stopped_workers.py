@@ -1,0 +1,49 @@
+"""Continue workers that were stopped. A mutant can stop its worker, and the command would wait for ever."""
+
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+
+from mutator.engines.in_target import guard
+
+_LOOK_S = 1.0
+_STOPPED = "T"
+
+
+class Continuing:
+    """A thread that tells stopped child processes of this process that they were stopped, and continues them.
+
+    Stopping all processes of a terminal (Ctrl-Z) also stops this thread, so `fg` tells nobody.
+    """
+
+    def __init__(self) -> None:
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._look, daemon=True)
+        self._thread.start()
+
+    def end(self) -> None:
+        self._ended.set()
+        self._thread.join()
+
+    def _look(self) -> None:
+        while not self._ended.wait(_LOOK_S):
+            for pid in _stopped_children():
+                with suppress(ProcessLookupError):
+                    os.kill(pid, signal.SIGUSR1)
+                    os.kill(pid, signal.SIGCONT)
+
+
+def on_stop(act: Callable[[], None]) -> None:
+    """Call `act` when this process was stopped and another one's `Continuing` has continued it."""
+    signal.signal(signal.SIGUSR1, lambda number, frame: act())
+
+
+def _stopped_children() -> Iterator[int]:
+    for pid in guard.children(os.getpid()):
+        with suppress(OSError):
+            state = Path(f"/proc/{pid}/stat").read_text(errors="replace").rpartition(")")[2].split()[0]
+            if state == _STOPPED:
+                yield pid
