@@ -5,19 +5,21 @@ and reruns those that crash. The `warm` engine forks before the first step. So d
 at its first terminal hazard and the golden run has one, too.
 """
 
+import hmac
 import marshal
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from secrets import token_bytes
 from typing import Any
 
 from mutator._common.files import disk_full, no_pipe, raising_disk_full, remove_folder, write_atomic
 from mutator._common.hashing import content_id
 from mutator.engines.activation import Observed, Start, first_active
 from mutator.engines.code_swap import CodeSwap, NotSwappable, plan_swap
-from mutator.engines.fork_pool import Golden, Lost, Pool, Refused, Waiting
+from mutator.engines.fork_pool import Golden, Lost, Pool, Refused, Waiting, used_unchanged
 from mutator.engines.jobs import Execution, Job, RunMode, Setting
 from mutator.engines.processes import (
     PATIENCE_S,
@@ -43,7 +45,8 @@ _Key = tuple[str, int, tuple[str, ...]]
 
 
 class ForkEngine:
-    """Takes the arguments of ReferenceEngine; `null` has the files of the null mutant."""
+    """Takes the arguments of ReferenceEngine; `null` has the files of the null mutant, `secret` is as in
+    `Setting`."""
 
     def __init__(
         self,
@@ -54,6 +57,7 @@ class ForkEngine:
         *,
         null: Mapping[str, bytes],
         warm: bool = False,
+        secret: bytes = b"",
     ) -> None:
         self.reference = ReferenceEngine(manifest, work, limits, parent)
         self._manifest = manifest
@@ -62,6 +66,7 @@ class ForkEngine:
         self._parent = parent
         self._null = null
         self._warm = warm
+        self._secret = secret or token_bytes(16)
         self._patience_s = limits.wall_s + PATIENCE_S
         self._pool: Pool | None = None
         self._pools = 0
@@ -145,7 +150,7 @@ class ForkEngine:
     def _at(self, job: Job, step: int, swap: CodeSwap) -> Waiting:
         pool = self._running()
         key = _key(job)
-        golden = Golden(key=key, arguments=lambda: self._arguments(job, pool.home))
+        golden = Golden(key=key, scenario=job.scenario, arguments=lambda: self._arguments(job, pool.home))
         seen = self._seen.get(key)
         libraries = seen.libraries if isinstance(seen, Observed) else ()
         return pool.before(step, golden, [*libraries, *_needed(swap)], self._patience_s)
@@ -187,7 +192,8 @@ class ForkEngine:
             request["args"] = self._arguments(job, self._running().home if watch else out)
         limits = {"wall_s": self._limits.wall_s, "disk_mb": self._limits.disk_mb}
         asked = {"do": "mutant", "job": marshal.dumps(request), "home": str(folder), **limits}
-        said, _ = waiting.ask(asked, self._patience_s)
+        with used_unchanged(job.scenario):
+            said, _ = waiting.ask(asked, self._patience_s)
         if said["threads"]:
             raise Refused(too_many(said["threads"]), turned_off(said["threads"]))
         if said["touched"]:
@@ -245,8 +251,8 @@ class ForkEngine:
 
     def _watch(self, job: Job, golden: Path) -> Observed:
         known = self._work / f"observed-{content_id(_key(job))}"  # shared by a session's workers
-        if known.is_file():
-            values, before, libraries = marshal.loads(known.read_bytes())
+        if known.is_file() and (data := self._authentic(known)):
+            values, before, libraries = marshal.loads(data)
             return Observed(values=values, before=before, libraries=libraries)
         folder = self._work / f"{os.getpid()}-watch-{content_id(_key(job))}"
         try:
@@ -272,14 +278,24 @@ class ForkEngine:
             )
             if found[0] and found[1][:1] != (0,):
                 raise Refused("it observes before its first step")
-            write_atomic(known, marshal.dumps(found))
+            data = marshal.dumps(found)
+            write_atomic(known, self._code(known, data) + data)
             return Observed(values=found[0], before=found[1], libraries=found[2])
         except NotSwappable as why:
             raise Refused(f"its observing statement cannot be inserted: {why}") from None
         finally:
             remove_folder(folder)
 
+    def _authentic(self, path: Path) -> bytes:
+        """Return what an engine with the same secret wrote to a file; empty for what a mutant wrote."""
+        code, data = (content := path.read_bytes())[:_CODE_BYTES], content[_CODE_BYTES:]
+        return data if hmac.compare_digest(code, self._code(path, data)) else b""
 
+    def _code(self, path: Path, data: bytes) -> bytes:
+        return hmac.digest(self._secret, path.name.encode() + data, "sha256")
+
+
+_CODE_BYTES = 32
 _FROM_THE_START = Start(step=0, observed=0, began=None, t=None)
 
 
@@ -330,4 +346,12 @@ def make_warm(setting: Setting) -> ForkEngine:
 
 def _make(setting: Setting, *, warm: bool) -> ForkEngine:
     null = build(setting.manifest, setting.models, None, always()).files
-    return ForkEngine(setting.manifest, setting.work, setting.limits, setting.parent, null=null, warm=warm)
+    return ForkEngine(
+        setting.manifest,
+        setting.work,
+        setting.limits,
+        setting.parent,
+        null=null,
+        warm=warm,
+        secret=setting.secret,
+    )

@@ -11,8 +11,8 @@ import struct
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Hashable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -50,6 +50,7 @@ class Refused(Exception):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Golden:
     key: Hashable
+    scenario: Path
     arguments: Callable[[], list[str]]
 
 
@@ -122,6 +123,15 @@ class Waiting:
         return data
 
 
+@contextmanager
+def used_unchanged(path: Path) -> Iterator[None]:
+    """Raise Lost if a file is written to while the server uses it."""
+    used = UnchangedFiles({str(path.resolve()): path.read_bytes()})
+    yield
+    if used.first_changed():
+        raise Lost(f"{path.name} was changed while it was in use")
+
+
 class Pool:
     """A fork server with its waiting processes, in the new scratch folder `home`.
 
@@ -186,7 +196,8 @@ class Pool:
         mine = [w for w in self._waiting if w.key == golden.key and w.step <= step]
         if not mine:
             self.first.load(modules, patience_s)
-            mine = [self._branch(self.first, golden.key, 0, patience_s, golden.arguments())]
+            with used_unchanged(golden.scenario):
+                mine = [self._branch(self.first, golden.key, 0, patience_s, golden.arguments())]
         best = max(mine, key=lambda waiting: waiting.step)
         best.load(modules, patience_s)
         if 0 < best.step < step <= best.step + _NEAR:

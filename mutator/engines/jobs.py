@@ -3,7 +3,9 @@
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
+from secrets import token_bytes
 from typing import Any, Protocol
 
 from mutator.faults.fault_models import FaultModels
@@ -126,7 +128,7 @@ class Setting:
     """The arguments of an engine's factory.
 
     `work` is an existing scratch folder. If `parent` is a process id, the engine exits once that process is
-    no longer its parent.
+    no longer its parent. Engines with the same `secret` share files in `work`.
     """
 
     manifest: TargetManifest
@@ -134,3 +136,4 @@ class Setting:
     work: Path
     limits: Limits
     parent: int | None = None
+    secret: bytes = field(default_factory=partial(token_bytes, 16))

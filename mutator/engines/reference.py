@@ -119,7 +119,8 @@ class ReferenceEngine:
         request = json.dumps(self._request(job, folder)).encode()
         path = folder / "job.json"
         path.write_bytes(request)
-        given = UnchangedFiles({str(path): request})
+        scenario = job.scenario.resolve()
+        given = UnchangedFiles({str(path): request, str(scenario): scenario.read_bytes()})
         ended = self._run(path, folder, job.hash_seed)
         changed = tree.first_changed() or given.first_changed().removeprefix(f"{folder}/")
         if not (changed or new):

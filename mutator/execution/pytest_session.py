@@ -176,7 +176,12 @@ class WorkerSide:
             target=Path(places["target"]) if places["target"] else None,
         )
         assignment = Assignment(
-            run=run, name=given["session"] + worker_id, engine=given["engine"], parent=given["parent"]
+            run=run,
+            name=given["session"] + worker_id,
+            engine=given["engine"],
+            goldens=given["goldens"],
+            secret=given["secret"],
+            parent=given["parent"],
         )
         self._config = config
         self._registration = register_worker(run)
@@ -230,7 +235,13 @@ class Controller:
         assert self.begun is not None
         begun = self.begun
         name = begun.worker_name("main")
-        assignment = Assignment(run=begun.folder.path, name=name, engine=begun.engine)
+        assignment = Assignment(
+            run=begun.folder.path,
+            name=name,
+            engine=begun.engine,
+            goldens=begun.golden_digests,
+            secret=begun.secret,
+        )
         self._worker = LazyWorker(begun.workspace, assignment)
         return _collect(session, (*begun.pending, *begun.proof), self._worker)
 

@@ -1,12 +1,14 @@
 """Turn experiments into records: build each mutant, run it, compare it with its golden run, judge it."""
 
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache, partial
 from pathlib import Path
 
+from mutator._common.files import no_pipe
 from mutator._common.hashing import digest
+from mutator._common.unchanged_files import UnchangedFiles
 from mutator.campaigns.shared_runs import runs
 from mutator.engines.jobs import Engine, Execution, Job, RunMode
 from mutator.errors import MutatorError
@@ -25,6 +27,7 @@ from mutator.store.run_folder import GoldenRun
 from mutator.store.series_format import encode
 from mutator.store.series_packing import EncodedSeries
 from mutator.targets.manifest import TargetManifest
+from mutator.verification.preflight_rules import digest_of
 
 _KEPT = 32  # golden runs in memory: enough for the current seed and the next
 
@@ -59,12 +62,32 @@ class Goldens:
         folder_of: Callable[[Experiment], Path],
         *,
         several_seeds: bool = False,
+        digests: Mapping[str, str] | None = None,
     ) -> None:
         self.folder = folder_of  # finds the output folder of the fault-free run
+        self._manifest = manifest
         self._several_seeds = several_seeds
+        self._digests = digests  # what `digest_of` must return, by key
+        self._files = lru_cache(_KEPT)(self._watched)
         self._trace = lru_cache(_KEPT)(partial(load_channels, manifest))
         self._sampler = lru_cache(_KEPT)(lambda folder: Sampler(manifest, self._trace(folder)))
         self._ends = lru_cache(_KEPT)(lambda folder: load_judged(manifest, folder)[1].t_end is not None)
+
+    def begin(self, experiment: Experiment) -> None:
+        """Read the golden run's files before they are used. MutatorError if their digest is another."""
+        self._files(self.folder(experiment), self.key(experiment))
+
+    def check(self, experiment: Experiment) -> None:
+        """Raise MutatorError if the golden run's files have been written to since `begin`."""
+        if changed := self._files(self.folder(experiment), self.key(experiment)).first_changed():
+            raise _changed(Path(changed))
+
+    def _watched(self, folder: Path, key: str) -> UnchangedFiles:
+        paths = [path for name in self._manifest.outputs if (path := folder / name).is_file()]
+        files = UnchangedFiles({str(path): path.read_bytes() for path in paths})
+        if self._digests is not None and digest_of(self._manifest, folder) != self._digests[key]:
+            raise _changed(folder)
+        return files
 
     def key(self, experiment: Experiment) -> str:
         return GoldenRun.of(experiment, several_seeds=self._several_seeds).key
@@ -122,6 +145,7 @@ class Runner:
                 except MutatorError as err:
                     refused.append(self._refused(experiment, err))
                     continue
+                self.goldens.begin(experiment)
                 started[experiment.id] = (experiment, built)
                 yield self._job(experiment, built)
 
@@ -157,6 +181,7 @@ class Runner:
             record, faulty = self._record(experiment, built, execution)
         except BadOutput as err:
             record = _bare(experiment, Status.HARNESS_ERROR, _problem_of(err), built)
+        self._check_input(experiment)
         return Finished(
             experiment=experiment,
             record=record,
@@ -170,6 +195,14 @@ class Runner:
             start=execution.start,
             series=self._series(experiment, record, faulty) if faulty is not None else None,
         )
+
+    def _check_input(self, experiment: Experiment) -> None:
+        """Raise MutatorError if a run has written to what this experiment used, so its record would not
+        count."""
+        self.goldens.check(experiment)
+        scenario = self.scenario_file(experiment.scenario)
+        if digest(no_pipe(scenario).read_bytes()) != experiment.scenario_digest:
+            raise _changed(scenario)
 
     def _series(self, experiment: Experiment, record: Record, faulty: Trace) -> EncodedSeries | None:
         if not self.with_series:
@@ -240,6 +273,16 @@ class Runner:
         activation = activation_of(execution.probe or {}) if status is Status.CRASHED else None
         bare = _bare(experiment, status, detail, built, activation)
         return replace(bare, error=error_of(execution.raised))
+
+
+def _changed(path: Path) -> MutatorError:
+    return MutatorError(
+        "changed while it was in use",
+        where=path,
+        expected="files that no mutant writes to",
+        remedy="restore it (`mutator verify` names what is damaged in a run folder), then run the same "
+        "command again; `mutator run --sandbox` keeps mutants from it",
+    )
 
 
 def _problem_of(err: BadOutput) -> str:

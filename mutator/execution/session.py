@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from itertools import chain
 from pathlib import Path
+from secrets import token_bytes
 from typing import Any
 
 from mutator._common.files import DiskFull, is_half_written, remove_folder
@@ -33,6 +34,7 @@ from mutator.outcomes import results
 from mutator.outcomes.ranking import worth_of
 from mutator.outcomes.reader import Results
 from mutator.store import digests
+from mutator.store.check_results import golden_digests
 from mutator.store.progress import Progress, label
 from mutator.store.records import endings
 from mutator.store.run_folder import RunFolder
@@ -44,6 +46,7 @@ from mutator.verification.seal import Seals, seals_of
 from mutator.workspace import Workspace
 
 EXIT_INTERRUPTED = 130
+_SECRET_BYTES = 16
 
 Notify = Callable[[Progress], None]
 
@@ -115,6 +118,8 @@ class Session:
         self._not_forked = "" if engine else not_worth_forking(self.manifest, experiments)
         self.problem = ""
         self.interrupted = False
+        self.secret = token_bytes(_SECRET_BYTES)
+        self.golden_digests: Mapping[str, str] = {}
         self.working = ""  # the present workers, if known
         self._began = time.monotonic()
         self._done_before = 0
@@ -149,6 +154,7 @@ class Session:
                 records=self.worker_name("*"),
                 accept=self.accept_versions,
             )
+            self.golden_digests = golden_digests(self.folder)
         self.pending = left
         self._records = None if left else records
 
@@ -169,6 +175,8 @@ class Session:
             "session": self.worker_name(""),
             "workspace": {k: str(v) if v else None for k, v in asdict(self.workspace).items()},
             "engine": self.engine,
+            "goldens": dict(self.golden_digests),
+            "secret": self.secret,
             "pending": [[item.chunk, list(item.places)] for item in self.pending],
             "proof": [[sample.number, sample.id] for sample in self.proof],
         }

@@ -35,12 +35,15 @@ class Assignment:
     """The role of a worker.
 
     `name` makes its file names in the run folder unique. `parent` is the process that the worker must not
-    outlive (None: the worker is the command itself).
+    outlive (None: the worker is the command itself). `goldens` has the digest of each golden run, and
+    `secret` authenticates files that workers share; neither is in a file.
     """
 
     run: Path
     name: str
     engine: str
+    goldens: Mapping[str, str]
+    secret: bytes
     parent: int | None = None
 
 
@@ -50,14 +53,13 @@ class Worker:
     def __init__(self, workspace: Workspace, assignment: Assignment) -> None:
         self.was_stopped = False  # a signal handler sets it
         self.folder = RunFolder.open(assignment.run)
-        self._name = assignment.name
         head = self.folder.head
         manifest = workspace.manifest(head["target"])
         now = sources(workspace, manifest, self.folder.scenarios)
         check_sources(self.folder.path, head["sources"], now)
         with raising_disk_full(self.folder.work):
             self.folder.work.mkdir(exist_ok=True)
-        self._workspace, self._manifest, self._parent = workspace, manifest, assignment.parent
+        self._workspace, self._manifest, self._assignment = workspace, manifest, assignment
         self._patches = PatchWriter(self.folder.path, assignment.name)
         self._series = SeriesWriter(self.folder.path, assignment.name) if self.folder.series_mb else None
         self._runner = self._make_runner(
@@ -128,7 +130,12 @@ class Worker:
     def _make_runner(self, engine: Engine, *, with_series: bool = False) -> Runner:
         folder = self.folder
         several = len(folder.seeds) > 1
-        goldens = Goldens(self._manifest, folder.golden_folder, several_seeds=several)
+        goldens = Goldens(
+            self._manifest,
+            folder.golden_folder,
+            several_seeds=several,
+            digests=self._assignment.goldens,
+        )
         models = self._workspace.fault_models()
         return Runner(
             self._manifest, models, engine, goldens, self._workspace.scenario, with_series=with_series
@@ -141,13 +148,16 @@ class Worker:
             models=self._workspace.fault_models(),
             work=folder.work,
             limits=folder.limits,
-            parent=self._parent,
+            parent=self._assignment.parent,
+            secret=self._assignment.secret,
         )
         return make_engine(name, setting)
 
     def _independent_engine(self) -> Engine:
         folder = self.folder
-        return ReferenceEngine(self._manifest, folder.work, folder.limits, self._parent, independent=True)
+        return ReferenceEngine(
+            self._manifest, folder.work, folder.limits, self._assignment.parent, independent=True
+        )
 
     def _blamed(self, finished: Finished) -> Finished:
         """Return the experiment; one that ran when this worker was stopped has no outcome."""
@@ -164,7 +174,7 @@ class Worker:
             self._patches.append(finished.experiment.id, finished.mutant.patch_bytes)
         if self._series is not None and finished.series is not None:
             self._series.append(finished.experiment.id, finished.series)
-        self._timings.append(timing_of(finished, self._name))
+        self._timings.append(timing_of(finished, self._assignment.name))
         self._records.append(line_of(finished.record))
 
     def _sync_blocks(self) -> None:
@@ -174,7 +184,7 @@ class Worker:
             self._series.sync()
 
     def _file(self, kind: str) -> Path:
-        return self.folder.path / kind / f"{self._name}.jsonl"
+        return self.folder.path / kind / f"{self._assignment.name}.jsonl"
 
 
 def timing_of(finished: Finished, worker: str) -> dict[str, Any]:

@@ -23,6 +23,11 @@ def loaded_packages(folder: RunFolder) -> tuple[str, ...]:
     return tuple(read_json(path, SCHEMA).get("packages", ())) if path.is_file() else ()
 
 
+def golden_digests(folder: RunFolder) -> dict[str, str]:
+    """Return the digest of each golden run, by its key."""
+    return dict(read_json(folder.path / FILE, SCHEMA)["goldens"])
+
+
 def measured_cpu_s(folder: RunFolder) -> float | None:
     path = folder.path / FILE
     found = read_json(path, SCHEMA).get("run_cpu_s") if path.is_file() else None

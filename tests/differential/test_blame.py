@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from mutator._common.hashing import digest
 from mutator.engines.jobs import Engine, Job, Setting
 from mutator.engines.kinds import ENGINES
 from mutator.engines.reference import ReferenceEngine
@@ -239,7 +240,7 @@ class Blamed:
         return Experiment(
             fault=fault,
             scenario=scenario,
-            scenario_digest="d",
+            scenario_digest=digest(self.toy.scenario(scenario).read_bytes()),
             method=Method.GUIDED,
             trigger=trigger,
             seed=SEED,

@@ -9,6 +9,7 @@ from itertools import product
 import numpy as np
 import pytest
 
+from mutator._common.hashing import digest
 from mutator.campaigns.plans import make_plan
 from mutator.engines.fork import ForkEngine
 from mutator.engines.in_target.stop import compiled
@@ -59,7 +60,7 @@ def drive(fork: Fork, engine: Engine, after: AfterHazard, at: float = 2.0) -> Re
     experiment = Experiment(
         fault=fork.fault(),
         scenario="A",
-        scenario_digest="",
+        scenario_digest=digest(fork.toy.scenario("A").read_bytes()),
         method=Method.GUIDED,
         trigger=at_time(at),
         seed=7,
