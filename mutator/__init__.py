@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from mutator._common.version import VERSION
 
 if TYPE_CHECKING:
-    from mutator.api.audits import Audit, verify
+    from mutator.api.audits import Audit, seal, verify
     from mutator.api.caches import cache_entries, cache_folder, clear_caches, prune_caches
     from mutator.api.campaigns import IncompleteRun, run
     from mutator.api.comparisons import RunComparison, compare
@@ -49,7 +49,7 @@ __version__ = VERSION
 
 # module -> names: `import mutator` stays fast because it does not load pandas, libcst or pytest
 _HOMES = {
-    "mutator.api.audits": ("Audit", "verify"),
+    "mutator.api.audits": ("Audit", "seal", "verify"),
     "mutator.api.caches": ("cache_entries", "cache_folder", "clear_caches", "prune_caches"),
     "mutator.api.campaigns": ("IncompleteRun", "run"),
     "mutator.api.comparisons": ("RunComparison", "compare"),
@@ -137,6 +137,7 @@ __all__ = [
     "plan",
     "prune_caches",
     "run",
+    "seal",
     "try_fault",
     "upgrade_manifest",
     "verify",

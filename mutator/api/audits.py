@@ -8,16 +8,20 @@ from typing import Any
 
 from mutator._common.arguments import check_type, check_whole
 from mutator._common.hashing import digest
+from mutator._common.locks import owned
 from mutator._common.tables import Table
 from mutator._common.text import counted
 from mutator.api.selection import WorkspaceLike, open_workspace
-from mutator.errors import MutatorError
+from mutator.errors import CheckFailed, MutatorError
 from mutator.execution.spot_check import drawn, driven_again
+from mutator.report.audited_pages import pages
 from mutator.store.run_folder import RunFolder
 from mutator.store.stretches import package_versions, told
 from mutator.verification.audit import Check, audit_checks
 from mutator.verification.repairing import repair as put_aside
 from mutator.verification.seal import Seals, seals_of, unsealed_facts
+from mutator.verification.signatures import sign as write_signature
+from mutator.verification.signatures import signer
 from mutator.workspace import Workspace
 
 SHOWN = 20  # differences listed in the text of an audit
@@ -36,7 +40,8 @@ class Audit:
     checks: tuple[Check, ...]  #: the checks: `what`, `count` and `differences` of each
     seals: Seals  #: the digests computed from the content
     not_sealed: Mapping[str, str]  #: facts that neither the seal nor a check covers, by name
-    compared: bool = False  #: whether the run was compared with an expected digest
+    compared: bool = False  #: whether the run was compared with an expected or signed digest
+    signer: str | None = None  #: who signed the run, if this was checked
     repaired: tuple[str, ...] = ()  #: the damaged parts that were set aside
 
     def __repr__(self) -> str:
@@ -91,15 +96,20 @@ def verify(
     rerun: int = 0,
     expect: str | None = None,
     expect_review: str | None = None,
+    signed_by: str | Path | None = None,
+    report: bool = False,
     repair: bool = False,
     workspace: WorkspaceLike = None,
 ) -> Audit:
     """Audit the run folder at `run`, finished or not, even if `load_run` can no longer open it.
 
     `rerun` is the number of randomly drawn experiments to rerun on the reference engine. `expect` is the seal
-    or the results digest that the run must have, `expect_review` its review digest. With `repair`, damaged
-    parts are set aside, and the next run of the campaign in this folder redoes them; otherwise nothing is
-    written. MutatorError if `run` is not a run folder or its run.json cannot be read.
+    or the results digest that the run must have, `expect_review` its review digest. `signed_by` is a file of
+    allowed signers (`man ssh-keygen`), one of whom must have signed the run. With `report`, the report is
+    built again and compared with the stored one. With `repair`, damaged parts are set aside, and the next run
+    of the campaign in this folder redoes them; otherwise nothing is written.
+
+    MutatorError if `run` is not a run folder, if its run.json cannot be read, or if `signed_by` is missing.
     """
     check_whole("rerun", rerun)
     for name, value in (("expect", expect), ("expect_review", expect_review)):
@@ -118,6 +128,13 @@ def verify(
     if expect_review is not None:
         facts["expected review"] = expect_review
         checks.append(_compared(folder, "review digest", seals.review_digest, expect_review))
+    identity = None
+    if signed_by is not None:
+        check, identity = _signed(folder, seals, Path(signed_by))
+        facts["signed by"] = identity or "nobody in the list"
+        checks.append(check)
+    if report:
+        checks.append(Check.of("pages of the report that follow from the run", *pages(folder, found)))
     damaged = any(check.differences for check in checks)
     repaired = put_aside(folder, found) if repair and damaged else []
     return Audit(
@@ -126,9 +143,26 @@ def verify(
         checks=tuple(checks),
         seals=seals,
         not_sealed=unsealed_facts(folder),
-        compared=expect is not None,
+        compared=expect is not None or identity is not None,
+        signer=identity,
         repaired=tuple(repaired),
     )
+
+
+def seal(run: str | Path, *, sign: str | Path | None = None) -> Seals:
+    """Compute the digests of the run folder at `run`. With `sign`, the file of an SSH key, also sign them:
+    `seal.json` and `seal.json.sig` are written into the folder.
+
+    MutatorError if `run` is not a run folder or is damaged, or if the key cannot sign; with `sign`, also if
+    the run is not finished or a command is using the folder.
+    """
+    folder = RunFolder.open(Path(run))
+    if sign is None:
+        return seals_of(folder)
+    with owned(folder.path, patience_s=0.0):
+        seals = seals_of(folder)
+        write_signature(folder, seals, Path(sign))
+    return seals
 
 
 def _check_digest(argument: str, value: str | None) -> None:
@@ -169,6 +203,14 @@ def _rerun(folder: RunFolder, workspace: Workspace | None, count: int, facts: di
         return Check(what=what, count=0, differences=(err,))
     facts["drawn at random"] = ", ".join(ids)
     return Check.of(what, len(ids), driven_again(workspace, folder, ids))
+
+
+def _signed(folder: RunFolder, seals: Seals, allowed_signers: Path) -> tuple[Check, str | None]:
+    try:
+        identity = signer(folder, seals, allowed_signers)
+    except CheckFailed as err:
+        return Check(what="digests as signed", count=1, differences=(err,)), None
+    return Check(what="digests as signed", count=1), identity
 
 
 def _seals(folder: RunFolder, checks: list[Check]) -> Seals:

@@ -60,7 +60,7 @@ GROUPS = (
     ("One fault", ("try", "diff", "generate")),
     ("Before a campaign", ("review",)),
     ("Campaigns", ("plan", "run", "merge", "report", "clean")),
-    ("After a campaign", ("compare", "export", "verify")),
+    ("After a campaign", ("compare", "export", "verify", "seal")),
     ("One experiment", ("show", "rerun")),
     ("In a browser", ("serve",)),
 )

@@ -8,7 +8,7 @@ import typer
 
 import mutator
 from mutator.cli import completion
-from mutator.cli.console import Terminal, error_text
+from mutator.cli.console import Terminal, error_text, short_path
 from mutator.cli.options import Json, Place, with_place
 from mutator.cli.run_folders import library_if_any
 from mutator.errors import EXIT_CHECK_FAILED
@@ -16,13 +16,20 @@ from mutator.errors import EXIT_CHECK_FAILED
 
 def register(app: typer.Typer) -> None:
     app.command("verify", epilog=EXAMPLES)(verify)
+    app.command("seal", epilog=SEAL_EXAMPLES)(seal)
 
 
 EXAMPLES = """\b
 Examples:
   mutator verify runs/first
   mutator verify runs/first --rerun 5 --expect 3f9a...     (the seal that `mutator run` printed)
+  mutator verify runs/first --signed-by allowed_signers --report
   mutator verify runs/first --repair
+"""
+SEAL_EXAMPLES = """\b
+Examples:
+  mutator seal runs/first
+  mutator seal runs/first --sign ~/.ssh/id_ed25519
 """
 
 
@@ -36,6 +43,13 @@ def verify(
     expect_review: Annotated[
         str | None, typer.Option(metavar="DIGEST", help="The expected review digest, 64 hex digits.")
     ] = None,
+    signed_by: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="A file of allowed signers, one of whom must have signed the run."),
+    ] = None,
+    report: Annotated[
+        bool, typer.Option("--report", help="Build the report again and compare it with the stored one.")
+    ] = False,
     repair: Annotated[
         bool,
         typer.Option(
@@ -57,6 +71,8 @@ def verify(
             rerun=rerun,
             expect=expect,
             expect_review=expect_review,
+            signed_by=signed_by,
+            report=report,
             repair=repair,
             workspace=library_if_any(place),
         )
@@ -66,7 +82,32 @@ def verify(
             for c in audit.checks
         ]
         facts = {"run": str(run), "passed": audit.passed, **asdict(audit.seals), "facts": audit.facts}
-        terminal.emit(facts | {"not_sealed": audit.not_sealed, "checks": checks, "repaired": audit.repaired})
+        facts |= {"signer": audit.signer, "not_sealed": audit.not_sealed}
+        terminal.emit(facts | {"checks": checks, "repaired": audit.repaired})
     terminal.say(str(audit))
     if not audit.passed:
         raise typer.Exit(EXIT_CHECK_FAILED)
+
+
+def seal(
+    run: Annotated[Path, typer.Argument(metavar="DIR", help="A run folder.", autocompletion=completion.runs)],
+    sign: Annotated[
+        Path | None, typer.Option(metavar="KEY", help="The file of the SSH key to sign with.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Print the digests of a run, or sign them with an SSH key.
+
+    The signature is stored in the run folder: seal.json and seal.json.sig. `verify --signed-by` checks it.
+    """
+    terminal = Terminal(as_json)
+    with terminal.wait("computing the digests"):
+        seals = mutator.seal(run, sign=sign)
+    if as_json:
+        terminal.emit({"run": str(run), "signed": sign is not None, **asdict(seals)})
+    for name, value in seals.texts().items():
+        terminal.say(f"{name}: {value}")
+    if sign:
+        terminal.say(f"signed: {short_path(run / 'seal.json.sig')}")
+    elif not seals.seal:
+        terminal.say("seal: none: the run is not finished, or not verifiable")

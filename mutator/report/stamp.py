@@ -27,7 +27,8 @@ _NOT_READ = {
     "traces",
     "workers",
     series_store.FOLDER,
-}  # folders in a run folder
+    *("seal.json", "seal.json.sig"),
+}  # names in a run folder
 _LINKED = (".mp4", ".gif")  # the report contains only the names of such files
 
 
@@ -85,7 +86,8 @@ def _files_of(run: Path) -> Iterator[tuple[str, str]]:
     for place, folders, names in os.walk(run):
         inside = Path(place).relative_to(run)
         folders[:] = sorted({*folders} - _NOT_READ) if inside == Path() else sorted(folders)
-        for path in (inside / name for name in sorted(names) if not name.startswith(".")):
+        names = sorted({*names} - _NOT_READ) if inside == Path() else sorted(names)
+        for path in (inside / name for name in names if not name.startswith(".")):
             yield path.as_posix(), "" if path.suffix in _LINKED else digests.sha256(run / path)
 
 

@@ -20,6 +20,7 @@ SCRATCH, ASIDE, TRACES = "work", "damaged", "traces"
 _TABLES = ("results", "propagation", "timings")
 CONTENT = (  # all files that a run folder can contain; * matches any text, including folders
     *(HEAD, digests.FILE, CAMPAIGN, "plan.csv", "plan/*.jsonl", "reviewed.json", "checks.json"),
+    *("seal.json", "seal.json.sig"),
     *("golden/*/*", "patches/*.blocks", "patches/*.patch"),
     *("records/*.jsonl", "timings/*.jsonl", "proof/*.jsonl"),
     *("series/*.js", "series/*.blocks"),

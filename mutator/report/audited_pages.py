@@ -1,0 +1,39 @@
+"""Audit a report: build it again and compare it with the stored files."""
+
+from collections.abc import Iterator
+
+from mutator._common.below import read_below
+from mutator.errors import MutatorError
+from mutator.report.building import build
+from mutator.report.panel import FOLDER
+from mutator.report.stamp import FILE
+from mutator.store.run_folder import RunFolder
+from mutator.workspace import Workspace
+
+_APART = "compare-"  # folders of comparisons with other runs
+
+
+def pages(folder: RunFolder, workspace: Workspace | None) -> tuple[int, Iterator[MutatorError]]:
+    """The number of files in the report's folder, and their differences from the report that this version of
+    mutator makes of the run. Comparisons with other runs are not counted."""
+    out = folder.path / FOLDER
+    names = (path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file())
+    stored = {name for name in names if not name.startswith(_APART)} - {FILE.removeprefix(f"{FOLDER}/")}
+    return len(stored), _differences(folder, workspace, stored)
+
+
+def _differences(folder: RunFolder, workspace: Workspace | None, stored: set[str]) -> Iterator[MutatorError]:
+    built = build(folder, workspace).files
+    for name in sorted({*built, *stored}):
+        path = folder.path / FOLDER / name
+        if name not in built:
+            yield MutatorError("not part of the report", where=path, remedy="delete it")
+        elif name not in stored:
+            yield MutatorError("missing", where=path, expected="a page", remedy="`mutator report` builds it")
+        elif read_below(folder.path, f"{FOLDER}/{name}") != built[name]:
+            yield MutatorError(
+                "differs from the page built now",
+                where=path,
+                expected="what this version of mutator makes of the run and the library",
+                remedy="`mutator report` builds it again",
+            )
