@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from mutator._common.bounded import MOST_WHOLE, read_open
-from mutator._common.files import raising_disk_full
+from mutator._common.files import raising_disk_full, remove_folder
 from mutator.errors import MutatorError
 
 _FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
@@ -185,12 +185,26 @@ def entries_below(
     folders = [""]
     while folders:
         folder = folders.pop()
-        with suppress(FileNotFoundError), os.scandir(f"{root}/{folder}") as entries:
+        with suppress(FileNotFoundError, NotADirectoryError), os.scandir(f"{root}/{folder}") as entries:
             for entry in entries:
                 name = f"{folder}{entry.name}"
                 yield name, entry
                 if entry.is_dir(follow_symlinks=False) and not closed(name):
                     folders.append(f"{name}/")
+
+
+def remove_odd(root: Path) -> None:
+    """Delete what `check_plain` refuses, and unprintable names, from a folder that a target wrote to."""
+    if root.is_symlink():
+        root.unlink()
+        root.mkdir()
+    for _, entry in list(entries_below(root)):
+        if is_plain(entry) and entry.name.isprintable():
+            continue
+        if entry.is_dir(follow_symlinks=False):
+            remove_folder(Path(entry.path))
+        else:
+            Path(entry.path).unlink(missing_ok=True)
 
 
 def is_plain(entry: os.DirEntry[str]) -> bool:

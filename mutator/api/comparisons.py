@@ -6,6 +6,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from mutator._common.below import inside
 from mutator._common.tables import Table
 from mutator.api.html import text_html
 from mutator.api.runs import Run, known_alerts_note, load_run
@@ -95,7 +96,7 @@ class RunComparison:
     def write(self, out: str | Path | None = None) -> pages.Written:
         """Write HTML, Markdown and CSV to `out`; default: report/compare-<first run> in the second run."""
         a, b = self.comparison.a, self.comparison.b
-        default = b.folder.path / "report" / f"compare-{a.name}"
+        default = inside(b.folder.path / "report", f"compare-{a.name}")
         return pages.write(self.comparison, default if out is None else Path(out))
 
 

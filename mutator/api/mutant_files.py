@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from mutator._common.below import inside
 from mutator._common.files import make_folder
 from mutator._common.text import counted
 from mutator.api.mutants import BuiltMutant, built
@@ -187,10 +188,10 @@ def _spec_names(workspace: Workspace, wanted: Iterable[str]) -> Iterator[str]:
 def _write(built_mutant: BuiltMutant, out: Path, *, trees: bool) -> dict[str, str]:
     mutant, fault, trigger = built_mutant.mutant, built_mutant.fault, built_mutant.trigger
     patch = Path("patches") / f"{mutant.id}.patch"
-    (out / patch).write_bytes(mutant.patch_bytes)
+    (inside(out, patch.as_posix())).write_bytes(mutant.patch_bytes)
     tree = Path("trees") / mutant.id
     if trees:
-        write_tree(built_mutant.manifest, mutant, out / tree)
+        write_tree(built_mutant.manifest, mutant, inside(out, tree.as_posix()))
     cells = (
         mutant.id,
         fault.id,

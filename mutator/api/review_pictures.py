@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from mutator._common.below import inside
 from mutator._common.files import make_folder, write_atomic
 from mutator.api.selection import WorkspaceLike, open_workspace
 from mutator.review.catalogue import Group
@@ -27,7 +28,7 @@ def write_pictures(
         shown = {"before": ("", pictures.before)}
         shown |= {level.name: (level.label, level.after) for level in pictures.levels}
         for level, (value, data) in shown.items():
-            path = folder / f"{name}-{level}.jpg"
+            path = inside(folder, f"{name}-{level}.jpg")
             write_atomic(path, data)
             written.setdefault(name, {})[level] = str(path)
             values[str(path)] = value

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+from mutator._common.below import inside
 from mutator._common.files import ScratchFolder
 from mutator.api.experiment_results import ExperimentResult, TraceFrames, trace_frame
 from mutator.api.mutants import built
@@ -73,7 +74,7 @@ class RunExperiment(ExperimentResult):
         """
         run, folder = self.run, self.run.folder
         temporary = None if keep else ScratchFolder("mutator-rerun-")
-        out = temporary.path / self.id if temporary else None
+        out = inside(temporary.path, self.id) if temporary else None
         single, same = rerun(run.workspace, folder.path, self.id, out=out)
         manifest = run.bench.manifest
         trial = trial_of(
@@ -104,7 +105,7 @@ class RunExperiment(ExperimentResult):
     @property
     def plot_file(self) -> Path:
         """Path of the plot in the run folder."""
-        return self.run.path / "plots" / f"{self.id}.svg"
+        return inside(self.run.path / "plots", f"{self.id}.svg")
 
     @property
     def is_drawn(self) -> bool:

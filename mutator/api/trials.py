@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from mutator._common.below import inside
 from mutator._common.files import ScratchFolder
 from mutator._common.hashing import digest
 from mutator.api.experiment_results import ExperimentResult, TraceFrames, trace_frame
@@ -51,7 +52,7 @@ class Trial(ExperimentResult):
     @property
     def has_trace(self) -> bool:
         """Whether the faulty run left a trace."""
-        return (self.single.faulty / self.manifest.trace_file).is_file()
+        return (inside(self.single.faulty, self.manifest.trace_file)).is_file()
 
     @property
     def golden_hazards(self) -> tuple[tuple[str, float], ...]:
@@ -123,7 +124,7 @@ def try_fault(
         seed=seed,
     )
     temporary = ScratchFolder("mutator-try-") if out is None else None
-    folder = (temporary.path if temporary else Path(out or "")) / experiment.id
+    folder = inside(temporary.path if temporary else Path(out or ""), experiment.id)
     single = run_single(bench.workspace, bench.manifest, experiment, folder)
     scale = bench.workspace.scale_of(bench.manifest)
     return trial_of(single, bench.manifest, scale=scale, temporary=temporary)

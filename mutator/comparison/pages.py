@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from importlib.resources import files as package_files
 from pathlib import Path
 
+from mutator._common.below import inside
 from mutator._common.files import make_folder, write_atomic
 from mutator._common.tables import Table, markdown_line
 from mutator._common.text import counted
@@ -35,7 +36,7 @@ def write(comparison: Comparison, out: Path) -> Written:
     make_folder(out / "tables")
     text, hypertext, pairs = out / "COMPARISON.md", out / "index.html", out / "pairs.csv"
     for sheet in comparison.sheets:
-        write_atomic(out / "tables" / f"{sheet.name}.csv", sheet.csv().encode())
+        write_atomic(inside(out / "tables", f"{sheet.name}.csv"), sheet.csv().encode())
     write_atomic(pairs, pairs_csv(comparison))
     write_atomic(out / "unmatched.csv", unmatched_csv(comparison))
     write_atomic(text, markdown(comparison).encode())

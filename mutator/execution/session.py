@@ -298,7 +298,7 @@ def open_session(
         folders = ("plan", "report", "series", "patches")
         written = (folder.path.iterdir(), *((folder.path / name).rglob("*") for name in folders))
         for path in chain(*written):
-            if is_half_written(path.name):
+            if is_half_written(path.name) and path.is_file():
                 path.unlink()
         try:
             yield Session(

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import mkdtemp
 
+from mutator._common.below import inside, remove_odd
 from mutator._common.files import make_folder, raising_disk_full, remove_folder, write_atomic
 from mutator._common.locks import alone_in
 from mutator.campaigns.provenance import check_sources, sources
@@ -90,7 +91,7 @@ def rerun(
         workspace,
         manifest,
         experiment,
-        out or folder.path / "traces" / wanted,
+        out or folder.traces_of(wanted),
         limits=folder.limits,
         golden=golden if golden.is_dir() else None,
     )
@@ -138,7 +139,7 @@ def _run_golden(workspace: Workspace, engine: ReferenceEngine, experiment: Exper
         seed=experiment.seed,
         changes=experiment.changes,
     )
-    execution = engine.execute(job, engine.work / job.name)
+    execution = engine.execute(job, inside(engine.work, job.name))
     if execution.status is not Status.OK:
         raise CheckFailed(
             f"the run without any fault ended as {execution.status.value}: {execution.detail}",
@@ -162,9 +163,10 @@ def _kept(runs: Iterator[Finished], out: Path) -> Iterator[Finished]:
 
 
 def _replace(new: Path, place: Path) -> None:
-    """Replace a folder that another process might be reading."""
+    """Replace a folder that another process might be reading, without the links that a target made."""
+    remove_odd(new)
     aside = Path(mkdtemp(dir=new.parent))
     if os.path.lexists(place):
-        place.rename(aside / place.name)
+        place.rename(inside(aside, place.name))
     new.rename(place)
     remove_folder(aside)

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from random import SystemRandom
 
+from mutator._common.below import inside
 from mutator._common.files import ScratchFolder
 from mutator.errors import MutatorError
 from mutator.execution.single_run import manifest_of, run_single
@@ -35,7 +36,7 @@ def driven_again(workspace: Workspace, folder: RunFolder, ids: Sequence[str]) ->
                 workspace,
                 manifest,
                 experiment,
-                scratch / name,
+                inside(scratch, name),
                 limits=folder.limits,
                 golden=golden if golden.is_dir() else None,
             )

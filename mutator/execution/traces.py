@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
+from mutator._common.below import inside
 from mutator.errors import MutatorError
 from mutator.execution.single_run import rerun
 from mutator.model import Experiment, Record
@@ -46,7 +47,7 @@ class Traces:
         Reruns the experiment if no trace is stored. Raises MutatorError if that is impossible, or if the
         result differs from the campaign's.
         """
-        kept = self.folder.path / "traces" / experiment_id
+        kept = self.folder.traces_of(experiment_id)
         experiment = self._experiments[experiment_id]
         golden = self.folder.golden_folder(experiment)
         if not golden.is_dir():
@@ -80,7 +81,7 @@ class Traces:
 
     def is_kept(self, experiment_id: str) -> bool:
         """Return whether a stored faulty trace matches the record."""
-        faulty = self.folder.path / "traces" / experiment_id / "faulty"
-        if not (faulty / self.manifest.trace_file).is_file():
+        faulty = self.folder.traces_of(experiment_id) / "faulty"
+        if not inside(faulty, self.manifest.trace_file).is_file():
             return False
         return trace_digest(self.manifest, faulty) == self.record(experiment_id).trace_digest

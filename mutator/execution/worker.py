@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from mutator._common import caches
+from mutator._common.below import inside
 from mutator._common.files import raising_disk_full
 from mutator.campaigns.chunks import Pending
 from mutator.campaigns.provenance import check_sources, sources
@@ -184,7 +185,7 @@ class Worker:
             self._series.sync()
 
     def _file(self, kind: str) -> Path:
-        return self.folder.path / kind / f"{self._assignment.name}.jsonl"
+        return inside(self.folder.path, f"{kind}/{self._assignment.name}.jsonl")
 
 
 def timing_of(finished: Finished, worker: str) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from mutator._common.below import inside
 from mutator._common.files import make_folder, write_atomic
 from mutator._common.text import counted
 from mutator.campaigns.filters import compile_filter
@@ -77,7 +78,7 @@ def write_experiments(
         )
     make_folder(out)
     for name in found:
-        write_atomic(out / f"{name}.mcap", content.of(name))
+        write_atomic(inside(out, f"{name}.mcap"), content.of(name))
     return out
 
 
@@ -118,11 +119,11 @@ class Content:
         """The kept traces, if both runs have one. MutatorError if a trace does not match its record: using
         the coarser series instead would hide the mismatch.
         """
-        kept = self._folder.path / "traces" / experiment_id
+        kept = self._folder.traces_of(experiment_id)
         if self._traces is None or not kept.is_dir() or experiment_id not in self._records:
             return None
         golden = self._folder.golden_folder(self._experiments[experiment_id])
-        faulty = kept / "faulty" / self._traces.manifest.trace_file
+        faulty = inside(kept / "faulty", self._traces.manifest.trace_file)
         if not (golden.is_dir() or (kept / "golden").is_dir()) or not faulty.is_file():
             return None
         if not self._traces.is_kept(experiment_id):

@@ -2,6 +2,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from mutator._common.below import inside
 from mutator._common.files import make_folder, write_atomic
 from mutator.errors import MutatorError
 from mutator.exports import Format, Table, elements, junit, mcap_export
@@ -47,7 +48,7 @@ def export(
         raise MutatorError(
             f"not valid for {format.value}", argument="failures", remedy="leave `failures` out"
         )
-    place = out or folder.path / FOLDER / FILES.get(format, f"{parts.table.value}.{format.value}")
+    place = out or inside(folder.path / FOLDER, FILES.get(format, f"{parts.table.value}.{format.value}"))
     if format is Format.MCAP:
         return mcap_export.write_experiments(folder, place, workspace, parts.only)
     make_folder(place.parent)

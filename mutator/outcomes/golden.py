@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from mutator._common.below import inside
 from mutator._common.files import no_pipe
 from mutator._common.hashing import digest
 from mutator._common.shortages import shortage
@@ -42,10 +43,10 @@ class Difference:
 
 def trace_digest(manifest: TargetManifest, out: Path) -> str:
     try:
-        return digest(no_pipe(out / manifest.trace_file).read_bytes())
+        return digest(no_pipe(inside(out, manifest.trace_file)).read_bytes())
     except OSError as err:
         _check_is_of_output(err)
-        raise BadOutput("the run left no trace", where=out / manifest.trace_file) from None
+        raise BadOutput("the run left no trace", where=inside(out, manifest.trace_file)) from None
 
 
 def load_trace(
@@ -55,7 +56,7 @@ def load_trace(
     also: Sequence[Channel] = (),
 ) -> Trace:
     """Load channels (default: all) and times of the trace in `out`. Channels in `also` can be missing."""
-    path = out / manifest.trace_file
+    path = inside(out, manifest.trace_file)
     kind = f"an {path.suffix} file" if path.suffix in (".npz", ".mcap") else f"a {path.suffix} file"
     try:
         trace = trace_files.read(path, manifest, channels, also)
@@ -119,7 +120,7 @@ def load_record(manifest: TargetManifest, out: Path) -> dict[str, Any]:
     """Load the record that the target wrote in `out`, or an empty one if the manifest names no record."""
     if manifest.record_file is None:
         return {"hazards": {}, "alerts": []}
-    path = out / manifest.record_file
+    path = inside(out, manifest.record_file)
     try:
         data = json.loads(no_pipe(path).read_bytes())
     except (OSError, ValueError, RecursionError) as err:

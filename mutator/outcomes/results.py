@@ -7,6 +7,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
+from mutator._common.below import inside
 from mutator._common.files import half_written, read_json, write_json
 from mutator._common.hashing import digest
 from mutator._common.processes import beside, processes_for, shared
@@ -47,7 +48,7 @@ def build(run: Path) -> Path:
     made_from = _made_from(folder)
     with ExitStack() as stack:
         # The stack exits in reverse order, so the first table is replaced first.
-        paths = {name: folder.path / name for name in reversed(names(folder))}
+        paths = {name: inside(folder.path, name) for name in reversed(names(folder))}
         made = {name: stack.enter_context(half_written(path)) for name, path in paths.items()}
         write(folder, made)
         now = {name: found.sha256 for name, path in made.items() if (found := Digest.of_file(path))}

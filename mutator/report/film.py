@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from mutator._common.below import inside
 from mutator._common.files import ScratchFolder, half_written, make_folder
 from mutator.engines import bytecode
 from mutator.errors import MutatorError
@@ -125,7 +126,7 @@ def _show(manifest: TargetManifest, folder: Path, places: Mapping[str, str], sho
     if manifest.overlay is not None:
         tree = folder / "tree"
         bytecode.put(manifest.tree.files, tree)
-    out, made = shot.out.absolute(), folder / "shown" / shot.out.name
+    out, made = shot.out.absolute(), inside(folder / "shown", shot.out.name)
     here = {**places, "out": str(made), "t": str(shot.t)}
     for place in (out, made):
         make_folder(place.parent)

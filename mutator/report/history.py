@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from urllib.parse import quote
 
+from mutator._common.below import inside
 from mutator._common.files import write_atomic
 from mutator._common.tables import Table
 from mutator._common.text import counted
@@ -199,5 +200,5 @@ def _linked(group: Sequence[PastRun]) -> Table:
 
 def _comparison(folder: Path, before: PastRun, after: PastRun) -> str:
     """The path of an existing comparison page, relative to the folder; '' if there is none."""
-    page = Path(after.name) / FOLDER / f"compare-{before.name}" / "index.html"
-    return quote(page.as_posix()) if (folder / page).exists() else ""
+    page = Path(after.name, FOLDER, f"compare-{before.name}", "index.html")
+    return quote(page.as_posix()) if inside(folder, page.as_posix()).exists() else ""

@@ -6,6 +6,7 @@ from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from itertools import islice
 from pathlib import Path
 
+from mutator._common.below import inside
 from mutator._common.files import ScratchFolder
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Record, Status
@@ -53,7 +54,9 @@ def take_stills(workspace: Workspace, folder: RunFolder, *, workers: int, notify
         try:
             driven = {_golden_key(experiments[name]): experiments[name] for name in due}
             # golden runs are submitted first; otherwise all threads could wait for one that has not started
-            goldens = {key: pool.submit(filming.golden, one, scratch / key) for key, one in driven.items()}
+            goldens = {
+                key: pool.submit(filming.golden, one, inside(scratch, key)) for key, one in driven.items()
+            }
             found = [pool.submit(wrong, name, goldens[_golden_key(experiments[name])]) for name in due]
             pace = Pace("pictures", len(found))
             notify(pace.at(0))
@@ -88,7 +91,7 @@ def _due(
 
 def _missing(folder: RunFolder, experiment_id: str, record: Record) -> list[Shot]:
     names = {f"{experiment_id}-{t:.2f}s.jpg": t for t in _times(record)}
-    shots = [Shot(out=folder.path / "plots" / name, t=t) for name, t in names.items()]
+    shots = [Shot(out=inside(folder.path / "plots", name), t=t) for name, t in names.items()]
     return [shot for shot in shots if not shot.out.exists()]
 
 

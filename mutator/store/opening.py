@@ -47,13 +47,13 @@ def check_contents(run: Path) -> None:
     tops: dict[str, str] = {}  # names in `run` itself
     for name, entry in entries_below(run, is_closed):
         if not is_plain(entry):
-            raise not_plain(run / name)
+            raise not_plain(Path(entry.path))
         if not entry.name.isprintable():
             raise _refused(f"the name {entry.name!a}", run, "names of printable characters")
         if "/" in name:
             continue
         if name in FOLDERS and not entry.is_dir():
-            raise _refused("a file", run / name, "a folder")
+            raise _refused("a file", Path(entry.path), "a folder")
         if (before := tops.setdefault(name.casefold(), name)) != name:
             raise _refused(f"both {before!a} and {name!a}", run, "names that differ not only in case")
 

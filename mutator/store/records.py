@@ -7,6 +7,7 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from mutator._common.below import inside
 from mutator.errors import CheckFailed, MutatorError
 from mutator.model import Activation, Outcome, Record, RunError, Status
 from mutator.store.indexed_lines import IndexedLines, Line
@@ -105,7 +106,7 @@ def read_records(run: Path, folder: str = "records", *, checksums: bool = True) 
     A harness error is replaced by any other record of its experiment. MutatorError for a damaged line, and
     for a second final record of an experiment; CheckFailed if the two differ.
     """
-    paths = sorted((run / folder).glob("*.jsonl"))
+    paths = sorted(inside(run, folder).glob("*.jsonl"))
     return IndexedLines(paths, SCHEMA, record_from, _replaces, checksums=checksums)
 
 

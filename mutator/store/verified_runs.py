@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from mutator._common import caches
+from mutator._common.below import inside
 from mutator._common.files import json_bytes, no_pipe, write_atomic
 from mutator._common.hashing import digest
 from mutator._common.version import VERSION
@@ -55,4 +56,4 @@ def remember(key: str, **facts: Any) -> None:
 
 
 def _path(key: str) -> Path:
-    return caches.of_runs() / f"{key}.json"
+    return inside(caches.of_runs(), f"{key}.json")

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from mutator._common.below import inside
 from mutator._common.files import read_json
 from mutator._common.hashing import digest, plain
 from mutator.campaigns.freezing import CSV, plan_csv
@@ -155,7 +156,7 @@ def _goldens(folder: RunFolder, manifest: TargetManifest | None) -> Problems:
         if checks["goldens"].get(name) != found:
             known = str(checks["goldens"].get(name))
             got = f"golden run {name} with digest {found[:16]}"
-            yield MutatorError(got, where=folder.path / "golden" / name, expected=known[:16])
+            yield MutatorError(got, where=inside(folder.path / "golden", name), expected=known[:16])
 
 
 def _sources(folder: RunFolder, workspace: Workspace | None) -> Problems:

@@ -6,6 +6,7 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
+from mutator._common.below import inside
 from mutator._common.hashing import digest
 from mutator._common.text import counted
 from mutator.engines.jobs import FAST
@@ -39,7 +40,7 @@ class Recorded:
 def recorded(folder: RunFolder, kind: str) -> list[Recorded]:
     """The readable records of one kind, without harness errors."""
     found = []
-    for path in sorted(path for path in (folder.path / kind).glob("*.jsonl") if path.is_file()):
+    for path in sorted(path for path in inside(folder.path, kind).glob("*.jsonl") if path.is_file()):
         segment = read_segment(path, checksums=folder.verifiable)
         for number in segment.lines:
             try:

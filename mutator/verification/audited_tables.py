@@ -6,6 +6,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TextIO
 
+from mutator._common.below import inside
 from mutator.errors import MutatorError
 from mutator.outcomes import results
 from mutator.outcomes.reader import same_parquet
@@ -25,10 +26,10 @@ def _differences(folder: RunFolder, there: list[str]) -> Iterator[MutatorError]:
     if not there:
         return
     with TemporaryDirectory() as scratch:
-        made = {name: Path(scratch) / name for name in results.names(folder)}
+        made = {name: inside(Path(scratch), name) for name in results.names(folder)}
         results.write(folder, made)
         for name in there:
-            path = folder.path / name
+            path = inside(folder.path, name)
             if name == results.CSV:
                 yield from _cells(path, made[name])
             elif name not in made or not same_parquet(path, made[name]):

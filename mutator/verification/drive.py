@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from mutator._common.below import inside
 from mutator._common.cores import usable_cores
 from mutator._common.files import ScratchFolder
 from mutator.campaigns.campaign_files import Campaign, load_campaign
@@ -135,7 +136,7 @@ class _Drive:
         )
 
     def _run(self, job: Job) -> Execution:
-        folder = self.engine.work / f"{job.name}-{'-'.join(job.changes)}"
+        folder = inside(self.engine.work, f"{job.name}-{'-'.join(job.changes)}")
         return self.engine.execute(job, folder)
 
     def _look(self, execution: Execution) -> CheckRun:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from mutator._common import kept_folders
+from mutator._common.below import inside
 from mutator._common.files import (
     DiskFull,
     json_bytes,
@@ -76,7 +77,7 @@ def unreached_triggers(workspace: Workspace, folder: RunFolder) -> list[str]:
 
 def are_there(folder: RunFolder) -> bool:
     places = (folder.golden(*one) for one in folder.goldens)
-    goldens = (place / name for place in places for name in folder.head["golden_files"])
+    goldens = (inside(place, name) for place in places for name in folder.head["golden_files"])
     return all(path.is_file() for path in (folder.path / FILE, *goldens))
 
 
@@ -132,7 +133,9 @@ class _Checks:
         if said is None or said["digest"] != self.digest:
             return None
         keys = [one.key for one in self.keys]
-        if any(digest_of(self.manifest, place / "golden" / key) != said["goldens"][key] for key in keys):
+        if any(
+            digest_of(self.manifest, inside(place / "golden", key)) != said["goldens"][key] for key in keys
+        ):
             return None
         results = tuple(CheckResult(**result) for result in said["results"])
         return results if all(result.passed for result in results) else None
@@ -180,7 +183,9 @@ class _Checks:
         """Raise CheckFailed if a run that has records would continue with different golden runs, for example
         on another processor."""
         run, before = self.folder.path, (self._before() or {}).get("goldens", {})
-        known = {key: before.get(key) or digest_of(self.manifest, run / "golden" / key) for key in goldens}
+        known = {
+            key: before.get(key) or digest_of(self.manifest, inside(run / "golden", key)) for key in goldens
+        }
         other = [key for key in goldens if known[key] not in ("", goldens[key])]
         if other and any((run / "records").glob("*.jsonl")):
             raise CheckFailed(

@@ -5,6 +5,7 @@ import shutil
 from pathlib import Path
 
 from mutator._common import caches, kept_folders
+from mutator._common.below import inside
 from mutator._common.hashing import digest
 from mutator.verification.unreached import FOLDER
 
@@ -12,7 +13,7 @@ from mutator.verification.unreached import FOLDER
 def entry(key: str) -> Path:
     """The path for checks with this digest. Machines with a shared home folder have separate entries, because
     the digest might not cover everything that changes last digits."""
-    return caches.of_checks() / digest([key, platform.node()])
+    return inside(caches.of_checks(), digest([key, platform.node()]))
 
 
 def store(place: Path, run: Path, file: str, observed: Path) -> None:
@@ -21,7 +22,7 @@ def store(place: Path, run: Path, file: str, observed: Path) -> None:
 
     def fill(made: Path) -> None:
         shutil.copytree(run / "golden", made / "golden")
-        shutil.copy(run / file, made / file)
+        shutil.copy(inside(run, file), inside(made, file))
         if (observed / FOLDER).is_dir():
             shutil.copytree(observed / FOLDER, made / FOLDER)
 

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from mutator._common.below import inside
 from mutator._common.files import no_pipe
 from mutator._common.hashing import digest
 from mutator.engines.jobs import Execution
@@ -55,7 +56,7 @@ def look(manifest: TargetManifest, execution: Execution) -> CheckRun:
 def digest_of(manifest: TargetManifest, out: Path) -> str:
     """Digest of trace and record in an output folder; empty if they are missing."""
     try:
-        return digest([digest(no_pipe(out / name).read_bytes()) for name in manifest.outputs])
+        return digest([digest(no_pipe(inside(out, name)).read_bytes()) for name in manifest.outputs])
     except OSError:
         return ""
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from mutator._common import caches
+from mutator._common.below import inside, remove_odd
 from mutator._common.files import remove_folder
 from mutator.engines.jobs import Job
 from mutator.engines.reference import ReferenceEngine
@@ -81,16 +82,17 @@ class CheckDriver:
         return dict(sorted(jobs.items(), key=lambda one: one[0][0] != NULL))  # null mutants last
 
     def _run(self, engine: ReferenceEngine, name: tuple[str, Any], job: Job) -> CheckRun:
-        scratch = engine.work / job.name
+        scratch = inside(engine.work, job.name)
         try:
             execution = engine.execute(job, scratch)
+            remove_odd(execution.out)  # before it is judged, because a run folder has no links
             run = look(self.manifest, execution)
             if name[0] == GOLDEN and name[1].seed is not None:
                 caches.make_room(self.manifest.name)
             if name[0] == NULL:
                 unreached.write_observed(self.kept, name[1].key, execution.watched.get("seen", ()))
             if name[0] == GOLDEN and not run.problem:
-                place = self.kept / "golden" / name[1].key
+                place = inside(self.kept / "golden", name[1].key)
                 place.parent.mkdir(parents=True, exist_ok=True)
                 execution.out.rename(place)
             return run

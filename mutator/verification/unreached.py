@@ -12,6 +12,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from mutator._common.below import inside
 from mutator._common.text import counted
 from mutator.model import Experiment, Trigger
 from mutator.mutants.building import build
@@ -29,7 +30,7 @@ Arming = tuple[float, Callable[..., bool]]  # arming time of a trigger (s), and 
 
 
 def write_observed(folder: Path, key: str, seen: Iterable[Sequence[float]]) -> None:
-    path = folder / FOLDER / f"{key}.npy"
+    path = inside(folder / FOLDER, f"{key}.npy")
     path.parent.mkdir(parents=True, exist_ok=True)  # scenario names can contain folders
     np.save(path, np.array(list(seen), dtype=float))
 

@@ -18,7 +18,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from mutator._common.below import Outside, check_inside, check_name, files_inside
+from mutator._common.below import Outside, check_inside, check_name, files_inside, inside
 from mutator._common.files import raising_disk_full, read_json
 from mutator._common.version import VERSION
 from mutator.errors import MutatorError
@@ -123,9 +123,9 @@ def _read_in_root(manifest: TargetManifest) -> Iterator[Path]:
         if word.startswith(_ROOT):
             with manifest.source.placing(("entry", "args", i)):
                 name = check_name(word.removeprefix(_ROOT).removesuffix("/"), manifest.path)
-                place = check_inside(manifest.root, manifest.root / name)
-                inside = files_inside(manifest.root, name, "*")
-            yield from (path for path in (place, *inside) if path.is_file())
+                place = check_inside(manifest.root, inside(manifest.root, name))
+                files = files_inside(manifest.root, name, "*")
+            yield from (path for path in (place, *files) if path.is_file())
 
 
 def lay_out(data: bytes, place: Path) -> None:
@@ -134,7 +134,7 @@ def lay_out(data: bytes, place: Path) -> None:
     _check(parts, place)
     with raising_disk_full(place):
         for name, content in parts.items():
-            path = place / name  # checked, and a new folder has no links
+            path = inside(place, name)  # a new folder has no links
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(content)
 
@@ -164,7 +164,7 @@ class Site:
     @cached_property
     def manifest(self) -> TargetManifest:
         """The target's manifest, with the root in the unpacked bundle."""
-        path = self.place / "manifest" / self.meta["manifest"]
+        path = inside(self.place / "manifest", self.meta["manifest"])
         overlay = self.place / "overlay"
         found = load_manifest(path, self.place / "target", overlay if overlay.is_dir() else None)
         check_names(found)
@@ -179,7 +179,7 @@ class Site:
         return Limits(**self.meta["limits"])
 
     def scenario(self, name: str) -> Path:
-        return self.place / "scenarios" / f"{check_name(name, self.place)}.yaml"
+        return inside(self.place / "scenarios", f"{name}.yaml")
 
     @cached_property
     def goldens(self) -> dict[str, tuple[GoldenRun, str]]:

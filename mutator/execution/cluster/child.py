@@ -16,6 +16,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 from mutator._common import caches
+from mutator._common.below import inside
 from mutator._common.files import DiskFull, raising_disk_full
 from mutator._common.hashing import canonical
 from mutator._common.shortages import Shortage, shortage
@@ -98,7 +99,7 @@ class PieceRunner:
                 engine = make_engine(site.meta["engine"], setting)  # type: ignore[assignment]
             goldens = Goldens(
                 site.manifest,
-                lambda experiment: self._goldens / self._golden_of(experiment).key,
+                lambda experiment: inside(self._goldens, self._golden_of(experiment).key),
                 several_seeds=site.meta["several_seeds"],
                 digests={key: known for key, (_, known) in site.goldens.items()},
             )
@@ -111,7 +112,7 @@ class PieceRunner:
     def _have_golden(self, key: str) -> None:
         """Make a golden run or copy it from the cache. Raises Unlike if it differs from the campaign's."""
         golden, known = self._site.goldens[key]
-        place = self._goldens / key
+        place = inside(self._goldens, key)
         self._goldens.mkdir(exist_ok=True)
         if not self._driven.fetch(golden, known, place):
             self._drive_golden(golden, known, place)

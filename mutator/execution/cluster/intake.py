@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+from mutator._common.below import inside
 from mutator._common.hashing import canonical
 from mutator.errors import MutatorError
 from mutator.execution.cluster.pieces import Kind, Piece, Result
@@ -85,4 +86,4 @@ class Intake:
             self._series.sync()
 
     def _file(self, kind: str) -> Path:
-        return self._folder.path / kind / f"{self._name}.jsonl"
+        return inside(self._folder.path, f"{kind}/{self._name}.jsonl")

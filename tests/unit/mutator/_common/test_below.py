@@ -7,10 +7,14 @@ import pytest
 
 from mutator._common.below import (
     Outside,
+    check_library_name,
     check_name,
     check_plain,
+    entries_below,
+    move_below,
     open_below,
     read_below,
+    remove_odd,
     unlink_below,
     write_below,
 )
@@ -122,3 +126,41 @@ def test_a_folder_with_anything_else_is_not_plain(folder: Path, kind: str) -> No
         os.mkfifo(place)
     with pytest.raises(Outside, match="a/x: a link, a pipe"):
         check_plain(folder)
+
+
+def test_links_that_a_target_made_are_deleted_and_not_followed(folder: Path) -> None:
+    (folder / "a" / "link").symlink_to(folder.parent / "elsewhere")
+    (folder / "a" / "c\n").mkdir()
+    (folder / "a" / "c\n" / "file").touch()
+    os.mkfifo(folder / "pipe")
+    remove_odd(folder)
+    check_plain(folder)
+    assert not (folder / "a" / "c\n").exists() and read_below(folder, "a/b.txt")
+    (folder.parent / "out").symlink_to(folder)
+    remove_odd(folder.parent / "out")
+    assert [*(folder.parent / "out").iterdir()] == [] and read_below(folder, "a/b.txt")
+
+
+def test_a_move_does_not_follow_links(folder: Path) -> None:
+    elsewhere = folder.parent / "elsewhere"
+    move_below(folder, "a/b.txt", "d/e.txt")
+    assert (folder / "d" / "e.txt").exists()
+    (folder / "link").symlink_to(elsewhere)
+    move_below(folder, "link", "d/link")
+    assert (folder / "d" / "link").is_symlink()
+    for name, to in (("d/link/b.txt", "x"), ("d/e.txt", "d/link/x")):
+        with pytest.raises(Outside):
+            move_below(folder, name, to)
+    assert [path.name for path in elsewhere.iterdir()] == ["b.txt"]
+
+
+def test_a_closed_folder_is_listed_without_its_content(folder: Path) -> None:
+    (folder / "link").symlink_to(folder)
+    assert {name for name, _ in entries_below(folder, lambda name: name == "a")} == {"a", "link"}
+
+
+@pytest.mark.parametrize("name", ["S1.yaml", "../S1.yml"])
+def test_the_path_of_a_file_is_no_name_in_the_library(name: str) -> None:
+    with pytest.raises(Outside, match=r"run\.json: the path .*; expected the name"):
+        check_library_name(name, "run.json")
+    assert check_library_name("cut_in/S1", "run.json") == "cut_in/S1"
