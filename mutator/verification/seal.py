@@ -137,7 +137,7 @@ def _versions(folder: RunFolder) -> list[str]:
 def _records(folder: RunFolder, kind: str) -> dict[str, str]:
     """Digest of each valid record's line without its checksum, by experiment id."""
     found = {}
-    for path in sorted((folder.path / kind).glob("*.jsonl")):
+    for path in sorted(inside(folder.path, kind).glob("*.jsonl")):
         segment = bare_segment(path, checksums=True)
         for number, line in intact_lines(path, checksums=True):
             if number > 1 and (ending := ending_on(line)).counts:
