@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cache, lru_cache, partial
 from pathlib import Path
 
+from mutator._common.below import inside
 from mutator._common.files import no_pipe
 from mutator._common.hashing import digest
 from mutator._common.unchanged_files import UnchangedFiles
@@ -83,7 +84,7 @@ class Goldens:
             raise _changed(Path(changed))
 
     def _watched(self, folder: Path, key: str) -> UnchangedFiles:
-        paths = [path for name in self._manifest.outputs if (path := folder / name).is_file()]
+        paths = [path for name in self._manifest.outputs if (path := inside(folder, name)).is_file()]
         files = UnchangedFiles({str(path): path.read_bytes() for path in paths})
         if self._digests is not None and digest_of(self._manifest, folder) != self._digests[key]:
             raise _changed(folder)
