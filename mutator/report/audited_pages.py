@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from mutator._common.below import read_below
+from mutator._common.below import inside, read_below
 from mutator.errors import MutatorError
 from mutator.report.building import build
 from mutator.report.panel import FOLDER
@@ -25,7 +25,7 @@ def pages(folder: RunFolder, workspace: Workspace | None) -> tuple[int, Iterator
 def _differences(folder: RunFolder, workspace: Workspace | None, stored: set[str]) -> Iterator[MutatorError]:
     built = build(folder, workspace).files
     for name in sorted({*built, *stored}):
-        path = folder.path / FOLDER / name
+        path = inside(folder.path / FOLDER, name)
         if name not in built:
             yield MutatorError("not part of the report", where=path, remedy="delete it")
         elif name not in stored:
