@@ -6,6 +6,7 @@
       runs/<digest>.json   verified run folders
       lines/<digest>.json  lines that a golden run executes
       pictures/<digest>.json  effects of image faults, for review
+      pages/<digest>/      reports that the server built
       targets/<name>/      files that a target keeps for its runs (`{cache}` in its manifest)
 
 Results never depend on the cache. Each entry is found by a digest of its inputs and checked before use. An
@@ -22,18 +23,19 @@ from urllib.parse import quote
 from mutator._common.hashing import content_id
 
 CHECKS, GOLDENS, RUNS = "checks", "goldens", "runs"
-LINES, PICTURES, TARGETS = "lines", "pictures", "targets"
+LINES, PICTURES, PAGES, TARGETS = "lines", "pictures", "pages", "targets"
 _LONGEST_NAME = 200
 TARGET_BYTES = 4_000_000_000  # size limit for one target, enforced between seeds
+PAGES_BYTES = 500_000_000  # size limit for all reports that the server built
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Entry:
     """A cached item that is kept or deleted as a whole.
 
-    `what` is the part of the cache: `checks`, `goldens`, `runs`, `lines`, `pictures` or, for example, `target
-    openpilot`. `size` is the size on disk in bytes, `used` the time of the last use in seconds since the
-    epoch.
+    `what` is the part of the cache: `checks`, `goldens`, `runs`, `lines`, `pictures`, `pages` or, for
+    example, `target openpilot`. `size` is the size on disk in bytes, `used` the time of the last use in
+    seconds since the epoch.
     """
 
     what: str
@@ -80,6 +82,10 @@ def of_pictures() -> Path:
     return folder() / PICTURES
 
 
+def of_pages() -> Path:
+    return folder() / PAGES
+
+
 def of_target(name: str) -> Path:
     """The folder that all runs of a target share."""
     quoted = quote(name, safe="").replace(".", "%2E")
@@ -93,6 +99,7 @@ def entries() -> list[Entry]:
     found += [_entry(RUNS, path) for path in _children(of_runs())]
     found += [_entry(LINES, path) for path in _children(of_lines())]
     found += [_entry(PICTURES, path) for path in _children(of_pictures())]
+    found += [_entry(PAGES, path) for path in _children(of_pages())]
     for target in _children(folder() / TARGETS):
         found += [_entry(f"target {target.name}", path) for path in _files(target)]
     return sorted(found, key=lambda entry: (entry.what, entry.path))
@@ -110,6 +117,11 @@ def make_room(target: str) -> list[Entry]:
     A run calls it before each seed, because each seed has its own images.
     """
     return _pruned([_entry(f"target {target}", path) for path in _files(of_target(target))], TARGET_BYTES)
+
+
+def prune_pages() -> list[Entry]:
+    """Delete the least recently used reports of the server until at most PAGES_BYTES remain; return them."""
+    return _pruned([_entry(PAGES, path) for path in _children(of_pages())], PAGES_BYTES)
 
 
 def _pruned(kept: list[Entry], most: int) -> list[Entry]:

@@ -36,7 +36,7 @@ def made_from(folder: RunFolder, workspace: Workspace | None) -> str:
     """The digest of all inputs of a report, including the sources of mutator."""
     run = folder.path
     series = [series_facts(folder), digests.sha256(run / series_store.FOLDER / f"{series_store.INDEX}.js")]
-    return digest([SCHEMA, _sources(), list(_files_of(run)), series, _library(folder, workspace)])
+    return digest([SCHEMA, _sources(), run.name, list(_files_of(run)), series, _library(folder, workspace)])
 
 
 def is_current(run: Path, made_from: str) -> bool:

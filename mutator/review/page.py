@@ -30,6 +30,7 @@ SCRIPTS = (  # in load order: each uses earlier ones
     "review_commands.js",
     "review_outbox.js",
     "review_question.js",
+    "review_guard.js",
     "review.js",
 )
 
@@ -50,8 +51,8 @@ def page_html(
     options: Sequence[str],
     served: Mapping[str, Any] | None = None,
 ) -> str:
-    """The page of `groups`. `served` has what a served page needs: target, reviewer, address for decisions,
-    runs."""
+    """The page of `groups`. `served` has what a served page needs: target, reviewer, address and token for
+    decisions, runs."""
     data = {
         "target": review.target,
         "states": [state.value for state in State],

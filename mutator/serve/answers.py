@@ -4,7 +4,7 @@ import os
 import re
 import tempfile
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from pydantic import ValidationError
 from starlette.exceptions import HTTPException
@@ -14,6 +14,7 @@ from starlette.types import Receive, Scope, Send
 
 from mutator.errors import MutatorError
 from mutator.serve.home import error_page
+from mutator.serve.page_tokens import UnknownPage
 from mutator.serve.runs import Absent
 
 _KINDS = {
@@ -28,22 +29,25 @@ _KINDS = {
     ".png": "image/png",
     ".svg": "image/svg+xml",
 }
+# For files that somebody else may have written: as pages of no origin, which run and load nothing. The styles
+# are those of figures.
+STORED = {"Content-Security-Policy": "default-src 'none'; style-src 'unsafe-inline'; sandbox"}
 _FOLDERS = re.compile(r"(?<![\w.~-])/(?!dev/null)(?:[^/\s'\"`]+/)+")
 
 
 class OpenFile(FileResponse):
     """Sends an open file, and then closes it."""
 
-    def __init__(self, descriptor: int, name: str) -> None:
-        self._descriptor = descriptor
-        place = f"/proc/self/fd/{descriptor}"
-        super().__init__(place, media_type=kind_of(name), stat_result=os.fstat(descriptor))
+    def __init__(self, file: BinaryIO, name: str) -> None:
+        self._file = file
+        place, facts = f"/proc/self/fd/{file.fileno()}", os.fstat(file.fileno())
+        super().__init__(place, media_type=kind_of(name), headers=STORED, stat_result=facts)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         try:
             await super().__call__(scope, receive, send)
         finally:
-            os.close(self._descriptor)
+            self._file.close()
 
 
 def kind_of(name: str) -> str:
@@ -70,7 +74,7 @@ def error_facts(error: MutatorError) -> dict[str, Any]:
 def on_error(request: Request, error: Exception) -> Response:
     """Return the response to a failed request: JSON for scripts, a page for people."""
     known = _known(error)
-    status = 404 if isinstance(known, Absent) else 400
+    status = 404 if isinstance(known, Absent) else 403 if isinstance(known, UnknownPage) else 400
     if isinstance(error, HTTPException):
         status = error.status_code
     facts = error_facts(known)

@@ -8,7 +8,8 @@ from starlette.responses import JSONResponse, Response
 from mutator.errors import MutatorError
 from mutator.serve.answers import error_facts
 from mutator.serve.jobs import Ended, Jobs
-from mutator.serve.orders import Desk
+from mutator.serve.orders import Desk, Work
+from mutator.serve.page_tokens import HEADER, HOME, PageTokens, review_page, run_page
 from mutator.serve.reviews import Decisions, Moved, Reviews, Selection
 from mutator.serve.runs import Runs
 
@@ -16,14 +17,15 @@ _MOST_WORDS = 100  # the maximum number of parameters in an address
 
 
 class ReviewApi:
-    def __init__(self, reviews: Reviews, runs: Runs) -> None:
-        self._reviews, self._runs = reviews, runs
+    def __init__(self, reviews: Reviews, runs: Runs, tokens: PageTokens) -> None:
+        self._reviews, self._runs, self._tokens = reviews, runs, tokens
 
     def told(self, request: Request) -> Response:
         return JSONResponse(self._reviews.told(asked(self._reviews, request)))
 
     def decide(self, request: Request, body: bytes) -> Response:
-        """Save decisions, remarks and flags: all or none."""
+        """Save decisions, remarks and flags: all or none. Only the target's review page can send them."""
+        self._tokens.check(_token(request), review_page(request.path_params["target"]))
         chosen, wanted = asked(self._reviews, request), Decisions.model_validate_json(body)
         try:
             return JSONResponse(self._reviews.decide(chosen, wanted))
@@ -57,24 +59,39 @@ class ReviewApi:
 
 
 class JobApi:
-    def __init__(self, desk: Desk, jobs: Jobs) -> None:
-        self._desk, self._jobs = desk, jobs
+    """Jobs for the first page, which can start and cancel all, and for a report, which can start and cancel
+    those of its run."""
+
+    def __init__(self, desk: Desk, jobs: Jobs, tokens: PageTokens) -> None:
+        self._desk, self._jobs, self._tokens = desk, jobs, tokens
 
     def told(self, _: Request) -> Response:
         return JSONResponse({"jobs": [job.told() for job in self._jobs.all()]})
 
-    def submit(self, _: Request, body: bytes) -> Response:
-        return JSONResponse({"id": self._jobs.submit(self._desk.work(body)).id}, 201)
+    def submit(self, request: Request, body: bytes) -> Response:
+        work = self._desk.work(body)
+        self._check(request, work)
+        return JSONResponse({"id": self._jobs.submit(work).id}, 201)
 
     def log(self, request: Request) -> Response:
         return JSONResponse({"log": self._jobs.get(request.path_params["job"]).text})
 
     def cancel(self, request: Request, _: bytes) -> Response:
+        job = self._jobs.get(request.path_params["job"])
+        self._check(request, job.work)
         try:
-            self._jobs.cancel(request.path_params["job"])
+            self._jobs.cancel(job.id)
         except Ended as err:
             return JSONResponse(error_facts(err), 409)
-        return JSONResponse({"id": request.path_params["job"]})
+        return JSONResponse({"id": job.id})
+
+    def _check(self, request: Request, work: Work) -> None:
+        pages = [run_page(work.run)] if work.run else []
+        self._tokens.check(_token(request), HOME, *pages)
+
+
+def _token(request: Request) -> str:
+    return request.headers.get(HEADER, "")
 
 
 def asked(reviews: Reviews, request: Request) -> Selection:

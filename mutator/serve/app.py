@@ -20,9 +20,10 @@ from mutator.serve.api import JobApi, ReviewApi, asked
 from mutator.serve.home import home_page, offered
 from mutator.serve.jobs import Jobs
 from mutator.serve.orders import TRIES, Desk, Work
+from mutator.serve.page_tokens import HOME, PageTokens, review_page
 from mutator.serve.report_pages import Shown
 from mutator.serve.reviews import Reviews
-from mutator.serve.runs import Absent, Runs, open_below, report_of, told
+from mutator.serve.runs import Absent, Runs, open_file, report_of, told
 from mutator.serve.security import assets
 from mutator.web import asset
 from mutator.workspace import Workspace
@@ -38,12 +39,13 @@ class Site:
     workspace: Workspace
     runs: Runs
     at_once: int = 1
+    tokens: PageTokens = field(default_factory=PageTokens)
     shown: Shown = field(init=False)
     reviews: Reviews = field(init=False)
     jobs: Jobs = field(init=False)
 
     def __post_init__(self) -> None:
-        self.shown = Shown(self.workspace, self.runs)
+        self.shown = Shown(self.workspace, self.runs, self.tokens)
         self.reviews = Reviews(self.workspace)
         self.jobs = Jobs(self.at_once, self._report_at)
 
@@ -63,8 +65,8 @@ def application(site: Site) -> Starlette:
         yield
         await run_in_threadpool(site.jobs.close)
 
-    reviews = ReviewApi(site.reviews, site.runs)
-    jobs = JobApi(Desk(site.workspace, site.runs), site.jobs)
+    reviews = ReviewApi(site.reviews, site.runs, site.tokens)
+    jobs = JobApi(Desk(site.workspace, site.runs), site.jobs, site.tokens)
     routes = [
         *_pages(site),
         Route("/api/library", _quick(lambda _: JSONResponse(offered(site.workspace)))),
@@ -106,7 +108,7 @@ def _sent(answer: Callable[[Request, bytes], Response]) -> Answer:
 
 def _pages(site: Site) -> list[Route]:
     def home(_: Request) -> Response:
-        return HTMLResponse(home_page(site.workspace, site.told_runs()))
+        return HTMLResponse(home_page(site.workspace, site.told_runs(), site.tokens.token(HOME)))
 
     def run(request: Request) -> Response:
         return RedirectResponse(report_of(request.path_params["run"]))
@@ -122,13 +124,14 @@ def _pages(site: Site) -> list[Route]:
         tried = re.fullmatch(r"[0-9a-f]{16}", request.path_params["name"])
         if tried is None:
             raise Absent("no such plot")
-        return OpenFile(open_below(site.runs.new / TRIES, [tried[0]], _PLOT), _PLOT)
+        return OpenFile(open_file(site.runs.new, f"{TRIES}/{tried[0]}/{_PLOT}"), _PLOT)
 
     def review(request: Request) -> Response:
         chosen = asked(site.reviews, request)
         own = [run for run in site.told_runs() if run["target"] == chosen.target]
         runs = [{"key": run["key"], "name": run["key"]} for run in own]
-        return HTMLResponse(site.reviews.page(chosen, request.url.query, runs))
+        token = site.tokens.token(review_page(chosen.target))
+        return HTMLResponse(site.reviews.page(chosen, request.url.query, runs, token))
 
     return [
         Route("/", _quick(home)),

@@ -13,8 +13,9 @@ from mutator.workspace import Workspace
 _MOST_PAIRS = 20  # pairs of runs offered for comparison
 
 
-def home_page(workspace: Workspace, runs: Sequence[Mapping[str, Any]]) -> str:
-    return _rendered("home.html", runs=runs, pairs=_pairs(runs), targets=tuple(workspace.targets))
+def home_page(workspace: Workspace, runs: Sequence[Mapping[str, Any]], token: str) -> str:
+    targets = tuple(workspace.targets)
+    return _rendered("home.html", runs=runs, pairs=_pairs(runs), targets=targets, token=token)
 
 
 def error_page(facts: Mapping[str, Any]) -> str:

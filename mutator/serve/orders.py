@@ -11,13 +11,14 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, TypeAdapter
 
+from mutator._common.below import check_plain
 from mutator._common.cores import usable_cores
 from mutator._common.text import one_of, suggestion
 from mutator.campaigns.filters import compile_filter
 from mutator.config.yaml_files import StrictModel
 from mutator.errors import MutatorError
 from mutator.outcomes.columns import PLAN_COLUMNS
-from mutator.serve.runs import Runs, check_no_links, report_of
+from mutator.serve.runs import Runs, report_of
 from mutator.store import plan_file
 from mutator.triggers.conditions import check_condition
 from mutator.workspace import Workspace
@@ -102,6 +103,7 @@ class Work:
     title: str
     words: tuple[str, ...]
     folder: Path | None = None
+    run: Path | None = None  # the run whose report can request it
     result: str | None = None  # the page with the result
 
 
@@ -151,6 +153,7 @@ class Desk:
             title=f"{order.experiment} of {order.run}: {what}",
             words=(*words, f"--run={folder}", *self._place()),
             folder=folder,
+            run=folder,
             result=f"{report_of(order.run)}#e={order.experiment}",
         )
 
@@ -158,7 +161,7 @@ class Desk:
         folder = self._folder(order.run)
         words = ("report", str(folder), *self._place())
         title, result = f"report of {order.run}", report_of(order.run)
-        return Work(order=order, title=title, words=words, folder=folder, result=result)
+        return Work(order=order, title=title, words=words, folder=folder, run=folder, result=result)
 
     def _try(self, order: Try) -> Work:
         spec = next((one for one in self.workspace.specs() if one.name == order.spec), None)
@@ -226,7 +229,7 @@ class Desk:
     def _folder(self, key: str) -> Path:
         """Return the run folder with this key; MutatorError if it contains links."""
         folder = self.runs.folder(key)
-        check_no_links(folder)
+        check_plain(folder)
         return folder
 
     def _new(self, name: str) -> Path:
@@ -234,7 +237,7 @@ class Desk:
         if folder.is_symlink():
             raise MutatorError(f"{name} is a link", expected="a new folder", remedy="choose another name")
         if folder.is_dir():
-            check_no_links(folder)
+            check_plain(folder)
         return folder.resolve()
 
     def _place(self) -> list[str]:

@@ -1,11 +1,11 @@
-"""Reports and comparisons of the served runs, rebuilt when outdated."""
+"""Reports and comparisons, which the server builds from the data of the served runs, and files of runs."""
 
-import os
 import threading
 from pathlib import Path
 
 from starlette.responses import HTMLResponse, Response
 
+from mutator._common.below import check_plain
 from mutator._common.hashing import digest
 from mutator.comparison import comparison as comparing
 from mutator.comparison import pages
@@ -13,15 +13,20 @@ from mutator.errors import MutatorError
 from mutator.outcomes.fault_free import fault_free_runs, own_alerts
 from mutator.outcomes.reader import Results
 from mutator.report import building
-from mutator.serve.answers import OpenFile, kind_of
-from mutator.serve.runs import REPORT, Absent, Runs, check_no_links, open_in_run
+from mutator.report.panel import FOLDER
+from mutator.report.stamp import made_from
+from mutator.serve.answers import STORED, OpenFile, kind_of
+from mutator.serve.page_tokens import PageTokens, run_page
+from mutator.serve.report_cache import ReportCache
+from mutator.serve.runs import Absent, Runs, open_in_run
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_script import read_script, script_of
 from mutator.workspace import Workspace
 
-_STUDY = "report/study.html"
-_STYLES = b'<link rel="stylesheet" href="/assets/served.css">\n</head>'
-_SCRIPT = b"""<script src="/assets/jobs.js" defer></script>
+_HEAD = """<meta name="mutator-page" content="{}">
+<link rel="stylesheet" href="/assets/served.css">
+</head>"""
+_SCRIPTS = b"""<script src="/assets/jobs.js" defer></script>
 <script src="/assets/served.js" defer></script>
 </body>"""
 _MOST_COMPARED = 4  # cached comparisons
@@ -30,18 +35,19 @@ _MOST_COMPARED = 4  # cached comparisons
 class Shown:
     """Serves files of the runs, and pages made from them. Only one page is made at a time."""
 
-    def __init__(self, workspace: Workspace, runs: Runs) -> None:
-        self._workspace, self._runs = workspace, runs
+    def __init__(self, workspace: Workspace, runs: Runs, tokens: PageTokens) -> None:
+        self._workspace, self._runs, self._tokens = workspace, runs, tokens
+        self._reports = ReportCache()
         self._making = threading.Lock()
         self._compared: dict[tuple[str, str], dict[str, bytes]] = {}
 
     def file(self, key: str, name: str) -> Response:
-        """Open a file of a run; Absent if it is not served."""
+        """Open a file of a run, or a part of its report; Absent if it is not served."""
         run = self._runs.folder(key)
-        if name in (REPORT, _STUDY):
-            return self._page(run, name)
+        if name.startswith(f"{FOLDER}/"):
+            return self._of_report(run, name.removeprefix(f"{FOLDER}/"))
         if name.endswith(".js"):
-            return Response(_series(run, name), media_type=kind_of(name))
+            return Response(_series(run, name), media_type=kind_of(name), headers=STORED)
         return OpenFile(open_in_run(run, name), name)
 
     def comparison(self, a: str, b: str, name: str) -> Response:
@@ -57,14 +63,21 @@ class Shown:
             raise Absent("no such file", expected=f"one of {', '.join(made)}")
         return Response(made[name], media_type=kind_of(name))
 
-    def _page(self, run: Path, name: str) -> Response:
-        check_no_links(run)
+    def _of_report(self, run: Path, name: str) -> Response:
+        """Build the report if it is not cached, whatever report the run folder contains."""
+        check_plain(run)
+        folder = RunFolder.open(run)
         with self._making:
-            building.ensure(run, self._workspace)
-        data = _read(open_in_run(run, name))
-        if name == REPORT:
-            data = _STYLES.join(data.split(b"</head>", 1))
-            data = _SCRIPT.join(data.rsplit(b"</body>", 1))
+            key = made_from(folder, self._workspace)
+            data = self._reports.file(key, name, lambda: building.build(folder, self._workspace).files)
+        if data is None:
+            raise Absent("no such file", expected="a file of the report")
+        if not name.endswith(".html"):
+            return Response(data, media_type=kind_of(name), headers=STORED)
+        if name == building.PAGE:
+            head = _HEAD.format(self._tokens.token(run_page(run))).encode()
+            data = head.join(data.split(b"</head>", 1))
+            data = _SCRIPTS.join(data.rsplit(b"</body>", 1))
         return HTMLResponse(data)
 
     def _comparison(self, a: Path, b: Path) -> dict[str, bytes]:
@@ -85,7 +98,8 @@ class Shown:
 
 def _series(run: Path, name: str) -> bytes:
     """Read a script of series; Absent unless it equals the output of `write_script` for the same data."""
-    data = _read(open_in_run(run, name))
+    with open_in_run(run, name) as file:
+        data = file.read()
     path = run / name
     try:
         if script_of(path.stem, read_script(path)) == data:
@@ -93,8 +107,3 @@ def _series(run: Path, name: str) -> bytes:
     except MutatorError:
         pass
     raise Absent("no such file", expected="series as a run writes them")
-
-
-def _read(descriptor: int) -> bytes:
-    with os.fdopen(descriptor, "rb") as file:
-        return file.read()

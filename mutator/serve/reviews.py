@@ -109,12 +109,13 @@ class Reviews:
             raise Absent(f"no group '{name}'", expected="the id of a group on the page")
         return found
 
-    def page(self, chosen: Selection, query: str, runs: Sequence[Mapping[str, Any]]) -> str:
+    def page(self, chosen: Selection, query: str, runs: Sequence[Mapping[str, Any]], token: str) -> str:
         review, groups = load_review(self.workspace, chosen.target), self.groups(chosen)
         served = {
             "target": chosen.target,
             "by": self.reviewer,
             "api": f"/api/review/{chosen.target}",
+            "token": token,
             "query": f"?{query}" if query else "",
             "runs": runs,
         }

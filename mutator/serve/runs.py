@@ -1,15 +1,14 @@
 """Find the served run folders at each request, summarise them, and open their files."""
 
-import os
-import stat
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 from urllib.parse import quote
 
+from mutator._common.below import Outside, open_below
 from mutator._common.places import RUN_HEAD
 from mutator.errors import MutatorError
 from mutator.outcomes.counting import outcome_counts
@@ -20,14 +19,10 @@ REPORT = "report/index.html"
 # folder in a run folder -> served file types
 SERVED: Mapping[str, tuple[str, ...]] = {
     "": (".csv",),
-    "report": (".html", ".md"),
-    "report/tables": (".csv",),
-    "report/figures": (".svg", ".png"),
     "plots": (".svg", ".png", ".jpg", ".mp4", ".gif"),
     "series": (".js",),
     "series/kept": (".js",),
 }
-_FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW
 
 
 class Absent(MutatorError):
@@ -110,52 +105,20 @@ def _outcomes(run: Path, mtime_ns: int, size: int) -> dict[str, int]:
     return outcome_counts(Results.of_run(run).texts())
 
 
-def check_no_links(run: Path) -> None:
-    """Raise MutatorError for a link in a run folder: commands would write to the link's target."""
-    folders = [str(run)]
-    while folders:
-        with suppress(FileNotFoundError), os.scandir(folders.pop()) as entries:
-            for entry in entries:
-                if entry.is_symlink():
-                    raise MutatorError(
-                        f"{Path(entry.path).relative_to(run)} is a link",
-                        where=run.name,
-                        expected="only files and folders",
-                        remedy="delete the link",
-                    )
-                if entry.is_dir():
-                    folders.append(entry.path)
-
-
-def open_in_run(run: Path, name: str) -> int:
-    """Open a file of a run and return its descriptor; Absent if the file is not served."""
+def open_in_run(run: Path, name: str) -> BinaryIO:
+    """Open a file of a run; Absent if it is not served."""
     folder, _, last = name.rpartition("/")
     if Path(last).suffix not in SERVED.get(folder, ()):
         raise _absent()
-    return open_below(run, [part for part in folder.split("/") if part], last)
+    return open_file(run, name)
 
 
-def open_below(root: Path, folders: Sequence[str], name: str) -> int:
-    """Open a plain file in the innermost of these folders; Absent if there is none.
-
-    Links are not followed: each folder is opened relative to the one before.
-    """
+def open_file(root: Path, name: str) -> BinaryIO:
+    """Open a file below a folder without following links; Absent if there is no plain file."""
     try:
-        handle = os.open(root, os.O_RDONLY | os.O_DIRECTORY)
-        try:
-            for part in folders:
-                inner = os.open(part, _FOLDER, dir_fd=handle)
-                os.close(handle)
-                handle = inner
-            file = os.open(name, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK, dir_fd=handle)
-        finally:
-            os.close(handle)
-    except (OSError, ValueError):  # a name with a NUL, or one that cannot be encoded
+        return open_below(root, name)
+    except (OSError, Outside):
         raise _absent() from None
-    if not stat.S_ISREG(os.fstat(file).st_mode):
-        os.close(file)
-        raise _absent()
-    return file
 
 
 def _absent() -> Absent:

@@ -23,7 +23,14 @@ from mutator.web import asset
 HOST = "127.0.0.1"
 MOST_BYTES = 1_000_000  # the longest body of a request
 _METHODS = ("GET", "HEAD", "POST")
+_FRAMES = ("frame", "iframe", "object", "embed", "fencedframe")
 _OWN_SITE = ("same-origin", "none")  # what browsers send for a site's own pages and for typed addresses
+# what they send with the requests of a page's script
+_OWN_SCRIPT = {
+    "sec-fetch-site": ("same-origin",),
+    "sec-fetch-dest": ("empty",),
+    "sec-fetch-mode": ("cors", "same-origin"),
+}
 
 
 class Guarded:
@@ -59,6 +66,15 @@ class Guarded:
             return _refusal("the request comes from another origin")
         if method == "POST" and not origins:
             return _refusal("the request has no origin")
+        if method == "POST" and any(
+            headers.get(name, own[0]) not in own for name, own in _OWN_SCRIPT.items()
+        ):
+            return _refusal("the request does not come from the script of a page")
+        use = headers.get("sec-fetch-dest", "")
+        if use in _FRAMES:
+            return _refusal("pages cannot be shown in other pages")
+        if use == "empty" and not scope["path"].startswith("/api/"):
+            return _refusal("scripts cannot read pages, because pages contain tokens")
         if headers.get("sec-fetch-site", "none") not in _OWN_SITE:
             return _refusal("the request comes from another site")
         return None
@@ -124,7 +140,7 @@ def _with_policy(send: Send) -> Send:
     async def guarded(message: Message) -> None:
         if message["type"] == "http.response.start":
             headers = MutableHeaders(scope=message)
-            headers["Content-Security-Policy"] = policy()
+            headers.setdefault("Content-Security-Policy", policy())
             headers["X-Content-Type-Options"] = "nosniff"
             headers["Referrer-Policy"] = "no-referrer"
             headers["Cross-Origin-Resource-Policy"] = "same-origin"

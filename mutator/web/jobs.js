@@ -1,11 +1,14 @@
 "use strict";
 // The server's jobs on every served page: progress, cancel, log and result. The server keeps the list, so it
-// survives a reload.
+// survives a reload. The first page can start and cancel any job, a report only those of its run.
 
 const Jobs = (() => {
   const { el } = Dom;
   const SOON_MS = 1000, LATER_MS = 5000, SHOWN = 20;
   const ACTIVE = ["queued", "running"];
+  const token = document.querySelector('meta[name="mutator-page"]').content; // says which page sends a request
+  const [, kind, run] = location.pathname.split("/");
+  const mayCancel = (job) => kind !== "runs" || job.run === decodeURIComponent(run);
   const isActive = (job) => ACTIVE.includes(job.state);
   const rows = new Map(); // job id -> row
   const watchers = [];
@@ -17,7 +20,7 @@ const Jobs = (() => {
 
   /** The server's answer. Throws an Error with a readable message if the server refuses or is unreachable. */
   async function ask(address, body) {
-    const post = body && { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) };
+    const post = body && { method: "POST", headers: { "Content-Type": "application/json", "X-Mutator-Page": token }, body: JSON.stringify(body) };
     let response = null;
     try {
       response = await fetch(address, post);
@@ -99,7 +102,7 @@ const Jobs = (() => {
       if (job.progress === null) progress.removeAttribute("value");
       else progress.value = job.progress;
       message.textContent = job.message;
-      cancel.hidden = !isActive(job);
+      cancel.hidden = !isActive(job) || !mayCancel(job);
       result.hidden = !job.result;
       if (job.result) result.href = job.result;
     }

@@ -295,6 +295,6 @@ const Review = (() => {
 
   Packed.read("review").then((data) => {
     new Page(data);
-    document.documentElement.dataset.ready = "";
+    Guard.start(Boolean(data.served)).then(() => (document.documentElement.dataset.ready = ""));
   });
 })();

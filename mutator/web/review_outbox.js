@@ -77,7 +77,7 @@ class Outbox {
   }
 
   async #ask(address, body) {
-    const post = body && { method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(body) };
+    const post = body && { method: "POST", headers: { "content-type": "application/json", "x-mutator-page": this.served.token }, body: JSON.stringify(body) };
     try {
       const response = await fetch(address, { ...post, signal: AbortSignal.timeout(20_000) });
       return { status: response.status, data: await response.json().catch(() => null) };
@@ -115,7 +115,8 @@ class Outbox {
   #answered({ status, data }, batch) {
     if (status === 200 && data?.groups) this.#saved(batch, data.groups);
     else if (status === 409 && data?.groups) this.#conflicted(batch, data);
-    else if (status >= 400 && status < 500 && status !== 403 && data?.error) this.#refused(batch, Beside.words(data.error));
+    else if (status === 403 && data?.error) location.reload(); // the server was restarted: a new page sends the marks
+    else if (status >= 400 && status < 500 && data?.error) this.#refused(batch, Beside.words(data.error));
     else return false;
     this.events.offline("");
     return true;

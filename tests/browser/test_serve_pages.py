@@ -91,7 +91,7 @@ def test_a_try_and_a_campaign_can_run_and_jobs_can_be_cancelled(
     page.select_option("[name=campaign]", "small")
     for name in ("first", "second"):
         page.fill("[name=name]", name)
-        page.click("text=Run it")
+        page.click("button:text-is('Run it')")
         page.wait_for_selector(f"#jobs li:has-text('{name}')")
     page.click("#jobs li:has-text('second') button:text('Cancel')")
     page.wait_for_selector("#jobs li:has-text('second') .cancelled")

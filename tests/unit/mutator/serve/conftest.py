@@ -15,6 +15,7 @@ import pytest
 
 from mutator.report.panels import figures
 from mutator.serve.app import Site
+from mutator.serve.page_tokens import HEADER, HOME, review_page
 from mutator.serve.runs import Runs
 from mutator.serve.security import HOST
 from mutator.serve.server import listening, server_of
@@ -65,7 +66,7 @@ class Client:
         """Send a request as the server's page does. None in `headers` leaves a header out."""
         own: dict[str, str | None] = {"Host": f"{HOST}:{self.port}", "Cookie": f"mutator-{self.port}={TOKEN}"}
         if method == "POST":
-            own |= {"Origin": self.origin, "Content-Type": "application/json"}
+            own |= {"Origin": self.origin, "Content-Type": "application/json", HEADER: self.token_for(path)}
         sent = {name: value for name, value in (own | dict(headers or {})).items() if value is not None}
         connection = http.client.HTTPConnection(HOST, self.port, timeout=60)
         try:
@@ -89,6 +90,11 @@ class Client:
         assert SECRET not in said
         assert str(self.place) not in said
         return found
+
+    def token_for(self, path: str) -> str:
+        """The token of the page that can send any request to `path`."""
+        target = path.partition("/api/review/")[2].partition("?")[0]
+        return self.site.tokens.token(review_page(target) if target else HOME)
 
     def get(self, path: str, **headers: str | None) -> Answer:
         return self.ask("GET", path, {name.replace("_", "-"): value for name, value in headers.items()})

@@ -3,9 +3,12 @@
 import base64
 import hashlib
 import re
+from collections.abc import Mapping
+from pathlib import Path
 
 import pytest
 
+from mutator.serve.page_tokens import HEADER, HOME, PageTokens, review_page, run_page
 from mutator.serve.security import MOST_BYTES
 
 from .conftest import TOKEN, Answer, Client
@@ -97,19 +100,101 @@ def test_a_body_within_the_limit_is_read(client: Client) -> None:
         assert client.ask("POST", "/api/jobs", body=body, chunked=chunked).status == 400
 
 
-@pytest.mark.parametrize("path", [*ASKED, "/runs/night/results.csv", "/?token=wrong"])
+@pytest.mark.parametrize("path", [*ASKED, "/?token=wrong"])
 def test_every_response_has_the_policy(client: Client, path: str) -> None:
-    headers = client.get(path).headers
-    policy = headers["content-security-policy"]
+    policy = headers_of(client, path)["content-security-policy"]
     assert policy.startswith("default-src 'none'; script-src 'self' 'sha256-")
     assert "'unsafe-inline'" not in policy.replace("style-src-attr 'unsafe-inline'", "")
     for part in ("frame-ancestors 'none'", "base-uri 'none'", "form-action 'none'", "connect-src 'self'"):
         assert part in policy
+
+
+def test_a_file_of_a_run_has_a_stricter_policy(client: Client) -> None:
+    assert headers_of(client, "/runs/night/results.csv")["content-security-policy"].endswith("; sandbox")
+
+
+def headers_of(client: Client, path: str) -> Mapping[str, str]:
+    headers = client.get(path).headers
     assert headers["x-content-type-options"] == "nosniff"
     assert headers["referrer-policy"] == "no-referrer"
     assert headers["cache-control"] == "no-store"
     assert headers["cross-origin-resource-policy"] == "same-origin"
     assert "server" not in headers
+    return headers
+
+
+@pytest.mark.parametrize("use", ["iframe", "frame", "object", "embed", "empty"])
+@pytest.mark.parametrize("path", ["/", "/runs/night/report/index.html", "/review/toycar"])
+def test_a_page_is_neither_framed_nor_read_by_scripts(client: Client, path: str, use: str) -> None:
+    """Its token would be readable, or its buttons could be disguised."""
+    assert client.get(path, Sec_Fetch_Dest="document", Sec_Fetch_Site="none").status == 200
+    answer = client.get(path, Sec_Fetch_Dest=use, Sec_Fetch_Site="same-origin")
+    assert answer.status == 403
+    assert "<" not in answer.text
+    assert client.get("/api/jobs", Sec_Fetch_Dest="empty").status == 200
+
+
+@pytest.mark.parametrize(
+    "header",
+    [("Mode", "navigate"), ("Mode", "no-cors"), ("Dest", "document"), ("Site", "none")],
+)
+def test_only_a_script_can_post(client: Client, header: tuple[str, str]) -> None:
+    usual = {"Sec-Fetch-Mode": "cors", "Sec-Fetch-Dest": "empty", "Sec-Fetch-Site": "same-origin"}
+    assert client.ask("POST", "/api/jobs", usual, b"{}").status == 400
+    assert client.ask("POST", "/api/jobs", usual | {f"Sec-Fetch-{header[0]}": header[1]}, b"{}").status == 403
+
+
+PAGES = (HOME, run_page(Path("/elsewhere")), review_page("toycar"), review_page("other"))
+
+
+def strangers(client: Client, *allowed: str) -> list[str]:
+    """The tokens of all other pages, and no token."""
+    night, linked = (run_page(client.place / "runs" / name) for name in ("night", "linked"))
+    tokens = [client.site.tokens.token(page) for page in {*PAGES, night, linked} - {*allowed}]
+    return [*tokens, "", "a", "\xff", PageTokens().token(allowed[0])]
+
+
+def test_only_the_review_page_decides(client: Client) -> None:
+    path, own = "/api/review/toycar", review_page("toycar")
+    [group, *_] = groups = client.get(path).json["groups"]
+    facts = groups[group]
+    body = {
+        "changes": [{"group": group, "kind": "approve"}],
+        "by": "Jane",
+        "seen": {group: facts["revision"]},
+        "digests": {group: facts["digest"]},
+    }
+    for token in strangers(client, own):
+        assert client.ask("POST", path, {HEADER: token}, body).status == 403
+    assert client.get(path).json["groups"][group]["state"] == "new"
+    assert client.ask("POST", path, {HEADER: client.site.tokens.token(own)}, body).status == 200
+    assert client.get(path).json["groups"][group]["state"] == "approved"
+
+
+def test_a_run_page_starts_and_cancels_only_jobs_of_its_run(
+    client: Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    night = run_page(client.place / "runs" / "night")
+    own = client.site.tokens.token(night)
+    orders: list[dict[str, object]] = [
+        {"kind": "report", "run": "night"},
+        {"kind": "try", "spec": "sensor/distance", "scenario": "near"},
+        {"kind": "campaign", "campaign": "small", "name": "night"},
+    ]
+    for order in orders:
+        for token in [*strangers(client, HOME, night), *([own] if "run" not in order else [])]:
+            assert client.ask("POST", "/api/jobs", {HEADER: token}, order).status in (400, 403)
+    assert not client.get("/api/jobs").json["jobs"]
+    monkeypatch.setattr(client.site.jobs, "_started", lambda job: None)
+    ids = [client.ask("POST", "/api/jobs", {HEADER: own}, orders[0]).json["id"]]
+    ids += [client.post("/api/jobs", order).json["id"] for order in orders[:1]]
+    campaign = client.post("/api/jobs", orders[2] | {"name": "later"}).json["id"]
+    for token in [*strangers(client, HOME, night), own]:
+        assert client.ask("POST", f"/api/jobs/{campaign}/cancel", {HEADER: token}, {}).status == 403
+    states = {job["id"]: job["state"] for job in client.get("/api/jobs").json["jobs"]}
+    assert states == dict.fromkeys([*ids, campaign], "queued")
+    for job, token in ((ids[0], own), (ids[1], own), (campaign, client.token_for("/api/jobs"))):
+        assert client.ask("POST", f"/api/jobs/{job}/cancel", {HEADER: token}, {}).status == 200
 
 
 def blocks(page: str, tag: str) -> list[str]:

@@ -1,0 +1,48 @@
+"""Tokens by which the server recognises the page that sends a request.
+
+The cookie says who asks, and every page sends it. Only a page that the server built also carries a token,
+and its script sends the token along. So a decision comes from the review's own page, and a job from the page
+of its run or from the first page.
+"""
+
+import hashlib
+import hmac
+import secrets
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from mutator.errors import MutatorError
+
+HEADER = "x-mutator-page"
+HOME = "home"
+
+
+class UnknownPage(MutatorError):
+    """The request comes from a page that may not send it, or from a page of an earlier server."""
+
+
+@dataclass(frozen=True, slots=True)
+class PageTokens:
+    """The tokens of one server. They are no longer valid when it has ended."""
+
+    _key: bytes = field(default_factory=lambda: secrets.token_bytes(32))
+
+    def token(self, page: str) -> str:
+        return hmac.new(self._key, page.encode("utf-8", "surrogateescape"), hashlib.sha256).hexdigest()
+
+    def check(self, token: str, *pages: str) -> None:
+        """Raise UnknownPage unless the token is that of one of these pages."""
+        if not any(hmac.compare_digest(self.token(page).encode(), token.encode()) for page in pages):
+            raise UnknownPage(
+                "the request does not come from the page that may send it",
+                remedy="reload the page; start other jobs on the first page",
+            )
+
+
+def run_page(folder: Path) -> str:
+    """The name of a run's report for `PageTokens`."""
+    return f"run {folder}"
+
+
+def review_page(target: str) -> str:
+    return f"review {target}"

@@ -1,0 +1,59 @@
+"""Reports that the server builds from runs, in memory and in the cache of all commands.
+
+The server never sends a page that is stored in a run folder, because whoever made the folder could have
+written it.
+"""
+
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+
+from mutator._common import caches
+from mutator._common.below import read_below, write_below
+from mutator._common.files import json_bytes, json_object
+from mutator._common.hashing import digest
+from mutator.errors import MutatorError
+
+SCHEMA = "pages/1"
+FILE = "files.json"
+_MOST_IN_MEMORY = 2
+
+
+class ReportCache:
+    """The files of reports, by the digest of their inputs (`stamp.made_from`) and by name."""
+
+    def __init__(self) -> None:
+        self._memory: dict[str, Mapping[str, bytes]] = {}
+
+    def file(self, key: str, name: str, build: Callable[[], Mapping[str, bytes]]) -> bytes | None:
+        """Return a file of a report, or None if it has no such file. `build` builds a report that is not
+        cached."""
+        files = self._memory.pop(key, None) or _stored(key)
+        if files is None:
+            files = build()
+            with suppress(OSError, MutatorError):  # the cache cannot be written
+                _store(key, files)
+        self._memory[key] = files
+        for old in list(self._memory)[:-_MOST_IN_MEMORY]:
+            del self._memory[old]
+        return files.get(name)
+
+
+def _stored(key: str) -> Mapping[str, bytes] | None:
+    """Read a report from the cache; None if it is missing or damaged."""
+    place = caches.of_pages() / key
+    try:
+        digests = json_object(read_below(place, FILE), place / FILE, SCHEMA)["files"]
+        files = {name: read_below(place, name) for name in digests}
+    except (OSError, MutatorError, LookupError, TypeError):
+        return None
+    return files if {name: digest(data) for name, data in files.items()} == digests else None
+
+
+def _store(key: str, files: Mapping[str, bytes]) -> None:
+    place = caches.of_pages() / key
+    place.mkdir(parents=True, exist_ok=True)
+    for name, data in files.items():
+        write_below(place, name, data)
+    digests = {name: digest(data) for name, data in files.items()}
+    write_below(place, FILE, json_bytes({"schema": SCHEMA, "files": digests}))  # last: marks it as complete
+    caches.prune_pages()

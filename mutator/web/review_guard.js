@@ -1,0 +1,33 @@
+"use strict";
+// Ignores clicks and keys that cannot be meant for a served review: events of scripts, repeats of a key that is held down, and
+// input in the first instants after the page appears, which the user may have meant for the page before it.
+
+const Guard = (() => {
+  const CALM_MS = 500;
+  const INPUT = ["click", "keydown", "submit"];
+  let shown = performance.now();
+  const left = () => shown + CALM_MS - performance.now();
+
+  /** Whether a key that is held down would decide again. It may move between groups, scroll and edit text. */
+  function isHeld({ repeat, key, target }) {
+    return repeat && !/^(INPUT|TEXTAREA)$/.test(target.tagName) && (key === "Enter" || (key.length === 1 && !"jk".includes(key)));
+  }
+
+  function check(event) {
+    if (event.isTrusted && left() <= 0 && !isHeld(event)) return;
+    event.preventDefault();
+    event.stopImmediatePropagation();
+  }
+
+  /** Begin to ignore such input if `isOn`. The promise ends with the first instants. */
+  async function start(isOn) {
+    if (!isOn) return;
+    for (const kind of INPUT) addEventListener(kind, check, { capture: true });
+    document.addEventListener("visibilitychange", (event) => {
+      if (event.isTrusted && !document.hidden) shown = performance.now();
+    });
+    await new Promise((done) => setTimeout(done, Math.max(0, left()) + 1));
+  }
+
+  return { start };
+})();
