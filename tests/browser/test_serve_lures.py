@@ -10,11 +10,13 @@ import pytest
 
 from mutator._common.hashing import digest
 from mutator.report.panels import figures
+from mutator.report.stamp import made_from
 from mutator.review.catalogue import of_library
 from mutator.review.decisions import load_review
 from mutator.review.page import page_html
 from mutator.serve.jobs import Jobs
 from mutator.store import digests
+from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
 pytestmark = pytest.mark.slow
@@ -68,9 +70,10 @@ def runs(run: Path, workspace: Workspace) -> Path:
     for name, text in stored_pages(workspace).items():
         (report / name).parent.mkdir(exist_ok=True)
         (report / name).write_text(text)
-    stamp = json.loads((report / "made_from.json").read_text())
-    paths = [path for path in report.rglob("*.*") if path.name != "made_from.json"]
-    stamp["files"] = {path.relative_to(report).as_posix(): digest(path.read_bytes()) for path in paths}
+    (report / "made_from.json").unlink()
+    files = {path.relative_to(report).as_posix(): digest(path.read_bytes()) for path in report.rglob("*.*")}
+    inputs = made_from(RunFolder.open(night), workspace)
+    stamp = {"schema": "report/1", "made_from": inputs, "files": files}
     (report / "made_from.json").write_text(json.dumps(stamp))
     return place
 
