@@ -1,9 +1,10 @@
 """What the workers of a session wrote, compared before it counts. A mutant can write to these files, too."""
 
+import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 
-from mutator._common.below import read_below, unlink_below, write_below
+from mutator._common.below import open_below, read_below, unlink_below, write_below
 from mutator._common.files import raising_disk_full
 from mutator.store import digests
 
@@ -40,4 +41,5 @@ class WrittenFiles:
     def _is_as_written(self, run: Path, name: str) -> bool:
         if Path(name).stem in self._unreported:
             return True
-        return digests.sha256(run / name) == self._sums.get(name)
+        with open_below(run, name) as file:
+            return hashlib.file_digest(file, "sha256").hexdigest() == self._sums.get(name)
