@@ -110,7 +110,9 @@ class RunExperiment(ExperimentResult):
     @property
     def is_drawn(self) -> bool:
         """Whether the run folder has the plot and an undamaged series."""
-        return self.plot_file.exists() and SeriesFolder(self.run.path).is_readable(self.id)
+        if self.record is None or not self.plot_file.exists():
+            return False
+        return SeriesFolder(self.run.path).is_readable(self.id, self.record)
 
     def not_run(self) -> MutatorError:
         """Return the error for an experiment that has not run."""

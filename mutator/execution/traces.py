@@ -66,11 +66,11 @@ class Traces:
         series, if it is damaged, or if the rerun fails.
         """
         series = SeriesFolder(self.folder.path)
-        found = series.read(experiment_id)
+        record = self.record(experiment_id)
+        found = series.read(experiment_id, record)
         if found is None and drive:
-            traces, record = self.of(experiment_id), self.record(experiment_id)
-            keep_series(self.folder.path, self.manifest, *traces, record)
-            found = series.read(experiment_id)
+            keep_series(self.folder.path, self.manifest, *self.of(experiment_id), record)
+            found = series.read(experiment_id, record)
         if found is None:
             raise MutatorError(
                 f"no series of {experiment_id}",

@@ -106,7 +106,7 @@ class Content:
             manifest = self._traces.manifest
             golden, faulty = (list(_of_trace(trace, manifest)) for trace in traces)
         else:
-            golden, faulty = self._of_series(experiment_id)
+            golden, faulty = self._of_series(record)
         written = _Written()
         written.metadata("experiment", self._facts(experiment, record))
         for run, topics in (("golden", golden), ("faulty", faulty)):
@@ -136,8 +136,8 @@ class Content:
             )
         return self._traces.of(experiment_id)
 
-    def _of_series(self, experiment_id: str) -> tuple[list[Topic], list[Topic]]:
-        found = self._series.read(experiment_id)
+    def _of_series(self, record: Record) -> tuple[list[Topic], list[Topic]]:
+        found = self._series.read(record.experiment_id, record)
         assert found is not None  # `has` was checked
         golden, faulty = found
         points = faulty.points

@@ -14,7 +14,7 @@ import numpy as np
 
 from mutator.model import Record
 from mutator.outcomes.golden import Trace, on_steps
-from mutator.store.series import SeriesFolder, write_kept
+from mutator.store.series import SeriesFolder, run_facts, write_kept
 from mutator.store.series_format import Points, Series, encode
 from mutator.targets.channels import Channel, Role
 from mutator.targets.manifest import TargetManifest
@@ -62,7 +62,7 @@ class Sampler:
             t=time[at],
             rows=self._rows(values[:, at]),
             every=self._every,
-            about=_happened(record) | {"end": float(max(self._time[-1], last))},
+            about=run_facts(record) | {"end": float(max(self._time[-1], last))},
             points=_points(time, golden, values, self._sampled(len(time), at), end, record),
         )
 
@@ -195,17 +195,6 @@ def _told(channel: Channel, manifest: TargetManifest) -> dict[str, Any]:
         "component": channel.component,
         "about": channel.about,
         "compared": channel in manifest.compared,
-    }
-
-
-def _happened(record: Record) -> dict[str, Any]:
-    active = record.activation
-    return {
-        "active": [active.first, active.last] if active else None,
-        "manifest": record.t_manifest,
-        "alerts": [list(event) for event in record.alerts],
-        "hazards": [list(event) for event in record.hazards],
-        "t_end": record.t_end,
     }
 
 

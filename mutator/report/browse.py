@@ -42,6 +42,7 @@ SCHEMA = "report-table/1"
 DETAILS_SCHEMA = "report-details/1"
 _OF_ALERTS = ("alerts", "t_alert", "reaction_time")  # columns that need a target with alerts
 STILLS_BYTES = 1_000_000  # limit of the stills embedded in the page; the others become links
+_TRACE = 16  # hex digits of the digest of a trace
 LISTED = 50_000  # maximum number of experiments that the page lists, so that it opens quickly
 
 
@@ -121,7 +122,9 @@ def _tables(
     made = table(rows, lines, paths, alerts=run.folder.has_alerts, source=run.source)
     if len(rows) < len(run.texts):
         made |= {"of": len(run.texts), "map": map_of(run)}
-    return made, details(planned, shapes(_patches(run, rows)), rows)
+    records = map(run.records.get, (row.experiment_id for row in rows))
+    traces = [record.trace_digest[:_TRACE] if record else "" for record in records]
+    return made, details(planned, shapes(_patches(run, rows)), rows, traces)
 
 
 def reading_order(row: Row) -> tuple[str, ...]:
@@ -201,10 +204,11 @@ def _number(text: str) -> float | int | str | None:
 
 
 def details(
-    experiments: Sequence[Experiment | None], found: Sequence[Shape], rows: Sequence[Row]
+    experiments: Sequence[Experiment | None], found: Sequence[Shape], rows: Sequence[Row], traces: list[str]
 ) -> dict[str, Any]:
-    """For each row, the codes of its spec and trigger setting (-1: not in the plan), and the index of its
-    diff's shape (-1: no diff). A shape has a list of values for each hole in its text, in row order."""
+    """For each row, the codes of its spec and trigger setting (-1: not in the plan), the index of its diff's
+    shape (-1: no diff), and the start of its trace's digest, which its series must name. A shape has a list
+    of values for each hole in its text, in row order."""
     specs, settings = _Codes(), _Codes()
     faults = {e.fault.id: e.fault for e in experiments if e}
     spec = {name: _spec(fault) for name, fault in faults.items()}
@@ -214,6 +218,7 @@ def details(
         "spec": [specs.code(spec[e.fault.id]) if e else -1 for e in experiments],
         "setting": [settings.code(_setting(e)) if e else -1 for e in experiments],
         "shape": [shape_of.get(row.experiment_id, -1) for row in rows],
+        "trace": traces,
         "specs": specs.known,
         "settings": [json.loads(text) for text in settings.known],
         "shapes": [

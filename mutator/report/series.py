@@ -25,5 +25,5 @@ def sample_kept_traces(folder: RunFolder, workspace: "Workspace") -> None:
     traces, series = Traces(workspace, folder), SeriesFolder(folder.path)
     for name in sorted(path.name for path in (folder.path / "traces").glob("*")):
         with suppress(MutatorError, KeyError):  # for example, the sources changed after the run
-            if not series.is_readable(name) and traces.is_kept(name):
+            if not series.is_readable(name, traces.record(name)) and traces.is_kept(name):
                 keep_series(folder.path, traces.manifest, *traces.of(name), traces.record(name))

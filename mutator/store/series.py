@@ -15,6 +15,7 @@ from typing import Any
 from mutator._common.below import check_name, inside
 from mutator._common.hashing import canonical
 from mutator.errors import MutatorError
+from mutator.model import Record
 from mutator.store.series_format import Series, decode
 from mutator.store.series_script import name_of, read_script, write_script
 
@@ -107,19 +108,25 @@ class SeriesFolder:
             return True
         return self.index is not None and experiment_id in self.index.entries
 
-    def is_readable(self, experiment_id: str) -> bool:
+    def is_readable(self, experiment_id: str, record: Record) -> bool:
         try:
-            return self.read(experiment_id) is not None
+            return self.read(experiment_id, record) is not None
         except MutatorError:
             return False
 
     def kept_ids(self) -> list[str]:
         return sorted(path.stem for path in (self.path / KEPT).glob("*.js"))
 
-    def read(self, experiment_id: str) -> tuple[Series, Series] | None:
-        """Return the golden and the faulty series of an experiment, or None. MutatorError for damage."""
+    def read(self, experiment_id: str, record: Record) -> tuple[Series, Series] | None:
+        """Return the golden and the faulty series of an experiment with this record, or None.
+
+        MutatorError for damage, and for the series of another run.
+        """
         try:
-            return self._read(experiment_id)
+            found = self._read(experiment_id)
+            if found is not None:
+                check_run(found[1].about, record)
+            return found
         except MutatorError as err:
             remedy = f"rerun the experiment: {making_again(self.path.parent, experiment_id)}"
             where = err.where or self.path
@@ -155,6 +162,30 @@ class SeriesFolder:
 
     def kept(self, experiment_id: str) -> Path:
         return inside(self.path / KEPT, f"{experiment_id}.js")
+
+
+def run_facts(record: Record) -> dict[str, Any]:
+    """Return what a faulty series says about its run: the digest of its trace, and its events."""
+    active = record.activation
+    return {
+        "trace": record.trace_digest,
+        "active": [active.first, active.last] if active else None,
+        "manifest": record.t_manifest,
+        "alerts": [list(event) for event in record.alerts],
+        "hazards": [list(event) for event in record.hazards],
+        "t_end": record.t_end,
+    }
+
+
+def check_run(about: Mapping[str, Any], record: Record, where: Path | None = None) -> None:
+    """Raise MutatorError if a faulty series belongs to another run than the record."""
+    for name, value in run_facts(record).items():
+        if about.get(name) != value:
+            raise MutatorError(
+                f"the series of another run: {name} {about.get(name)}",
+                where=where,
+                expected=f"{value}, as in the record of {record.experiment_id}",
+            )
 
 
 def making_again(run: Path, experiment_id: str = "ID") -> str:

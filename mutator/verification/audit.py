@@ -85,7 +85,7 @@ def audit_checks(folder: RunFolder, workspace: Workspace | None) -> list[Check]:
         Check.of(
             "records of the proof that match those of the run", len(proven), proof(folder, records, proven)
         ),
-        Check.of("series that are unchanged", *series(folder)),
+        Check.of("series that are unchanged", *series(folder, manifest)),
         Check.of("tables that follow from the records", *tables(folder)),
     ]
     return checks

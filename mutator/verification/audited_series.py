@@ -2,25 +2,43 @@
 
 from collections.abc import Iterator
 
+from mutator._common.below import inside
 from mutator.errors import MutatorError
+from mutator.outcomes.judging import load_channels
+from mutator.outcomes.sampling import Sampler
 from mutator.store.blocks import read_blocks
 from mutator.store.run_folder import RunFolder
-from mutator.store.series import INDEX, Index, SeriesFolder, making_again, putting_aside, read_kept
+from mutator.store.series import (
+    INDEX,
+    Index,
+    SeriesFolder,
+    check_run,
+    making_again,
+    putting_aside,
+    read_kept,
+)
+from mutator.store.series_format import about_of, decode, encode
 from mutator.store.series_packing import segments
+from mutator.targets.manifest import TargetManifest
 
 
-def series(folder: RunFolder) -> tuple[int, Iterator[MutatorError]]:
-    """The number of series files, and their problems: damaged files, and missing files that others need."""
+def series(folder: RunFolder, manifest: TargetManifest | None = None) -> tuple[int, Iterator[MutatorError]]:
+    """The number of series files, and their problems: damaged files, missing files that others need, series
+    of other runs than the records, and, with a `manifest`, series that differ from the golden runs."""
     there = SeriesFolder(folder.path)
-    return sum(path.is_file() for path in there.path.rglob("*")), _problems(folder, there)
+    return sum(path.is_file() for path in there.path.rglob("*")), _problems(folder, there, manifest)
 
 
-def _problems(folder: RunFolder, there: SeriesFolder) -> Iterator[MutatorError]:
-    run = folder.path
-    yield from _packed(folder, there)
+def _problems(
+    folder: RunFolder, there: SeriesFolder, manifest: TargetManifest | None
+) -> Iterator[MutatorError]:
+    run, records = folder.path, folder.records()
+    yield from _packed(folder, there, manifest)
     for name in there.kept_ids():
         try:
-            read_kept(there.kept(name))
+            _, faulty = read_kept(there.kept(name))
+            if (record := records.get(name)) is not None:
+                check_run(faulty.about, record, there.kept(name))
         except MutatorError as err:
             yield _told(err, err.got, f"{making_again(run, name)} rebuilds it")
     for path in segments(run):
@@ -33,7 +51,9 @@ def _problems(folder: RunFolder, there: SeriesFolder) -> Iterator[MutatorError]:
             )
 
 
-def _packed(folder: RunFolder, there: SeriesFolder) -> Iterator[MutatorError]:
+def _packed(
+    folder: RunFolder, there: SeriesFolder, manifest: TargetManifest | None
+) -> Iterator[MutatorError]:
     run, path = folder.path, there.path / f"{INDEX}.js"
     try:
         index = there.index
@@ -58,6 +78,38 @@ def _packed(folder: RunFolder, there: SeriesFolder) -> Iterator[MutatorError]:
             more = f" and {len(ids) - 1} more" if len(ids) > 1 else ""
             got = f"{err.got}; the series of {ids[0]}{more} cannot be read" if ids else err.got
             yield _told(err, got, putting_aside(run))
+
+    yield from _of_other_runs(folder, there, index)
+    yield from _of_other_goldens(folder, there, index, manifest)
+
+
+def _of_other_runs(folder: RunFolder, there: SeriesFolder, index: Index) -> Iterator[MutatorError]:
+    records = folder.records()
+    for name, number in index.entries.items():
+        path = there.path / f"{index.places[number][0]}.js"
+        try:
+            check_run(about_of(there.entry(number)), records[name], path)
+        except KeyError:
+            yield MutatorError(f"a series of {name}, which has no record", where=path)
+        except MutatorError as err:
+            if err.where == str(path):  # damaged chunks are reported above
+                yield _told(err, f"{name}: {err.got}", putting_aside(folder.path))
+
+
+def _of_other_goldens(
+    folder: RunFolder, there: SeriesFolder, index: Index, manifest: TargetManifest | None
+) -> Iterator[MutatorError]:
+    for key, number in index.goldens.items() if manifest else ():
+        assert manifest is not None
+        path = there.path / f"{index.places[number][0]}.js"
+        try:
+            stored = decode(there.entry(number))
+            golden = Sampler(manifest, load_channels(manifest, inside(folder.path, f"golden/{key}"))).golden
+        except MutatorError:  # reported elsewhere
+            continue
+        if encode(stored) != encode(golden):
+            expected = f"the series of golden/{key}"
+            yield MutatorError("differs", where=path, expected=expected, remedy=putting_aside(folder.path))
 
 
 def _told(err: MutatorError, got: str, remedy: str) -> MutatorError:

@@ -25,6 +25,11 @@ class Details {
     return shape.parts.map((part, i) => part + (i < shape.places.length ? values[shape.places[i]] : "")).join("");
   }
 
+  /** The start of the digest of a row's trace, which its series must name. */
+  trace(row) {
+    return this.data.trace[row];
+  }
+
   spec(row) {
     return this.data.specs[this.data.spec[row]] ?? null;
   }

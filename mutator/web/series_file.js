@@ -146,8 +146,10 @@ const SeriesFile = (() => {
     return made.sort((a, b) => a[1] - b[1]);
   }
 
-  function shown(id, golden, run) {
+  /** The data of a replay. `trace`: the start of the digest of the experiment's trace; a series of another trace is an error. */
+  function shown(id, trace, golden, run) {
     const { about } = run;
+    if (!trace || !about.trace?.startsWith(trace)) throw new Error("it belongs to another run than the record");
     return {
       id, start: golden.about.start, end: about.end, tEnd: about.t_end, active: about.active, marks: marks(about),
       channels: golden.about.channels.map((channel, i) => ({ ...channel, ...together(golden, run, i) })),
@@ -155,17 +157,17 @@ const SeriesFile = (() => {
   }
 
   /** The two runs in the file of one rerun experiment. */
-  async function readKept(id) {
+  async function readKept(id, trace) {
     const bytes = await read(`kept/${id}`, id);
     if (!bytes) return null;
     const length = new DataView(bytes.buffer).getUint32(0, true), golden = await decoded(bytes.subarray(4, 4 + length), null);
-    return shown(id, golden, await decoded(bytes.subarray(4 + length), golden));
+    return shown(id, trace, golden, await decoded(bytes.subarray(4 + length), golden));
   }
 
-  async function found(id, isNew) {
+  async function found(id, trace, isNew) {
     const there = JSON.parse(document.getElementById("facts").textContent).series; // so that no missing files are requested
     if (isNew || there.kept.includes(id)) { // from a rerun, perhaps because the packed series is damaged
-      const own = await readKept(id);
+      const own = await readKept(id, trace);
       if (own) return own;
     }
     if (there.packed) index ??= readIndex();
@@ -174,14 +176,14 @@ const SeriesFile = (() => {
     const { places } = await index, [entry, reference] = place;
     if (!goldens.has(reference)) goldens.set(reference, bytesOf(places[reference]).then((bytes) => decoded(bytes, null)));
     const golden = await goldens.get(reference);
-    return shown(id, golden, await decoded(await bytesOf(places[entry]), golden));
+    return shown(id, trace, golden, await decoded(await bytesOf(places[entry]), golden));
   }
 
-  /** The series of an experiment; null if there is none. Rejects with a message if it is damaged.
-   *  `isNew`: the series can be newer than this page. */
-  async function load(id, { isNew = false } = {}) {
+  /** The series of an experiment; null if there is none. Rejects with a message if it is damaged or names another trace than
+   *  `trace`, the start of a digest. `isNew`: the series can be newer than this page. */
+  async function load(id, trace, { isNew = false } = {}) {
     try {
-      return await found(id, isNew);
+      return await found(id, trace, isNew);
     } catch (error) {
       throw new Error(`The series of ${id} cannot be read: ${error.message}`);
     }

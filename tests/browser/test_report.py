@@ -10,16 +10,19 @@ import pytest
 
 from mutator.report import building
 from mutator.report.panels import figures
+from mutator.store import plan_file
 from mutator.store.patches import Patches
 from mutator.store.run_folder import RunFolder
 from mutator.store.series import SeriesFolder
+
+from .conftest import record
 
 if TYPE_CHECKING:
     from .conftest import Page
 
 COUNT = 24
-LOADED = """async (id) => {
-    const series = await SeriesFile.load(id), words = (values) => [...new Uint32Array(values.buffer)];
+LOADED = """async ([id, trace]) => {
+    const series = await SeriesFile.load(id, trace), words = (values) => [...new Uint32Array(values.buffer)];
     const channels = series.channels.map((channel) => (
         { ...channel, t: [...channel.t], golden: words(channel.golden), faulty: words(channel.faulty) }));
     return { ...series, channels };
@@ -177,12 +180,14 @@ def test_series_are_loaded_from_their_files(page: "Page", run: Path, rows: list[
     series = SeriesFolder(run)
     assert series.index is not None
     names = {*series.index.entries, *series.kept_ids()}
+    planned = {experiment.id: experiment for experiment in plan_file.read_all(run)}
     assert len(names) == 2
     for name in names:
         page.open(f"e={name}")
         page.page.wait_for_selector("#experiment .replay-player")
         assert "H3" in page.page.inner_text("#experiment .replay")
-        found, read = page.page.evaluate(LOADED, name), series.read(name)
+        one = record(planned[name], 7, b"")
+        found, read = page.page.evaluate(LOADED, [name, one.trace_digest]), series.read(name, one)
         assert read is not None
         golden, faulty = read
         assert [channel["name"] for channel in found["channels"]] == [

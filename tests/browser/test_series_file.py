@@ -8,15 +8,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mutator.store.run_folder import RunFolder
 from mutator.store.series import SeriesFolder, write_kept
 from mutator.store.series_format import Points, Series, encode
 from mutator.web import asset
 
+TRACE = "0123456789abcdef"
 FIXTURE = Path(__file__).parents[1] / "fixtures" / "run-3"
-LOADED = """async (id) => {
+LOADED = """async ([id, trace]) => {
     const words = (values) => [...new Uint32Array(values.buffer)];
     try {
-        const series = await SeriesFile.load(id);
+        const series = await SeriesFile.load(id, trace);
         const bits = ({ t, golden, faulty }) => ({ t: [...t], golden: words(golden), faulty: words(faulty) });
         return series && { ...series, channels: series.channels.map((one) => ({ ...one, ...bits(one) })) };
     } catch (error) {
@@ -36,18 +38,18 @@ def run(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def load(browser: Any, run: Path, name: str) -> Any:
+def load(browser: Any, run: Path, name: str, trace: str = TRACE) -> Any:
     context = browser.new_context()
     page = context.new_page()
     page.goto((run / "report" / "index.html").as_uri())
-    found = page.evaluate(LOADED, name)
+    found = page.evaluate(LOADED, [name, trace])
     context.close()
     return found
 
 
 def as_read(run: Path, name: str) -> list[dict[str, Any]]:
     """Return the channels that Python reads, as bits, including the points between the values."""
-    read = SeriesFolder(run).read(name)
+    read = SeriesFolder(run).read(name, RunFolder.unverified(FIXTURE / "small").records()[name])
     assert read is not None
     golden, faulty = read
     found = []
@@ -67,7 +69,7 @@ def test_a_page_and_python_read_the_numbers_of_the_fixture(browser: Any, run: Pa
     for name, known in expected.items():
         told = [{key: one[key] for key in ("name", "t", "golden", "faulty")} for one in known["channels"]]
         assert as_read(run, name) == told
-        found = load(browser, run, name)
+        found = load(browser, run, name, known["about"]["trace"][:16])
         assert [{key: one[key] for key in told[0]} for one in found["channels"]] == told
         assert (found["active"], found["tEnd"]) == (known["about"]["active"], known["about"]["t_end"])
         assert found["end"] == known["about"]["end"]
@@ -81,7 +83,15 @@ def test_the_page_reads_the_points_between_the_values(browser: Any, run: Path) -
     single = np.array([7.5, np.inf], dtype="<f4")
     points = Points(channel=np.array([0, 1]), t=np.array([0.11, 0.01]), golden=single, faulty=-single)
     longer = [np.arange(9, dtype="<f4") ** 2, np.array([1, 2, 3, 4, 5], dtype="<f4")]
-    happened = {"active": None, "manifest": None, "alerts": [], "hazards": [], "t_end": None, "end": 0.4}
+    happened = {
+        "trace": TRACE,
+        "active": None,
+        "manifest": None,
+        "alerts": [],
+        "hazards": [],
+        "t_end": None,
+        "end": 0.4,
+    }
     faulty = Series(t=t, rows=longer, every=[1, 2], about=happened, points=points)
     name = SeriesFolder(run).kept_ids()[0]
     write_kept(SeriesFolder(run).kept(name), encode(golden), encode(faulty, golden))
@@ -95,6 +105,14 @@ def test_the_page_reads_the_points_between_the_values(browser: Any, run: Path) -
     assert values["faulty"] == [1, -np.inf, 2, 3, 4, 5]
     assert values["golden"][:4] == [1, np.inf, np.inf, -np.inf] and np.isnan(values["golden"][4:]).all()
     assert np.array(a["faulty"], dtype="<u4").view("<f4").tolist() == [0, 1, 4, -7.5, 9, 16, 25, 36, 49, 64]
+
+
+def test_the_series_of_another_run_is_not_shown(browser: Any, run: Path) -> None:
+    """A series names the trace that it was made of, and the page knows the trace of each record."""
+    name = next(iter(json.loads((FIXTURE / "series.json").read_text())))
+    assert load(browser, run, name) == (
+        f"The series of {name} cannot be read: it belongs to another run than the record"
+    )
 
 
 def test_a_damaged_series_gives_a_message(browser: Any, run: Path) -> None:

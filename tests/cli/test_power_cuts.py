@@ -125,14 +125,15 @@ def test_a_lost_series_is_restored_by_a_rerun(cli: Cli, cut: Path) -> None:
     [path] = segments(cut)
     data = path.read_bytes()
     names = [block.key.split()[0] for block in read_blocks(path).blocks if block.kind]
+    records = RunFolder.unverified(cut).records()
     places = {one: place for place, one in enumerate(names)}
     for length in (*range(last_block(path), len(data), 7), len(data) - 1):
         run = Path(shutil.copytree(cut / "series", Path("cut") / "series")).parent
         (run / "series" / path.name).write_bytes(data[:length])
         pack(run, "p", places, 500)
         there = SeriesFolder(run)
-        assert [name for name in names if there.is_readable(name)] == names[:-1]
-        assert there.read(names[-1]) is None
+        assert [name for name in names if there.is_readable(name, records[name])] == names[:-1]
+        assert there.read(names[-1], records[names[-1]]) is None
         shutil.rmtree(run)
     path.write_bytes(data[: last_block(path) + 30])
     ran = cli(*WORDS)
@@ -140,4 +141,4 @@ def test_a_lost_series_is_restored_by_a_rerun(cli: Cli, cut: Path) -> None:
     assert [one for one in worth(Results.of_run(cut).rows()) if not SeriesFolder(cut).has(one)] == names[-1:]
     assert cli("verify", "run").code == 0
     assert cli("rerun", names[-1], "--trace", "--run", "run").code == 0
-    assert SeriesFolder(cut).is_readable(names[-1])
+    assert SeriesFolder(cut).is_readable(names[-1], records[names[-1]])

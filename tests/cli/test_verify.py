@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from mutator.errors import MutatorError
+from mutator.store.run_folder import RunFolder
 from mutator.store.series import Index, SeriesFolder
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
@@ -36,6 +37,11 @@ def sealed(cli: Cli, root: Path, shared: list[Any]) -> str:
     elif not Path("run").exists():
         shutil.copytree(kept, "run")
     return str(shared[1])
+
+
+def series_of(name: str) -> object:
+    run = Path("run")
+    return SeriesFolder(run).read(name, RunFolder.unverified(run).records()[name])
 
 
 def test_an_audit_is_printed_on_one_page(cli: Cli, sealed: str) -> None:
@@ -129,11 +135,11 @@ def test_rerun_restores_damaged_series(
         assert f"the series of {name} and {len(others)} more cannot be read" in told
     made = cli("rerun", name, "--trace", "--run", "run")
     assert made.code == 0, made.err
-    whole = SeriesFolder(Path("run")).read(name)
+    whole = series_of(name)
     assert whole is not None
     if what != "index" or damage is flip:
         with pytest.raises(MutatorError, match=f"rerun the experiment: `mutator rerun {others[0]} --trace"):
-            SeriesFolder(Path("run")).read(others[0])
+            series_of(others[0])
     repaired = cli("verify", "run", "--repair")
     assert repaired.code == 1 and f"repaired: series/{file.name}" in repaired.out
     if what != "index":  # the rerun experiment's series can be read
@@ -141,14 +147,14 @@ def test_rerun_restores_damaged_series(
         assert left in " ".join(repaired.out.split())
     assert (Path("run/damaged/series") / file.name).exists() == (damage is flip)
     assert cli("verify", "run", "--expect", sealed).code == 0
-    assert SeriesFolder(Path("run")).read(name) is not None
+    assert series_of(name) is not None
     if what == "goldens":
         after = {path.name: path.read_bytes() for path in Path("run/series").glob("*.js")}
         assert after == before
     else:
-        assert SeriesFolder(Path("run")).read(others[0]) is None
+        assert series_of(others[0]) is None
         assert cli("rerun", others[0], "--trace", "--run", "run").code == 0
-        assert SeriesFolder(Path("run")).read(others[0]) is not None
+        assert series_of(others[0]) is not None
 
 
 def test_the_audit_names_the_command_that_restores_a_series(cli: Cli, sealed: str) -> None:
@@ -164,6 +170,21 @@ def test_the_audit_names_the_command_that_restores_a_series(cli: Cli, sealed: st
     assert cli("show", name, "--run", "run").code == 0
     assert kept.read_bytes() == data
     assert cli("verify", "run").code == 0
+
+
+def test_the_series_of_another_run_is_not_used(cli: Cli, sealed: str) -> None:
+    """The audit names it, and commands refuse it."""
+    one, other, *_ = RunFolder.open(Path("run")).records()
+    assert cli("rerun", one, "--trace", "--run", "run").code == 0
+    kept = SeriesFolder(Path("run")).kept(one)
+    script = kept.read_bytes().replace(one.encode(), other.encode(), 1)
+    kept.with_name(f"{other}.js").write_bytes(script)
+    with pytest.raises(MutatorError, match="the series of another run"):
+        series_of(other)
+    found = cli("verify", "run")
+    assert found.code == 1 and f"series/kept/{other}.js: the series of another run" in found.out
+    kept.with_name(f"{other}.js").unlink()
+    assert cli("verify", "run", "--expect", sealed).code == 0
 
 
 def test_damaged_blocks_of_patches_are_reported(cli: Cli, sealed: str) -> None:

@@ -20,7 +20,7 @@ from mutator.exports.write import Parts, export
 from mutator.model import Activation, Experiment, Outcome
 from mutator.store.cleaning import check
 from mutator.store.run_folder import RunFolder
-from mutator.store.series import SeriesFolder, write_kept
+from mutator.store.series import SeriesFolder, run_facts, write_kept
 from mutator.store.series_format import Points, Series, encode
 from mutator.workspace import Workspace
 
@@ -81,7 +81,8 @@ def run(
     golden = encode(GOLDEN)
     for record in RunFolder.open(run).records().values():
         if record.hazards:
-            write_kept(SeriesFolder(run).kept(record.experiment_id), golden, encode(FAULTY, GOLDEN))
+            faulty = replace(FAULTY, about=FAULTY.about | run_facts(record))
+            write_kept(SeriesFolder(run).kept(record.experiment_id), golden, encode(faulty, GOLDEN))
     return run
 
 
@@ -132,7 +133,9 @@ def test_negative_times_are_shifted(run: Path, tmp_path: Path) -> None:
     copy, name = tmp_path / "run", hazardous(run)[0]
     shutil.copytree(run, copy)
     early = replace(GOLDEN, t=GOLDEN.t - 0.5)
-    write_kept(SeriesFolder(copy).kept(name), encode(early), encode(replace(FAULTY, t=FAULTY.t - 0.5), early))
+    about = FAULTY.about | run_facts(RunFolder.open(copy).records()[name])
+    faulty = replace(FAULTY, t=FAULTY.t - 0.5, about=about)
+    write_kept(SeriesFolder(copy).kept(name), encode(early), encode(faulty, early))
     only = f'experiment_id == "{name}"'
     [file] = export(copy, Format.MCAP, tmp_path / "out", parts=Parts(only=only)).iterdir()
     times = defaultdict(list)

@@ -154,7 +154,7 @@ def test_a_series_is_read_back_from_its_file(
     before = path.read_bytes()
     keep_series(tmp_path, manifest, trace(), trace(speed=T), one)
     assert path.read_bytes() == before
-    found = SeriesFolder(tmp_path).read(one.experiment_id)
+    found = SeriesFolder(tmp_path).read(one.experiment_id, one)
     assert found is not None
     assert (found[0].rows[SPEED] == 0).all()
     assert found[1].about["alerts"] == [["brake_hard", 2.5]]

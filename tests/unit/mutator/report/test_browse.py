@@ -78,8 +78,8 @@ def test_diffs_are_stored_as_shapes_and_values(experiment: Callable[..., Experim
     one, two = experiment(3.0), experiment(4.0)
     rows = [row(two.id), row("none"), row(one.id)]
     patches = [(two.id, "", PATCH.format(4)), (one.id, "", PATCH.format(3))]
-    made = details([two, None, one], shapes(patches), rows)
-    assert made["shape"] == [0, -1, 0]
+    made = details([two, None, one], shapes(patches), rows, ["2" * 16, "", "1" * 16])
+    assert made["shape"] == [0, -1, 0] and made["trace"] == ["2" * 16, "", "1" * 16]
     [shape] = made["shapes"]
     values = list(zip(*shape["values"], strict=True))
     for member, number in enumerate((4, 3)):

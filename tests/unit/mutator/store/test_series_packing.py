@@ -1,23 +1,43 @@
 """Packed series."""
 
 import random
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.store.series import SeriesFolder, write_kept
+from mutator.model import Activation, Outcome, Record, Status
+from mutator.store.series import SeriesFolder, run_facts, write_kept
 from mutator.store.series_format import Series, encode
 from mutator.store.series_packing import EncodedSeries, SeriesWriter, pack, segments
 
+RECORD = Record(
+    experiment_id="e" * 16,
+    status=Status.OK,
+    outcome=Outcome.MASKED,
+    detail="",
+    tree="t" * 64,
+    activation=Activation(first=2.0, last=3.0, count=5),
+    t_manifest=None,
+    max_dev=(),
+    hazards=(),
+    alerts=(),
+    trace_digest="f" * 64,
+)
 IDS = [f"{number:016x}" for number in range(150)]
 DRAW = np.random.default_rng(1)
 VALUES = DRAW.random((151, 4, 600)).astype("<f4")
 
 
 def series(number: int) -> Series:
-    return Series(t=np.arange(600) / 20, rows=list(VALUES[number]), every=[1] * 4, about={"n": number})
+    return Series(
+        t=np.arange(600) / 20,
+        rows=list(VALUES[number]),
+        every=[1] * 4,
+        about={"n": number} | run_facts(RECORD),
+    )
 
 
 GOLDEN = series(150)
@@ -59,11 +79,11 @@ def test_each_series_is_found_in_its_chunk(packed: Path) -> None:
     assert len(index.sizes) == 151
     assert len(index.chunks) > 3
     for number, name in enumerate(IDS):
-        found = folder.read(name)
+        found = folder.read(name, RECORD)
         assert found is not None
-        assert found[1].about == {"n": number}
+        assert found[1].about == {"n": number} | run_facts(RECORD)
         assert (np.array(found[1].rows) == VALUES[number]).all()
-    assert folder.read("f" * 16) is None
+    assert folder.read("f" * 16, RECORD) is None
     assert segments(packed) == []
 
 
@@ -135,11 +155,18 @@ def test_experiments_of_a_damaged_chunk_can_be_rerun(tmp_path: Path) -> None:
     data = chunk.read_bytes()
     chunk.write_bytes(data[:300] + bytes([data[300] ^ 1]) + data[301:])
     with pytest.raises(MutatorError, match="damaged"):
-        SeriesFolder(tmp_path).read(IDS[0])
+        SeriesFolder(tmp_path).read(IDS[0], RECORD)
     (tmp_path / "series" / "index.js").write_bytes(data)
     with pytest.raises(MutatorError, match="damaged"):
-        SeriesFolder(tmp_path).read(IDS[0])
+        SeriesFolder(tmp_path).read(IDS[0], RECORD)
     write_kept(SeriesFolder(tmp_path).kept(IDS[0]), MADE[IDS[0]].golden, MADE[IDS[0]].faulty)
-    found = SeriesFolder(tmp_path).read(IDS[0])
+    found = SeriesFolder(tmp_path).read(IDS[0], RECORD)
     assert found is not None
-    assert found[1].about == {"n": 0}
+    assert found[1].about == {"n": 0, **run_facts(RECORD)}
+
+
+def test_the_series_of_another_run_is_refused(packed: Path) -> None:
+    """A series names the trace and the events of its run."""
+    for other in (replace(RECORD, trace_digest="0" * 64), replace(RECORD, hazards=(("H1", 2.5),))):
+        with pytest.raises(MutatorError, match="the series of another run"):
+            SeriesFolder(packed).read(IDS[0], other)
