@@ -86,7 +86,7 @@ def _packed(
 def _of_other_runs(folder: RunFolder, there: SeriesFolder, index: Index) -> Iterator[MutatorError]:
     records = folder.records()
     for name, number in index.entries.items():
-        path = there.path / f"{index.places[number][0]}.js"
+        path = inside(there.path, f"{index.places[number][0]}.js")
         try:
             check_run(about_of(there.entry(number)), records[name], path)
         except KeyError:
@@ -101,7 +101,7 @@ def _of_other_goldens(
 ) -> Iterator[MutatorError]:
     for key, number in index.goldens.items() if manifest else ():
         assert manifest is not None
-        path = there.path / f"{index.places[number][0]}.js"
+        path = inside(there.path, f"{index.places[number][0]}.js")
         try:
             stored = decode(there.entry(number))
             golden = Sampler(manifest, load_channels(manifest, inside(folder.path, f"golden/{key}"))).golden
