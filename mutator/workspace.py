@@ -8,6 +8,7 @@ from pathlib import Path
 
 from mutator._common.arguments import check_whole
 from mutator._common.below import check_inside, files_inside
+from mutator._common.bounded import MOST_WHOLE, check_open, open_regular
 from mutator._common.files import check_is_text
 from mutator._common.places import environment_path, library_files, library_folder, templates_folder
 from mutator._common.shipped import shipped_folder
@@ -259,21 +260,28 @@ class Workspace:
                     expected=f"a {what}: the path of a YAML file, or {one_of(known)}",
                     remedy="correct the path" + suggestion(str(Path(name).with_suffix("")), list(known)),
                 )
-            check_is_text(Path(name))
-            return Path(name)
+            return _readable(Path(name))
         if (path := known.get(str(name))) is not None:
-            check_is_text(path)
-            if path.is_fifo() or path.is_socket():
-                raise MutatorError(
-                    "a pipe or socket", where=path, expected="a YAML file", remedy="put the file back"
-                )
-            return path
+            return _readable(path)
         raise MutatorError(
             f"no {what} '{name}'",
             where=self.library / folder,
             expected=f"{one_of(known)}, or the path of a YAML file",
             remedy="correct the name" + suggestion(str(name), list(known)),
         )
+
+
+def _readable(path: Path) -> Path:
+    """Return the path of a file; MutatorError unless it is a regular file of a size to be read as a whole."""
+    check_is_text(path)
+    try:
+        with open_regular(path) as file:
+            check_open(file, path, MOST_WHOLE)
+    except OSError as error:
+        raise MutatorError(
+            f"cannot be read ({error.strerror})", where=path, expected="a file", remedy="put the file back"
+        ) from None
+    return path
 
 
 def _variants(spec: FaultSpec) -> list[str]:

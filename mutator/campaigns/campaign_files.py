@@ -5,6 +5,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TypeVar
 
+from mutator._common.below import check_library_name
 from mutator.campaigns.campaign_model import CampaignModel, SelectionModel
 from mutator.campaigns.operator_selection import OperatorSelection, When
 from mutator.campaigns.studies import Study, find_study
@@ -106,7 +107,9 @@ def load_campaign(path: Path) -> Campaign:
     model, source = read(path, CampaignModel, SCHEMA, older={SCHEMA: with_list})
     _check_once(model, source)
     triggers = model.triggers
-    _check_names(source, {("target",): model.target, ("triggers", "table"): triggers.table})
+    for keys, name in {("target",): model.target, ("triggers", "table"): triggers.table or ""}.items():
+        with source.placing(keys):
+            check_library_name(name, path)
     return Campaign(
         name=model.name,
         about=model.about.strip(),
@@ -174,15 +177,6 @@ def _check_once(model: CampaignModel, source: Source) -> None:
             if value in seen:
                 raise source.error((*keys, i), f"'{value}' is listed twice", remedy="remove one of the two")
             seen.add(value)
-
-
-def _check_names(source: Source, names: Mapping[Keys, str | None]) -> None:
-    """Refuse paths where only names of the library's files are allowed."""
-    for keys, name in names.items():
-        if name is not None and name.endswith(_SUFFIXES):
-            raise source.error(
-                keys, f"'{name}'", expected="a name in the library", remedy="leave out folder and suffix"
-            )
 
 
 def _spec_file(campaign: Path, spec: str) -> Path | None:

@@ -23,13 +23,11 @@ from mutator.execution.phases import Lines
 from mutator.execution.session import Notify, Session, Summary, open_session
 from mutator.execution.stopped_workers import Continuing, on_stop
 from mutator.execution.worker import Assignment, Worker, bind_to_parent, dying_python
-from mutator.execution.written_files import Sums
 from mutator.verification.equivalence import Sample
 from mutator.workspace import Workspace
 
 _INPUT = "mutator_campaign"
 _PROBLEM = "mutator_problem"
-_WRITTEN = "mutator_written"
 
 
 class Deals(Protocol):
@@ -117,13 +115,10 @@ class LazyWorker:
         if self._worker is not None:
             self._worker.was_stopped = True
 
-    def close(self) -> Sums:
-        """Close the worker's files; return their digests."""
-        worker, self._worker = self._worker, None
-        if worker is None:
-            return {}
-        worker.close()
-        return worker.written
+    def close(self) -> None:
+        if self._worker is not None:
+            self._worker.close()
+            self._worker = None
 
 
 def configure(
@@ -202,8 +197,7 @@ class WorkerSide:
 
     def pytest_sessionfinish(self) -> None:
         try:
-            written = self._worker.close()
-            self._config.workeroutput[_WRITTEN] = dict(written)  # type: ignore[attr-defined]
+            self._worker.close()
         except MutatorError as err:
             self._config.workeroutput[_PROBLEM] = str(err)  # type: ignore[attr-defined]
         os.close(self._registration)
@@ -233,13 +227,7 @@ class Controller:
     def pytest_testnodedown(self, node: Any, error: object | None) -> None:
         if error:
             self._note(f"worker {node.gateway.id} died: {error}")
-        assert self.begun is not None
-        output, given = getattr(node, "workeroutput", {}), node.workerinput[_INPUT]
-        self._note(output.get(_PROBLEM, ""))
-        if _WRITTEN in output:
-            self.begun.written.report(output[_WRITTEN])
-        else:
-            self.begun.written.lose(given["session"] + node.gateway.id)
+        self._note(getattr(node, "workeroutput", {}).get(_PROBLEM, ""))
 
     def pytest_collection(self, session: pytest.Session) -> bool | None:
         if session.config.pluginmanager.hasplugin("dsession"):
@@ -273,8 +261,8 @@ class Controller:
 
     @pytest.hookimpl(trylast=True)  # after xdist has ended its workers
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
-        if self._worker is not None and self.begun is not None:
-            self.begun.written.report(self._worker.close())
+        if self._worker is not None:
+            self._worker.close()
         if self._continuing is not None:
             self._continuing.end()
 

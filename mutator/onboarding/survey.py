@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from importlib import metadata
 from pathlib import Path
 
+from mutator._common.below import Outside, check_inside
 from mutator.errors import MutatorError
 from mutator.targets.roots import INSTALLED, installed_at
 
@@ -72,7 +73,8 @@ def _installed(name: str) -> Survey:
             expected="the import name of a package",
             remedy="install it in mutator's environment, or correct the name",
         )
-    return replace(_of(place.parent, (place.name,)), installed=name, requires=_distribution(name))
+    found = _of(place.parent, (place.name,), any_links=True)
+    return replace(found, installed=name, requires=_distribution(name))
 
 
 def _distribution(name: str) -> str | None:
@@ -123,7 +125,8 @@ def _parsed(path: Path) -> ast.Module:
         return ast.parse(path.read_bytes())
 
 
-def _of(root: Path, packages: tuple[str, ...]) -> Survey:
+def _of(root: Path, packages: tuple[str, ...], *, any_links: bool = False) -> Survey:
+    """Read the modules of packages; with `any_links`, links may lead out of the root."""
     modules: list[Module] = []
     unread: list[tuple[str, str]] = []
     for name in packages:
@@ -137,7 +140,11 @@ def _of(root: Path, packages: tuple[str, ...]) -> Survey:
                 )
             relative = path.relative_to(root).as_posix()
             try:
+                if not any_links:
+                    check_inside(root, path)
                 modules.append(Module(path=relative, tree=_parsed(path)))
+            except Outside as err:
+                unread.append((f"{relative}:1", err.got))
             except (SyntaxError, ValueError, RecursionError, MemoryError, OSError) as err:
                 line = getattr(err, "lineno", None) or 1
                 unread.append((f"{relative}:{line}", getattr(err, "msg", None) or str(err)))

@@ -166,11 +166,7 @@ class Jobs:
         with self._lock:
             if job.state is not State.QUEUED or self._closed:
                 return None
-            try:
-                watched, job.hold = os.pipe()
-            except OSError as err:
-                self._fail(job, err)
-                return None
+            watched, job.hold = os.pipe()
             try:
                 process = subprocess.Popen(
                     [sys.executable, "-P", "-m", _KEEPER, str(watched), *job.work.words],
@@ -183,16 +179,13 @@ class Jobs:
                 )
             except OSError as err:
                 os.close(job.hold)
-                self._fail(job, err)
+                job.hold, job.state, job.message = None, State.FAILED, f"cannot be started: {err.strerror}"
+                job.ended = datetime.now(UTC)
                 return None
             finally:
                 os.close(watched)
             job.state, job.started = State.RUNNING, datetime.now(UTC)
             return process
-
-    def _fail(self, job: Job, err: OSError) -> None:
-        job.hold, job.state, job.message = None, State.FAILED, f"cannot be started: {err.strerror}"
-        job.ended = datetime.now(UTC)
 
     def _follow(self, job: Job, process: subprocess.Popen[bytes]) -> None:
         assert process.stdout is not None

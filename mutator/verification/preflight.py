@@ -44,17 +44,15 @@ def run_checks(
 ) -> tuple[CheckResult, ...]:
     """Run the checks, and store the results in checks.json and the golden runs in the folder.
 
-    Nothing runs if the checks have passed for these sources in this folder. If they have passed in another
-    folder on this machine, only the golden runs are repeated, because a mutant can write to the cache.
+    Nothing runs if the checks have passed for these sources, in this folder or in another on this machine.
     Raises CheckFailed if any check fails, after all have run.
     """
     checks = _Checks(workspace, folder)
-    notify = notify or (lambda progress: None)
-    known = checks.known(workers, notify)
+    known = checks.known()
     if known is not None:
         return known
     with raising_disk_full(folder.path):
-        results = tuple(checks.run(workers, notify))
+        results = tuple(checks.run(workers, notify or (lambda progress: None)))
     failed = [result for result in results if not result.passed]
     if failed:
         text = "; ".join(f"{result.name}: {result.detail}" for result in failed[:3])
@@ -111,7 +109,7 @@ class _Checks:
         ]
         self.digest = digest([*content, places])
 
-    def known(self, workers: int, notify: Notify) -> tuple[CheckResult, ...] | None:
+    def known(self) -> tuple[CheckResult, ...] | None:
         """Earlier results, copied from another folder if necessary; None unless all checks passed and the
         golden runs are unchanged."""
         if (results := self._passed(self._before(), self.folder.path)) is not None:
@@ -127,8 +125,6 @@ class _Checks:
         except (MutatorError, OSError, KeyError, TypeError, AttributeError):
             return None  # missing or damaged
         if results is not None:
-            if self._driver(self.folder.work / "again").drive_goldens(workers, notify) != found["goldens"]:
-                return None  # forged, or no longer true
             self._check_same_as_before(found["goldens"])
             self._install((copy / FILE).read_bytes())
         return results
@@ -149,7 +145,10 @@ class _Checks:
         if not anchors.passed:  # the runs would take minutes
             yield anchors
             return
-        runs, canary_verdict = self._driver(self.kept).drive(workers, notify)
+        driver = CheckDriver(
+            workspace=self.workspace, folder=self.folder, manifest=self.manifest, kept=self.kept
+        )
+        runs, canary_verdict = driver.drive(workers, notify)
         results = [anchors, *self._judge(runs), _result("canary", *canary_verdict)]
         goldens = {one.key: runs[GOLDEN, one].digest for one in self.keys}
         self._check_same_as_before(goldens)
@@ -164,9 +163,6 @@ class _Checks:
         }
         self._install(json_bytes(checks))
         yield from results
-
-    def _driver(self, kept: Path) -> CheckDriver:
-        return CheckDriver(workspace=self.workspace, folder=self.folder, manifest=self.manifest, kept=kept)
 
     def _install(self, checks: bytes) -> None:
         run, golden = self.folder.path, self.kept / "golden"

@@ -72,7 +72,7 @@ def test_a_campaign_names_only_targets_and_tables_of_the_library(
 ) -> None:
     assert old in mine.read_text()
     mine.write_text(mine.read_text().replace(old, new))
-    with pytest.raises(MutatorError, match=r"mine\.yaml:\d+: .* expected a name in the library"):
+    with pytest.raises(MutatorError, match=r"mine\.yaml:\d+: .* expected the name of a file in the library"):
         make_plan(toycar, mine)
 
 

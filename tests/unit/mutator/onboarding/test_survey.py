@@ -121,3 +121,12 @@ def test_a_missing_folder_or_package_is_an_error_with_a_remedy(target: str, word
     with pytest.raises(MutatorError, match=words) as told:
         look_at(target)
     assert told.value.remedy
+
+
+def test_a_link_out_of_the_tree_is_not_read(tree: Tree, tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text("class MySecret:\n    def update(self, state): ...\n")
+    folder = tree(own_py="")
+    (folder / "linked.py").symlink_to(tmp_path / "mine.py")
+    found = look_at(str(folder))
+    assert [module.path for module in found.modules] == ["own.py"]
+    assert found.unread == (("linked.py:1", "a link that leads out of its folder"),)
