@@ -126,7 +126,7 @@ def _parsed(path: Path) -> ast.Module:
 
 
 def _of(root: Path, packages: tuple[str, ...], *, any_links: bool = False) -> Survey:
-    """Read the modules of packages; with `any_links`, links may lead out of the root."""
+    """Read the modules of packages; with `any_links`, links may point out of the root."""
     modules: list[Module] = []
     unread: list[tuple[str, str]] = []
     for name in packages:
