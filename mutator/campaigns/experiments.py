@@ -8,7 +8,7 @@ from fnmatch import fnmatchcase
 from itertools import chain
 from pathlib import Path
 
-from mutator._common.below import is_inside
+from mutator._common.below import inside, is_inside
 from mutator._common.hashing import digest
 from mutator._common.text import one_of
 from mutator.campaigns.campaign_files import Campaign
@@ -128,7 +128,7 @@ class Expansion:
                 remedy="copy it there",
             )
         spec = self.workspace.spec(file)
-        known = self.workspace.library / "faults" / f"{spec.name}.yaml"
+        known = inside(self.workspace.library / "faults", f"{spec.name}.yaml")
         if known.exists() and not known.samefile(file):
             raise self.campaign.error(
                 keys,

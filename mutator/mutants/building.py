@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+from mutator._common.below import inside
 from mutator._common.hashing import content_id
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import PROBE_TEMPLATE, FaultModels
@@ -212,6 +213,6 @@ class _ReusingSplicer(_Splicer):
 
 def write_tree(manifest: TargetManifest, mutant: Mutant, dest: Path) -> None:
     for path, data in {**manifest.tree.files, **mutant.files}.items():
-        place = dest / path
+        place = inside(dest, path)
         place.parent.mkdir(parents=True, exist_ok=True)
         place.write_bytes(data)

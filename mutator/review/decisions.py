@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
 
-from mutator._common.below import open_below, write_below
+from mutator._common.below import inside, open_below, write_below
 from mutator._common.files import make_folder
 from mutator._common.locks import alone_in
 from mutator._common.shipped import refuse_shipped
@@ -84,7 +84,7 @@ class Review:
     @property
     def path(self) -> Path:
         """The file, which might not exist."""
-        return self.library / _name_of(self.target)
+        return inside(self.library, _name_of(self.target))
 
     def decision(self, group: str) -> Decision | None:
         entry = self.entries.get(group)
@@ -151,7 +151,7 @@ def load_review(workspace: Workspace, target: str) -> Review:
         open_below(library, name).close()
     except FileNotFoundError:
         return Review(library=library, target=target, entries={})
-    content = review_file.load(library / name, target)
+    content = review_file.load(inside(library, name), target)
     return Review(library=library, target=target, entries=content.entries, four_eyes=content.four_eyes)
 
 

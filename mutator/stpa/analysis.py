@@ -11,6 +11,7 @@ from pathlib import Path
 
 from pydantic import Field
 
+from mutator._common.below import inside
 from mutator._common.text import one_of, suggestion
 from mutator.config.yaml_files import Keys, Source, StrictModel, read
 from mutator.stpa.context_tables import ContextTable, HazardList, load_context_table, load_hazards
@@ -232,7 +233,7 @@ def _tables(
     tables = {}
     for i, name in enumerate(unsafe.tables):
         _known(source, ("tables", i), "context table", name, known)
-        tables[name] = table = load_context_table(folder / f"{name}.yaml")
+        tables[name] = table = load_context_table(inside(folder, f"{name}.yaml"))
         for row in table.rows:
             for action in row.actions:
                 keys = ("contexts", row.id, "actions", action)

@@ -8,7 +8,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from mutator._common.below import check_inside, check_name, is_inside
+from mutator._common.below import check_inside, check_name, inside, is_inside
 from mutator._common.files import check_is_text
 from mutator._common.hashing import canonical, digest
 from mutator.errors import MutatorError
@@ -93,7 +93,7 @@ def read_tree(
     files = _read(root, tuple(globs), None if any_links else root)
     laid_over = _read(overlay, ("**",), library or overlay) if overlay else {}
     for path in laid_over:
-        if os.path.lexists(root / path):
+        if os.path.lexists(inside(root, path)):
             raise MutatorError(
                 f"'{path}' is in the overlay and in {root}",
                 where=overlay,

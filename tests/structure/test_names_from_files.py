@@ -1,8 +1,9 @@
 """A name that is not a constant of the code is joined to a path only by `inside`, which checks it.
 
-Names in the files of a run folder, such as ids, golden runs and files of the ledger, come from whoever made
-the folder: `../../setup.py` must not reach a user's file. A reader of the code cannot see where each name
-comes from, so every join in the packages that handle run folders follows the rule.
+Names in the files of a run folder or a library, such as ids, golden runs, files of the ledger and scenarios,
+come from whoever made the folder: `../../setup.py` must not reach a user's file. A reader of the code cannot
+see where each name comes from, so every join in the packages that handle run folders and libraries follows
+the rule.
 """
 
 import ast
@@ -12,12 +13,31 @@ from pathlib import Path
 import pytest
 
 CLONE = Path(__file__).parents[2]
-PACKAGES = ("store", "outcomes", "verification", "execution", "exports", "comparison", "report", "api")
+PACKAGES = (
+    *("store", "outcomes", "verification", "execution", "exports", "comparison", "report", "api"),
+    *("targets", "faults", "stpa", "mutants", "operators", "onboarding", "campaigns", "review"),
+)
 ALLOWED = {  # joins of names that no file contains
+    "campaigns/clones.py: folder / objects": "printed by git, and only read",
+    "campaigns/clones.py: folder / shallow": "printed by git, and only read",
+    "campaigns/clones.py: folder / excluded": "printed by git, and only read",
+    "campaigns/clones.py: folder / within": "names from os.scandir",
     "execution/cluster/child.py: site.place / f'work-{os.getpid()}'": "a process id",
+    "faults/imports.py: root / path": "only shown",
+    "mutants/anchors.py: root / path": "only shown",
+    "mutants/imported_names.py: tree.root / path": "only shown",
+    "onboarding/new_library.py: folder / place.format(name=words['name'], entry=words['entry'])": (
+        "letters, digits and _"
+    ),
+    "onboarding/survey.py: Path(place, name)": "names from os.walk",
+    "onboarding/survey.py: root / name": "names from a folder's listing",
+    "operators/executed.py: scratch / 'work' / f'lines-{i}'": "a number",
     "report/stamp.py: run / path": "a path from os.walk",
+    "review/called_code.py: folder / one.value": "only compared with the tree's paths",
+    "review/pictures.py: scratch / 'work' / f'pictures-{i}'": "a number",
     "store/cleaning.py: Path(folder, name)": "names from os.walk",
     "store/cleaning.py: Path(name).with_name(complete(Path(name).name))": "only compared with patterns",
+    "targets/source_tree.py: root / name": "the folder of a checked glob",
 }
 
 
