@@ -3,11 +3,14 @@
 `mutator run` starts pytest itself; otherwise, `pytest --campaign FILE --campaign-out DIR -n N` does the same.
 """
 
+import warnings
 from pathlib import Path
 
 from mutator.campaigns.plans import Choices
+from mutator.errors import MutatorWarning
 from mutator.execution.distribution import Distributor
 from mutator.execution.following import followed
+from mutator.execution.left_files import LeftFiles
 from mutator.execution.local import LocalWorkers
 from mutator.execution.session import Notify, Summary, open_session
 from mutator.workspace import Workspace
@@ -52,6 +55,9 @@ def run_campaign(
     ) as session:
         session.prepare()
         if session.pending or session.proof:
+            left = LeftFiles()
             with followed(session):
                 distributor.run(session)
+            if remark := left.remark():
+                warnings.warn(remark, MutatorWarning, stacklevel=2)
         return session.finish()

@@ -134,6 +134,13 @@ def test_processes_that_a_run_stops_go_on(misbehave: Misbehave) -> None:
     assert time.monotonic() - began < 30.0, "the runs were stopped until their limits"
 
 
+def test_temporary_files_are_in_the_folder_of_the_run(misbehave: Misbehave) -> None:
+    """Its size is limited. `tempfile` remembers the folder that it chose when the target was loaded."""
+    trouble = "import os, tempfile\nassert os.path.samefile(tempfile.mkdtemp() + '/..', '..')"
+    ends = misbehave(trouble, head="import tempfile\ntempfile.gettempdir()")
+    assert [(e.status, e.mode) for e, _ in ends.values()] == [(Status.OK, RunMode(name)) for name in ENGINES]
+
+
 @pytest.mark.parametrize("name", ENGINES)
 def test_daemons_end_with_a_killed_engine(
     tmp_path: Path, copy_toycar: Callable[[Path], Workspace], name: str

@@ -182,7 +182,7 @@ class Process:
         os.dup2(log, 1)
         os.dup2(log, 2)
         os.close(log)
-        os.environ["TMPDIR"] = job["home"]
+        self.use_folder(job["home"])
         child.limit_resources(job)
         os.chdir(job["out"])
         report = self.finish(job)
@@ -192,6 +192,13 @@ class Process:
         if not report["threads"]:  # with other threads, the result is not used
             end()
         os._exit(0)
+
+    def use_folder(self, home: str) -> None:
+        """Make `home` the folder for temporary files, even if `tempfile` has already chosen the server's."""
+        os.environ["TMPDIR"] = home
+        tempfile: Any = sys.modules.get("tempfile")
+        if tempfile is not None and tempfile.tempdir == self.start["home"]:
+            tempfile.tempdir = home
 
     def elsewhere(self, names: Iterable[str]) -> Any:
         return child.imported_elsewhere(self.start["packages"], self.start["tree"], names)

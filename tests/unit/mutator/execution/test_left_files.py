@@ -1,0 +1,19 @@
+"""Files that a run leaves in shared folders are named."""
+
+from pathlib import Path
+
+from mutator.execution.left_files import LeftFiles
+
+
+def test_only_new_files_are_named(tmp_path: Path) -> None:
+    for folder in ("one", "other"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "before").touch()
+    left = LeftFiles([tmp_path / "one", tmp_path / "other", tmp_path / "missing"])
+    assert left.remark() == ""
+    (tmp_path / "one" / "mutator-scratch").mkdir()
+    assert left.remark() == ""
+    for number in range(5):
+        (tmp_path / "other" / f"left{number}").touch()
+    names = ", ".join(str(tmp_path / "other" / f"left{number}") for number in range(3))
+    assert f"{names} and 2 more" in left.remark()
