@@ -106,7 +106,7 @@ def writing_below(root: Path, name: str) -> Iterator[BinaryIO]:
     """Yield a file to write. It takes its name at the end of the block, and its folders are made.
 
     What stands in its place is replaced, never written to. Outside if a folder on the way is a link;
-    IsADirectoryError if a folder stands in its place.
+    MutatorError if a folder stands in its place.
     """
     with raising_disk_full(root / name), _parent(root, name, make=True) as (parent, last):
         temporary = f".{last}.{threading.get_native_id()}"  # `is_half_written`
@@ -119,9 +119,12 @@ def writing_below(root: Path, name: str) -> Iterator[BinaryIO]:
                 writer.flush()
                 os.fsync(file)
             os.replace(temporary, last, src_dir_fd=parent, dst_dir_fd=parent)
-        except BaseException:
+        except BaseException as err:
             with suppress(OSError):
                 os.unlink(temporary, dir_fd=parent)
+            if isinstance(err, IsADirectoryError):
+                what = "a file to write"
+                raise MutatorError("a folder", where=root / name, expected=what, remedy="move it") from None
             raise
 
 

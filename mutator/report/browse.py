@@ -273,7 +273,8 @@ def media(folder: RunFolder, seen_from: Path, budget: int) -> dict[str, dict[str
     """The stills, films and exact plots in plots/, by experiment. Stills are embedded up to `budget` bytes
     in total; the rest become links relative to `seen_from`."""
     found: dict[str, dict[str, Any]] = {}
-    for path in sorted((folder.path / "plots").glob("*"), key=lambda p: (len(p.name), p.name)):
+    files = filter(Path.is_file, (folder.path / "plots").glob("*"))
+    for path in sorted(files, key=lambda p: (len(p.name), p.name)):
         name, _, time = path.stem.partition("-")
         link = Path(os.path.relpath(path, seen_from)).as_posix()
         here = found.setdefault(name, {"stills": [], "films": []})

@@ -34,6 +34,8 @@ CONTENT = (  # all files that a run folder can contain; * matches any text, incl
     *(f"{ASIDE}/*", "owner.lock", "workers/*", f"{SCRATCH}/*"),
 )
 FOLDERS = {pattern.partition("/")[0] for pattern in CONTENT if "/" in pattern}
+_ALL_FOLDERS = FOLDERS | {f"report/{name}" for name in ("series", "tables", "figures")}
+_ALL_FOLDERS |= {"series/kept", "exports/mcap"}
 # what targets wrote, and what `verify --repair` set aside; nothing in them is reached by its name
 _CLOSED = (SCRATCH, ASIDE, f"{TRACES}/*/{SCRATCH}")
 
@@ -50,11 +52,9 @@ def check_contents(run: Path) -> None:
             raise not_plain(Path(entry.path))
         if not entry.name.isprintable():
             raise _refused(f"the name {entry.name!a}", run, "names of printable characters")
-        if "/" in name:
-            continue
-        if name in FOLDERS and not entry.is_dir():
+        if name in _ALL_FOLDERS and not entry.is_dir():
             raise _refused("a file", Path(entry.path), "a folder")
-        if (before := tops.setdefault(name.casefold(), name)) != name:
+        if "/" not in name and (before := tops.setdefault(name.casefold(), name)) != name:
             raise _refused(f"both {before!a} and {name!a}", run, "names that differ not only in case")
 
 
