@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from mutator._common.places import environment_path, library_files, library_fold
 from mutator._common.shipped import shipped_folder
 from mutator._common.tables import Table
 from mutator._common.text import counted, one_of, suggestion
+from mutator.engines.sandbox import check as check_sandbox
 from mutator.errors import MutatorError
 from mutator.faults.expansion import expand
 from mutator.faults.fault_models import FaultModels, load_fault_models
@@ -35,6 +36,7 @@ class Workspace:
     library: Path  #: the folder fault_library/
     templates: Path  #: the folder templates/
     target: Path | None = None  #: root of the target's source; None: as in the manifest
+    sandbox: bool = False  #: whether a target's code runs in a sandbox
 
     def __repr__(self) -> str:
         counts = ", ".join(counted(len(names), what) for what, names in self._contents())
@@ -64,14 +66,19 @@ class Workspace:
         library: str | Path | None = None,
         templates: str | Path | None = None,
         target: str | Path | None = None,
+        *,
+        sandbox: bool = False,
     ) -> "Workspace":
         """Find library, templates and target, each in the first of these places that names or contains it: 1.
         the argument, or `root`, which holds library and templates; 2. MUTATOR_LIBRARY, MUTATOR_TEMPLATES and
         MUTATOR_TARGET, or MUTATOR_ROOT; 3. the current folder or its nearest parent that holds
         fault_library/; 4. the copies that ship with the harness.
 
-        MutatorError if a named folder does not exist.
+        With `sandbox`, the processes that run a target's code can reach neither your other files nor the
+        network. MutatorError if a named folder does not exist, or if this machine has no sandbox.
         """
+        if sandbox:
+            check_sandbox()
         its_target = Path(target) if target else environment_path("MUTATOR_TARGET")
         if its_target and not its_target.is_dir():
             raise MutatorError(
@@ -83,11 +90,13 @@ class Workspace:
             library=_folder(library_folder(root, library), "fault_library", "library"),
             templates=_folder(templates_folder(root, templates), "templates", "templates"),
             target=its_target.resolve() if its_target else None,
+            sandbox=sandbox,
         )
 
     def manifest(self, name: str) -> TargetManifest:
         """The manifest with this name or path."""
         manifest = load_manifest(self._file("targets", name, "target"), self.target)
+        manifest = replace(manifest, sandbox=self.sandbox)
         check_names(manifest)
         return manifest
 

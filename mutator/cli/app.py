@@ -35,7 +35,7 @@ from mutator.cli import (
     serving,
 )
 from mutator.cli.console import Terminal, discard, remarking, show_error
-from mutator.cli.options import Library, Place, Root, Target, Templates
+from mutator.cli.options import Library, Place, Root, Sandbox, Target, Templates
 from mutator.errors import (
     EXIT_CHECK_FAILED,
     EXIT_HARNESS_ERRORS,
@@ -110,12 +110,13 @@ def start(
     library: Library = None,
     templates: Templates = None,
     target: Target = None,
+    sandbox: Sandbox = None,
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
     """Inject faults into a driving controller, simulate it, and see the effects."""
-    ctx.obj = Place(root=root, library=library, templates=templates, target=target)
+    ctx.obj = Place(root=root, library=library, templates=templates, target=target, sandbox=sandbox)
 
 
 for module in (

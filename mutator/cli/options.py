@@ -109,15 +109,20 @@ OutRun = Annotated[Path, typer.Option("--out", metavar="DIR", help="The run fold
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Place:
-    """The library, templates and target that options name; the environment supplies the rest."""
+    """The library, templates and target that options name; the environment supplies the rest.
+
+    `sandbox` is whether the target's code runs in a sandbox.
+    """
 
     root: Path | None = None
     library: Path | None = None
     templates: Path | None = None
     target: Path | None = None
+    sandbox: bool | None = None
 
     def workspace(self) -> "Workspace":
-        return mutator.Workspace.find(self.root, self.library, self.templates, self.target)
+        sandbox = bool(self.sandbox)
+        return mutator.Workspace.find(self.root, self.library, self.templates, self.target, sandbox=sandbox)
 
     def over(self, other: "Place") -> "Place":
         mine = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
@@ -140,11 +145,24 @@ Target = Annotated[
         metavar="DIR", help="The controller's source root. Default: the manifest's [env: MUTATOR_TARGET]."
     ),
 ]
-PLACE_OPTIONS = {"root": Root, "library": Library, "templates": Templates, "target": Target}
+Sandbox = Annotated[
+    bool | None,
+    typer.Option(
+        "--sandbox",
+        help="Run the target's code in a sandbox, without your files and the network (needs bubblewrap).",
+    ),
+]
+PLACE_OPTIONS = {
+    "root": Root,
+    "library": Library,
+    "templates": Templates,
+    "target": Target,
+    "sandbox": Sandbox,
+}
 
 
 def with_place(verb: Callable[..., None]) -> Callable[..., None]:
-    """Add the four options of a place to a subcommand, so that users can also write them after it."""
+    """Add the options of a place to a subcommand, so that users can also write them after it."""
     signature = inspect.signature(verb, eval_str=True)
     own = [p for p in signature.parameters.values() if p.name != "place"]
     context = inspect.Parameter("ctx", inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context)

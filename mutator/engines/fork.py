@@ -46,7 +46,10 @@ _Key = tuple[str, int, tuple[str, ...]]
 
 class ForkEngine:
     """Takes the arguments of ReferenceEngine; `null` has the files of the null mutant, `secret` is as in
-    `Setting`."""
+    `Setting`.
+
+    In a sandbox, the fork server and its mutants can write only to the folder that `run` uses.
+    """
 
     def __init__(
         self,
@@ -63,6 +66,7 @@ class ForkEngine:
         self._manifest = manifest
         self._limits = limits
         self._work = self.reference.work
+        self._runs = self._work / f"{os.getpid()}-fork"
         self._parent = parent
         self._null = null
         self._warm = warm
@@ -75,7 +79,7 @@ class ForkEngine:
 
     def run(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Execution]]:
         for job in jobs:
-            folder = self._work / f"{os.getpid()}-{job.name}"
+            folder = self._runs / job.name
             try:
                 yield job, self.execute(job, folder)
             finally:
@@ -99,7 +103,7 @@ class ForkEngine:
             if self._unfit:
                 raise Refused(*self._unfit.args)
             steps = len(self._observed(job, job.golden).before)
-            swap = plan_swap(self._manifest, self._null, str(self._running().tree))
+            swap = plan_swap(self._manifest, self._null, str(self._running(job).tree))
             waiting = self._at(job, steps - 1, swap)
             said, _ = waiting.ask({"do": "load", "modules": []}, self._patience_s)
             if said["threads"]:
@@ -114,13 +118,14 @@ class ForkEngine:
         if self._pool is not None:
             self._pool.close()
             self._pool = None
+            remove_folder(self._runs)
 
     def _execute(self, job: Job, folder: Path) -> Execution:
         if self._unfit:
             raise Refused(*self._unfit.args)
         if job.mutant is None or job.golden is None or job.hash_seed:
             raise Refused("not an experiment")
-        swap = plan_swap(self._manifest, job.files, str(self._running().tree))
+        swap = plan_swap(self._manifest, job.files, str(self._running(job).tree))
         if self._warm:
             return self._from_the_start(job, folder, swap)
         seen = self._observed(job, job.golden)
@@ -132,23 +137,26 @@ class ForkEngine:
         return self._become(self._at(job, start.step, swap), job, folder, swap, start)
 
     def _from_the_start(self, job: Job, folder: Path, swap: CodeSwap) -> Execution:
-        first = self._running().first
+        first = self._running(job).first
         first.load(_needed(swap), self._patience_s)
         return self._become(first, job, folder, swap, _FROM_THE_START)
 
-    def _running(self) -> Pool:
+    def _running(self, job: Job) -> Pool:
+        scenarios = Path(_resolved(job.scenario)).parent
         if self._pool is None:
             self._pools += 1
-            home = self._work / f"{os.getpid()}-server-{self._pools}"
+            home = self._runs / f"server-{self._pools}"
             try:
-                self._pool = Pool(self._manifest, home, self._parent)
+                self._pool = Pool(self._manifest, home, self._parent, scenarios)
             except Refused as why:
                 self._unfit = why
                 raise
+        if self._manifest.sandbox and self._pool.scenarios != scenarios:
+            raise Refused("the sandbox of the fork server has the scenarios of another folder")
         return self._pool
 
     def _at(self, job: Job, step: int, swap: CodeSwap) -> Waiting:
-        pool = self._running()
+        pool = self._running(job)
         key = _key(job)
         golden = Golden(key=key, scenario=job.scenario, arguments=lambda: self._arguments(job, pool.home))
         seen = self._seen.get(key)
@@ -189,11 +197,15 @@ class ForkEngine:
         }
         # the child must begin the run; a watched run has the arguments of the waiting processes
         if waiting.key is None:
-            request["args"] = self._arguments(job, self._running().home if watch else out)
+            request["args"] = self._arguments(job, self._running(job).home if watch else out)
         limits = {"wall_s": self._limits.wall_s, "disk_mb": self._limits.disk_mb}
-        asked = {"do": "mutant", "job": marshal.dumps(request), "home": str(folder), **limits}
+        limited = (
+            self._runs if self._manifest.sandbox else folder
+        )  # a sandbox's /tmp is beside the run's folder
+        asked = {"do": "mutant", "job": marshal.dumps(request), "home": str(limited), **limits}
         with used_unchanged(job.scenario):
             said, _ = waiting.ask(asked, self._patience_s)
+        self._running(job).clean()
         if said["threads"]:
             raise Refused(too_many(said["threads"]), turned_off(said["threads"]))
         if said["touched"]:
@@ -254,13 +266,13 @@ class ForkEngine:
         if known.is_file() and (data := self._authentic(known)):
             values, before, libraries = marshal.loads(data)
             return Observed(values=values, before=before, libraries=libraries)
-        folder = self._work / f"{os.getpid()}-watch-{content_id(_key(job))}"
+        folder = self._runs / f"watch-{content_id(_key(job))}"
         try:
-            swap = plan_swap(self._manifest, self._null, str(self._running().tree))
+            swap = plan_swap(self._manifest, self._null, str(self._running(job).tree))
             null = replace(job, mutant=None, stop=False)
             self._at(job, 0, swap)  # Refused, with the reason, if the run cannot begin
             # Fork before the first step, because a later fork misses earlier observations.
-            first = self._running().first
+            first = self._running(job).first
             execution = self._become(first, null, folder, swap, _FROM_THE_START, watch=True)
             if execution.status is Status.HARNESS_ERROR:
                 raise Lost(execution.detail)

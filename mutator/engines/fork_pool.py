@@ -22,6 +22,7 @@ from mutator._common.unchanged_files import UnchangedFiles
 from mutator.engines import bytecode
 from mutator.engines.base_tree import RunTree
 from mutator.engines.processes import end, environment, raised_in
+from mutator.engines.sandbox import Sandbox
 from mutator.engines.threads import too_many, turned_off
 from mutator.targets.manifest import TargetManifest
 
@@ -135,14 +136,17 @@ def used_unchanged(path: Path) -> Iterator[None]:
 class Pool:
     """A fork server with its waiting processes, in the new scratch folder `home`.
 
+    In a sandbox, they can read the folder `scenarios`, and write to the folder in which `home` is.
+
     Its tree has no bytecode, which a mutant could exchange before the server loads one more module. Raises
     Refused if the target cannot be loaded or has more than one thread, and Lost if the server ends without an
     answer, or if its tree is not the pristine one.
     """
 
-    def __init__(self, manifest: TargetManifest, home: Path, parent: int | None) -> None:
+    def __init__(self, manifest: TargetManifest, home: Path, parent: int | None, scenarios: Path) -> None:
         assert manifest.stepwise is not None
         self.home = home
+        self.scenarios = scenarios
         self.tree = home / "tree"
         self._parent = parent
         self._waiting: list[Waiting] = []
@@ -160,9 +164,13 @@ class Pool:
         told.write_bytes(data)
         self._told = UnchangedFiles({str(told): data})
         ours, theirs = socket.socketpair()
+        command = [sys.executable, "-P", "-s", str(_SERVER), str(theirs.fileno()), str(told)]
+        self._sandbox = Sandbox.of(manifest, home.parent, [scenarios])
+        if self._sandbox:
+            command = self._sandbox.command(command)
         with theirs, (home / "log").open("wb") as log:
             self._process = subprocess.Popen(
-                [sys.executable, "-P", "-s", _SERVER, str(theirs.fileno()), str(told)],
+                command,
                 cwd=home,
                 stdin=subprocess.DEVNULL,
                 stdout=log,
@@ -188,6 +196,13 @@ class Pool:
         self._group = said["group"]
         if self._files.first_changed() or self._told.first_changed():
             raise Lost("the tree of the fork server is not the pristine one")
+        if self._sandbox:
+            self._sandbox.begin()
+
+    def clean(self) -> None:
+        """Delete what a run has left in the temporary folders of the sandbox."""
+        if self._sandbox:
+            self._sandbox.clear()
 
     def before(self, step: int, golden: Golden, modules: Sequence[str], patience_s: float) -> Waiting:
         """Return a process that waits before `step` of the golden run, with these modules loaded."""

@@ -31,7 +31,7 @@ def not_loadable(manifest: TargetManifest, home: Path) -> Refused | None:
     if found := unfit(manifest):
         return found
     try:
-        Pool(manifest, home, None).close()
+        Pool(manifest, home, None, home).close()
     except Refused as why:
         return why
     except Lost as why:

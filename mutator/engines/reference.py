@@ -32,6 +32,7 @@ from mutator.engines.processes import (
     tail,
     was_active,
 )
+from mutator.engines.sandbox import Sandbox
 from mutator.model import Limits, Status
 from mutator.mutants.anchors import parsed
 from mutator.mutants.probe import probe_module, state_after
@@ -121,7 +122,7 @@ class ReferenceEngine:
         path.write_bytes(request)
         scenario = job.scenario.resolve()
         given = UnchangedFiles({str(path): request, str(scenario): scenario.read_bytes()})
-        ended = self._run(path, folder, job.hash_seed)
+        ended = self._run(job, path, folder)
         changed = tree.first_changed() or given.first_changed().removeprefix(f"{folder}/")
         if not (changed or new):
             self._base_tree.take_back(tree)
@@ -167,19 +168,22 @@ class ReferenceEngine:
         holder, _ = state_after(0, None, None)
         return holder, [value.name for value in self.manifest.observation.values]
 
-    def _run(self, request: Path, folder: Path, hash_seed: int) -> Ended:
+    def _run(self, job: Job, request: Path, folder: Path) -> Ended:
         """Run the job in a guarded process. Process and guard end when the connection is closed."""
         began = time.monotonic()
         ours, theirs = socket.socketpair()
+        command = [sys.executable, "-P", "-s", str(_CHILD), str(request), str(theirs.fileno())]
+        if sandbox := Sandbox.of(self.manifest, folder, [job.scenario.resolve()]):
+            command = sandbox.command(command)
         with ours:
             with theirs, (folder / "log").open("wb") as log:
                 guarding = subprocess.Popen(
-                    [sys.executable, "-P", "-s", str(_CHILD), str(request), str(theirs.fileno())],
+                    command,
                     cwd=folder,
                     stdin=subprocess.DEVNULL,
                     stdout=log,
                     stderr=subprocess.STDOUT,
-                    env=environment(hash_seed, folder, self.manifest.env),
+                    env=environment(job.hash_seed, folder, self.manifest.env),
                     pass_fds=[theirs.fileno()],
                     start_new_session=True,  # Ctrl-C at the terminal is for the command, not for the target
                 )

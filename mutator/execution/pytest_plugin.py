@@ -32,6 +32,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         help="resume even if Python or packages have changed since the run folder was last used",
     )
     group.addoption(
+        "--campaign-sandbox",
+        action="store_true",
+        help="run the target's code in a sandbox, like `mutator run --sandbox`",
+    )
+    group.addoption(
         "--campaign-cluster",
         metavar="WHERE",
         help="use the workers of a Dask cluster, like `mutator run --cluster`",
@@ -48,7 +53,8 @@ def pytest_configure(config: pytest.Config) -> None:
     if campaign is None:
         if out is not None:
             raise pytest.UsageError("--campaign-out without --campaign")
-        for option in ("require_reviewed", "accept_versions", "campaign_cluster", "insecure_network"):
+        others = ("require_reviewed", "accept_versions", "campaign_sandbox", "campaign_cluster")
+        for option in (*others, "insecure_network"):
             if config.getoption(option):
                 raise pytest.UsageError(f"--{option.replace('_', '-')} without --campaign")
         return
@@ -71,5 +77,6 @@ def pytest_configure(config: pytest.Config) -> None:
         out,
         reviewed=config.getoption("require_reviewed"),
         accept_versions=config.getoption("accept_versions"),
+        sandbox=config.getoption("campaign_sandbox"),
         distributor=deals,
     )

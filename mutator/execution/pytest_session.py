@@ -128,6 +128,7 @@ def configure(
     *,
     reviewed: bool,
     accept_versions: bool,
+    sandbox: bool,
     distributor: "Deals | None" = None,
 ) -> None:
     """Register the plugin for this process's role.
@@ -143,7 +144,12 @@ def configure(
     elif not any(isinstance(plugin, Controller) for plugin in config.pluginmanager.get_plugins()):
         config.pluginmanager.register(
             PlainController(
-                campaign, out, reviewed=reviewed, accept_versions=accept_versions, distributor=distributor
+                campaign,
+                out,
+                reviewed=reviewed,
+                accept_versions=accept_versions,
+                sandbox=sandbox,
+                distributor=distributor,
             )
         )
 
@@ -174,6 +180,7 @@ class WorkerSide:
             library=Path(places["library"]),
             templates=Path(places["templates"]),
             target=Path(places["target"]) if places["target"] else None,
+            sandbox=bool(places["sandbox"]),
         )
         assignment = Assignment(
             run=run,
@@ -281,6 +288,7 @@ class PlainController(Controller):
         *,
         reviewed: bool,
         accept_versions: bool,
+        sandbox: bool,
         distributor: "Deals | None" = None,
     ) -> None:
         super().__init__()
@@ -288,6 +296,7 @@ class PlainController(Controller):
         self._campaign = campaign
         self._reviewed = reviewed
         self._accept_versions = accept_versions
+        self._sandbox = sandbox
         self._out = out
         self._open = ExitStack()
         self._closing_lines: list[str] = []
@@ -297,7 +306,7 @@ class PlainController(Controller):
         workers = getattr(session.config.option, "numprocesses", None) or 0
         try:
             opened = open_session(
-                Workspace.find(),
+                Workspace.find(sandbox=self._sandbox),
                 self._campaign,
                 self._out,
                 workers=workers,

@@ -2,7 +2,6 @@
 target's command."""
 
 import json
-import os
 import shutil
 import subprocess
 import sys
@@ -10,9 +9,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from mutator._common.below import inside
+from mutator._common.below import inside, open_below
 from mutator._common.files import ScratchFolder, half_written, make_folder
 from mutator.engines import bytecode
+from mutator.engines.processes import environment
+from mutator.engines.sandbox import Sandbox
 from mutator.errors import MutatorError
 from mutator.execution.single_run import is_same, manifest_of, run_golden, run_single
 from mutator.figures.run_plot import marks_of
@@ -131,10 +132,14 @@ def _show(manifest: TargetManifest, folder: Path, places: Mapping[str, str], sho
     for place in (out, made):
         make_folder(place.parent)
     arguments = (*film.args, *(film.still_args if shot.t is not None else ()))
+    command = [sys.executable, "-P", "-s", "-m", film.module, *filled(arguments, here)]
+    films = (Path(places["golden"]), Path(places["faulty"]))
+    if sandbox := Sandbox.of(manifest, folder, [*films, tree]):
+        command = sandbox.command(command)
     done = subprocess.run(
-        [sys.executable, "-P", "-s", "-m", film.module, *filled(arguments, here)],
+        command,
         cwd=made.parent,
-        env={**os.environ, **manifest.env, "PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"},
+        env={**environment(0, folder, manifest.env), "PYTHONPATH": str(tree)},
         capture_output=True,
         text=True,
         check=False,
@@ -143,5 +148,6 @@ def _show(manifest: TargetManifest, folder: Path, places: Mapping[str, str], sho
         said = done.stderr.strip().splitlines() or ["no message"]
         complaint = said[-1].removeprefix("error: ").replace(str(made), str(out))
         raise MutatorError(complaint, where=f"{film.module}")
-    with half_written(out) as temporary:  # copying can be interrupted
-        shutil.copyfile(made, temporary)
+    # copying can be interrupted, and the command can leave a link
+    with open_below(made.parent, made.name) as source, half_written(out) as half, half.open("wb") as target:
+        shutil.copyfileobj(source, target)

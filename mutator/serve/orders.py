@@ -243,7 +243,7 @@ class Desk:
     def _place(self) -> list[str]:
         place = self.workspace
         options = {"--library": place.library, "--templates": place.templates, "--target": place.target}
-        return _options(options)
+        return [*_options(options), *(["--sandbox"] if place.sandbox else [])]
 
 
 def _options(given: dict[str, Any]) -> list[str]:

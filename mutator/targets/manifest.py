@@ -82,6 +82,7 @@ class TargetManifest:
     film: Film | None = None
     # change -> scenarios that it makes identical, e.g. because they differ only in traffic that it removes
     same_in: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    sandbox: bool = False  # whether the target's code runs in a sandbox
 
     @property
     def package(self) -> str | None:
@@ -170,6 +171,17 @@ class TargetManifest:
                 )
             extra += self.changes[change]
         return tuple(filled((*self.entry_args, *extra), values))
+
+    def read_by_runs(self) -> tuple[Path, ...]:
+        """What runs read besides their tree and scenario: the target's cache and, if an argument names it,
+        its root."""
+        words = (
+            *self.entry_args,
+            *self.independent,
+            *(word for args in self.changes.values() for word in args),
+        )
+        its_root = (self.root,) if any("{root}" in word for word in words) else ()
+        return (caches.of_target(self.name), *its_root)
 
     def filming(self) -> "TargetManifest":
         """The same target, with runs that write a film; MutatorError if it cannot be filmed."""

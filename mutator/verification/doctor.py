@@ -17,6 +17,7 @@ from packaging.requirements import Requirement
 
 from mutator._common.cores import usable_cores
 from mutator._common.text import counted
+from mutator.engines.sandbox import shortcoming as shortcoming_of_sandbox
 from mutator.errors import MutatorError
 from mutator.targets.requirements import MISSING, check_requirements, shortcoming
 from mutator.verification.fast_engines import loading
@@ -33,7 +34,7 @@ LITTLE_MEMORY = 1e9  # bytes; two controllers with their solvers, and the runner
 def examine(workspace: "Workspace | MutatorError") -> list[Finding]:
     """Check interpreter, packages, machine, current folder, child processes, library and targets (including
     whether each can be forked). If no workspace was found, `workspace` is the error, which is reported."""
-    findings = [_python(), *_packages(), _cores(), _memory(), _disk(), _folder(), _child()]
+    findings = [_python(), *_packages(), _cores(), _memory(), _disk(), _folder(), _child(), _sandbox()]
     if isinstance(workspace, MutatorError):
         remedy = workspace.remedy or ""
         findings.append(Finding(name="library", level=Level.FAIL, found=workspace.got, remedy=remedy))
@@ -110,6 +111,13 @@ def _child() -> Finding:
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
     memory = "" if limit == resource.RLIM_INFINITY else f", address space limited to {limit / 1e9:.1f} GB"
     return Finding(name="child process", level=Level.OK, found=f"starts and finds its packages{memory}")
+
+
+def _sandbox() -> Finding:
+    if problem := shortcoming_of_sandbox():
+        remedy = "needed only for `--sandbox` (docs/explanation/trust.md#the-sandbox)"
+        return Finding(name="sandbox", level=Level.WARN, found=problem, remedy=remedy)
+    return Finding(name="sandbox", level=Level.OK, found="`--sandbox` works")
 
 
 def _library(workspace: "Workspace") -> Iterator[Finding]:

@@ -86,7 +86,7 @@ def test_loadfile_distributes_chunks_over_all_workers(tmp_path: Path, given: str
     registered: list[object] = []
     manager = SimpleNamespace(get_plugins=lambda: (), register=registered.append)
     config: Any = SimpleNamespace(option=SimpleNamespace(dist=given), pluginmanager=manager)
-    configure(config, "small", tmp_path, reviewed=False, accept_versions=False)
+    configure(config, "small", tmp_path, reviewed=False, accept_versions=False, sandbox=False)
     assert config.option.dist == used
     assert len(registered) == 1
 

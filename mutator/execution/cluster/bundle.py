@@ -12,7 +12,7 @@ Each machine makes the golden runs itself; their digests show whether its result
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
@@ -21,6 +21,7 @@ from typing import Any
 from mutator._common.below import Outside, check_inside, check_name, files_inside, inside
 from mutator._common.files import raising_disk_full, read_json
 from mutator._common.version import VERSION
+from mutator.engines import sandbox
 from mutator.errors import MutatorError
 from mutator.execution.cluster.parcel import pack, unpack
 from mutator.faults.fault_models import FILES, FaultModels, load_fault_models
@@ -99,6 +100,7 @@ def _parts(workspace: Workspace, folder: RunFolder, engine: str) -> Iterator[tup
         "several_seeds": len(folder.seeds) > 1,
         "goldens": [{"golden": one.plain(), "digest": digests[one.key]} for one in folder.goldens],
         "manifest": manifest.path.name,
+        "sandbox": workspace.sandbox,
     }
     yield _META, json.dumps(meta).encode()
     yield f"manifest/{manifest.path.name}", manifest.path.read_bytes()
@@ -168,7 +170,9 @@ class Site:
         overlay = self.place / "overlay"
         found = load_manifest(path, self.place / "target", overlay if overlay.is_dir() else None)
         check_names(found)
-        return found
+        if self.meta["sandbox"]:
+            sandbox.check()
+        return replace(found, sandbox=self.meta["sandbox"])
 
     @cached_property
     def models(self) -> FaultModels:

@@ -1,0 +1,149 @@
+"""A sandbox for the processes that run a target's code: bubblewrap (`bwrap`), for the code of strangers.
+
+In it, a process sees only its own processes, network and shared memory. Of the disk, it sees the system,
+Python with its packages, and what a run reads. It can write to one folder only, which also holds its /tmp
+and /dev/shm. What it computes is the same.
+"""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
+from functools import lru_cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from mutator._common.files import remove_folder
+from mutator.engines.processes import environment
+from mutator.errors import MutatorError
+from mutator.targets.manifest import TargetManifest
+
+_PACKAGE = Path(__file__).parents[1]  # the harness, parts of which run inside
+_ALONE = ("--unshare-all", "--die-with-parent", "--new-session", "--as-pid-1", "--cap-drop", "ALL")
+_SYSTEM = ("/usr", "/bin", "/sbin", "/lib", "/lib32", "/lib64", "/libx32", "/nix/store", "/gnu/store")
+_ETC = ("alternatives", "fonts", "group", "ld.so.cache", "ld.so.conf", "ld.so.conf.d", "localtime")
+_ETC_MORE = ("mime.types", "nsswitch.conf", "passwd", "timezone")
+_CPUS = "/sys/devices/system/cpu"
+_PYTHON = "import json, sys; print(json.dumps([sys.prefix, sys.base_prefix, sys.exec_prefix, *sys.path]))"
+_PATIENCE_S = 60.0
+_TEMPORARY = {"/tmp": "tmp", "/dev/shm": "shm"}  # folders of the sandbox -> their names in its folder
+
+
+class Sandbox:
+    """A sandbox in which processes read `reads` and write to the existing folder `folder`."""
+
+    def __init__(self, folder: Path, reads: Iterable[Path]) -> None:
+        self._temporary = {place: folder / name for place, name in _TEMPORARY.items()}
+        for path in self._temporary.values():
+            path.mkdir(exist_ok=True)
+        binds = [word for place, path in self._temporary.items() for word in ("--bind", str(path), place)]
+        readable = [word for path in (*_python(), *reads) for word in _read_only(path)]
+        own = ("--bind", str(folder), str(folder), "--remount-ro", "/dev", "--remount-ro", "/")
+        system = [word for path in _system() for word in _read_only(path)]
+        devices = ("--proc", "/proc", "--dev", "/dev")
+        self._words = [_bwrap(), *_ALONE, *system, *devices, *binds, *readable, *own, "--"]
+        self._first: set[Path] = set()
+
+    @classmethod
+    def of(cls, manifest: TargetManifest, folder: Path, reads: Iterable[Path]) -> "Sandbox | None":
+        """Return the sandbox of a run in `folder`, or None if the target's code runs without one.
+
+        Besides `reads`, it can read what the target's arguments name: its cache, and its root.
+        """
+        if not manifest.sandbox:
+            return None
+        return cls(folder, (*reads, *manifest.read_by_runs()))
+
+    def command(self, words: Sequence[str]) -> list[str]:
+        """Return the command that runs `words` in the sandbox."""
+        return [*self._words, *words]
+
+    def begin(self) -> None:
+        """Note what /tmp and /dev/shm contain before the first run. Folders can be mounted there."""
+        self._first = set(self._left())
+
+    def clear(self) -> None:
+        """Delete what runs have left in /tmp and /dev/shm since `begin`."""
+        for path in set(self._left()) - self._first:
+            if path.is_dir() and not path.is_symlink():
+                remove_folder(path)
+            else:
+                path.unlink(missing_ok=True)
+
+    def _left(self) -> Iterator[Path]:
+        for folder in self._temporary.values():
+            with suppress(OSError):
+                yield from folder.iterdir()
+
+
+def check() -> None:
+    """Raise MutatorError if no sandbox can be made here."""
+    if problem := shortcoming():
+        raise MutatorError(
+            f"no sandbox: {problem}",
+            argument="sandbox",
+            expected="bubblewrap, and a kernel on which users can make namespaces",
+            remedy="see docs/explanation/trust.md#the-sandbox, or leave out `sandbox`",
+        )
+
+
+@lru_cache(maxsize=1)
+def shortcoming() -> str:
+    """Return why no sandbox can be made here; empty if one can."""
+    if shutil.which("bwrap") is None:
+        return "`bwrap` is not installed (Debian, Ubuntu, Fedora: package bubblewrap)"
+    with TemporaryDirectory(prefix="mutator-") as folder:
+        try:
+            command = Sandbox(Path(folder), ()).command([sys.executable, "-P", "-s", "-c", "import numpy"])
+            done = subprocess.run(
+                command,
+                cwd=folder,
+                env=environment(0, Path(folder)),
+                capture_output=True,
+                text=True,
+                timeout=_PATIENCE_S,
+                check=False,
+            )
+        except (OSError, subprocess.TimeoutExpired) as err:
+            return str(err)
+    said = done.stderr.strip().splitlines() or [f"`bwrap` ended with status {done.returncode}"]
+    return said[-1] if done.returncode else ""
+
+
+def _bwrap() -> str:
+    return shutil.which("bwrap") or "bwrap"
+
+
+def _read_only(path: str | Path) -> tuple[str, str, str]:
+    return ("--ro-bind-try", str(path), str(path))
+
+
+def _system() -> Iterator[str]:
+    yield from _SYSTEM
+    yield from (f"/etc/{name}" for name in (*_ETC, *_ETC_MORE))
+    yield _CPUS
+
+
+@lru_cache(maxsize=1)
+def _python() -> tuple[Path, ...]:
+    """Return the folders and files of Python, its packages, their libraries, and the harness.
+
+    A folder that contains the user's home is left out, because the sandbox hides the home.
+    """
+    with TemporaryDirectory(prefix="mutator-") as folder:
+        done = subprocess.run(
+            [sys.executable, "-P", "-s", "-c", _PYTHON],
+            cwd=folder,
+            env=environment(0, Path(folder)),
+            capture_output=True,
+            check=True,
+        )
+    libraries = os.environ.get("LD_LIBRARY_PATH", "").split(os.pathsep)
+    named = [_PACKAGE, *map(Path, (*json.loads(done.stdout), *libraries))]
+    found = {place for path in named for place in (path, path.resolve()) if path.is_absolute()}
+    home = Path(os.environ.get("HOME") or "/").resolve()
+    shown = {path for path in found if path.exists() and not home.is_relative_to(path.resolve())}
+    return tuple(sorted(path for path in shown if not shown & set(path.parents)))

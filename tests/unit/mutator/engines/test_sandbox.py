@@ -1,0 +1,197 @@
+"""In a sandbox, a target's code reaches nothing but what its run needs, and computes the same."""
+
+import json
+import os
+import socket
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from mutator.engines import sandbox
+from mutator.engines.jobs import Execution, Job, RunMode
+from mutator.engines.reference import ReferenceEngine
+from mutator.engines.sandbox import Sandbox
+from mutator.errors import EXIT_WRONG_INPUT, MutatorError
+from mutator.model import Limits, Status
+from mutator.triggers.kinds import at_time
+from mutator.workspace import Workspace
+
+from ..fork_on_toy import Edit, Fork
+
+LIMITS = Limits(cpu_s=2, wall_s=60, memory_mb=1024, steps=500, disk_mb=8)
+Run = Callable[..., Execution]
+needed = pytest.mark.skipif(bool(sandbox.shortcoming()), reason=f"no sandbox: {sandbox.shortcoming()}")
+
+REACHING = """
+import json, os, socket
+from pathlib import Path
+
+def refused(act):
+    try:
+        return repr(act())
+    except OSError as err:
+        return type(err).__name__
+
+def connect():
+    return socket.create_connection(("127.0.0.1", {port}), timeout=5)
+
+def write(path):
+    return Path(path).write_text("changed")
+
+found = {{
+    "secret": refused(Path("{home}/.ssh/id").read_bytes),
+    "kill": refused(lambda: os.kill({pid}, 0)),
+    "connect": refused(connect),
+    "home": refused(lambda: write("{home}/new")),
+    "scenario": refused(lambda: write("{scenario}")),
+    "library": refused(lambda: os.listdir("{library}/faults")),
+    "beside": refused(lambda: write("../../beside")) and None,  # a folder of the sandbox
+    "system": refused(lambda: write("/etc/new")),
+    "devices": refused(lambda: write("/dev/new")),
+    "host": refused(lambda: os.listdir("/root/.cache")),
+    "processes": sorted(int(name) for name in os.listdir("/proc") if name.isdigit()),
+}}
+write("/tmp/{mark}")
+write("/dev/shm/{mark}")
+write("written.json") and write(os.environ["TMPDIR"] + "/mine")
+Path("found.json").write_text(json.dumps(found))
+"""
+
+
+@pytest.fixture
+def run(toycar: Workspace, tmp_path: Path) -> Iterator[Run]:
+    manifest = replace(toycar.manifest("toycar"), sandbox=True)
+    (tmp_path / "work").mkdir()
+    engine = ReferenceEngine(manifest, tmp_path / "work", LIMITS)
+
+    def execute(body: str | None = None) -> Execution:
+        files = {} if body is None else {"toycar/go.py": body.encode()}
+        job = Job(name="job", scenario=toycar.scenario("A"), seed=1, files=files)
+        return engine.execute(job, tmp_path / "work" / "job")
+
+    yield execute
+    engine.close()
+
+
+@needed
+def test_a_run_reaches_nothing_outside(
+    run: Run, toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    home, mark = tmp_path / "home", f"mutator-left-{os.getpid()}"
+    (home / ".ssh").mkdir(parents=True)
+    (home / ".ssh/id").write_text("secret")
+    monkeypatch.setenv("HOME", str(home))
+    scenario = toycar.scenario("A")
+    before = scenario.read_bytes()
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        places = {"home": home, "scenario": scenario, "library": toycar.library, "mark": mark}
+        execution = run(REACHING.format(port=server.getsockname()[1], pid=os.getpid(), **places))
+    assert (execution.status, execution.detail) == (Status.OK, "")
+    found = json.loads((execution.out / "found.json").read_text())
+    assert found.pop("processes") == [1, 2], "the guard and the run"
+    assert not (tmp_path / "work/beside").exists()
+    assert found == {
+        "beside": None,
+        "secret": "FileNotFoundError",
+        "kill": "ProcessLookupError",
+        "connect": "ConnectionRefusedError",
+        "home": "FileNotFoundError",
+        "scenario": "OSError",
+        "library": "FileNotFoundError",
+        "system": "OSError",
+        "devices": "OSError",
+        "host": "FileNotFoundError",
+    }
+    assert scenario.read_bytes() == before and (execution.out / "written.json").exists()
+    assert not Path("/tmp", mark).exists() and not Path("/dev/shm", mark).exists()
+
+
+@needed
+@pytest.mark.parametrize(
+    ("body", "status", "detail"),
+    [
+        ("raise ValueError('no')", Status.CRASHED, "ValueError: no (toycar/go.py:1)"),
+        ("import os; os._exit(0)", Status.CRASHED, "left with status 0 without a report"),
+        ("import ctypes; ctypes.string_at(0)", Status.CRASHED, "killed by SIGSEGV"),
+        ("import os; os.kill(os.getpid(), 9)", Status.HARNESS_ERROR, "killed from outside by SIGKILL"),
+        ("import os; os.kill(os.getppid(), 9)", Status.OK, ""),  # nothing inside can kill the guard
+        ("import os; os.kill(-1, 9)", Status.CRASHED, "ProcessLookupError"),  # there is no other
+        ("import os\nif not os.fork():\n    os.setsid(); import time; time.sleep(60)", Status.OK, ""),
+        ("while True: pass", Status.TIMEOUT, "CPU time limit of 2 s"),
+        ("open('/dev/shm/x', 'wb').write(bytes(9 << 20))", Status.TIMEOUT, "disk limit"),
+        ("for i in range(9): open(f'/tmp/{i}', 'wb').write(bytes(1 << 20))", Status.TIMEOUT, "disk limit"),
+    ],
+)
+def test_each_kind_of_ending_has_its_status(run: Run, body: str, status: Status, detail: str) -> None:
+    execution = run(body)
+    assert execution.status is status and execution.detail.startswith(detail), execution.detail
+
+
+@needed
+def test_runs_leave_the_bytes_of_runs_without_a_sandbox(run: Run, toycar: Workspace, tmp_path: Path) -> None:
+    (tmp_path / "open").mkdir()
+    engine = ReferenceEngine(toycar.manifest("toycar"), tmp_path / "open", LIMITS)
+    plain = engine.execute(Job(name="a", scenario=toycar.scenario("A"), seed=1), tmp_path / "open/a")
+    boxed = run()
+    assert boxed.status is plain.status is Status.OK and boxed.modules == plain.modules
+    assert {path.name for path in boxed.out.iterdir()} == {"log.npz", "said.json"}
+    for path in plain.out.iterdir():
+        assert (boxed.out / path.name).read_bytes() == path.read_bytes()
+
+
+@needed
+def test_a_fork_server_and_its_mutants_share_a_sandbox(toycar: Workspace, tmp_path: Path, edit: Edit) -> None:
+    """The target leaves a file in /tmp. No other run finds it."""
+    leaving = '        __import__("tempfile").NamedTemporaryFile(dir="/tmp", delete=False).close()\n'
+    edit(
+        "tree/toycar/sensing.py",
+        "        offset = world.offset\n",
+        f"        offset = world.offset\n{leaving}",
+    )
+    boxed = Fork(replace(toycar, sandbox=True), tmp_path)
+    job = boxed.job(at_time(3.0))
+    [(_, first)] = boxed.engine.run([job])
+    [folder] = (tmp_path / "work").glob("*-fork")
+    assert [path for path in (folder / "tmp").rglob("*") if path.is_file()] == []
+    [(_, second)] = boxed.engine.run([replace(job, name="k")])
+    assert first.mode is second.mode is RunMode.FORK and first.status is Status.OK, first.why
+    boxed.close()
+    assert not folder.exists()
+
+
+def test_temporary_folders_are_cleared_but_for_what_was_there_first(tmp_path: Path) -> None:
+    (tmp_path / "tmp/mounted").mkdir(parents=True)
+    found = Sandbox(tmp_path, ())
+    found.begin()
+    (tmp_path / "tmp/left/inner").mkdir(parents=True)
+    (tmp_path / "shm/left").write_text("x")
+    (tmp_path / "tmp/link").symlink_to(tmp_path)
+    found.clear()
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["mounted", "shm", "tmp"]
+
+
+@pytest.fixture
+def no_bwrap(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A folder on PATH without `bwrap`."""
+    (tmp_path / "bin").mkdir()
+    monkeypatch.setenv("PATH", str(tmp_path / "bin"))
+    sandbox.shortcoming.cache_clear()
+    yield tmp_path / "bin"
+    sandbox.shortcoming.cache_clear()
+
+
+def test_without_bubblewrap_a_sandbox_is_refused(no_bwrap: Path, toycar: Workspace) -> None:
+    with pytest.raises(MutatorError, match="sandbox: no sandbox: `bwrap` is not installed") as caught:
+        Workspace.find(toycar.library.parent, sandbox=True)
+    assert caught.value.exit_code == EXIT_WRONG_INPUT
+
+
+def test_where_namespaces_are_refused_a_sandbox_is_refused(no_bwrap: Path, toycar: Workspace) -> None:
+    (no_bwrap / "bwrap").write_text(
+        "#!/bin/sh\necho 'bwrap: No permissions to create new namespace' >&2\nexit 1\n"
+    )
+    (no_bwrap / "bwrap").chmod(0o755)
+    with pytest.raises(MutatorError, match="no sandbox: bwrap: No permissions to create new namespace"):
+        Workspace.find(toycar.library.parent, sandbox=True)
