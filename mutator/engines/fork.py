@@ -5,6 +5,7 @@ and reruns those that crash. The `warm` engine forks before the first step. So d
 at its first terminal hazard and the golden run has one, too.
 """
 
+import errno
 import hmac
 import marshal
 import os
@@ -174,8 +175,7 @@ class ForkEngine:
         self, waiting: Waiting, job: Job, folder: Path, swap: CodeSwap, start: Start, watch: bool = False
     ) -> Execution:
         out = folder / "out"
-        out.mkdir(parents=True)
-        inactive(folder).touch()
+        _make_folder(folder)
         request = {
             "home": str(folder),
             "out": str(out),
@@ -199,13 +199,12 @@ class ForkEngine:
         if waiting.key is None:
             request["args"] = self._arguments(job, self._running(job).home if watch else out)
         limits = {"wall_s": self._limits.wall_s, "disk_mb": self._limits.disk_mb}
-        limited = (
-            self._runs if self._manifest.sandbox else folder
-        )  # a sandbox's /tmp is beside the run's folder
+        # a sandbox's /tmp is beside the run's folder
+        limited = self._runs if self._manifest.sandbox else folder
         asked = {"do": "mutant", "job": marshal.dumps(request), "home": str(limited), **limits}
         with used_unchanged(job.scenario):
             said, _ = waiting.ask(asked, self._patience_s)
-        self._running(job).clean()
+        self._running(job).clean(folder)
         if said["threads"]:
             raise Refused(too_many(said["threads"]), turned_off(said["threads"]))
         if said["touched"]:
@@ -309,6 +308,22 @@ class ForkEngine:
 
 _CODE_BYTES = 32
 _FROM_THE_START = Start(step=0, observed=0, began=None, t=None)
+
+
+def _make_folder(folder: Path) -> None:
+    """Make the folder of a run, without following a link that an earlier run left there."""
+    try:
+        folder.mkdir()
+        handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+        try:
+            os.mkdir("out", dir_fd=handle)
+            os.close(os.open(inactive(folder).name, os.O_CREAT | os.O_EXCL, 0o644, dir_fd=handle))
+        finally:
+            os.close(handle)
+    except OSError as err:
+        if err.errno not in (errno.EEXIST, errno.ENOTDIR, errno.ELOOP):
+            raise
+        raise Lost(f"something else is in the place of a run's folder ({err.strerror})") from None
 
 
 def _needed(swap: CodeSwap) -> list[str]:

@@ -199,10 +199,10 @@ class Pool:
         if self._sandbox:
             self._sandbox.begin()
 
-    def clean(self) -> None:
-        """Delete what a run has left in the temporary folders of the sandbox."""
+    def clean(self, run: Path) -> None:
+        """Delete what a run has left in the temporary folders of the sandbox, and links to the outside."""
         if self._sandbox:
-            self._sandbox.clear()
+            self._sandbox.clear(run)
 
     def before(self, step: int, golden: Golden, modules: Sequence[str], patience_s: float) -> Waiting:
         """Return a process that waits before `step` of the golden run, with these modules loaded."""
@@ -255,6 +255,8 @@ class Pool:
         for waiting in (self.first, *self._waiting):
             waiting.close()
         end(self._process)
+        if self._sandbox:
+            self._sandbox.close()
         remove_folder(self.home)
 
 

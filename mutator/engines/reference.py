@@ -173,7 +173,9 @@ class ReferenceEngine:
         began = time.monotonic()
         ours, theirs = socket.socketpair()
         command = [sys.executable, "-P", "-s", str(_CHILD), str(request), str(theirs.fileno())]
-        if sandbox := Sandbox.of(self.manifest, folder, [job.scenario.resolve()]):
+        scenario, fault_free = job.scenario.resolve(), not job.files
+        sandbox = Sandbox.of(self.manifest, folder, [scenario], fault_free=fault_free)
+        if sandbox:
             command = sandbox.command(command)
         with ours:
             with theirs, (folder / "log").open("wb") as log:
@@ -192,6 +194,9 @@ class ReferenceEngine:
             finally:
                 ours.close()
                 end(guarding)
+                if sandbox:
+                    sandbox.clear(folder)
+                    sandbox.close()
         if not told:
             seconds = time.monotonic() - began
             return Ended(code=guarding.returncode, cpu_s=0.0, wall_s=seconds, stopped=LOST)

@@ -16,6 +16,7 @@ from functools import lru_cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from mutator._common.below import entries_below, is_inside
 from mutator._common.files import remove_folder
 from mutator.engines.processes import environment
 from mutator.errors import MutatorError
@@ -33,29 +34,40 @@ _TEMPORARY = {"/tmp": "tmp", "/dev/shm": "shm"}  # folders of the sandbox -> the
 
 
 class Sandbox:
-    """A sandbox in which processes read `reads` and write to the existing folder `folder`."""
+    """A sandbox in which processes read `reads`, and write to the existing folder `folder` and to `cache`."""
 
-    def __init__(self, folder: Path, reads: Iterable[Path]) -> None:
-        self._temporary = {place: folder / name for place, name in _TEMPORARY.items()}
-        for path in self._temporary.values():
-            path.mkdir(exist_ok=True)
-        binds = [word for place, path in self._temporary.items() for word in ("--bind", str(path), place)]
-        readable = [word for path in (*_python(), *reads) for word in _read_only(path)]
-        own = ("--bind", str(folder), str(folder), "--remount-ro", "/dev", "--remount-ro", "/")
+    def __init__(self, folder: Path, reads: Iterable[Path], cache: Path | None = None) -> None:
+        self._folder = folder
+        binds: list[str] = []
+        self._temporary: list[int] = []  # descriptors, because runs can exchange what is in `folder`
+        for place, name in _TEMPORARY.items():
+            (folder / name).mkdir(exist_ok=True)
+            self._temporary.append(os.open(folder / name, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW))
+            binds += ["--bind", str(folder / name), place]
+        self._first: set[Path] = set()
         system = [word for path in _system() for word in _read_only(path)]
         devices = ("--proc", "/proc", "--dev", "/dev")
-        self._words = [_bwrap(), *_ALONE, *system, *devices, *binds, *readable, *own, "--"]
-        self._first: set[Path] = set()
+        readable = [word for path in (*_python(), *reads) for word in _read_only(path)]
+        writable = [word for path in (folder, *([cache] if cache else [])) for word in _bind(path)]
+        sealed = ("--remount-ro", "/dev", "--remount-ro", "/", "--")
+        self._words = [_bwrap(), *_ALONE, *system, *devices, *binds, *readable, *writable, *sealed]
 
     @classmethod
-    def of(cls, manifest: TargetManifest, folder: Path, reads: Iterable[Path]) -> "Sandbox | None":
+    def of(
+        cls, manifest: TargetManifest, folder: Path, reads: Iterable[Path], *, fault_free: bool = False
+    ) -> "Sandbox | None":
         """Return the sandbox of a run in `folder`, or None if the target's code runs without one.
 
-        Besides `reads`, it can read what the target's arguments name: its cache, and its root.
+        Besides `reads`, a run reads what the target's arguments name: its root and its cache. Only
+        `fault_free` runs write to the cache.
         """
         if not manifest.sandbox:
             return None
-        return cls(folder, (*reads, *manifest.read_by_runs()))
+        if fault_free:
+            with suppress(OSError):
+                manifest.cache.mkdir(parents=True, exist_ok=True)
+                return cls(folder, (*reads, *manifest.read_by_runs()), manifest.cache)
+        return cls(folder, (*reads, *manifest.read_by_runs(), manifest.cache))
 
     def command(self, words: Sequence[str]) -> list[str]:
         """Return the command that runs `words` in the sandbox."""
@@ -65,18 +77,28 @@ class Sandbox:
         """Note what /tmp and /dev/shm contain before the first run. Folders can be mounted there."""
         self._first = set(self._left())
 
-    def clear(self) -> None:
-        """Delete what runs have left in /tmp and /dev/shm since `begin`."""
+    def clear(self, run: Path) -> None:
+        """Delete what a run left in /tmp and /dev/shm, and the links in its folder that lead out of it.
+
+        Such a link leads nowhere in the sandbox, but the harness could follow it.
+        """
         for path in set(self._left()) - self._first:
             if path.is_dir() and not path.is_symlink():
                 remove_folder(path)
             else:
                 path.unlink(missing_ok=True)
+        for _, entry in entries_below(run):
+            if entry.is_symlink() and not is_inside(run, Path(entry.path)):
+                Path(entry.path).unlink(missing_ok=True)
+
+    def close(self) -> None:
+        while self._temporary:
+            os.close(self._temporary.pop())
 
     def _left(self) -> Iterator[Path]:
-        for folder in self._temporary.values():
+        for handle in self._temporary:
             with suppress(OSError):
-                yield from folder.iterdir()
+                yield from Path(f"/proc/self/fd/{handle}").iterdir()
 
 
 def check() -> None:
@@ -97,7 +119,9 @@ def shortcoming() -> str:
         return "`bwrap` is not installed (Debian, Ubuntu, Fedora: package bubblewrap)"
     with TemporaryDirectory(prefix="mutator-") as folder:
         try:
-            command = Sandbox(Path(folder), ()).command([sys.executable, "-P", "-s", "-c", "import numpy"])
+            trial = Sandbox(Path(folder), ())
+            command = trial.command([sys.executable, "-P", "-s", "-c", "import numpy"])
+            trial.close()
             done = subprocess.run(
                 command,
                 cwd=folder,
@@ -115,6 +139,10 @@ def shortcoming() -> str:
 
 def _bwrap() -> str:
     return shutil.which("bwrap") or "bwrap"
+
+
+def _bind(path: Path) -> tuple[str, str, str]:
+    return ("--bind", str(path), str(path))
 
 
 def _read_only(path: str | Path) -> tuple[str, str, str]:

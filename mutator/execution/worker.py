@@ -96,7 +96,7 @@ class Worker:
     def _make_room(self, seed: int) -> None:
         """Delete images of earlier seeds, which would fill the disk."""
         if len(self.folder.seeds) > 1 and seed != self._seed:
-            caches.make_room(self._manifest.name)
+            caches.make_room(self._manifest.cache_name)
         self._seed = seed
 
     def prove(self, sample: Sample) -> list[tuple[str, str]]:

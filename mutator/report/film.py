@@ -136,6 +136,7 @@ def _show(manifest: TargetManifest, folder: Path, places: Mapping[str, str], sho
     films = (Path(places["golden"]), Path(places["faulty"]))
     if sandbox := Sandbox.of(manifest, folder, [*films, tree]):
         command = sandbox.command(command)
+        sandbox.close()
     done = subprocess.run(
         command,
         cwd=made.parent,

@@ -8,6 +8,7 @@ from pathlib import Path
 from packaging.requirements import Requirement
 
 from mutator._common import caches
+from mutator._common.hashing import digest
 from mutator.config.yaml_files import Source
 from mutator.errors import MutatorError
 from mutator.targets.channels import Channel, Role
@@ -159,7 +160,7 @@ class TargetManifest:
     ) -> tuple[str, ...]:
         """The entry module's arguments for one run; MutatorError for an unknown change."""
         values = {"scenario": str(scenario), "seed": str(seed), "out": str(out)}
-        values |= {"film": str(out / FILM), "cache": str(caches.of_target(self.name)), "root": str(self.root)}
+        values |= {"film": str(out / FILM), "cache": str(self.cache), "root": str(self.root)}
         extra = [*self.independent] if independent else []
         for change in changes:
             if change not in self.changes:
@@ -172,16 +173,27 @@ class TargetManifest:
             extra += self.changes[change]
         return tuple(filled((*self.entry_args, *extra), values))
 
+    @cached_property
+    def cache_name(self) -> str:
+        """The name of the cache that runs share. In a sandbox, no other code or manifest writes to it."""
+        if not self.sandbox:
+            return self.name
+        return f"{self.name}-{digest(self.tree.digest.encode() + self.path.read_bytes())[:16]}"
+
+    @property
+    def cache(self) -> Path:
+        """The folder `{cache}`, which need not exist."""
+        return caches.of_target(self.cache_name)
+
     def read_by_runs(self) -> tuple[Path, ...]:
-        """What runs read besides their tree and scenario: the target's cache and, if an argument names it,
-        its root."""
+        """What runs read besides their tree, scenario and cache: the target's root, if an argument names
+        it."""
         words = (
             *self.entry_args,
             *self.independent,
             *(word for args in self.changes.values() for word in args),
         )
-        its_root = (self.root,) if any("{root}" in word for word in words) else ()
-        return (caches.of_target(self.name), *its_root)
+        return (self.root,) if any("{root}" in word for word in words) else ()
 
     def filming(self) -> "TargetManifest":
         """The same target, with runs that write a film; MutatorError if it cannot be filmed."""

@@ -88,7 +88,7 @@ class CheckDriver:
             remove_odd(execution.out)  # before it is judged, because a run folder has no links
             run = look(self.manifest, execution)
             if name[0] == GOLDEN and name[1].seed is not None:
-                caches.make_room(self.manifest.name)
+                caches.make_room(self.manifest.cache_name)
             if name[0] == NULL:
                 unreached.write_observed(self.kept, name[1].key, execution.watched.get("seen", ()))
             if name[0] == GOLDEN and not run.problem:

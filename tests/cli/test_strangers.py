@@ -2,10 +2,12 @@
 
 import os
 import subprocess
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from mutator.engines import sandbox
 from mutator.execution.cluster import connecting
 
 from .conftest import Cli
@@ -88,3 +90,78 @@ def test_processes_that_dask_starts_get_a_safe_path(monkeypatch: pytest.MonkeyPa
         with connecting.own_scheduler():
             assert os.environ["PYTHONSAFEPATH"] == "1"
         assert os.environ.get("PYTHONSAFEPATH") == before
+
+
+@pytest.fixture
+def no_bwrap(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    (tmp_path / "bin").mkdir()
+    monkeypatch.setenv("PATH", str(tmp_path / "bin"))
+    sandbox.shortcoming.cache_clear()
+    yield
+    sandbox.shortcoming.cache_clear()
+
+
+TRY = ("try", "sensor/lane", "--scenario", "A", "--trigger", "1.0")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("run", "small", "--out", "new", "-n", "0"), ("plan", "small", "--out", "new"), (*TRY, "--out", "new")],
+)
+def test_nothing_runs_where_there_is_no_sandbox(
+    cli: Cli, root: Path, no_bwrap: None, words: tuple[str, ...]
+) -> None:
+    for command in (("--sandbox", *words), (*words, "--sandbox")):
+        answer = cli(*command)
+        assert answer.code == 2
+        assert "--sandbox: no sandbox: `bwrap` is not installed" in answer.err and "trust.md" in answer.err
+    assert not Path("new").exists()
+
+
+def test_doctor_says_whether_there_is_a_sandbox(cli: Cli, root: Path, no_bwrap: None) -> None:
+    [found] = [one for one in cli("doctor", "--json").json if one["name"] == "sandbox"]
+    assert found["level"] == "warning" and "`bwrap` is not installed" in found["found"]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(bool(sandbox.shortcoming()), reason=f"no sandbox: {sandbox.shortcoming()}")
+def test_every_way_to_run_in_a_sandbox_gives_the_results_of_one_without(cli: Cli, root: Path) -> None:
+    """The target's code looks for this process. In a sandbox, it does not find it."""
+    looking = f"import os\nOUTSIDE = os.path.exists('/proc/{os.getpid()}')\n"
+    open_runs = root / "open_runs"
+    open_runs.touch()
+    noting = f"if OUTSIDE:\n    open({str(open_runs)!r}, 'a').write('x')\n"
+    for name in ("go.py", "show.py"):
+        path = root / "tree/toycar" / name
+        text = path.read_text()
+        place = text.index("import ")
+        path.write_text(text[:place] + looking + noting + text[place:])
+    seals = [
+        cli("run", "small", "--out", name, *words, "--limit", "4", "--json").json["seal"]
+        for name, words in {
+            "plain": ("-n", "0"),
+            "alone": ("-n", "0", "--engine", "reference"),
+        }.items()
+    ]
+    assert seals[0] and len(set(seals)) == 1 and open_runs.stat().st_size > 0
+    open_runs.write_text("")
+    for name, words in {
+        "boxed": ("-n", "0"),
+        "workers": ("-n", "1", "--engine", "fork"),
+        "cluster": ("--cluster", "local:1"),
+    }.items():
+        answer = cli("--sandbox", "run", "small", "--out", name, *words, "--limit", "4", "--json")
+        assert answer.code == 0 and answer.json["seal"], answer.err
+        results = (Path(name) / "results.csv").read_bytes()
+        assert results == (Path("plain") / "results.csv").read_bytes()
+    experiment = next(line.split(",")[0] for line in results.decode().splitlines() if ",ok," in line)
+    for words in (
+        (*TRY, "--out", "tried"),
+        ("rerun", experiment, "--run", "boxed"),
+        ("show", experiment, "--run", "boxed", "--still", "1.0"),
+        ("verify", "boxed", "--rerun", "1"),
+        ("doctor",),
+    ):
+        answer = cli(*words, "--sandbox")
+        assert answer.code == 0, (words, answer.err)
+    assert open_runs.read_text() == "", "something ran outside"

@@ -135,7 +135,7 @@ class PieceRunner:
                 raise Unlike(f"golden run {golden.key} {came}")
             execution.out.rename(place)
             if golden.seed is not None:  # the images of a hundred seeds would fill the disk
-                caches.make_room(site.manifest.name)
+                caches.make_room(site.manifest.cache_name)
 
     def _golden_of(self, experiment: Experiment) -> GoldenRun:
         return GoldenRun.of(experiment, several_seeds=self._site.meta["several_seeds"])

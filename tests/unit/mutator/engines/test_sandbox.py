@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from mutator._common.files import remove_folder
 from mutator.engines import sandbox
 from mutator.engines.jobs import Execution, Job, RunMode
 from mutator.engines.reference import ReferenceEngine
@@ -69,7 +70,8 @@ def run(toycar: Workspace, tmp_path: Path) -> Iterator[Run]:
     def execute(body: str | None = None) -> Execution:
         files = {} if body is None else {"toycar/go.py": body.encode()}
         job = Job(name="job", scenario=toycar.scenario("A"), seed=1, files=files)
-        return engine.execute(job, tmp_path / "work" / "job")
+        remove_folder(tmp_path / "work/job")
+        return engine.execute(job, tmp_path / "work/job")
 
     yield execute
     engine.close()
@@ -161,15 +163,44 @@ def test_a_fork_server_and_its_mutants_share_a_sandbox(toycar: Workspace, tmp_pa
     assert not folder.exists()
 
 
-def test_temporary_folders_are_cleared_but_for_what_was_there_first(tmp_path: Path) -> None:
-    (tmp_path / "tmp/mounted").mkdir(parents=True)
-    found = Sandbox(tmp_path, ())
+def test_what_a_run_left_is_cleared_even_if_it_exchanged_folders_for_links(tmp_path: Path) -> None:
+    box, mine, run = tmp_path / "box", tmp_path / "mine", tmp_path / "box/run"
+    for folder in (box / "tmp/mounted", mine, run / "out"):
+        folder.mkdir(parents=True)
+    (mine / "kept").write_text("x")
+    found = Sandbox(box, ())
     found.begin()
-    (tmp_path / "tmp/left/inner").mkdir(parents=True)
-    (tmp_path / "shm/left").write_text("x")
-    (tmp_path / "tmp/link").symlink_to(tmp_path)
-    found.clear()
-    assert sorted(path.name for path in tmp_path.rglob("*")) == ["mounted", "shm", "tmp"]
+    (box / "tmp/left/inner").mkdir(parents=True)
+    (box / "shm/left").write_text("x")
+    (box / "tmp/link").symlink_to(mine)
+    (box / "tmp").rename(box / "moved")
+    (box / "tmp").symlink_to(mine)
+    (run / "out/log.npz").symlink_to(mine / "kept")
+    (run / "out/last").symlink_to("first")
+    found.clear(run)
+    found.close()
+    assert (mine / "kept").exists() and list((box / "shm").iterdir()) == []
+    assert [path.name for path in (box / "moved").iterdir()] == ["mounted"]
+    assert [path.name for path in (run / "out").iterdir()] == ["last"], "a link inside stays"
+
+
+@needed
+def test_only_fault_free_runs_write_to_a_cache_of_this_target_alone(run: Run, toycar: Workspace) -> None:
+    manifest = toycar.manifest("toycar")
+    cache = replace(manifest, sandbox=True).cache
+    assert cache.parent == manifest.cache.parent and cache != manifest.cache
+    body = f"open({str(cache / 'frame')!r}, 'w').write('x')"
+    assert run(body).detail.startswith("FileNotFoundError")
+    assert run().status is Status.OK and list(cache.iterdir()) == []
+    execution = run(body)
+    assert (execution.status, execution.detail[:19]) == (Status.CRASHED, "OSError: [Errno 30]")
+
+
+@needed
+def test_the_harness_follows_no_link_that_a_run_left(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "mine").write_text("secret words")
+    body = f"import os\nos.remove('../log')\nos.symlink({str(tmp_path / 'mine')!r}, '../log')"
+    assert "secret" not in run(body).log
 
 
 @pytest.fixture
