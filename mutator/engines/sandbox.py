@@ -78,7 +78,7 @@ class Sandbox:
         self._first = set(self._left())
 
     def clear(self, run: Path) -> None:
-        """Delete what a run left in /tmp and /dev/shm, and the links in its folder that lead out of it.
+        """Delete what a run left in /tmp and /dev/shm, and the links in its folder that point out of it.
 
         Such a link leads nowhere in the sandbox, but the harness could follow it.
         """
