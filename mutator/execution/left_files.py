@@ -1,6 +1,7 @@
 """Files that appear in the machine's shared folders during a run, outside the limit on its disk space.
 
-Which process made a file is not recorded anywhere, so it can also be another program of this user.
+Which process made a file is not recorded anywhere, so it can also be another program of this user. Small
+files are not named, because such programs make them all the time.
 """
 
 import os
@@ -8,9 +9,12 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
+from mutator.engines.in_target import guard
+
 FOLDERS = (Path("/tmp"), Path("/dev/shm"))
 _OURS = "mutator-"
 _LISTED = 3
+_LEAST = 1 << 20  # bytes on the disk
 
 
 class LeftFiles:
@@ -21,8 +25,8 @@ class LeftFiles:
         self._before = {*self._names()}
 
     def remark(self) -> str:
-        """Return a sentence about new files and folders of this user; empty if there are none."""
-        new = [path for path in self._names() if path not in self._before]
+        """Return a sentence about large new files and folders of this user; empty if there are none."""
+        new = [path for path in self._names() if path not in self._before and _size(path) >= _LEAST]
         if not new:
             return ""
         more = f" and {len(new) - _LISTED} more" if len(new) > _LISTED else ""
@@ -41,3 +45,9 @@ class LeftFiles:
                         if owner == os.getuid() and not entry.name.startswith(_OURS):
                             found.append(entry.path)
         return sorted(found)
+
+
+def _size(path: str) -> int:
+    with suppress(OSError):
+        return os.lstat(path).st_blocks * 512 + guard.used(path)
+    return 0
