@@ -9,12 +9,14 @@ import os
 import stat
 import zlib
 from collections.abc import Iterator
+from functools import partial
+from io import BufferedReader
 from pathlib import Path
 from typing import BinaryIO
 
 from mutator.errors import MutatorError
 
-MOST_WHOLE = 64_000_000  # bytes of a file that is read as a whole; a reader can have another limit
+MOST_WHOLE = 128_000_000  # bytes of a file that is read as a whole; a reader can have another limit
 MOST_JSON = 6_000_000  # bytes of a JSON object; as Python objects they can take 30 times as much memory
 MOST_DATA = 8_000_000_000  # bytes of a file that grows with the number of experiments
 MOST_LINE = 4_000_000  # bytes of a line
@@ -38,7 +40,7 @@ def read_bounded(path: Path, most: int = MOST_WHOLE) -> bytes:
         return read_open(file, path, most)
 
 
-def open_regular(path: Path) -> BinaryIO:
+def open_regular(path: Path) -> BufferedReader:
     """Open a regular file for reading, without waiting for a pipe; OSError as in `read_bounded`."""
     file = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     mode = os.fstat(file).st_mode
@@ -75,9 +77,7 @@ def check_open(file: BinaryIO, where: Path, most: int = MOST_DATA) -> None:
 def bounded_lines(file: BinaryIO, where: Path, most: int = MOST_LINE) -> Iterator[bytes]:
     """Yield the lines of an open file, with their newlines; TooLarge for a line of more than `most` bytes."""
     check_open(file, where)
-    number = 0
-    while line := file.readline(most + 1):
-        number += 1
+    for number, line in enumerate(iter(partial(file.readline, most + 1), b""), start=1):
         if len(line) > most:
             raise TooLarge(
                 f"a line of more than {most:,} bytes",

@@ -44,13 +44,6 @@ def is_no_file(err: OSError) -> bool:
     return err.errno in _NO_FILE
 
 
-def no_pipe(path: Path) -> Path:
-    """Return the path; OSError (`is_no_file`) for a pipe, socket or device, which could block a reader."""
-    if path.exists() and not (path.is_file() or path.is_dir()):
-        raise OSError(errno.ENXIO, os.strerror(errno.ENXIO), str(path))
-    return path
-
-
 def disk_full(where: str | Path | None) -> DiskFull:
     return DiskFull(
         "no space left on this disk",

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from mutator._common.below import Outside, check_plain
+from mutator._common.bounded import MOST_DATA, read_bounded
 from mutator._common.hashing import digest
 
 _SUM = "sum"  # the file with the digest of all others
@@ -23,7 +24,7 @@ def fetch(place: Path, to: Path) -> None:
     except Outside as err:  # the copy of a link would be the file at its end
         raise OSError(str(err)) from None
     kept = to / _SUM
-    said = kept.read_bytes()
+    said = read_bounded(kept)
     kept.unlink()
     if said != _sum(to):
         raise OSError(f"{place}: damaged")
@@ -45,5 +46,5 @@ def store(place: Path, fill: Callable[[Path], object]) -> None:
 
 def _sum(folder: Path) -> bytes:
     files = sorted(path for path in folder.rglob("*") if path.is_file())
-    found = sorted((path.relative_to(folder).as_posix(), digest(path.read_bytes())) for path in files)
-    return digest(found).encode()
+    found = [(path, digest(read_bounded(path, MOST_DATA))) for path in files]
+    return digest(sorted((path.relative_to(folder).as_posix(), one) for path, one in found)).encode()

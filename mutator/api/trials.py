@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from mutator._common.below import inside
+from mutator._common.bounded import read_bounded
 from mutator._common.files import ScratchFolder
 from mutator._common.hashing import digest
 from mutator.api.experiment_results import ExperimentResult, TraceFrames, trace_frame
@@ -118,7 +119,7 @@ def try_fault(
     experiment = Experiment(
         fault=bench.fault(fault, value=value, seed=seed, reading=reading),
         scenario=str(scenario),
-        scenario_digest=digest(file.read_bytes()),
+        scenario_digest=digest(read_bounded(file)),
         method=Method.GUIDED,
         trigger=bench.trigger(trigger, armed_after_s),
         seed=seed,

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from mutator._common.below import check_library_name
+from mutator._common.bounded import read_bounded
 from mutator.campaigns.campaign_model import CampaignModel, SelectionModel
 from mutator.campaigns.operator_selection import OperatorSelection, When
 from mutator.campaigns.studies import Study, find_study
@@ -115,7 +116,7 @@ def load_campaign(path: Path) -> Campaign:
         about=model.about.strip(),
         study=model.study,
         path=path,
-        source=path.read_bytes(),
+        source=read_bounded(path),
         target=model.target,
         scenarios=tuple(model.scenarios),
         setting={reading: tuple(names) for reading, names in model.setting.items()},

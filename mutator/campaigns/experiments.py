@@ -9,6 +9,7 @@ from itertools import chain
 from pathlib import Path
 
 from mutator._common.below import inside, is_inside
+from mutator._common.bounded import read_bounded
 from mutator._common.hashing import digest
 from mutator._common.text import one_of
 from mutator.campaigns.campaign_files import Campaign
@@ -280,7 +281,7 @@ class Expansion:
 
     def _scenario_digest(self, scenario: str) -> str:
         if scenario not in self._digests:
-            self._digests[scenario] = digest(self._scenario_file(scenario).read_bytes())
+            self._digests[scenario] = digest(read_bounded(self._scenario_file(scenario)))
         return self._digests[scenario]
 
     def _scenario_file(self, scenario: str) -> Path:

@@ -7,6 +7,7 @@ from typing import Any
 
 from packaging.utils import canonicalize_name
 
+from mutator._common.bounded import read_bounded
 from mutator._common.files import json_bytes
 from mutator._common.hashing import digest, plain
 from mutator._common.version import VERSION
@@ -29,9 +30,9 @@ def sources(workspace: Workspace, manifest: TargetManifest, scenarios: set[str])
     """Return the digests, by name, of all files outside the plan that affect results."""
     return {
         "target": manifest.tree.digest,
-        "manifest": digest(manifest.path.read_bytes()),
+        "manifest": digest(read_bounded(manifest.path)),
         "templates": workspace.fault_models().digest,
-        **{f"scenario {s}": digest(workspace.scenario(s).read_bytes()) for s in sorted(scenarios)},
+        **{f"scenario {s}": digest(read_bounded(workspace.scenario(s))) for s in sorted(scenarios)},
     }
 
 

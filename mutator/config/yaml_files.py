@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from mutator._common.files import no_pipe
+from mutator._common.bounded import read_bounded
 from mutator._common.text import counted, shown
 from mutator.config import problems
 from mutator.errors import MutatorError
@@ -114,11 +114,8 @@ def parse(text: str, path: Path) -> Source:
 
 def _read_text(path: Path) -> str:
     try:
-        if path.stat().st_size > MAX_BYTES:
-            raise MutatorError(
-                f"{path.stat().st_size} bytes", where=path, expected=f"at most {MAX_BYTES} bytes"
-            )
-        return no_pipe(path).read_text(encoding="utf-8")
+        text = read_bounded(path, MAX_BYTES).decode()
+        return text.replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeDecodeError as error:
         raise MutatorError(
             f"not UTF-8 (byte {error.object[error.start]:#04x} at offset {error.start})",

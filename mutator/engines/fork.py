@@ -16,7 +16,8 @@ from pathlib import Path
 from secrets import token_bytes
 from typing import Any
 
-from mutator._common.files import disk_full, no_pipe, raising_disk_full, remove_folder, write_atomic
+from mutator._common.bounded import read_bounded
+from mutator._common.files import disk_full, raising_disk_full, remove_folder, write_atomic
 from mutator._common.hashing import content_id
 from mutator.engines.activation import Observed, Start, first_active
 from mutator.engines.code_swap import CodeSwap, NotSwappable, plan_swap
@@ -278,7 +279,7 @@ class ForkEngine:
             if execution.status is not Status.OK:
                 raise Refused(f"its golden run ended as {execution.status.value}: {execution.detail}")
             for name in self._manifest.outputs:
-                if no_pipe(execution.out / name).read_bytes() != (golden / name).read_bytes():
+                if read_bounded(execution.out / name) != read_bounded(golden / name):
                     raise Refused(f"its {name} differs when it is driven step by step")
             report = read_report(folder / "report.json")
             assert report is not None
@@ -299,7 +300,7 @@ class ForkEngine:
 
     def _authentic(self, path: Path) -> bytes:
         """Return what an engine with the same secret wrote to a file; empty for what a mutant wrote."""
-        code, data = (content := path.read_bytes())[:_CODE_BYTES], content[_CODE_BYTES:]
+        code, data = (content := read_bounded(path))[:_CODE_BYTES], content[_CODE_BYTES:]
         return data if hmac.compare_digest(code, self._code(path, data)) else b""
 
     def _code(self, path: Path, data: bytes) -> bytes:

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from mutator._common.bounded import read_bounded
 from mutator._common.files import remove_folder
 from mutator._common.unchanged_files import UnchangedFiles
 from mutator.engines import bytecode
@@ -127,7 +128,7 @@ class Waiting:
 @contextmanager
 def used_unchanged(path: Path) -> Iterator[None]:
     """Raise Lost if a file is written to while the server uses it."""
-    used = UnchangedFiles({str(path.resolve()): path.read_bytes()})
+    used = UnchangedFiles({str(path.resolve()): read_bounded(path)})
     yield
     if used.first_changed():
         raise Lost(f"{path.name} was changed while it was in use")

@@ -12,7 +12,8 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any
 
-from mutator._common.files import is_disk_full, no_pipe
+from mutator._common.bounded import read_bounded
+from mutator._common.files import is_disk_full
 from mutator.engines.in_target import guard
 from mutator.engines.jobs import Raised
 from mutator.errors import MutatorError
@@ -133,7 +134,7 @@ def tail(path: Path) -> str:
         return ""
     with path.open("rb") as file:
         file.seek(max(0, path.stat().st_size - _LOG_TAIL))
-        return file.read().decode("utf-8", "replace")
+        return file.read(_LOG_TAIL).decode("utf-8", "replace")
 
 
 def read_report(path: Path, **more: type) -> dict[str, Any] | None:
@@ -143,7 +144,7 @@ def read_report(path: Path, **more: type) -> dict[str, Any] | None:
     one engine reports.
     """
     try:
-        report: dict[str, Any] = json.loads(no_pipe(path).read_bytes())
+        report: dict[str, Any] = json.loads(read_bounded(path))
         raised_in(report)
         sound = all(isinstance(report[key], kind) for key, kind in (_REPORT | more).items())
         sound = sound and all(isinstance(name, str) for key in _NAMES for name in report.get(key, ()))

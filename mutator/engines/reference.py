@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
+from mutator._common.bounded import read_bounded
 from mutator._common.files import disk_full, raising_disk_full, remove_folder
 from mutator._common.hashing import digest
 from mutator._common.unchanged_files import UnchangedFiles
@@ -121,7 +122,7 @@ class ReferenceEngine:
         path = folder / "job.json"
         path.write_bytes(request)
         scenario = job.scenario.resolve()
-        given = UnchangedFiles({str(path): request, str(scenario): scenario.read_bytes()})
+        given = UnchangedFiles({str(path): request, str(scenario): read_bounded(scenario)})
         ended = self._run(job, path, folder)
         changed = tree.first_changed() or given.first_changed().removeprefix(f"{folder}/")
         if not (changed or new):

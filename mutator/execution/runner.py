@@ -7,7 +7,7 @@ from functools import cache, lru_cache, partial
 from pathlib import Path
 
 from mutator._common.below import inside
-from mutator._common.files import no_pipe
+from mutator._common.bounded import read_bounded
 from mutator._common.hashing import digest
 from mutator._common.unchanged_files import UnchangedFiles
 from mutator.campaigns.shared_runs import runs
@@ -85,7 +85,7 @@ class Goldens:
 
     def _watched(self, folder: Path, key: str) -> UnchangedFiles:
         paths = [path for name in self._manifest.outputs if (path := inside(folder, name)).is_file()]
-        files = UnchangedFiles({str(path): path.read_bytes() for path in paths})
+        files = UnchangedFiles({str(path): read_bounded(path) for path in paths})
         if self._digests is not None and digest_of(self._manifest, folder) != self._digests[key]:
             raise _changed(folder)
         return files
@@ -202,7 +202,7 @@ class Runner:
         count."""
         self.goldens.check(experiment)
         scenario = self.scenario_file(experiment.scenario)
-        if digest(no_pipe(scenario).read_bytes()) != experiment.scenario_digest:
+        if digest(read_bounded(scenario)) != experiment.scenario_digest:
             raise _changed(scenario)
 
     def _series(self, experiment: Experiment, record: Record, faulty: Trace) -> EncodedSeries | None:

@@ -12,11 +12,11 @@ from pydantic import Field
 
 from mutator._common import hashing
 from mutator._common.below import check_inside
-from mutator._common.files import no_pipe
+from mutator._common.bounded import read_bounded
 from mutator._common.text import suggestion
 from mutator.config import units
 from mutator.config.locations import PROBE_NAME
-from mutator.config.yaml_files import Source, StrictModel, read
+from mutator.config.yaml_files import MAX_BYTES, Source, StrictModel, read
 from mutator.errors import MutatorError
 from mutator.faults.injections import InjectionModel, InjectionSpec
 
@@ -221,7 +221,7 @@ def load_fault_models(folder: Path) -> FaultModels:
     """Load the fault models of a templates folder, from memory unless a file has changed."""
     paths = [check_inside(folder, path) for kind in FILES for path in sorted(folder.glob(kind))]
     try:
-        contents = tuple((path, no_pipe(path).read_bytes()) for path in paths)
+        contents = tuple((path, read_bounded(path, MAX_BYTES)) for path in paths)
     except OSError:
         return _load_all(folder)  # the error that names the file
     return _unchanged(folder, contents)
@@ -313,7 +313,7 @@ def _param(name: str, model: _ParamModel, source: Source) -> ParamSchema:
 
 def _text(path: Path) -> str:
     try:
-        return no_pipe(path).read_text(encoding="utf-8")
+        return read_bounded(path, MAX_BYTES).decode()
     except (OSError, UnicodeDecodeError) as error:
         raise MutatorError(
             f"cannot be read ({error})", where=path, remedy="put the template next to its YAML file, as UTF-8"

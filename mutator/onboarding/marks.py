@@ -4,6 +4,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from mutator._common.below import files_inside
+from mutator._common.bounded import read_bounded
+from mutator.config.yaml_files import MAX_BYTES
 from mutator.errors import MutatorError
 
 MARK = "TODO(init)"
@@ -14,7 +16,7 @@ def unfilled(library: Path) -> Iterator[MutatorError]:
     for path in files_inside(library, "", "*"):
         if path.suffix not in (".yaml", ".py") or not path.is_file():
             continue
-        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+        lines = read_bounded(path, MAX_BYTES).decode(errors="replace").splitlines()
         for number, line in enumerate(lines, 1):
             _, mark, text = line.partition(f"# {MARK}:")
             if mark:

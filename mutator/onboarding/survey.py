@@ -10,8 +10,10 @@ from importlib import metadata
 from pathlib import Path
 
 from mutator._common.below import Outside, check_inside
+from mutator._common.bounded import read_bounded
 from mutator.errors import MutatorError
 from mutator.targets.roots import INSTALLED, installed_at
+from mutator.targets.source_tree import MOST_SOURCE
 
 _MOST_FILES = 5000
 _NOT_THE_CONTROLLER = {
@@ -122,7 +124,7 @@ def _importable(name: str) -> bool:
 def _parsed(path: Path) -> ast.Module:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # warnings concern the controller's code
-        return ast.parse(path.read_bytes())
+        return ast.parse(read_bounded(path, MOST_SOURCE))
 
 
 def _of(root: Path, packages: tuple[str, ...], *, any_links: bool = False) -> Survey:

@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from mutator._common import caches
-from mutator._common.files import ScratchFolder, json_bytes, no_pipe, write_atomic
+from mutator._common.bounded import read_bounded
+from mutator._common.files import ScratchFolder, json_bytes, write_atomic
 from mutator._common.hashing import digest
 from mutator.engines.jobs import Job
 from mutator.engines.reference import ReferenceEngine
@@ -66,14 +67,14 @@ def _key(manifest: TargetManifest, drive: GoldenDrive) -> str:
     )
     at = manifest.observation.location
     entry = [manifest.entry_module, arguments, sorted(manifest.env.items()), at]
-    scenario = digest(drive.scenario.read_bytes())
+    scenario = digest(read_bounded(drive.scenario))
     return digest([_SCHEMA, platform.python_version(), manifest.tree.digest, scenario, drive.seed, entry])
 
 
 def _recalled(key: str) -> Executed | None:
     path = caches.of_lines() / f"{key}.json"
     try:
-        data: dict[str, Any] = json.loads(no_pipe(path).read_bytes())
+        data: dict[str, Any] = json.loads(read_bounded(path))
         if data["sum"] == digest([key, data["lines"]]):
             os.utime(path)  # mark as used
             return {file: frozenset(lines) for file, lines in data["lines"].items()}

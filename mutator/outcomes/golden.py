@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from mutator._common.below import inside
-from mutator._common.files import no_pipe
+from mutator._common.bounded import MOST_JSON, read_bounded
 from mutator._common.hashing import digest
 from mutator._common.shortages import shortage
 from mutator.errors import MutatorError
@@ -43,7 +43,7 @@ class Difference:
 
 def trace_digest(manifest: TargetManifest, out: Path) -> str:
     try:
-        return digest(no_pipe(inside(out, manifest.trace_file)).read_bytes())
+        return digest(read_bounded(inside(out, manifest.trace_file)))
     except OSError as err:
         _check_is_of_output(err)
         raise BadOutput("the run left no trace", where=inside(out, manifest.trace_file)) from None
@@ -122,7 +122,7 @@ def load_record(manifest: TargetManifest, out: Path) -> dict[str, Any]:
         return {"hazards": {}, "alerts": []}
     path = inside(out, manifest.record_file)
     try:
-        data = json.loads(no_pipe(path).read_bytes())
+        data = json.loads(read_bounded(path, MOST_JSON))
     except (OSError, ValueError, RecursionError) as err:
         _check_is_of_output(err)
         raise BadOutput(

@@ -15,6 +15,7 @@ _END = Struct("<4sHHHHIIH")
 _ENTRY = Struct("<4sBBHHHHHIIIHHHHHII")
 _LOCAL = Struct("<4sHHHHHIIIHH")
 _MAGIC = b"\x93NUMPY\x01\x00"
+ARRAY, ENTRY = _MAGIC[:6], b"PK\1\2"  # what a single array, and a member's directory entry, begin with
 _BEFORE = len(_MAGIC) + 2  # bytes before the header of a .npy file
 _IN_EXTRA = 0xFFFFFFFF  # marks a size that is stored in a ZIP64 field
 _NAME = ".npy"

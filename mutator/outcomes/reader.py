@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
-from mutator._common.files import no_pipe
+from mutator._common.bounded import MOST_DATA, check_open, open_regular, read_bounded
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Outcome, Record, Status
 from mutator.outcomes import result_rows, results
@@ -70,7 +70,7 @@ class Results:
 
     def _read(self, path: Path) -> bytes:
         try:
-            return no_pipe(path).read_bytes()
+            return read_bounded(path, MOST_DATA)
         except FileNotFoundError:
             raise MutatorError(
                 f"no results here (no {path.name})",
@@ -128,7 +128,9 @@ class Results:
 
     def _opened(self) -> BinaryIO:
         try:
-            return no_pipe(self.path).open("rb")
+            file = open_regular(self.path)
+            check_open(file, self.path)
+            return file
         except OSError:
             self._read(self.path)  # raises the precise error
             raise

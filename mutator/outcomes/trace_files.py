@@ -1,5 +1,6 @@
 """Reads the trace files of runs. The suffix selects the reader."""
 
+import io
 import json
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -7,12 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from mutator._common.files import no_pipe
+from mutator._common.bounded import MOST_WHOLE, check_open, open_regular, read_bounded
 from mutator.outcomes import npz
 from mutator.targets.channels import Channel
 from mutator.targets.manifest import TargetManifest
 
 Arrays = dict[str, np.ndarray]
+MOST_TRACE = MOST_WHOLE  # bytes of a trace, also when unpacked
+MOST_CSV = 64_000_000  # bytes; as numbers, text takes more memory
+_MOST_COLUMNS = 10_000
+_NUMERIC = ("BOOLEAN", "INT32", "INT64", "FLOAT", "DOUBLE")
 
 
 class BadTrace(ValueError):
@@ -21,6 +26,12 @@ class BadTrace(ValueError):
     def __init__(self, got: str, expected: str) -> None:
         super().__init__(got)
         self.got, self.expected = got, expected
+
+
+def _check_size(size: int) -> None:
+    """Raise BadTrace if a trace unpacks to too many bytes."""
+    if size > MOST_TRACE:
+        raise BadTrace(f"{size:,} bytes when unpacked", f"at most {MOST_TRACE:,}")
 
 
 def own_times(name: str) -> str:
@@ -68,26 +79,41 @@ def _empty(values: np.ndarray) -> np.ndarray:
 
 
 def _read_npz(path: Path, names: Iterable[str] | None, may_miss: Collection[str]) -> Arrays:
-    members = npz.members(no_pipe(path).read_bytes())
+    data = read_bounded(path, MOST_TRACE)
+    members = npz.members(data)
     if members is not None:
         return {name: members[name] for name in _wanted(members, names, may_miss)}
-    loaded = np.load(no_pipe(path), allow_pickle=False)
-    if not isinstance(loaded, np.lib.npyio.NpzFile):
+    if data.startswith(npz.ARRAY):
         raise BadTrace("a single array", "an .npz file")
-    with loaded as file:
+    if data.count(npz.ENTRY) > _MOST_COLUMNS:
+        raise BadTrace(f"{data.count(npz.ENTRY)} members", f"at most {_MOST_COLUMNS}")
+    with np.load(io.BytesIO(data), allow_pickle=False) as file:
+        _check_size(sum(member.file_size for member in file.zip.infolist()))
         return {name: np.asarray(file[name]) for name in _wanted(file.files, names, may_miss)}
 
 
 def _read_csv(path: Path, names: Iterable[str] | None, may_miss: Collection[str]) -> Arrays:
     import pandas as pd
 
-    return _columns(pd.read_csv(no_pipe(path)), names, may_miss)
+    data = read_bounded(path, MOST_CSV)
+    commas = data.count(b",", 0, data.find(b"\n") + 1 or None)
+    if commas >= _MOST_COLUMNS:
+        raise BadTrace(f"{commas + 1} columns", f"at most {_MOST_COLUMNS}")
+    return _columns(pd.read_csv(io.BytesIO(data)), names, may_miss)
 
 
 def _read_parquet(path: Path, names: Iterable[str] | None, may_miss: Collection[str]) -> Arrays:
     import pandas as pd
+    from pyarrow import parquet  # type: ignore[import-untyped]
 
-    return _columns(pd.read_parquet(no_pipe(path)), names, may_miss)
+    data = read_bounded(path, MOST_TRACE)
+    file = parquet.ParquetFile(io.BytesIO(data), pre_buffer=False)
+    wanted = list(_wanted(file.schema_arrow.names, names, may_miss))
+    _check_size(file.metadata.num_rows * min(len(wanted), file.metadata.num_columns) * 8)
+    for column in file.schema:
+        if column.name in wanted and column.physical_type not in _NUMERIC:
+            raise BadTrace(f"channel {column.name} is not numeric", "a number in each row")
+    return _columns(pd.read_parquet(io.BytesIO(data), columns=wanted), names, may_miss)
 
 
 def _columns(frame: Any, names: Iterable[str] | None, may_miss: Collection[str]) -> Arrays:
@@ -120,8 +146,12 @@ def _read_mcap(path: Path, steps: str, channels: Iterable[Channel], also: Sequen
     may_miss = {channel.name for channel in also}
     topics = {steps, *(topic for topic, _ in places.values())}
     seen: dict[str, list[tuple[float, Any]]] = {topic: [] for topic in topics}
-    with no_pipe(path).open("rb") as file:
-        for _, channel, message in make_reader(file).iter_messages(topics=sorted(topics)):
+    with open_regular(path) as file:
+        check_open(file, path, MOST_TRACE)
+        reader = make_reader(file)
+        summary = reader.get_summary()
+        _check_size(sum(chunk.uncompressed_size for chunk in summary.chunk_indexes) if summary else 0)
+        for _, channel, message in reader.iter_messages(topics=sorted(topics)):
             if channel.message_encoding != "json":
                 raise BadTrace(f"{channel.message_encoding} messages in {channel.topic}", "JSON messages")
             seen[channel.topic].append((message.log_time / 1e9, json.loads(message.data)))

@@ -4,7 +4,9 @@ import re
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
+from mutator._common.bounded import read_bounded
 from mutator._common.text import counted
+from mutator.config.yaml_files import MAX_BYTES
 from mutator.outcomes.fault_free import own_alerts
 from mutator.paper import observations, observations_page, seeds
 from mutator.paper.observations import Verdict
@@ -66,7 +68,7 @@ def observations_panel(run: ReportedRun) -> Panel | None:
     if len(missing) == len(kinds):
         return None
     ends = run.ends() or {}
-    words = re.findall(r"\w+", file.read_text(encoding="utf-8"))
+    words = re.findall(r"\w+", read_bounded(file, MAX_BYTES).decode())
     frame = slim(run.frame, *words)  # the queries use only columns that the file names
     frame = frame.assign(t_end=frame["scenario"].map(ends))
     judged = observations.judge(file, frame, list(_lacks(run, missing)))

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import yaml
 from markupsafe import Markup
 
+from mutator._common.bounded import read_bounded
 from mutator._common.hashing import plain
 from mutator.config.locations import as_written_at
 from mutator.errors import MutatorError
@@ -287,6 +288,6 @@ def media(folder: RunFolder, seen_from: Path, budget: int) -> dict[str, dict[str
             if size <= budget:
                 budget -= size
                 kind = "jpeg" if path.suffix == ".jpg" else "png"
-                link = f"data:image/{kind};base64,{base64.b64encode(path.read_bytes()).decode()}"
+                link = f"data:image/{kind};base64,{base64.b64encode(read_bounded(path)).decode()}"
             here["stills"].append([time.removesuffix("s"), link])
     return {name: kept for name, kept in found.items() if any(kept.values())}

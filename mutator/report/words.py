@@ -2,8 +2,7 @@
 
 from collections.abc import Mapping
 
-import yaml
-
+from mutator.config.yaml_files import load
 from mutator.errors import MutatorError
 from mutator.model import Method
 from mutator.report.studies import ReportedRun
@@ -95,15 +94,15 @@ def _scenarios(run: ReportedRun) -> dict[str, str]:
 
 
 def _title(run: ReportedRun, name: str) -> str:
-    """The `title` or `about` in a scenario's file, which can have any format."""
+    """The `title` or `about` in a scenario's file; empty if the file has a format of its own."""
     if run.workspace is None:
         return ""
     try:
-        data = yaml.safe_load(run.workspace.scenario(name).read_text(encoding="utf-8"))
-    except (MutatorError, OSError, ValueError, yaml.YAMLError):
+        data = load(run.workspace.scenario(name)).data
+    except MutatorError:
         return ""
     told = (data.get("title") or data.get("about")) if isinstance(data, dict) else ""
-    return " ".join(str(told or "").split())
+    return " ".join(told.split()) if isinstance(told, str) else ""
 
 
 def _triggers(run: ReportedRun) -> dict[str, str]:
@@ -124,9 +123,8 @@ def _triggers(run: ReportedRun) -> dict[str, str]:
 def _contexts(run: ReportedRun) -> dict[str, str]:
     """The contexts in the campaign's context table; empty if the table is not found."""
     try:
-        campaign = yaml.safe_load((run.folder.path / "campaign.yaml").read_text(encoding="utf-8"))
-        table = campaign["triggers"]["table"]
+        table = load(run.folder.path / "campaign.yaml").data["triggers"]["table"]
         found = run.workspace.context_table(table) if run.workspace and table else None
-    except (MutatorError, OSError, ValueError, KeyError, TypeError, yaml.YAMLError):
+    except (MutatorError, KeyError, TypeError):
         return {}
     return {row.id: " ".join(row.about.split()) for row in found.rows} if found else {}

@@ -3,6 +3,7 @@
 import shlex
 from typing import Any
 
+from mutator._common.bounded import read_bounded
 from mutator._common.hashing import plain
 from mutator._common.text import counted
 from mutator.campaigns.plans import Plan
@@ -76,5 +77,5 @@ def _campaign(workspace: Workspace, plan: Plan) -> str:
     """The campaign's name if the library's file of that name has the same text, else its file."""
     name = plan.campaign.name
     known = name in workspace.campaigns
-    same = known and workspace.campaign(name).read_bytes() == plan.campaign.source
+    same = known and read_bounded(workspace.campaign(name)) == plan.campaign.source
     return name if same else shlex.quote(str(plan.campaign.path))

@@ -20,7 +20,8 @@ import numpy as np
 from PIL import Image
 
 from mutator._common import caches
-from mutator._common.files import ScratchFolder, json_bytes, no_pipe, write_atomic
+from mutator._common.bounded import read_bounded
+from mutator._common.files import ScratchFolder, json_bytes, write_atomic
 from mutator._common.hashing import content_id, digest
 from mutator.engines.in_target import picture_probe
 from mutator.engines.jobs import Job
@@ -120,7 +121,7 @@ class _Wanted:
             scenario=Path("scenario"), seed=0, out=Path("out"), changes=faults[0].changes
         )
         probe = digest(Path(picture_probe.__file__).read_bytes())
-        run = [manifest.entry_module, entry, sorted(manifest.env.items()), digest(scenario.read_bytes())]
+        run = [manifest.entry_module, entry, sorted(manifest.env.items()), digest(read_bounded(scenario))]
         labels = list(map(_label, faults))
         versions = [_SCHEMA, platform.python_version(), probe, manifest.tree.digest]
         key = content_id([*versions, run, content_id(place[0]), place[1], lines, labels])
@@ -227,7 +228,7 @@ def _run(
             expected="a run that reaches the image effect",
             remedy="see `mutator check --drive`",
         )
-    with np.load(no_pipe(file), allow_pickle=False) as found:
+    with np.load(io.BytesIO(read_bounded(file)), allow_pickle=False) as found:
         return [found["before"], *(found[f"after_{i}"] for i in range(len(lines)))]
 
 
@@ -263,7 +264,7 @@ def _jpeg(picture: np.ndarray) -> bytes:
 def _recalled(key: str) -> Pictures | None:
     path = caches.of_pictures() / f"{key}.json"
     try:
-        data: dict[str, Any] = json.loads(no_pipe(path).read_bytes())
+        data: dict[str, Any] = json.loads(read_bounded(path))
         before, levels = data["before"], data["levels"]
         if data["sum"] == digest([key, before, levels]):
             os.utime(path)  # mark as recently used

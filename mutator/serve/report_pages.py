@@ -6,6 +6,7 @@ from pathlib import Path
 from starlette.responses import HTMLResponse, Response
 
 from mutator._common.below import check_plain
+from mutator._common.bounded import read_open
 from mutator._common.hashing import digest
 from mutator.comparison import comparison as comparing
 from mutator.comparison import pages
@@ -99,7 +100,7 @@ class Shown:
 def _series(run: Path, name: str) -> bytes:
     """Read a script of series; Absent unless it equals the output of `write_script` for the same data."""
     with open_in_run(run, name) as file:
-        data = file.read()
+        data = read_open(file, run / name)
     path = run / name
     try:
         if script_of(path.stem, read_script(path)) == data:

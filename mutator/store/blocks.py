@@ -13,10 +13,12 @@ from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
+from mutator._common.bounded import MOST_DATA, read_bounded
 from mutator._common.files import raising_disk_full
 
 _MARK = b"FIB1"
 _HEAD, _CHECK = struct.Struct("<4sBHI"), 8
+_SEARCHED = 8  # how many times the bytes of a file a search may verify
 _BATCH, _BATCH_S = 32, 2.0  # at most this many blocks, and seconds, between two syncs
 
 
@@ -97,25 +99,25 @@ def as_block(kind: int, key: str, data: bytes) -> bytes:
 
 
 def read_blocks(path: Path) -> Blocks:
-    found = list(_verified(path.read_bytes()))
+    found = list(_verified(read_bounded(path, MOST_DATA)))
     blocks = tuple(block for block in found if block is not None)
     return Blocks(path=path, blocks=blocks, damaged=len(blocks) < len(found))
 
 
 def intact_blocks(path: Path) -> Iterator[Block]:
-    yield from (block for block in _verified(path.read_bytes()) if block is not None)
+    yield from (block for block in _verified(read_bounded(path, MOST_DATA)) if block is not None)
 
 
 def _verified(data: bytes) -> Iterator[Block | None]:
     """Yield the intact blocks, and None for each damaged part."""
-    at = 0
+    at, search = 0, _Search(data)
     while at < len(data):
         block = _block_at(data, at)
         if block is not None:
             yield block
             at = block.offset + len(block.data)
             continue
-        following = next(_intact(data, at + 1), None)
+        following = search.after(at)
         if following is not None or not _is_cut(data, at):
             yield None
         at = len(data) if following is None else following
@@ -125,28 +127,47 @@ def _block_at(data: bytes, at: int) -> Block | None:
     begin = at + _HEAD.size + _CHECK
     if begin > len(data):
         return None
-    mark, kind, of_key, of_data = _HEAD.unpack_from(data, at)
-    offset = begin + of_key
-    end = offset + of_data
-    if mark != _MARK or end > len(data):
+    end = _end(data, at)
+    if end is None or end > len(data):
         return None
+    _, kind, of_key, _ = _HEAD.unpack_from(data, at)
     check = data[at + _HEAD.size : begin]
     if sha256(data[at : at + _HEAD.size] + data[begin:end]).digest()[:_CHECK] != check:
         return None
-    return Block(kind=kind, key=data[begin:offset].decode(), data=data[offset:end], offset=offset)
+    offset = begin + of_key
+    key = data[begin:offset].decode(errors="replace")
+    return Block(kind=kind, key=key, data=data[offset:end], offset=offset)
 
 
-def _intact(data: bytes, at: int) -> Iterator[int]:
-    while (at := data.find(_MARK, at)) >= 0:
-        if _block_at(data, at) is not None:
-            yield at
-        at += 1
+def _end(data: bytes, at: int) -> int | None:
+    """Return where the block that begins at this offset says that it ends; None if none begins there."""
+    mark, _, of_key, of_data = _HEAD.unpack_from(data, at)
+    return at + _HEAD.size + _CHECK + of_key + of_data if mark == _MARK else None
+
+
+class _Search:
+    """Finds the next intact block after damage.
+
+    Bytes in the damaged part can look like many long blocks, so the search ends when it has verified a
+    multiple of the file's bytes.
+    """
+
+    def __init__(self, data: bytes) -> None:
+        self._data = data
+        self._left = _SEARCHED * len(data)
+
+    def after(self, at: int) -> int | None:
+        while self._left > 0 and (at := self._data.find(_MARK, at + 1)) >= 0:
+            if _block_at(self._data, at) is not None:
+                return at
+            end = _end(self._data, at) if at + _HEAD.size <= len(self._data) else None
+            self._left -= end - at if end and end <= len(self._data) else 0
+        return None
 
 
 def _is_cut(data: bytes, at: int) -> bool:
     """Return whether the block that begins at this offset is cut off by the end of the file."""
-    rest = data[at:]
-    if len(rest) < _HEAD.size + _CHECK:
-        return _MARK.startswith(rest[: len(_MARK)])
-    mark, _, of_key, of_data = _HEAD.unpack_from(rest)
-    return bool(mark == _MARK and _HEAD.size + _CHECK + of_key + of_data > len(rest))
+    if len(data) - at < _HEAD.size + _CHECK:
+        return _MARK.startswith(data[at : at + len(_MARK)])
+    end = _end(data, at)
+    return end is not None and end > len(data)

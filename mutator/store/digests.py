@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from mutator._common.below import Outside, check_name, inside, open_below, write_below
+from mutator._common.bounded import MOST_DATA, MOST_JSON, check_open, open_regular, read_bounded, read_open
 from mutator._common.cores import usable_cores
 from mutator._common.files import (
     is_no_file,
@@ -52,11 +53,9 @@ class Digest:
     @classmethod
     def of_file(cls, path: Path) -> "Digest | None":
         """Compute the digest of a file; None if it is missing."""
-        if not path.is_file():  # never block on a pipe
-            return None
         try:
-            with path.open("rb") as file:
-                return cls._of_open(file)
+            with open_regular(path) as file:
+                return cls._of_open(file, path)
         except OSError as err:
             if not is_no_file(err):
                 raise
@@ -67,7 +66,7 @@ class Digest:
         """Compute the digest of a file below `run`; None if it is missing, or not a plain file."""
         try:
             with open_below(run, name) as file:
-                return cls._of_open(file)
+                return cls._of_open(file, run / name)
         except Outside:
             return None
         except OSError as err:
@@ -76,7 +75,8 @@ class Digest:
             return None
 
     @classmethod
-    def _of_open(cls, file: BufferedReader) -> "Digest":
+    def _of_open(cls, file: BufferedReader, where: Path) -> "Digest":
+        check_open(file, where)
         return cls(
             sha256=hashlib.file_digest(file, "sha256").hexdigest(), size=os.fstat(file.fileno()).st_size
         )
@@ -158,7 +158,7 @@ def read(run: Path) -> Ledger:
     if not path.is_file():
         raise MutatorError("missing", where=path, expected="the digests of all files", remedy=remedy)
     data = read_json(path, SCHEMA)
-    as_written = path.read_bytes() == json_bytes(data)
+    as_written = read_bounded(path, MOST_JSON) == json_bytes(data)
     if data.pop("sum", None) != digest(data) or not as_written:
         raise MutatorError(
             "changed since it was written",
@@ -254,7 +254,7 @@ def segments(run: Path) -> list[str]:
 
 def _closed(run: Path, name: str) -> Digest:
     with open_below(run, name) as file:
-        data = file.read()
+        data = read_open(file, run / name, MOST_DATA)
         os.fsync(file.fileno())
     segment = read_segment(inside(run, name), data)
     if segment.damaged:

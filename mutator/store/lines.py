@@ -12,8 +12,9 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
+from mutator._common.bounded import MOST_DATA, bounded_lines, open_regular, read_open
 from mutator._common.files import check_schema, raising_disk_full, writing_atomic
 from mutator._common.hashing import canonical
 from mutator.errors import MutatorError
@@ -182,8 +183,8 @@ def verified_lines(path: Path, schema: str, *, checksums: bool) -> Iterator[tupl
     MutatorError for a damaged line, a missing file, or another schema or file name.
     """
     last, offset = b"", 0
-    with _no_pipe(path).open("rb") as file:
-        for number, line in enumerate(file, start=1):
+    with _opened(path) as file:
+        for number, line in enumerate(bounded_lines(file, path), start=1):
             if not line.endswith(b"\n"):  # incomplete, because the process was killed
                 return
             data = line[:-1]
@@ -200,8 +201,8 @@ def verified_lines(path: Path, schema: str, *, checksums: bool) -> Iterator[tupl
 def intact_lines(path: Path, *, checksums: bool) -> Iterator[tuple[int, bytes]]:
     """Yield the number and bytes of each complete, intact line. MutatorError if the file is missing."""
     last = b""
-    with _no_pipe(path).open("rb") as file:
-        for number, line in enumerate(file, start=1):
+    with _opened(path) as file:
+        for number, line in enumerate(bounded_lines(file, path), start=1):
             data = line[:-1]
             if line.endswith(b"\n") and (not checksums or _is_intact(last, data)):
                 yield number, data
@@ -218,12 +219,13 @@ def _is_intact(last: bytes, line: bytes) -> bool:
 
 
 def _read(path: Path) -> bytes:
-    return _no_pipe(path).read_bytes()
+    with _opened(path) as file:
+        return read_open(file, path, MOST_DATA)
 
 
-def _no_pipe(path: Path) -> Path:
-    if path.is_file():  # never block on a pipe
-        return path
+def _opened(path: Path) -> BinaryIO:
+    if path.is_file():
+        return open_regular(path)
     raise MutatorError(
         "no file",
         where=path,

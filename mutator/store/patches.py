@@ -11,6 +11,7 @@ from functools import cached_property
 from pathlib import Path
 
 from mutator._common.below import inside
+from mutator._common.bounded import read_bounded, unpacked
 from mutator._common.files import write_atomic
 from mutator._common.hashing import digest
 from mutator.store.blocks import Block, BlockWriter, as_block, intact_blocks, read_blocks
@@ -20,6 +21,7 @@ WHOLE, BESIDE = 0, 1  # kinds of blocks: a complete patch, or a difference from 
 _WINDOW = 32_768  # window size of deflate, in bytes
 _RUN = 256  # patches that depend on one complete patch, and are lost with it
 _LEVEL = 9
+MOST_PATCH = 16_000_000  # bytes
 
 
 class _Packer:
@@ -70,14 +72,19 @@ class PatchWriter:
 
 
 class _Whole:
-    """A complete patch, unpacked once."""
+    """A complete patch."""
 
     def __init__(self, block: Block) -> None:
         self._block = block
 
-    @cached_property
+    @property
     def data(self) -> bytes:
-        return zlib.decompress(self._block.data)
+        return unpacked(self._block.data, MOST_PATCH)
+
+    @cached_property
+    def end(self) -> bytes:
+        """The part to which other patches refer."""
+        return self.data[-_WINDOW:]
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,13 +97,12 @@ class _Place:
 
 
 def _unpacked(block: Block, whole: _Whole | None) -> bytes | None:
-    """Return the patch in a block; None if the complete patch on which it depends is lost."""
+    """Return the patch in a block; None if it or the complete patch on which it depends is damaged."""
     try:
         if block.kind == WHOLE or whole is None:
-            return whole.data if whole is not None and block.kind == WHOLE else zlib.decompress(block.data)
-        packer = zlib.decompressobj(zdict=whole.data[-_WINDOW:])
-        return packer.decompress(block.data) + packer.flush()
-    except zlib.error:
+            return unpacked(block.data, MOST_PATCH)
+        return unpacked(block.data, MOST_PATCH, whole.end)
+    except (zlib.error, ValueError):
         return None
 
 
@@ -113,7 +119,7 @@ class Patches:
         place = self._places.get(experiment_id)
         if place is None:
             path = self.old_file(experiment_id)
-            return path.read_bytes() if path.is_file() else None
+            return read_bounded(path, MOST_PATCH) if path.is_file() else None
         return _unpacked(place.block, place.whole)
 
     def digests(self) -> Iterator[tuple[str, str]]:

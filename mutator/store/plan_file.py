@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar, overload
 
 from mutator._common.below import check_library_name
-from mutator._common.files import no_pipe, raising_disk_full, writing_atomic
+from mutator._common.bounded import bounded_lines, check_open, open_regular
+from mutator._common.files import raising_disk_full, writing_atomic
 from mutator._common.hashing import added_values, canonical, content_id, plain
 from mutator._common.text import counted
 from mutator.errors import MutatorError
@@ -127,7 +128,8 @@ def lines_named(run: Path, names: Container[str]) -> Iterator[bytes]:
 
 def chunk_lines(run: Path, chunk: Sequence[int]) -> list[bytes]:
     offset, length, _ = chunk
-    with (run / EXPERIMENTS).open("rb") as file:
+    with open_regular(run / EXPERIMENTS) as file:
+        check_open(file, run / EXPERIMENTS)
         file.seek(offset)
         return file.read(length).splitlines()
 
@@ -182,8 +184,8 @@ def iterate(run: Path) -> Iterator[Experiment]:
 
 def lines_of(path: Path) -> Iterator[bytes]:
     try:
-        with no_pipe(path).open("rb") as file:
-            yield from file
+        with open_regular(path) as file:
+            yield from bounded_lines(file, path)
     except OSError as err:
         raise MutatorError(f"cannot be read ({err.strerror})", where=path, remedy=_REMEDY) from None
 

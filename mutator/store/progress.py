@@ -6,6 +6,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from mutator._common.bounded import MOST_DATA, open_regular, read_open
 from mutator.model import Status
 
 
@@ -60,9 +61,9 @@ class Tail:
     def _read(self) -> None:
         for path in self._folder.glob("*.jsonl"):
             offset = self._offsets.get(path, 0)
-            with path.open("rb") as file:
+            with open_regular(path) as file:
                 file.seek(offset)
-                data = file.read()
+                data = read_open(file, path, MOST_DATA)
             end = data.rfind(b"\n") + 1
             self._offsets[path] = offset + end
             for line in data[:end].splitlines():

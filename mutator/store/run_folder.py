@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from mutator._common.below import inside
+from mutator._common.bounded import MOST_DATA, read_bounded
 from mutator._common.files import check_is_text
 from mutator._common.hashing import plain
 from mutator.errors import MutatorError
@@ -147,7 +148,9 @@ class RunFolder:
         files = sorted((self.path / "records").glob("*.jsonl"))
         for stretch in reversed(self.stretches):
             for path in files:
-                if fnmatchcase(path.stem, stretch.records) and experiment_id.encode() in path.read_bytes():
+                if fnmatchcase(path.stem, stretch.records) and experiment_id.encode() in read_bounded(
+                    path, MOST_DATA
+                ):
                     return stretch
         return None
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from mutator._common.below import check_name, inside
+from mutator._common.bounded import unpacked
 from mutator._common.hashing import canonical
 from mutator.errors import MutatorError
 from mutator.model import Record
@@ -21,6 +22,7 @@ from mutator.store.series_script import name_of, read_script, write_script
 
 SCHEMA, FOLDER, KEPT = "series/1", "series", "kept"
 INDEX = "index"
+_INDEX_RATIO, _INDEX_BYTES = 30, 1_000_000  # an index unpacks to at most this many times its size, and bytes
 _ID = 16  # hex digits of an experiment id
 _LENGTH = struct.Struct("<I")
 
@@ -202,7 +204,8 @@ def putting_aside(run: Path) -> str:
 def read_index(path: Path) -> Index:
     remedy = putting_aside(path.parent.parent)
     try:
-        data = json.loads(gzip.decompress(read_script(path)))
+        packed = read_script(path)
+        data = json.loads(unpacked(packed, _INDEX_RATIO * len(packed) + _INDEX_BYTES, gzip=True))
         if data["schema"] != SCHEMA:
             raise MutatorError(f"schema {data['schema']!r}", where=path, expected=SCHEMA, remedy=remedy)
         index = Index.of(data)
@@ -212,7 +215,7 @@ def read_index(path: Path) -> Index:
             if number not in range(len(index.places)):
                 raise ValueError(f"no entry {number}")
         return index
-    except (ValueError, LookupError, TypeError, AttributeError, OSError, EOFError, zlib.error) as err:
+    except (ValueError, LookupError, TypeError, AttributeError, RecursionError, zlib.error) as err:
         raise MutatorError(f"a damaged index ({err})", where=path, remedy=remedy) from None
 
 

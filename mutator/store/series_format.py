@@ -15,9 +15,12 @@ from typing import Any
 
 import numpy as np
 
+from mutator._common.bounded import unpacked
 from mutator._common.hashing import canonical
 from mutator.errors import MutatorError
 
+MOST_BYTES = 32_000_000  # of a run's series
+_DAMAGED = (ValueError, LookupError, TypeError, AttributeError, RecursionError)
 _LENGTH = struct.Struct("<I")
 _LEVEL = 4  # gives one percent more bytes than level 6, in two thirds of the time
 _BELOW_SIGN = np.int32(0x7FFFFFFF)
@@ -87,8 +90,8 @@ def encode(one: Series, golden: Series | None = None) -> bytes:
 def decode(data: bytes, golden: Series | None = None) -> Series:
     """Decode a run that was encoded with `golden`; MutatorError if the bytes are damaged."""
     try:
-        return _decode(gzip.decompress(data), golden)
-    except (ValueError, LookupError, TypeError, struct.error, EOFError, OSError, zlib.error) as err:
+        return _decode(unpacked(data, MOST_BYTES, gzip=True), golden)
+    except (*_DAMAGED, struct.error, zlib.error) as err:
         raise MutatorError(f"a damaged series ({err})", expected="unchanged bytes") from None
 
 
@@ -112,6 +115,8 @@ def _decode(raw: bytes, golden: Series | None) -> Series:
     words = np.frombuffer(raw, np.uint8, -1, at + times.nbytes).reshape(4, -1).T.copy().view("<u4").ravel()
     t = times[:more].copy() if golden is None else np.concatenate((golden.t[:known], times[:more]))
     lengths = [len(t[::step]) for step in every]
+    if sum(lengths) * words.itemsize > MOST_BYTES:
+        raise ValueError(f"values for more than {MOST_BYTES} bytes")
     if len(words) != sum(lengths[channel] for channel in changed) + 2 * len(channels):
         raise ValueError("wrong number of values")
     rows = list(_references(golden, known, lengths))

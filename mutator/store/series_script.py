@@ -7,7 +7,8 @@ character per byte. The page loads it as `x-user-defined`, an encoding in which 
 import re
 from pathlib import Path
 
-from mutator._common.files import no_pipe, write_atomic
+from mutator._common.bounded import read_bounded
+from mutator._common.files import write_atomic
 from mutator._common.hashing import digest
 from mutator.errors import MutatorError
 
@@ -40,7 +41,7 @@ def script_of(name: str, data: bytes) -> bytes:
 def read_script(path: Path) -> bytes:
     """Return the data in a script; MutatorError if it is missing or invalid."""
     try:
-        text = no_pipe(path).read_bytes()
+        text = read_bounded(path)
     except OSError as err:
         raise MutatorError(f"cannot be read ({err.strerror})", where=path) from None
     call = _CALL.match(text)

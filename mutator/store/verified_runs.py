@@ -12,7 +12,8 @@ from typing import Any
 
 from mutator._common import caches
 from mutator._common.below import inside
-from mutator._common.files import json_bytes, no_pipe, write_atomic
+from mutator._common.bounded import read_bounded
+from mutator._common.files import json_bytes, write_atomic
 from mutator._common.hashing import digest
 from mutator._common.version import VERSION
 from mutator.errors import MutatorError
@@ -35,7 +36,7 @@ def recall(key: str) -> dict[str, Any]:
     """Return what the cache knows about a run; empty for an unknown run."""
     path = _path(key)
     try:
-        data = json.loads(no_pipe(path).read_bytes())
+        data = json.loads(read_bounded(path))
         if data.pop("sum") == digest([key, data]):
             os.utime(path)  # mark as used
             return dict(data)

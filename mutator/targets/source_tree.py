@@ -1,5 +1,6 @@
 """A target's files in memory, with a cache of data derived from them."""
 
+import itertools
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -9,11 +10,15 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from mutator._common.below import check_inside, check_name, inside, is_inside
+from mutator._common.bounded import read_bounded
 from mutator._common.files import check_is_text
 from mutator._common.hashing import canonical, digest
 from mutator.errors import MutatorError
 
 T = TypeVar("T")
+MOST_SOURCE = 1_000_000  # bytes of a Python file
+MOST_TREE = 128_000_000  # bytes of all files, which are kept in memory
+MOST_FILES = 50_000  # files and folders below the folders that a manifest's globs name
 _SPECIAL = re.compile(r"(\*\*/|\*\*|\*|\?)")  # special characters in a glob
 
 
@@ -115,8 +120,20 @@ def read_tree(
 def _read(root: Path, globs: tuple[str, ...], bounds: Path | None) -> dict[str, bytes]:
     """Read the files of `root` that match; Outside for a link that leads out of the folder `bounds`."""
 
+    numbers = itertools.count()
+
+    def count() -> None:
+        if next(numbers) == MOST_FILES:
+            raise MutatorError(
+                f"more than {MOST_FILES:,} files and folders",
+                where=root,
+                expected="the source of one controller",
+                remedy="name narrower folders in the manifest's `files`",
+            )
+
     def enters(folder: Path) -> bool:
         """Whether to read a folder; Outside if its files could be part of the tree but are elsewhere."""
+        count()
         if bounds is None or is_inside(bounds, folder):
             return True
         if any(_may_match_below(folder.relative_to(root).parts, glob.split("/")) for glob in globs):
@@ -124,10 +141,12 @@ def _read(root: Path, globs: tuple[str, ...], bounds: Path | None) -> dict[str, 
         return False
 
     folders = {_SPECIAL.split(glob)[0].rpartition("/")[0] for glob in globs}
-    found = {
-        path: path.relative_to(root).as_posix() for name in folders for path in _below(root / name, enters)
-    }
-    files = {}
+    found = {}
+    for path in itertools.chain.from_iterable(_below(root / name, enters) for name in folders):
+        count()
+        found[path] = path.relative_to(root).as_posix()
+    files: dict[str, bytes] = {}
+    left = MOST_TREE
     for path in sorted(path for path, name in found.items() if matches(name, globs)):
         check_is_text(path)
         check_name(found[path], root)
@@ -141,7 +160,9 @@ def _read(root: Path, globs: tuple[str, ...], bounds: Path | None) -> dict[str, 
                 remedy="repair or remove the link, or leave it out of `files`",
             )
         if path.is_file():
-            files[found[path]] = path.read_bytes()
+            data = read_bounded(path, min(left, MOST_SOURCE if path.suffix == ".py" else left))
+            files[found[path]] = data
+            left -= len(data)
     return files
 
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import yaml
 
-from mutator._common.files import no_pipe
-from mutator.config.yaml_files import Keys, Source, parse
+from mutator._common.bounded import read_bounded
+from mutator.config.yaml_files import MAX_BYTES, Keys, Source, parse
 from mutator.errors import MutatorError
 
 OLD, NEW = "target/1", "target/2"
@@ -105,7 +105,7 @@ def upgraded_text(source: Source) -> Upgrade:
 
     If a key does not have its own lines, everything is rewritten. MutatorError if the text would not match.
     """
-    text = no_pipe(source.path).read_bytes().decode()
+    text = read_bounded(source.path, MAX_BYTES).decode()
     new = upgraded(source).data
     for upgrade in (_line_by_line, _anew):
         done = upgrade(text, source, new)

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from mutator._common.below import inside
-from mutator._common.files import no_pipe
+from mutator._common.bounded import read_bounded
 from mutator._common.text import shown
 from mutator.outcomes import golden
 from mutator.outcomes.golden import BadOutput
@@ -19,7 +19,7 @@ def first_difference(manifest: TargetManifest, one: Path, other: Path) -> str:
     The text names the channel, step and time, or the key of the record, and both values.
     """
     for name in manifest.outputs:
-        if no_pipe(inside(one, name)).read_bytes() != no_pipe(inside(other, name)).read_bytes():
+        if read_bounded(inside(one, name)) != read_bounded(inside(other, name)):
             in_trace = name == manifest.trace_file
             found = _in_traces(manifest, one, other) if in_trace else _in_records(one, other, name)
             return found or f"in bytes of {name} that are not values of a channel, such as a timestamp"
@@ -50,7 +50,7 @@ def _in_traces(manifest: TargetManifest, one: Path, other: Path) -> str:
 
 
 def _in_records(one: Path, other: Path, name: str) -> str:
-    first, second = (json.loads(no_pipe(inside(out, name)).read_bytes()) for out in (one, other))
+    first, second = (json.loads(read_bounded(inside(out, name))) for out in (one, other))
     for key in dict.fromkeys((*first, *second)):
         if first.get(key) != second.get(key):
             return f"in {name}, '{key}': {shown(first.get(key))} and {shown(second.get(key))}"

@@ -8,6 +8,7 @@ from typing import Any
 
 from mutator._common import kept_folders
 from mutator._common.below import inside
+from mutator._common.bounded import read_bounded
 from mutator._common.files import (
     DiskFull,
     json_bytes,
@@ -126,7 +127,7 @@ class _Checks:
             return None  # missing or damaged
         if results is not None:
             self._check_same_as_before(found["goldens"])
-            self._install((copy / FILE).read_bytes())
+            self._install(read_bounded(copy / FILE))
         return results
 
     def _passed(self, said: dict[str, Any] | None, place: Path) -> tuple[CheckResult, ...] | None:
@@ -168,7 +169,7 @@ class _Checks:
         run, golden = self.folder.path, self.kept / "golden"
         golden.mkdir(parents=True, exist_ok=True)
         files = {f"golden/{path.relative_to(golden).as_posix()}": path for path in golden.rglob("*")}
-        new = {name: Digest.of(path.read_bytes()) for name, path in files.items() if path.is_file()}
+        new = {name: Digest.of(read_bounded(path)) for name, path in files.items() if path.is_file()}
         gone = {name: None for name in digests.read(run).names if name.startswith("golden/")}
         with digests.rewriting(run, {**gone, **new, FILE: Digest.of(checks)}):
             shutil.rmtree(run / "golden", ignore_errors=True)

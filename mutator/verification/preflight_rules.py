@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mutator._common.below import inside
-from mutator._common.files import no_pipe
+from mutator._common.bounded import read_bounded
 from mutator._common.hashing import digest
 from mutator.engines.jobs import Execution
 from mutator.model import Status
@@ -56,7 +56,7 @@ def look(manifest: TargetManifest, execution: Execution) -> CheckRun:
 def digest_of(manifest: TargetManifest, out: Path) -> str:
     """Digest of trace and record in an output folder; empty if they are missing."""
     try:
-        return digest([digest(no_pipe(inside(out, name)).read_bytes()) for name in manifest.outputs])
+        return digest([digest(read_bounded(inside(out, name))) for name in manifest.outputs])
     except OSError:
         return ""
 

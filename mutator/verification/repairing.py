@@ -20,6 +20,7 @@ from mutator._common.below import (
     write_below,
     writing_below,
 )
+from mutator._common.bounded import MOST_DATA, read_bounded
 from mutator._common.files import raising_disk_full
 from mutator._common.locks import owned
 from mutator._common.text import counted
@@ -153,7 +154,7 @@ def _segments(folder: RunFolder, ledger: Ledger, lost: Collection[str]) -> Itera
             if not path.is_file():
                 yield name, None, f"{name} set aside: it is not a file"
                 continue
-            data = path.read_bytes()
+            data = read_bounded(path, MOST_DATA)
             segment, known = read_segment(path, data), ledger.files.get(name)
             dropped = lost if kind == "records" else ()
             kept = list(_kept(_trusted(segment, known, data), planned, dropped, done))

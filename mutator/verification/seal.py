@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from mutator._common.below import inside
+from mutator._common.bounded import read_bounded
 from mutator._common.files import read_json
 from mutator._common.hashing import canonical, digest
 from mutator.campaigns.freezing import CSV
@@ -113,7 +114,7 @@ def golden_digests(folder: RunFolder, names: Sequence[str]) -> dict[str, str]:
     found = {}
     for one in folder.goldens:
         place = folder.golden(*one)
-        files = [digest(inside(place, name).read_bytes()) for name in names]
+        files = [digest(read_bounded(inside(place, name))) for name in names]
         found[one.key] = digest(files)
     return found
 

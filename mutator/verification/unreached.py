@@ -4,6 +4,7 @@ A faulty run equals the golden run until its fault is active, so a trigger that 
 never fires. The run of a null mutant equals its golden run, and it records the observed values.
 """
 
+import io
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from inspect import signature
@@ -13,6 +14,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from mutator._common.below import inside
+from mutator._common.bounded import read_bounded
 from mutator._common.text import counted
 from mutator.model import Experiment, Trigger
 from mutator.mutants.building import build
@@ -38,7 +40,9 @@ def write_observed(folder: Path, key: str, seen: Iterable[Sequence[float]]) -> N
 def read_observed(folder: Path) -> dict[str, Observed]:
     base = folder / FOLDER
     found = {path.relative_to(base).as_posix(): path for path in base.rglob("*.npy")}
-    return {name.removesuffix(".npy"): np.load(path) for name, path in found.items()}
+    return {
+        name.removesuffix(".npy"): np.load(io.BytesIO(read_bounded(path))) for name, path in found.items()
+    }
 
 
 def arming(workspace: Workspace, manifest: TargetManifest, trigger: Trigger) -> Arming:

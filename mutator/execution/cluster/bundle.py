@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from mutator._common.below import Outside, check_inside, check_name, files_inside, inside
+from mutator._common.bounded import read_bounded
 from mutator._common.files import raising_disk_full, read_json
 from mutator._common.version import VERSION
 from mutator.engines import sandbox
@@ -103,7 +104,7 @@ def _parts(workspace: Workspace, folder: RunFolder, engine: str) -> Iterator[tup
         "sandbox": workspace.sandbox,
     }
     yield _META, json.dumps(meta).encode()
-    yield f"manifest/{manifest.path.name}", manifest.path.read_bytes()
+    yield f"manifest/{manifest.path.name}", read_bounded(manifest.path)
     tree = manifest.tree
     for path, data in tree.files.items():
         yield f"{'overlay' if path in tree.overlaid else 'target'}/{path}", data
@@ -111,12 +112,12 @@ def _parts(workspace: Workspace, folder: RunFolder, engine: str) -> Iterator[tup
         name = file.relative_to(manifest.root).as_posix()
         if name not in tree.files:
             _check_size(file.stat().st_size, file)
-            yield f"target/{name}", file.read_bytes()
+            yield f"target/{name}", read_bounded(file)
     for kind in FILES:
         for file in sorted(workspace.templates.glob(kind)):
-            yield f"templates/{file.name}", check_inside(workspace.templates, file).read_bytes()
+            yield f"templates/{file.name}", read_bounded(check_inside(workspace.templates, file))
     for name in sorted(folder.scenarios):
-        yield f"scenarios/{name}.yaml", workspace.scenario(name).read_bytes()
+        yield f"scenarios/{name}.yaml", read_bounded(workspace.scenario(name))
 
 
 def _read_in_root(manifest: TargetManifest) -> Iterator[Path]:

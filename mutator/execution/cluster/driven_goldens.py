@@ -10,6 +10,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from mutator._common import caches, kept_folders
+from mutator._common.bounded import read_bounded
 from mutator._common.hashing import digest
 from mutator._common.version import VERSION
 from mutator.campaigns import machine
@@ -28,7 +29,7 @@ class DrivenGoldens:
         files = sorted(path for name in _SOURCES for path in (site.place / name).rglob("*") if path.is_file())
         self._common = [
             VERSION,
-            [[path.relative_to(site.place).as_posix(), digest(path.read_bytes())] for path in files],
+            [[path.relative_to(site.place).as_posix(), digest(read_bounded(path))] for path in files],
             site.meta["limits"],
             machine.surroundings(),
             platform.node(),
@@ -48,7 +49,7 @@ class DrivenGoldens:
         kept_folders.store(self._entry(golden), lambda made: shutil.copytree(out, made))
 
     def _entry(self, golden: GoldenRun) -> Path:
-        scenario = digest(self._site.scenario(golden.scenario).read_bytes())
+        scenario = digest(read_bounded(self._site.scenario(golden.scenario)))
         seed = self._site.meta["seed"] if golden.seed is None else golden.seed
         content = [*self._common, scenario, seed, list(golden.changes)]
         return caches.of_goldens() / digest(content)

@@ -40,9 +40,10 @@ def test_a_file_that_grows_is_not_read_further() -> None:
     assert len(read_bounded(Path("/proc/self/maps"))) > 1
 
 
-@pytest.mark.parametrize("path", ["/dev/zero", "/dev", "pipe"])
+@pytest.mark.parametrize("path", ["/dev/zero", "/dev", "pipe", "link"])
 def test_what_is_no_regular_file_is_not_opened(tmp_path: Path, path: str) -> None:
     os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "link").symlink_to(tmp_path / "pipe")
     with pytest.raises(OSError, match=r"such device|directory") as caught:
         open_regular(tmp_path / path)
     assert is_no_file(caught.value)

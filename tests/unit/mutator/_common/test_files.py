@@ -12,8 +12,6 @@ from mutator._common.files import (
     DiskFull,
     ScratchFolder,
     check_schema,
-    is_no_file,
-    no_pipe,
     raising_disk_full,
     read_json,
     remove_folder,
@@ -42,8 +40,6 @@ def test_a_pipe_is_refused_without_waiting(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "a.json")
     with pytest.raises(MutatorError, match=r"a\.json: not a file"):
         read_json(tmp_path / "a.json", "a/1")
-    (tmp_path / "b").write_bytes(b"x")
-    assert no_pipe(tmp_path / "b").read_bytes() == b"x"
 
 
 def test_a_newer_schema_is_refused() -> None:
@@ -85,17 +81,6 @@ def test_a_scratch_folder_is_deleted_after_its_block_or_with_its_object(
     assert path == scratch.path
     del scratch
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize("name", ["pipe", "link", "/dev/zero"])
-def test_pipes_devices_and_links_to_them_are_refused_without_waiting(tmp_path: Path, name: str) -> None:
-    """Folders and missing files are accepted, so that opening them raises the usual errors."""
-    os.mkfifo(tmp_path / "pipe")
-    (tmp_path / "link").symlink_to(tmp_path / "pipe")
-    with pytest.raises(OSError, match="No such device") as refused:
-        no_pipe(tmp_path / name)
-    assert is_no_file(refused.value)
-    assert no_pipe(tmp_path) == tmp_path and no_pipe(tmp_path / "none") == tmp_path / "none"
 
 
 def test_a_full_disk_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
