@@ -108,7 +108,7 @@ def test_invalid_utf_8_is_refused_with_its_offset(tmp_path: Path) -> None:
 def test_deep_nesting_and_huge_files_are_refused(tmp_path: Path) -> None:
     with pytest.raises(MutatorError):
         read(tmp_path, "[" * 20_000)
-    with pytest.raises(MutatorError, match="at most 1000000 bytes"):
+    with pytest.raises(MutatorError, match="at most 1,000,000 bytes"):
         read(tmp_path, "#" * 1_000_001)
 
 

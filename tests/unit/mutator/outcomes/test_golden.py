@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from mutator._common.shortages import Shortage
+from mutator.outcomes import trace_files
 from mutator.outcomes.golden import (
     BadOutput,
     alerts_of,
@@ -202,7 +203,7 @@ def test_a_lack_of_file_handles_is_not_blamed_on_the_run(
     def full(*given: Any, **more: Any) -> None:
         raise OSError(errno.EMFILE, "Too many open files")
 
-    monkeypatch.setattr(Path, "read_bytes", full)
+    monkeypatch.setattr(trace_files, "read_bounded", full)
     with pytest.raises(Shortage, match="too many open files"):
         load_trace(MANIFEST, tmp_path)
 
