@@ -99,9 +99,9 @@ class Shown:
 
 def _series(run: Path, name: str) -> bytes:
     """Read a script of series; Absent unless it equals the output of `write_script` for the same data."""
-    with open_in_run(run, name) as file:
-        data = read_open(file, run / name)
     path = run / name
+    with open_in_run(run, name) as file:
+        data = read_open(file, path)
     try:
         if script_of(path.stem, read_script(path)) == data:
             return data

@@ -66,7 +66,7 @@ class Digest:
         """Compute the digest of a file below `run`; None if it is missing, or not a plain file."""
         try:
             with open_below(run, name) as file:
-                return cls._of_open(file, run / name)
+                return cls._of_open(file, inside(run, name))
         except Outside:
             return None
         except OSError as err:
@@ -254,7 +254,7 @@ def segments(run: Path) -> list[str]:
 
 def _closed(run: Path, name: str) -> Digest:
     with open_below(run, name) as file:
-        data = read_open(file, run / name, MOST_DATA)
+        data = read_open(file, inside(run, name), MOST_DATA)
         os.fsync(file.fileno())
     segment = read_segment(inside(run, name), data)
     if segment.damaged:
