@@ -32,6 +32,7 @@ from mutator.store.digests import Digest, DigestingFile, Ledger
 from mutator.store.opening import check_contents
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN, HEAD, SCHEMA
+from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 
 CSV = "plan.csv"
@@ -145,7 +146,6 @@ def _head(
     plan: Plan | Planning, tally: Tally, found: str, workspace: Workspace, chunks: list[plan_file.Chunk]
 ) -> dict[str, Any]:
     manifest = workspace.manifest(plan.campaign.target)
-    structure = workspace.structure(manifest)
     canary = plan_file.to_plain(plan.canary) | {"fault": plain(plan.canary.fault)}
     return {
         "schema": SCHEMA,
@@ -162,26 +162,35 @@ def _head(
         "experiments": tally.experiments,
         "runs": tally.runs,
         "limits": plain(plan.campaign.limits),
-        "hazards": list(manifest.hazards),
-        "alerts": list(manifest.alerts),
+        **target_facts(workspace, manifest),
+        "goldens": [one.plain() for one in tally.needed()],
+        "canary": canary,
+        "canary_hazard": plan.campaign.canary.hazard,
+        "sources": _sources(tally, plan, workspace),
+        "provenance": {"mutator": VERSION},
+        "stretches": [],
+        "chunks": chunks,
+    }
+
+
+def target_facts(workspace: Workspace, manifest: TargetManifest) -> dict[str, Any]:
+    """What run.json says about the target: keys and values in JSON types."""
+    structure, scale = workspace.structure(manifest), workspace.scale_of(manifest)
+    facts = {
+        "hazards": manifest.hazards,
+        "alerts": manifest.alerts,
         "compared": [channel.name for channel in manifest.compared],
         "metrics": metric_columns(manifest),
         "about_hazards": [
             {"name": one.name, "about": one.about, "terminal": bool(one.terminal)} for one in manifest.rules
         ],
-        "severity": scale.plain() if (scale := workspace.scale_of(manifest)) else None,
+        "severity": scale.plain() if scale else None,
         "channels": channel_facts(manifest),
         "structure": structure.model_dump(mode="json", by_alias=True) if structure else None,
-        "goldens": [one.plain() for one in tally.needed()],
-        "golden_files": list(manifest.outputs),
-        "canary": canary,
-        "canary_hazard": plan.campaign.canary.hazard,
-        "sources": _sources(tally, plan, workspace),
+        "golden_files": manifest.outputs,
         "target_files": manifest.tree.digests,
-        "provenance": {"mutator": VERSION},
-        "stretches": [],
-        "chunks": chunks,
     }
+    return dict(plain(facts))
 
 
 def csv_bytes(experiments: Iterable[Experiment], *, head: bool = False) -> bytes:

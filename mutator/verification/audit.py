@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 from mutator._common.below import inside
@@ -20,6 +21,8 @@ from mutator.store.digests import Digest
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN, HEAD
 from mutator.targets.manifest import TargetManifest
+from mutator.verification.audited_head import checks as checks_of
+from mutator.verification.audited_head import engines, facts_of_target, idle_runs, seeds_and_sessions
 from mutator.verification.audited_records import mutants, proof, recorded, verdicts
 from mutator.verification.audited_series import series
 from mutator.verification.audited_tables import tables
@@ -67,15 +70,24 @@ def audit_checks(folder: RunFolder, workspace: Workspace | None) -> list[Check]:
     here = Check.of("sources that match those of the run", len(head["sources"]), _sources(folder, workspace))
     manifest = workspace.manifest(head["target"]) if workspace and not here.differences else None
     records, proven = recorded(folder, "records"), recorded(folder, "proof")
+    idle = idle_runs(folder, manifest, records) if manifest else ()
     checks = [
         Check.of("files, lines and ids that are unchanged", _files(folder), _content(folder)),
         Check.of(
-            "ids, plan digest and run.json that follow from the plan", head["experiments"], _plan(folder)
+            "ids, plan digest and run.json that follow from the plan",
+            head["experiments"],
+            chain(_plan(folder), seeds_and_sessions(folder)),
         ),
-        Check.of("golden runs that match the checks", len(head["goldens"]), _goldens(folder, manifest)),
+        Check.of(
+            "golden runs that match the checks",
+            len(head["goldens"]),
+            chain(checks_of(folder), _goldens(folder, manifest), idle),
+        ),
         here,
     ]
     if workspace and manifest:
+        told = facts_of_target(folder, workspace, manifest)
+        checks.append(Check.of("facts about the target that follow from the library", 1, told))
         compared = mutants(folder, records, manifest, workspace.fault_models())
         checks.append(Check.of("trees and patches that follow from plan and sources", len(records), compared))
     checks += [
@@ -83,7 +95,9 @@ def audit_checks(folder: RunFolder, workspace: Workspace | None) -> list[Check]:
             "verdicts that follow from what was recorded", len(records), verdicts(head, records, manifest)
         ),
         Check.of(
-            "records of the proof that match those of the run", len(proven), proof(folder, records, proven)
+            "records of the proof that match those of the run",
+            len(proven),
+            chain(proof(folder, records, proven), engines(folder, records)),
         ),
         Check.of("series that are unchanged", *series(folder, manifest)),
         Check.of("tables that follow from the records", *tables(folder)),
