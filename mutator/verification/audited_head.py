@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
 from typing import Any
 
+from mutator._common.below import inside
 from mutator._common.files import read_json
 from mutator.campaigns.freezing import target_facts
 from mutator.errors import MutatorError
@@ -50,7 +51,9 @@ def seeds_and_sessions(folder: RunFolder) -> Problems:
         stem = name.partition("/")[2].removesuffix(".jsonl")
         if not any(fnmatchcase(stem, pattern) for pattern in patterns):
             yield MutatorError(
-                "records of no session", where=folder.path / name, expected=f"a stretch of work in {HEAD}"
+                "records of no session",
+                where=inside(folder.path, name),
+                expected=f"a stretch of work in {HEAD}",
             )
 
 
