@@ -23,11 +23,13 @@ from mutator.execution.phases import Lines
 from mutator.execution.session import Notify, Session, Summary, open_session
 from mutator.execution.stopped_workers import Continuing, on_stop
 from mutator.execution.worker import Assignment, Worker, bind_to_parent, dying_python
+from mutator.execution.written_files import Sums
 from mutator.verification.equivalence import Sample
 from mutator.workspace import Workspace
 
 _INPUT = "mutator_campaign"
 _PROBLEM = "mutator_problem"
+_WRITTEN = "mutator_written"
 
 
 class Deals(Protocol):
@@ -115,10 +117,13 @@ class LazyWorker:
         if self._worker is not None:
             self._worker.was_stopped = True
 
-    def close(self) -> None:
-        if self._worker is not None:
-            self._worker.close()
-            self._worker = None
+    def close(self) -> Sums:
+        """Close the worker's files; return their digests."""
+        worker, self._worker = self._worker, None
+        if worker is None:
+            return {}
+        worker.close()
+        return worker.written
 
 
 def configure(
@@ -204,7 +209,8 @@ class WorkerSide:
 
     def pytest_sessionfinish(self) -> None:
         try:
-            self._worker.close()
+            written = self._worker.close()
+            self._config.workeroutput[_WRITTEN] = dict(written)  # type: ignore[attr-defined]
         except MutatorError as err:
             self._config.workeroutput[_PROBLEM] = str(err)  # type: ignore[attr-defined]
         os.close(self._registration)
@@ -234,7 +240,13 @@ class Controller:
     def pytest_testnodedown(self, node: Any, error: object | None) -> None:
         if error:
             self._note(f"worker {node.gateway.id} died: {error}")
-        self._note(getattr(node, "workeroutput", {}).get(_PROBLEM, ""))
+        assert self.begun is not None
+        output, given = getattr(node, "workeroutput", {}), node.workerinput[_INPUT]
+        self._note(output.get(_PROBLEM, ""))
+        if _WRITTEN in output:
+            self.begun.written.report(output[_WRITTEN])
+        else:
+            self.begun.written.lose(given["session"] + node.gateway.id)
 
     def pytest_collection(self, session: pytest.Session) -> bool | None:
         if session.config.pluginmanager.hasplugin("dsession"):
@@ -268,8 +280,8 @@ class Controller:
 
     @pytest.hookimpl(trylast=True)  # after xdist has ended its workers
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
-        if self._worker is not None:
-            self._worker.close()
+        if self._worker is not None and self.begun is not None:
+            self.begun.written.report(self._worker.close())
         if self._continuing is not None:
             self._continuing.end()
 

@@ -29,6 +29,7 @@ from mutator.engines.registry import choose_engine, not_worth_forking
 from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK, MutatorError, MutatorWarning
 from mutator.execution.ended_runs import Ended, ended_before, keep_end
 from mutator.execution.run_plan import open_frozen
+from mutator.execution.written_files import WrittenFiles
 from mutator.model import Record
 from mutator.outcomes import results
 from mutator.outcomes.ranking import worth_of
@@ -120,6 +121,8 @@ class Session:
         self.interrupted = False
         self.secret = token_bytes(_SECRET_BYTES)
         self.golden_digests: Mapping[str, str] = {}
+        self.written = WrittenFiles()
+        self._ledger: digests.Ledger | None = None  # as it was when the work began
         self.working = ""  # the present workers, if known
         self._began = time.monotonic()
         self._done_before = 0
@@ -155,11 +158,13 @@ class Session:
                 accept=self.accept_versions,
             )
             self.golden_digests = golden_digests(self.folder)
+            self._ledger = digests.read(self.folder.path)
         self.pending = left
         self._records = None if left else records
 
     def note_machine(self, machine: Mapping[str, Any]) -> None:
         add_machine(self.folder, machine)
+        self._ledger = digests.read(self.folder.path)
 
     def worker_name(self, name: str) -> str:
         """Return a name for a worker's files that no session used before."""
@@ -185,6 +190,7 @@ class Session:
         self.notify(Progress(stage="tables"))
         if self._known:
             return self._finish_again(self._known)
+        self._undo_writes_of_mutants()
         records = self.folder.records() if self._records is None else self._records
         ends = Counter((one.status, one.outcome) for one in endings(records))
         failed = (one.experiment_id for one in endings(records) if not one.counts)
@@ -224,6 +230,23 @@ class Session:
             not_forked=not_forked,
             elapsed_s=time.monotonic() - self._began,
         )
+
+    def _undo_writes_of_mutants(self) -> None:
+        """Restore the digests of the run folder, and set aside lines that no worker wrote."""
+        run = self.folder.path
+        if self._ledger is None or wait_for_workers(run):
+            return
+        with self._noting_full_disk():
+            changed = []
+            if not digests.is_as(run, self._ledger):
+                digests.write(run, self._ledger)
+                changed.append(digests.FILE)
+            changed += self.written.set_others_aside(run)
+            if changed and not self.problem:
+                self.problem = (
+                    f"{run}: a mutant, or another program, changed {', '.join(changed)}; run the same "
+                    "command again to repeat what is missing"
+                )
 
     def _finish_again(self, known: Ended) -> Summary:
         built = None

@@ -18,6 +18,7 @@ from mutator.engines.jobs import FAST, Engine, Setting
 from mutator.engines.reference import ReferenceEngine
 from mutator.engines.registry import make_engine
 from mutator.execution.runner import Finished, Goldens, Runner, without_outcome
+from mutator.execution.written_files import Sums
 from mutator.model import Experiment, Status
 from mutator.store import plan_file
 from mutator.store.lines import LineWriter
@@ -121,6 +122,12 @@ class Worker:
             if finished.record.status is Status.HARNESS_ERROR:
                 errors.append((finished.experiment.id, finished.record.detail))
         return errors
+
+    @property
+    def written(self) -> Sums:
+        """The digests of the files whose lines count."""
+        writers = [self._records, *([self._proofs] if self._proofs else [])]
+        return {one.path.relative_to(self.folder.path).as_posix(): one.sha256 for one in writers}
 
     def close(self) -> None:
         self._runner.engine.close()

@@ -144,7 +144,7 @@ def survived(frame: pd.DataFrame) -> Answer:
 
 def time_spent(frame: pd.DataFrame, timings: pd.DataFrame) -> Answer:
     """Say how much CPU time the experiments took, and why some took none."""
-    cpu = frame["experiment_id"].map(timings.set_index("experiment_id")["cpu_s"])
+    cpu = frame["experiment_id"].map(timings.set_index("experiment_id")["cpu_s"]).astype(float)
     total, ran = float(cpu.sum()), int((cpu > 0).sum())
     workers = timings["worker"].nunique()
     says = f"The experiments took {duration(total)} of CPU time on {counted(workers, 'worker')}: "

@@ -166,7 +166,11 @@ class Jobs:
         with self._lock:
             if job.state is not State.QUEUED or self._closed:
                 return None
-            watched, job.hold = os.pipe()
+            try:
+                watched, job.hold = os.pipe()
+            except OSError as err:
+                self._fail(job, err)
+                return None
             try:
                 process = subprocess.Popen(
                     [sys.executable, "-P", "-m", _KEEPER, str(watched), *job.work.words],
@@ -179,13 +183,16 @@ class Jobs:
                 )
             except OSError as err:
                 os.close(job.hold)
-                job.hold, job.state, job.message = None, State.FAILED, f"cannot be started: {err.strerror}"
-                job.ended = datetime.now(UTC)
+                self._fail(job, err)
                 return None
             finally:
                 os.close(watched)
             job.state, job.started = State.RUNNING, datetime.now(UTC)
             return process
+
+    def _fail(self, job: Job, err: OSError) -> None:
+        job.hold, job.state, job.message = None, State.FAILED, f"cannot be started: {err.strerror}"
+        job.ended = datetime.now(UTC)
 
     def _follow(self, job: Job, process: subprocess.Popen[bytes]) -> None:
         assert process.stdout is not None

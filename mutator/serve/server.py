@@ -8,7 +8,10 @@ import uvicorn
 
 from mutator.errors import MutatorError
 from mutator.serve.app import Site, application
+from mutator.serve.connections import Connection
 from mutator.serve.security import HOST, Guarded
+
+_BACKLOG = 64  # connections to accept at once
 
 
 def serve(site: Site, *, port: int, ready: Callable[[str], None]) -> None:
@@ -31,6 +34,8 @@ def serve(site: Site, *, port: int, ready: Callable[[str], None]) -> None:
 def server_of(site: Site, *, port: int, token: str) -> uvicorn.Server:
     config = uvicorn.Config(
         Guarded(application(site), port=port, token=token),
+        http=Connection,
+        backlog=_BACKLOG,
         access_log=False,  # the log would show the token
         log_level="error",
         ws="none",

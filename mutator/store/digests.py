@@ -184,6 +184,14 @@ def may_name(name: str) -> bool:
     return bool(_NAMES.fullmatch(name))
 
 
+def is_as(run: Path, ledger: Ledger) -> bool:
+    """Whether the ledger of a run folder is this one, and intact."""
+    try:
+        return read(run) == ledger
+    except MutatorError:
+        return False
+
+
 def write(run: Path, ledger: Ledger) -> None:
     data: dict[str, Any] = {
         "schema": SCHEMA,

@@ -43,6 +43,7 @@ class LineWriter:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
         self._end = 0
+        self._sum = sha256()
         self._last = b""
         self.append(_head(path, head))
 
@@ -67,10 +68,16 @@ class LineWriter:
                 os.ftruncate(self._fd, self._end)
                 raise
         self._end += len(data)
+        self._sum.update(data)
         self._last = last
         self._unsynced += len(lines)
         if time.monotonic() - self._synced_at > _BATCH_S:
             self.sync()
+
+    @property
+    def sha256(self) -> str:
+        """The digest of all bytes that this object wrote."""
+        return self._sum.hexdigest()
 
     def sync(self) -> None:
         """Sync the file, so that appended lines survive a power cut."""

@@ -45,15 +45,17 @@ def run_checks(
 ) -> tuple[CheckResult, ...]:
     """Run the checks, and store the results in checks.json and the golden runs in the folder.
 
-    Nothing runs if the checks have passed for these sources, in this folder or in another on this machine.
+    Nothing runs if the checks have passed for these sources in this folder. If they have passed in another
+    folder on this machine, only the golden runs are repeated, because a mutant can write to the cache.
     Raises CheckFailed if any check fails, after all have run.
     """
     checks = _Checks(workspace, folder)
-    known = checks.known()
+    notify = notify or (lambda progress: None)
+    known = checks.known(workers, notify)
     if known is not None:
         return known
     with raising_disk_full(folder.path):
-        results = tuple(checks.run(workers, notify or (lambda progress: None)))
+        results = tuple(checks.run(workers, notify))
     failed = [result for result in results if not result.passed]
     if failed:
         text = "; ".join(f"{result.name}: {result.detail}" for result in failed[:3])
@@ -110,7 +112,7 @@ class _Checks:
         ]
         self.digest = digest([*content, places])
 
-    def known(self) -> tuple[CheckResult, ...] | None:
+    def known(self, workers: int, notify: Notify) -> tuple[CheckResult, ...] | None:
         """Earlier results, copied from another folder if necessary; None unless all checks passed and the
         golden runs are unchanged."""
         if (results := self._passed(self._before(), self.folder.path)) is not None:
@@ -126,6 +128,8 @@ class _Checks:
         except (MutatorError, OSError, KeyError, TypeError, AttributeError):
             return None  # missing or damaged
         if results is not None:
+            if self._driver(self.folder.work / "again").drive_goldens(workers, notify) != found["goldens"]:
+                return None  # forged, or no longer true
             self._check_same_as_before(found["goldens"])
             self._install(read_bounded(copy / FILE))
         return results
@@ -146,10 +150,7 @@ class _Checks:
         if not anchors.passed:  # the runs would take minutes
             yield anchors
             return
-        driver = CheckDriver(
-            workspace=self.workspace, folder=self.folder, manifest=self.manifest, kept=self.kept
-        )
-        runs, canary_verdict = driver.drive(workers, notify)
+        runs, canary_verdict = self._driver(self.kept).drive(workers, notify)
         results = [anchors, *self._judge(runs), _result("canary", *canary_verdict)]
         goldens = {one.key: runs[GOLDEN, one].digest for one in self.keys}
         self._check_same_as_before(goldens)
@@ -164,6 +165,9 @@ class _Checks:
         }
         self._install(json_bytes(checks))
         yield from results
+
+    def _driver(self, kept: Path) -> CheckDriver:
+        return CheckDriver(workspace=self.workspace, folder=self.folder, manifest=self.manifest, kept=kept)
 
     def _install(self, checks: bytes) -> None:
         run, golden = self.folder.path, self.kept / "golden"

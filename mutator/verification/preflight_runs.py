@@ -1,7 +1,8 @@
 """The runs of the checks before a campaign: golden runs, each twice, null mutants, the canary."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -40,13 +41,7 @@ class CheckDriver:
 
     def drive(self, workers: int, notify: Notify) -> tuple[Runs, tuple[str, str]]:
         """Do all runs of all checks, `workers` at a time. Return them with the result of `canary.judge`."""
-        work = self.folder.work / "checks"
-        for scratch in (work, self.kept):
-            remove_folder(scratch)
-        work.mkdir(parents=True)
-        engine = ReferenceEngine(self.manifest, work, self.folder.limits)
-        pool = ThreadPoolExecutor(max(1, workers))
-        try:
+        with self._working(workers) as (engine, pool):
             judged = pool.submit(self._judge_canary, engine)
             futures = {name: pool.submit(self._run, engine, name, job) for name, job in self._jobs().items()}
             nulls = [future for name, future in futures.items() if name[0] == NULL]
@@ -54,6 +49,24 @@ class CheckDriver:
             _follow("golden", [future for name, future in futures.items() if name[0] != NULL], notify)
             canary_verdict = judged.result()
             return {name: future.result() for name, future in futures.items()}, canary_verdict
+
+    def drive_goldens(self, workers: int, notify: Notify) -> dict[str, str]:
+        """Do each golden run once; return the digests by key."""
+        jobs = {name: job for name, job in self._jobs().items() if name[0] == GOLDEN}
+        with self._working(workers) as (engine, pool):
+            futures = {name[1].key: pool.submit(self._run, engine, name, job) for name, job in jobs.items()}
+            _follow("golden", [*futures.values()], notify)
+            return {key: future.result().digest for key, future in futures.items()}
+
+    @contextmanager
+    def _working(self, workers: int) -> Iterator[tuple[ReferenceEngine, ThreadPoolExecutor]]:
+        work = self.folder.work / "checks"
+        for scratch in (work, self.kept):
+            remove_folder(scratch)
+        work.mkdir(parents=True)
+        pool = ThreadPoolExecutor(max(1, workers))
+        try:
+            yield ReferenceEngine(self.manifest, work, self.folder.limits), pool
         finally:
             pool.shutdown(cancel_futures=True)
             remove_folder(work)

@@ -5,7 +5,7 @@ import random
 import re
 import subprocess
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -22,8 +22,10 @@ from .tally import Case, End
 from .worlds import LAST
 
 LISTED = Path(__file__).with_name("misdeeds.txt")
+ATTACKS = Path(__file__).with_name("attacks.txt")
 METHODS = ("guided", "random")
 WORKERS = (1, 2)
+_WORDS = ("raises", "noticed")  # of a misdeed, besides its statuses
 MOST = 3  # misdeeds in one campaign
 LONGEST_S = 240  # of a command, on a busy machine
 MODULES = (
@@ -35,11 +37,27 @@ MODULES = (
         "errno",
         "gc",
         "glob",
+        "hashlib",
+        "importlib.util",
         "json",
         "locale",
+        "marshal",
+        "mmap",
         "multiprocessing",
     ),
-    *("numpy", "os", "random", "resource", "shutil", "signal", "subprocess", "sys", "threading", "time"),
+    *(
+        "numpy",
+        "os",
+        "pathlib",
+        "random",
+        "resource",
+        "shutil",
+        "signal",
+        "subprocess",
+        "sys",
+        "threading",
+        "time",
+    ),
     *("warnings", "zipfile"),
 )
 MODEL = """schema: fault_model/1
@@ -92,13 +110,14 @@ chunk: 2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Misdeed:
-    """What a mutant does when its fault is first active, the statuses that are allowed, and whether the fault
-    model declares that it raises."""
+    """What a mutant does when its fault is first active, the statuses that are allowed, whether the fault
+    model declares that it raises, and whether the command may end with an error."""
 
     name: str
     lines: tuple[str, ...]
     ends: frozenset[Status]
     raises: bool
+    noticed: bool
 
     @property
     def model(self) -> str:
@@ -118,15 +137,21 @@ class Misdeed:
         spec.write_text(SPEC.format(**names))
 
 
-def misdeeds() -> dict[str, Misdeed]:
-    _, *parts = re.split(r"^== ", LISTED.read_text(), flags=re.MULTILINE)
+def misdeeds(listed: Path = LISTED, names: Mapping[str, object] | None = None) -> dict[str, Misdeed]:
+    """Read a list of misdeeds. `names` are set before each."""
+    first, *parts = re.split(r"^== ", listed.read_text(), flags=re.MULTILINE)
+    before = [f"{name} = {value!r}" for name, value in (names or {}).items()]
+    before += [line for line in first.split("\n") if line and not line.startswith("#")]
     found = {}
     for part in parts:
         head, *lines = part.rstrip("\n").split("\n")
-        name, _, words = head.partition(": ")
-        ends = frozenset(Status(word) for word in words.split() if word != "raises")
-        code = tuple(line for line in lines if line)
-        found[name] = Misdeed(name=name, lines=code, ends=ends, raises="raises" in words.split())
+        name, _, said = head.partition(": ")
+        words = said.split()
+        ends = frozenset(Status(word) for word in words if word not in _WORDS)
+        code = (*before, *(line for line in lines if line))
+        found[name] = Misdeed(
+            name=name, lines=code, ends=ends, raises="raises" in words, noticed="noticed" in words
+        )
     return found
 
 
@@ -152,9 +177,11 @@ class Drawn:
 
 
 class Misbehaving:
-    def __init__(self, workspace: Workspace, at: Path, seeds: Sequence[int]) -> None:
+    def __init__(
+        self, workspace: Workspace, at: Path, seeds: Sequence[int], known: Mapping[str, Misdeed] | None = None
+    ) -> None:
         self.workspace, self.at = workspace, at
-        self.misdeeds = misdeeds()
+        self.misdeeds = known or misdeeds()
         self.drawn = {seed: self._draw(seed) for seed in seeds}
         self.tree = workspace.manifest("toycar").root
         for misdeed in self.misdeeds.values():
@@ -173,7 +200,7 @@ class Misbehaving:
     def cases(self, seed: int) -> Sequence[Case]:
         """Run a campaign on some engine. Each of its misdeeds is a case."""
         drawn = self.drawn[seed]
-        came = self._came(drawn, LONGEST_S)
+        came = self.came(drawn, LONGEST_S)
         problem = self._problem(came, drawn.method)
         return [self._case(self.misdeeds[name], drawn, came, problem) for name in drawn.names]
 
@@ -214,14 +241,14 @@ class Misbehaving:
             drawn = [one for one in self.drawn.values() if one.method == method]
             names = sorted({name for one in drawn for name in one.names})
             every = Drawn(engine=REFERENCE, workers=2, method=method, names=tuple(names))
-            came = self._came(every, LONGEST_S + 20 * len(names))
+            came = self.came(every, LONGEST_S + 20 * len(names))
             assert len(came.bad) == len(names) and not came.left, f"on the reference engine: {came}"
             for name in names:
                 self.verdicts[name, REFERENCE].add(str(came.status[self.misdeeds[name].model]))
             self._right[method] = came
         return self._right[method]
 
-    def _came(self, drawn: Drawn, longest_s: float) -> Came:
+    def came(self, drawn: Drawn, longest_s: float) -> Came:
         specs = "".join(f"  - spec: misdeeds/{self.misdeeds[name].model}/it\n" for name in drawn.names)
         campaign = self.workspace.library / "campaigns" / "misbehaving.yaml"
         campaign.write_text(CAMPAIGN.format(more=specs, method=drawn.method))

@@ -102,7 +102,7 @@ class Deal:
             await self._part()
             self._session.working = ""
             await asyncio.gather(*self._writes, return_exceptions=True)
-            self._intake.close()
+            self._session.written.report(self._intake.close())
 
     async def _part(self) -> None:
         """Tell the workers to drop the run. Workers that do not answer drop it once the client is gone."""

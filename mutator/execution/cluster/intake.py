@@ -8,6 +8,7 @@ from mutator._common.hashing import canonical
 from mutator.errors import MutatorError
 from mutator.execution.cluster.pieces import Kind, Piece, Result
 from mutator.execution.runner import without_outcome
+from mutator.execution.written_files import Sums
 from mutator.model import Status
 from mutator.outcomes.judging import load_channels
 from mutator.outcomes.sampling import Sampler
@@ -64,10 +65,13 @@ class Intake:
             record = without_outcome(name, Status.HARNESS_ERROR, why)
             writer.extend([canonical(line_of(record)).encode()])
 
-    def close(self) -> None:
+    def close(self) -> Sums:
+        """Close the files; return the digests of those whose lines count."""
         for writer in (self._patches, self._series, self._records, self._timings, self._proofs):
             if writer is not None:
                 writer.close()
+        counting = [self._records, *([self._proofs] if self._proofs else [])]
+        return {one.path.relative_to(self._folder.path).as_posix(): one.sha256 for one in counting}
 
     def _golden_series(self, key: str) -> bytes:
         golden = next(one for one in self._folder.goldens if one.key == key)

@@ -1,5 +1,6 @@
 """Cached results of the checks before a campaign."""
 
+import json
 import os
 import shutil
 from collections.abc import Callable
@@ -7,12 +8,16 @@ from pathlib import Path
 
 import pytest
 
+from mutator._common import kept_folders
+from mutator._common.files import json_bytes
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plans import Choices, make_plan
+from mutator.engines.jobs import Execution, Job
 from mutator.engines.reference import ReferenceEngine
 from mutator.store.run_folder import RunFolder
 from mutator.verification import preflight_cache
 from mutator.verification.preflight import run_checks
+from mutator.verification.preflight_rules import digest_of
 from mutator.workspace import Workspace
 
 CopyToycar = Callable[[Path], Workspace]
@@ -42,14 +47,19 @@ class RunStarted(Exception):
 
 
 @pytest.fixture
-def no_run_starts(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(*given: object) -> None:
-        raise RunStarted
+def only_golden_runs_start(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Refuse second golden runs, null mutants and the canary, which only checks that are not cached need."""
+    genuine = ReferenceEngine.execute
 
-    monkeypatch.setattr(ReferenceEngine, "execute", refuse)
+    def execute(engine: ReferenceEngine, job: Job, folder: Path) -> Execution:
+        if not job.name.startswith("a-"):
+            raise RunStarted
+        return genuine(engine, job, folder)
+
+    monkeypatch.setattr(ReferenceEngine, "execute", execute)
 
 
-@pytest.mark.usefixtures("cache", "no_run_starts")
+@pytest.mark.usefixtures("cache", "only_golden_runs_start")
 def test_another_folder_uses_the_cached_results(checked: tuple[Workspace, RunFolder], tmp_path: Path) -> None:
     toy, before = checked
     folder = freeze(make_plan(toy, "small", Choices(only='method == "guided"')), tmp_path / "run", toy)
@@ -60,7 +70,7 @@ def test_another_folder_uses_the_cached_results(checked: tuple[Workspace, RunFol
     assert all((folder.path / f).read_bytes() == (before.path / f).read_bytes() for f in files)
 
 
-@pytest.mark.usefixtures("no_run_starts")
+@pytest.mark.usefixtures("only_golden_runs_start")
 @pytest.mark.parametrize("damaged", ["checks.json", "golden/A/log.npz", "golden/A+alone/said.json", ""])
 @pytest.mark.parametrize("content", [b"", b"{}", None])
 def test_a_damaged_entry_is_ignored(
@@ -78,7 +88,7 @@ def test_a_damaged_entry_is_ignored(
         run_checks(toy, folder)
 
 
-@pytest.mark.usefixtures("no_run_starts")
+@pytest.mark.usefixtures("only_golden_runs_start")
 @pytest.mark.parametrize("how", ["another word in a result", "another file", "a pipe"])
 def test_a_changed_entry_is_ignored(
     checked: tuple[Workspace, RunFolder], tmp_path: Path, cache: Path, how: str
@@ -99,7 +109,7 @@ def test_a_changed_entry_is_ignored(
         run_checks(toy, folder)
 
 
-@pytest.mark.usefixtures("cache", "no_run_starts")
+@pytest.mark.usefixtures("cache", "only_golden_runs_start")
 @pytest.mark.parametrize("changed", ["seed", "target", "machine"])
 def test_another_seed_target_or_machine_has_no_entry(
     checked: tuple[Workspace, RunFolder],
@@ -116,6 +126,24 @@ def test_another_seed_target_or_machine_has_no_entry(
     plan = make_plan(toycar, "small", Choices(seed=9 if changed == "seed" else None))
     with pytest.raises(RunStarted):
         run_checks(toycar, freeze(plan, tmp_path / "run", toycar))
+
+
+@pytest.mark.usefixtures("only_golden_runs_start")
+def test_a_forged_golden_run_is_ignored(
+    checked: tuple[Workspace, RunFolder], tmp_path: Path, cache: Path
+) -> None:
+    """Whoever can write to the cache can compute its digests."""
+    toy, _ = checked
+    manifest, place = toy.manifest("toycar"), cache / "golden" / "A"
+    (place / "said.json").write_text((place / "said.json").read_text() + " ")
+    told = json.loads((cache / "checks.json").read_text())
+    told["goldens"]["A"] = digest_of(manifest, place)
+    (cache / "checks.json").write_bytes(json_bytes(told))
+    (cache / "sum").unlink()
+    (cache / "sum").write_bytes(kept_folders._sum(cache))
+    folder = freeze(make_plan(toy, "small"), tmp_path / "run", toy)
+    with pytest.raises(RunStarted):
+        run_checks(toy, folder)
 
 
 def test_a_damaged_entry_is_replaced(checked: tuple[Workspace, RunFolder], cache: Path) -> None:

@@ -1,0 +1,45 @@
+"""What the workers of a session wrote, compared before it counts. A mutant can write to these files, too."""
+
+import hashlib
+from collections.abc import Mapping
+from pathlib import Path
+
+from mutator._common.below import open_below, read_below, unlink_below, write_below
+from mutator._common.files import raising_disk_full
+from mutator.store import digests
+
+ASIDE = "damaged"
+Sums = Mapping[str, str]  # SHA-256 by the name of a file of lines in the run folder
+
+
+class WrittenFiles:
+    """Files of lines that the workers of a session wrote, with the digests that the workers reported."""
+
+    def __init__(self) -> None:
+        self._sums: dict[str, str] = {}
+        self._unreported: set[str] = set()
+
+    def report(self, sums: Sums) -> None:
+        self._sums |= sums
+
+    def lose(self, worker: str) -> None:
+        """Note that a worker ended without a report. Its files are believed, so that its work is kept."""
+        self._unreported.add(worker)
+
+    def set_others_aside(self, run: Path) -> list[str]:
+        """Move new files of lines that no worker wrote so to `damaged/`; return their names."""
+        known = digests.read(run).files
+        found = [name for name in digests.segments(run) if name not in known]
+        lost = [name for name in self._sums if name not in found]
+        others = [name for name in found if not self._is_as_written(run, name)]
+        with raising_disk_full(run):
+            for name in others:
+                write_below(run, f"{ASIDE}/{name}", read_below(run, name))
+                unlink_below(run, name)
+        return [*others, *lost]
+
+    def _is_as_written(self, run: Path, name: str) -> bool:
+        if Path(name).stem in self._unreported:
+            return True
+        with open_below(run, name) as file:
+            return hashlib.file_digest(file, "sha256").hexdigest() == self._sums.get(name)

@@ -1,0 +1,30 @@
+"""A stopped child goes on, and learns that it was stopped."""
+
+import signal
+import subprocess
+import sys
+
+from mutator.execution.stopped_workers import Continuing
+
+CHILD = """
+import os, signal
+from mutator.execution.stopped_workers import on_stop
+on_stop(lambda: print("stopped", flush=True))
+print("ready", flush=True)
+input()
+"""
+
+
+def test_a_stopped_child_goes_on_and_is_told() -> None:
+    with subprocess.Popen(
+        [sys.executable, "-c", CHILD], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as child:
+        assert child.stdout is not None
+        assert child.stdout.readline() == "ready\n"
+        continuing = Continuing()
+        try:
+            child.send_signal(signal.SIGSTOP)
+            assert child.stdout.readline() == "stopped\n"
+        finally:
+            continuing.end()
+            child.kill()

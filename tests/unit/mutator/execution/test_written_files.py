@@ -1,0 +1,52 @@
+"""Lines that count are those that a worker says it wrote."""
+
+from pathlib import Path
+
+import pytest
+
+from mutator.execution.written_files import WrittenFiles
+from mutator.store import digests
+from mutator.store.lines import LineWriter
+
+NAME = "records/0001-gw0.jsonl"
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Path:
+    digests.write(tmp_path, digests.Ledger(files={}))
+    return tmp_path
+
+
+def write(run: Path) -> WrittenFiles:
+    writer, written = LineWriter(run / NAME, {"schema": "x/1"}), WrittenFiles()
+    writer.append({"a": 1})
+    writer.close()
+    written.report({NAME: writer.sha256})
+    return written
+
+
+def test_lines_of_a_worker_count(run: Path) -> None:
+    assert write(run).set_others_aside(run) == []
+    assert (run / NAME).exists()
+
+
+def test_lines_that_were_changed_are_set_aside(run: Path) -> None:
+    written = write(run)
+    lines = (run / NAME).read_bytes()
+    (run / NAME).write_bytes(lines + lines)
+    assert written.set_others_aside(run) == [NAME]
+    assert (run / "damaged" / NAME).read_bytes() == lines + lines
+    assert digests.segments(run) == []
+
+
+def test_lines_of_nobody_are_set_aside_and_lost_lines_are_named(run: Path) -> None:
+    written = write(run)
+    (run / NAME).rename(run / "records" / "0001-gw7.jsonl")
+    assert written.set_others_aside(run) == ["records/0001-gw7.jsonl", NAME]
+
+
+def test_lines_of_a_worker_that_died_count(run: Path) -> None:
+    write(run)
+    written = WrittenFiles()
+    written.lose("0001-gw0")
+    assert written.set_others_aside(run) == []
