@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from mutator._common.below import inside
+from mutator._common.below import check_inside, check_plain, inside
 from mutator._common.bounded import read_bounded
 from mutator._common.files import ScratchFolder
 from mutator._common.hashing import digest
@@ -125,7 +125,9 @@ def try_fault(
         seed=seed,
     )
     temporary = ScratchFolder("mutator-try-") if out is None else None
-    folder = inside(temporary.path if temporary else Path(out or ""), experiment.id)
+    place = temporary.path if temporary else Path(out or "")
+    folder = check_inside(place, inside(place, experiment.id))
+    check_plain(folder)
     single = run_single(bench.workspace, bench.manifest, experiment, folder)
     scale = bench.workspace.scale_of(bench.manifest)
     return trial_of(single, bench.manifest, scale=scale, temporary=temporary)

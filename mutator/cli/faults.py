@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 import mutator
+from mutator._common.below import is_inside
 from mutator._common.text import counted
 from mutator.cli import completion
 from mutator.cli.console import Terminal, short_path
@@ -15,6 +16,7 @@ from mutator.errors import EXIT_HARNESS_ERRORS, MutatorError
 from mutator.mutants.readable_diffs import readable
 from mutator.operators.names import Operator
 
+_TRIED = Path("runs/try")
 EXPERIMENT_ID = re.compile(r"[0-9a-f]{4,16}")
 
 SpecName = Annotated[
@@ -74,7 +76,7 @@ def try_spec(
     ] = None,
     out: Annotated[
         Path, typer.Option("--out", metavar="DIR", help="Folder for patch, traces and plot.")
-    ] = Path("runs/try"),
+    ] = _TRIED,
     manifest: Manifest = None,
     as_json: Json = False,
     *,
@@ -85,6 +87,13 @@ def try_spec(
     from mutator.cli.experiment_view import show_trial
 
     terminal = Terminal(as_json)
+    if out == _TRIED and not is_inside(Path(), out):  # the current folder can be somebody's library
+        raise MutatorError(
+            "a link that leads out of the current folder",
+            where=out,
+            argument="out",
+            remedy="name the folder at its end, or another one",
+        )
     bench = Bench.of(place.workspace(), manifest)
     choice = FaultChoice(spec=spec, variant=variant, value=value, seed=seed, reading=reading)
     faults = bench.faults(choice)

@@ -264,3 +264,59 @@ TRICKS: dict[str, Trick] = {
     "a huge spec": _sparse("fault_library/faults/sensor/lane.yaml"),
     "loops": _loop,
 }
+
+MODULES = (  # that Python, pytest, the harness or a worker would import if they looked there
+    *(
+        "json",
+        "_pytest",
+        "pytest",
+        "xdist",
+        "execnet",
+        "numpy",
+        "yaml",
+        "matplotlib",
+        "typer",
+        "mutator",
+        "site",
+    ),
+    *("sitecustomize", "usercustomize", "conftest", "encodings", "linecache", "readline", "_fi"),
+)
+_RC_FILES = {
+    "matplotlibrc": "axes.facecolor: red\nbackend: module://json\ntext.usetex: True\n",
+    ".pdbrc": "import json\n",
+    "pytest.ini": "[pytest]\naddopts = -p conftest\npythonpath = .\n",
+    "tox.ini": "[pytest]\naddopts = -p conftest\n",
+    "setup.cfg": "[tool:pytest]\naddopts = -p conftest\n",
+    "pyproject.toml": '[tool.pytest.ini_options]\naddopts = "-p conftest"\npythonpath = ["."]\n',
+    ".coveragerc": "[run]\nplugins = conftest\n",
+    ".env": "PYTHONPATH=.\nMUTATOR_LIBRARY=/nowhere\n",
+    ".netrc": "machine example.org login a password b\n",
+    ".gitattributes": "* filter=run diff=run\n",
+    ".mailmap": "Somebody Else <else@example.org> <you@example.org>\n",
+    "pyvenv.cfg": "home = .\n",
+    "run.pth": "import json\n",
+    "dask.yml": "distributed: {preload: [conftest]}\n",
+}
+_HOOK = "open({mark!r}, 'a').write(__file__ + chr(10))\nraise SystemExit('ran ' + __file__)\n"
+
+
+def plant_hooks(world: World) -> Path:
+    """Put modules, rc files and a git folder everywhere; return the file that appears if one of them runs."""
+    mark = world.mine / "ran"
+    for place in (world.got, world.library, world.templates, world.tree, world.out):
+        for name in MODULES:
+            (place / f"{name}.py").write_text(_HOOK.format(mark=str(mark)))
+        for name, text in _RC_FILES.items():
+            (place / name).write_text(text)
+        (place / ".git" / "hooks").mkdir(parents=True)
+        run = f"touch {mark}"
+        (place / ".git" / "HEAD").write_text("ref: refs/heads/main\n")
+        (place / ".git" / "config").write_text(
+            "[core]\n\trepositoryformatversion = 0\n"
+            f'\tfsmonitor = "{run}"\n\tpager = "{run}"\n\tsshCommand = "{run}"\n'
+            f'[filter "run"]\n\tclean = "{run}"\n\tsmudge = "{run}"\n[diff "run"]\n\ttextconv = "{run}"\n'
+            f'[log]\n\tshowSignature = true\n[gpg]\n\tprogram = "{run}"\n[user]\n\tname = {SECRET}\n'
+        )
+        for name in ("objects", "refs"):
+            (place / ".git" / name).mkdir()
+    return mark

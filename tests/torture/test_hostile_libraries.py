@@ -1,7 +1,10 @@
 """Whatever a stranger's library contains, nothing outside it is read, written, deleted or run."""
 
 import asyncio
+import os
 import signal
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,7 +20,7 @@ from mutator.execution.session import open_session
 from mutator.serve.app import Site, application
 from mutator.serve.runs import Runs
 
-from .hostile_libraries import SECRET, TRICKS, World
+from .hostile_libraries import SECRET, TRICKS, World, plant_hooks
 from .readers import cli
 
 LONGEST_S = 60  # of one command, on a busy machine
@@ -30,7 +33,7 @@ QUICK: dict[str, tuple[object, ...]] = {  # commands that run no target
     "generate": ("generate", "sensor/*", "--trees", "--out", "OUT"),
     "review": ("review", "list"),
     "review page": ("review", "page", "--out", "OUT/page.html"),
-    "approve": ("review", "approve", "--only", "spec ~ lane", "--by", "Jane Doe", "--yes"),
+    "approve": ("review", "approve", "--only", 'match(spec, "*lane*")', "--by", "Jane Doe", "--yes"),
     "pictures": ("review", "show", "0", "--pictures", "OUT"),
     "stpa": ("stpa", "--svg", "OUT/analysis.svg"),
     "upgrade": ("upgrade", "fault_library/targets/toycar.yaml"),
@@ -39,7 +42,7 @@ QUICK: dict[str, tuple[object, ...]] = {  # commands that run no target
 SLOW: dict[str, tuple[object, ...]] = {
     "check": ("check",),
     "check --drive": ("check", "--drive", "--scenario", "A"),
-    "try": ("try", "sensor/lane", "--scenario", "A", "--trigger", "near"),
+    "try": ("try", "sensor/lane", "--scenario", "A", "--trigger", "near", "--out", "OUT/try"),
     "operators": (
         "generate",
         "--operators",
@@ -55,7 +58,7 @@ SLOW: dict[str, tuple[object, ...]] = {
     "run again": ("run", "toy", "--out", "OUT", "--limit", "2", "-n", "0"),
     "report": ("report", "OUT"),
     "verify": ("verify", "OUT"),
-    "rerun": ("rerun", "OUT", "0"),
+    "rerun": ("rerun", "0", "--run", "OUT"),
     "export": ("export", "OUT", "--format", "csv"),
 }
 ADDRESSES = (
@@ -179,6 +182,13 @@ def called(world: World) -> tuple[int, str]:
         return error.exit_code, str(error)
 
 
+@pytest.mark.parametrize("trick", [*TRICKS][::8])
+def test_a_plan_of_a_hostile_library_reaches_nothing_outside(world: World, trick: str) -> None:
+    TRICKS[trick](world)
+    for name in ("list", "plan", "diff"):
+        assert problems(world, name, lambda n=name: command(world, QUICK[n], 0)) == []
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("trick", TRICKS)
 def test_no_command_of_a_hostile_library_reaches_out(world: World, trick: str) -> None:
@@ -193,6 +203,15 @@ def test_no_command_of_a_hostile_library_reaches_out(world: World, trick: str) -
     assert found == []
 
 
+@pytest.mark.parametrize("name", ["runs", "runs/try", "runs/try/ID", "runs/try/ID/golden"])
+def test_a_try_does_not_follow_links_of_the_current_folder(world: World, name: str) -> None:
+    words = ("try", "sensor/lane", "--scenario", "A", "--trigger", "near")
+    world.link(name.replace("ID", "0" * 16), world.mine / "folder")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("mutator.model.Experiment.id", "0" * 16)
+        assert problems(world, "try", lambda: command(world, words, 0)) == []
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("trick", TRICKS)
 def test_no_run_of_a_hostile_library_reaches_out(world: World, trick: str) -> None:
@@ -204,3 +223,46 @@ def test_no_run_of_a_hostile_library_reaches_out(world: World, trick: str) -> No
         )
     found += problems(world, "bundle", lambda: packed(world))
     assert found == []
+
+
+HOOKED: tuple[tuple[str, ...], ...] = (
+    ("mutator", "list"),
+    ("mutator", "check"),
+    ("mutator", "review", "list"),
+    ("mutator", "review", "approve", "--only", 'match(spec, "*lane*")', "--by", "Jane Doe", "--yes"),
+    ("mutator", "try", "sensor/lane", "--scenario", "A", "--trigger", "near", "--out", "TRY"),
+    ("mutator", "run", "small", "--out", "RUN", "-n", "1"),
+    ("mutator", "run", "small", "--out", "CLUSTER", "--cluster", "local:1"),
+    ("mutator", "report", "RUN"),
+    ("mutator", "verify", "RUN", "--rerun", "1"),
+    ("mutator", "show", "0", "--run", "RUN"),
+    ("mutator", "export", "RUN", "--format", "csv"),
+    ("mutator", "doctor"),
+)
+
+
+@pytest.mark.slow
+def test_no_module_setting_or_repository_of_a_library_is_run(world: World, tmp_path: Path) -> None:
+    """The current folder is the library's. pytest starts elsewhere: in a folder with a conftest.py, it runs
+    that itself."""
+    mark = plant_hooks(world)
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    home = str(Path(sys.executable).parent)
+    environment = os.environ | {"MUTATOR_ROOT": str(world.got), "PATH": f"{home}:{os.environ['PATH']}"}
+    by_pytest = ("pytest", "--campaign", "small", "--campaign-out", "PYTEST", "-n", "1")
+    before, told = world.state(without="reviews"), []
+    for words, place in (*((words, world.got) for words in HOOKED), (by_pytest, elsewhere)):
+        names = {name: str(tmp_path / "runs" / name) for name in ("RUN", "CLUSTER", "PYTEST", "TRY")}
+        done = subprocess.run(
+            [names.get(word, word) for word in words],
+            cwd=place, env=environment, capture_output=True, text=True, timeout=300, check=False,
+        )  # fmt: skip
+        said = done.stdout + done.stderr
+        told.append((" ".join(words), done.returncode, "" if done.returncode == 0 else said[-800:]))
+        assert not mark.exists(), (words, mark.read_text(), said)
+        assert "Traceback" not in said and SECRET not in said, (words, said)
+    print(*told, sep="\n")
+    assert [one for one in told if one[1] not in (0, 1, 2)] == []
+    assert all((tmp_path / "runs" / name / "results.csv").exists() for name in ("RUN", "CLUSTER", "PYTEST"))
+    assert world.state(without="reviews") == before
