@@ -45,14 +45,21 @@ class Server:
         return self.address.partition("token=")[2]
 
     def ask(self, path: str, body: Any = None) -> Any:
+        return json.loads(self._answer(path, body))
+
+    def _answer(self, path: str, body: Any = None) -> str:
+        """Send a request as the script of the first page does."""
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=30)
         headers = {"Cookie": f"mutator-{self.port}={self.token}", "Content-Type": "application/json"}
         headers |= {"Origin": f"http://127.0.0.1:{self.port}"}
+        if body is not None:
+            [page] = re.findall(r'name="mutator-page" content="(\w+)"', self._answer("/"))
+            headers |= {"X-Mutator-Page": page}
         data = None if body is None else json.dumps(body)
         connection.request("GET" if body is None else "POST", path, data, headers)
-        answer = connection.getresponse().read()
+        answer = connection.getresponse().read().decode()
         connection.close()
-        return json.loads(answer)
+        return answer
 
     def wait_for(self, what: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
         deadline = time.monotonic() + 120
