@@ -1,6 +1,5 @@
 """Digests of a report's inputs and files, so that resuming a complete run does not rewrite the report."""
 
-import os
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
@@ -15,20 +14,13 @@ from mutator.report.panel import FOLDER
 from mutator.report.series import series_facts
 from mutator.store import digests
 from mutator.store import series as series_store
+from mutator.store.opening import ASIDE, SCRATCH, SIGNATURE, TRACES, belongs
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
 SCHEMA = "report/1"
 FILE = f"{FOLDER}/made_from.json"
-_NOT_READ = {
-    FOLDER,
-    "damaged",
-    "exports",
-    "traces",
-    "workers",
-    series_store.FOLDER,
-    *("seal.json", "seal.json.sig"),
-}  # names in a run folder
+_NOT_READ = {FOLDER, "exports", series_store.FOLDER, TRACES, ASIDE, SCRATCH, "workers", *SIGNATURE}
 _LINKED = (".mp4", ".gif")  # the report contains only the names of such files
 
 
@@ -83,12 +75,14 @@ def _sources() -> object:
 
 
 def _files_of(run: Path) -> Iterator[tuple[str, str]]:
-    for place, folders, names in os.walk(run):
-        inside = Path(place).relative_to(run)
-        folders[:] = sorted({*folders} - _NOT_READ) if inside == Path() else sorted(folders)
-        names = sorted({*names} - _NOT_READ) if inside == Path() else sorted(names)
-        for path in (inside / name for name in names if not name.startswith(".")):
-            yield path.as_posix(), "" if path.suffix in _LINKED else digests.sha256(run / path)
+    """Yield the names and digests of the files that a report can read. What does not belong in a run folder
+    is not opened."""
+    tops = [top for top in sorted(run.iterdir()) if top.name not in _NOT_READ and belongs(top.name)]
+    for top in tops:
+        inside = sorted(top.rglob("*")) if top.is_dir() else [top]
+        for path in (path for path in inside if not path.is_dir() and not path.name.startswith(".")):
+            name = path.relative_to(run).as_posix()
+            yield name, "" if path.suffix in _LINKED else digests.sha256(path)
 
 
 def _library(folder: RunFolder, workspace: Workspace | None) -> object:

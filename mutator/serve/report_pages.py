@@ -54,6 +54,8 @@ class Shown:
     def comparison(self, a: str, b: str, name: str) -> Response:
         """Open a file of a comparison of two runs; MutatorError if they cannot be compared."""
         folders = [self._runs.folder(key) for key in (a, b)]
+        for folder in folders:
+            check_plain(folder)  # because outdated tables are written
         with self._making:
             first, second = (digest(Results.up_to_date(folder).csv()) for folder in folders)
             made = self._compared.pop((first, second), None) or self._comparison(*folders)
@@ -66,7 +68,6 @@ class Shown:
 
     def _of_report(self, run: Path, name: str) -> Response:
         """Build the report if it is not cached, whatever report the run folder contains."""
-        check_plain(run)
         folder = RunFolder.open(run)
         with self._making:
             key = made_from(folder, self._workspace)

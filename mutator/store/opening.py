@@ -17,10 +17,11 @@ from mutator.store import digests
 from mutator.store.run_head import CAMPAIGN, HEAD
 
 SCRATCH, ASIDE, TRACES = "work", "damaged", "traces"
+SIGNATURE = ("seal.json", "seal.json.sig")
 _TABLES = ("results", "propagation", "timings")
 CONTENT = (  # all files that a run folder can contain; * matches any text, including folders
     *(HEAD, digests.FILE, CAMPAIGN, "plan.csv", "plan/*.jsonl", "reviewed.json", "checks.json"),
-    *("seal.json", "seal.json.sig"),
+    *SIGNATURE,
     *("golden/*/*", "patches/*.blocks", "patches/*.patch"),
     *("records/*.jsonl", "timings/*.jsonl", "proof/*.jsonl"),
     *("series/*.js", "series/*.blocks"),
@@ -56,6 +57,11 @@ def check_contents(run: Path) -> None:
             raise _refused("a file", Path(entry.path), "a folder")
         if "/" not in name and (before := tops.setdefault(name.casefold(), name)) != name:
             raise _refused(f"both {before!a} and {name!a}", run, "names that differ not only in case")
+
+
+def belongs(name: str) -> bool:
+    """Whether a run folder can contain a folder or file of this name, which is not a path."""
+    return name in FOLDERS or any(fnmatchcase(name, pattern) for pattern in CONTENT if "/" not in pattern)
 
 
 def is_closed(name: str) -> bool:

@@ -32,7 +32,6 @@ ALLOWED = {  # joins of names that no file contains
     "onboarding/survey.py: Path(place, name)": "names from os.walk",
     "onboarding/survey.py: root / name": "names from a folder's listing",
     "operators/executed.py: scratch / 'work' / f'lines-{i}'": "a number",
-    "report/stamp.py: run / path": "a path from os.walk",
     "review/called_code.py: folder / one.value": "only compared with the tree's paths",
     "review/pictures.py: scratch / 'work' / f'pictures-{i}'": "a number",
     "store/cleaning.py: Path(folder, name)": "names from os.walk",

@@ -17,6 +17,7 @@ from mutator.errors import MutatorError
 from mutator.figures.style import themed
 from mutator.report import building
 from mutator.report.panels import failed
+from mutator.report.stamp import made_from
 from mutator.store import approvals
 from mutator.store.run_folder import STOP_NOTE, RunFolder
 from mutator.workspace import Workspace
@@ -210,6 +211,18 @@ def test_a_report_is_not_written_through_a_link(run: Path, tmp_path: Path, name:
     with suppress(Outside):
         building.write(run, None)
     assert before == {path: path.stat().st_mtime_ns for path in (elsewhere, *elsewhere.rglob("*"))}
+
+
+def test_inputs_of_a_report_are_not_read_without_limit(run: Path) -> None:
+    """A sparse file takes no space on the disk. What does not belong in a run folder is not opened."""
+    for name in ("huge.bin", "work/huge.bin", "records/huge.jsonl"):
+        (run / name).parent.mkdir(exist_ok=True)
+        with (run / name).open("wb") as file:
+            file.truncate(4_000_000_000_000)
+    with pytest.raises(MutatorError, match=r"records/huge\.jsonl: 4,000,000,000,000 bytes"):
+        made_from(RunFolder.unverified(run), None)
+    (run / "records/huge.jsonl").unlink()
+    assert made_from(RunFolder.unverified(run), None)
 
 
 @pytest.mark.parametrize("text", ["{", "[1]", '{"schema": "report/1"}', *STAMPS])

@@ -138,6 +138,7 @@ def test_no_command_is_started_on_a_run_folder_with_a_link(client: Client, linke
     assert refused.status == 400
     assert refused.json["error"]["got"].startswith("a link")
     assert client.get("/runs/linked/report/index.html").status == 400
+    assert client.get("/compare/linked/night/").status == 400
     assert end.read_text() == SECRET
 
 
