@@ -59,9 +59,10 @@ FILE = re.compile(r"`([^`\s]+)`[^`]*:$")
 # Links to pages and images, but not to the web.
 LINK = re.compile(r"\]\(([^)#:\s]*)(?:#([^)\s]+))?\)")
 IMAGE = re.compile(r"""<(?:img|source) [^>]*\bsrc(?:set)?="([^"#:\s]+)\"""")
-# Parts that differ between machines: durations, and the seal, which covers all versions.
+# Parts that differ between machines: durations, and digests of versions, of golden runs and of dates.
 VARYING = re.compile(
     r"\d+ h \d\d min|\d+ min \d\d s|(?<![.\d])\d+ s\b|\d\.\d s each|(?<=^seal: )[0-9a-f]{64}$"
+    r"|(?<=^results digest: )[0-9a-f]{64}$|(?<=^review digest: )[0-9a-f]{64}$"
 )
 
 
