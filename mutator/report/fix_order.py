@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from math import inf
 
 import pandas as pd
 
@@ -99,7 +100,7 @@ def _line(
     else:
         numbers = f"{len(counted):,}"
     after = _after(counted)
-    fastest = str(counted["experiment_id"].iloc[int(after.argmin())])
+    fastest = str(counted["experiment_id"].iloc[int(after.fillna(inf).argmin())])
     worst = next((name for name, n in told if n), "")
     facets = {"kind": [kind], **only}
     severe = {SEVERITY: [worst or NO_CONTACT]} if SEVERITY in counted else {}

@@ -7,7 +7,9 @@ from typing import Any
 from mutator._common.files import json_bytes, read_json
 from mutator._common.hashing import digest
 from mutator._common.text import counted
+from mutator.errors import MutatorError
 from mutator.store import digests
+from mutator.store.run_head import REMEDY
 
 SCHEMA, FILE = "reviewed/1", "reviewed.json"
 _DIGEST_SCHEMA = "review-digest/1"
@@ -28,8 +30,11 @@ def approval_summary(run: Path) -> str:
     """Who approved a run's mutants, as text; empty without `--require-reviewed`."""
     if not (run / FILE).exists():
         return ""
-    groups = read_json(run / FILE, SCHEMA)["groups"]
-    names = Counter(group["by"] for group in groups)
+    groups: Any = read_json(run / FILE, SCHEMA).get("groups")
+    try:
+        names = Counter(str(group["by"]) for group in groups)
+    except (TypeError, KeyError):
+        raise MutatorError("damaged at 'groups'", where=run / FILE, remedy=REMEDY) from None
     return f"{counted(len(groups), 'group')} approved by " + ", ".join(
         f"{name} ({n})" for name, n in sorted(names.items())
     )

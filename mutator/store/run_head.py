@@ -11,6 +11,8 @@ from mutator._common.files import read_json
 from mutator._common.places import RUN_HEAD
 from mutator.errors import MutatorError
 from mutator.model import Limits
+from mutator.targets.channels import Role
+from mutator.targets.severity import Scale
 
 SCHEMA, FIRST_SCHEMA = "run/3", "run/1"  # the first schema had neither digests nor checksums
 HEAD, CAMPAIGN = RUN_HEAD, "campaign.yaml"
@@ -102,6 +104,13 @@ def _wrong(head: Head) -> Iterator[str]:
     yield from (
         key for key, size in _SIZES.items() if any(len(item) not in size for item in head.get(key, ()))
     )
+    if not {role for _, _, role, *_ in head.get("channels", ())} <= {*Role}:
+        yield "channels"
+    try:
+        if told := head.get("severity"):
+            Scale.from_plain(told).class_of(0.0)
+    except (ValueError, TypeError, IndexError):
+        yield "severity"
 
 
 def _fits(value: object, shape: Any) -> bool:
