@@ -10,6 +10,7 @@ import hmac
 import marshal
 import os
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import nullcontext
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -203,7 +204,7 @@ class ForkEngine:
         # a sandbox's /tmp is beside the run's folder
         limited = self._runs if self._manifest.sandbox else folder
         asked = {"do": "mutant", "job": marshal.dumps(request), "home": str(limited), **limits}
-        with used_unchanged(job.scenario):
+        with nullcontext() if waiting.key else used_unchanged(job.scenario):
             said, _ = waiting.ask(asked, self._patience_s)
         self._running(job).clean(folder)
         if said["threads"]:

@@ -3,8 +3,9 @@
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import cache, lru_cache, partial
+from functools import cache, lru_cache
 from pathlib import Path
+from typing import TypeVar
 
 from mutator._common.below import inside
 from mutator._common.bounded import read_bounded
@@ -30,6 +31,7 @@ from mutator.store.series_packing import EncodedSeries
 from mutator.targets.manifest import TargetManifest
 from mutator.verification.preflight_rules import digest_of
 
+_T = TypeVar("_T")
 _KEPT = 32  # golden runs in memory: enough for the current seed and the next
 
 
@@ -68,25 +70,31 @@ class Goldens:
         self.folder = folder_of  # finds the output folder of the fault-free run
         self._manifest = manifest
         self._several_seeds = several_seeds
-        self._digests = digests  # what `digest_of` must return, by key
+        self._digests = digests  # what `digest_of` must return, by the folder's name
         self._files = lru_cache(_KEPT)(self._watched)
-        self._trace = lru_cache(_KEPT)(partial(load_channels, manifest))
+        self._trace = lru_cache(_KEPT)(lambda folder: self._unchanged(folder, load_channels))
         self._sampler = lru_cache(_KEPT)(lambda folder: Sampler(manifest, self._trace(folder)))
-        self._ends = lru_cache(_KEPT)(lambda folder: load_judged(manifest, folder)[1].t_end is not None)
+        self._judged = lru_cache(_KEPT)(lambda folder: self._unchanged(folder, load_judged)[1])
 
     def begin(self, experiment: Experiment) -> None:
         """Read the golden run's files before they are used. MutatorError if their digest is another."""
-        self._files(self.folder(experiment), self.key(experiment))
+        self._files(self.folder(experiment))
 
-    def check(self, experiment: Experiment) -> None:
-        """Raise MutatorError if the golden run's files have been written to since `begin`."""
-        if changed := self._files(self.folder(experiment), self.key(experiment)).first_changed():
+    def check(self, folder: Path) -> None:
+        """Raise MutatorError if the files of a golden run have been written to since they were read."""
+        if changed := self._files(folder).first_changed():
             raise _changed(Path(changed))
 
-    def _watched(self, folder: Path, key: str) -> UnchangedFiles:
+    def _unchanged(self, folder: Path, load: Callable[[TargetManifest, Path], _T]) -> _T:
+        self._files(folder)
+        loaded = load(self._manifest, folder)
+        self.check(folder)
+        return loaded
+
+    def _watched(self, folder: Path) -> UnchangedFiles:
         paths = [path for name in self._manifest.outputs if (path := inside(folder, name)).is_file()]
         files = UnchangedFiles({str(path): read_bounded(path) for path in paths})
-        if self._digests is not None and digest_of(self._manifest, folder) != self._digests[key]:
+        if self._digests is not None and digest_of(self._manifest, folder) != self._digests[folder.name]:
             raise _changed(folder)
         return files
 
@@ -97,7 +105,7 @@ class Goldens:
         return self._trace(self.folder(experiment))
 
     def ends(self, experiment: Experiment) -> bool:
-        return self._ends(self.folder(experiment))
+        return self._judged(self.folder(experiment)).t_end is not None
 
     def sampler(self, experiment: Experiment) -> Sampler:
         return self._sampler(self.folder(experiment))
@@ -182,7 +190,7 @@ class Runner:
             record, faulty = self._record(experiment, built, execution)
         except BadOutput as err:
             record = _bare(experiment, Status.HARNESS_ERROR, _problem_of(err), built)
-        self._check_input(experiment)
+        self._check_input(experiment, execution)
         return Finished(
             experiment=experiment,
             record=record,
@@ -197,10 +205,11 @@ class Runner:
             series=self._series(experiment, record, faulty) if faulty is not None else None,
         )
 
-    def _check_input(self, experiment: Experiment) -> None:
+    def _check_input(self, experiment: Experiment, execution: Execution) -> None:
         """Raise MutatorError if a run has written to what this experiment used, so its record would not
         count."""
-        self.goldens.check(experiment)
+        if execution.mode is RunMode.GOLDEN:
+            self.goldens.check(execution.out)
         scenario = self.scenario_file(experiment.scenario)
         if digest(read_bounded(scenario)) != experiment.scenario_digest:
             raise _changed(scenario)

@@ -10,8 +10,10 @@ import pytest
 
 from mutator.campaigns.plans import Choices, make_plan
 from mutator.engines.jobs import Execution, Job
+from mutator.errors import MutatorError
 from mutator.execution.runner import Goldens, Runner
 from mutator.model import Activation, Experiment, Outcome, Record, Status
+from mutator.verification.preflight_rules import digest_of
 from mutator.workspace import Workspace
 
 T = np.arange(20) * 0.05
@@ -157,3 +159,42 @@ def test_mutants_that_cannot_be_built_are_not_run(toycar: Workspace, tmp_path: P
     del manifest.tree.files["toycar/sensing.py"]  # type: ignore[attr-defined]
     statuses = [f.record.status for f in runner.run(experiments[:1])]
     assert statuses == [Status.HARNESS_ERROR]
+
+
+@pytest.mark.parametrize("change", ["before", "while it runs"])
+def test_nothing_is_compared_with_a_changed_golden_run(
+    toycar: Workspace, tmp_path: Path, change: str
+) -> None:
+    """A mutant can write to it, and put the bytes back."""
+    manifest = toycar.manifest("toycar")
+    experiment = make_plan(toycar, "small", Choices(only='fault_type == "distance"', limit=1)).experiments[0]
+    place = tmp_path / "golden" / "A"
+    place.mkdir(parents=True)
+    write(place)
+    (place / "said.json").write_text("{}")
+    digests = {"A": digest_of(manifest, place)}
+    said: Outputs = {"said": {"hazards": {}, "alert_events": []}, "trace": {"gas": np.zeros(20)}, "ran": RAN}
+
+    class Changing(PlayedEngine):
+        def run(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Execution]]:
+            for job, execution in super().run(jobs):
+                (place / "said.json").write_text("{}")
+                yield job, execution
+
+    kind = PlayedEngine if change == "before" else Changing
+    engine = kind(tmp_path / "faulty", Status.OK, said)
+    goldens = Goldens(manifest, lambda experiment: place, digests=digests)
+    runner = Runner(manifest, toycar.fault_models(), engine, goldens, toycar.scenario)
+    if change == "before":
+        (place / "said.json").write_text("{ }")
+    with pytest.raises(MutatorError, match="changed while it was in use"):
+        list(runner.run([experiment]))
+
+
+def test_nothing_is_kept_of_a_run_with_a_changed_scenario(
+    judged: Callable[..., Record], toycar: Workspace
+) -> None:
+    with toycar.scenario("A").open("a") as file:
+        file.write("# another\n")
+    with pytest.raises(MutatorError, match=r"A\.yaml: changed while it was in use"):
+        judged(ran=RAN)
