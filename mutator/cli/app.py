@@ -8,6 +8,7 @@ import traceback
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import cache
 from typing import Annotated, Any
 
 import typer
@@ -178,10 +179,16 @@ def _open_streams() -> None:
             setattr(sys, name, os.fdopen(number, "w" if number else "r", closefd=False))
 
 
+@cache
+def _command() -> Any:
+    """The program with its subcommands, whose options take long to collect."""
+    return get_command(app)
+
+
 def _answer(words: Sequence[str]) -> int:
     try:
         # Not `app()`, which has its own handling of errors, interrupts and closed pipes.
-        command = get_command(app)
+        command = _command()
         if "_MUTATOR_COMPLETE" in os.environ:  # a shell asks for completions
             command.main(prog_name="mutator")
         with (
