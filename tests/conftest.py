@@ -74,6 +74,8 @@ variants:
           params: {{effect: toycar.lens.Light, target: {target}, amount: level, camera: self, scene: world}}
 """
 
+gc.disable()  # until all tests are collected
+
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # A shell starts background commands with Ctrl-C ignored; the commands under test would inherit that.
     signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -87,9 +89,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_collection_finish() -> None:
     """Exempt the objects that exist now from garbage collection: each in-process campaign collects several
-    times."""
+    times. The next ones are collected seldom."""
     gc.collect()
     gc.freeze()
+    gc.set_threshold(20_000, 20, 20)
+    gc.enable()
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
@@ -153,14 +157,25 @@ def toycar(tmp_path: Path, copy_toycar: Callable[[Path], Workspace]) -> Workspac
 
 @pytest.fixture(scope="session")
 def copy_toycar() -> Callable[[Path], Workspace]:
+    """Write a copy of the toy car, whose files are read only once, because hundreds of tests make one."""
+    sources = ((_TESTS / "toy", "."), (_TESTS.parent / "templates", "templates"))
+    files = {Path(at, name): data for source, at in sources for name, data in _files(source).items()}
+    folders = sorted({file.parent for file in files})
+
     def copy(folder: Path) -> Workspace:
         root = folder / "toy"
-        shutil.copytree(_TESTS / "toy", root, ignore=shutil.ignore_patterns("__pycache__", "templates"))
-        shutil.copytree(_TESTS.parent / "templates", root / "templates")
-        shutil.copytree(_TESTS / "toy" / "templates", root / "templates", dirs_exist_ok=True)
+        for name in folders:
+            (root / name).mkdir(parents=True, exist_ok=True)
+        for name, data in files.items():
+            (root / name).write_bytes(data)
         return Workspace(library=root / "fault_library", templates=root / "templates")
 
     return copy
+
+
+def _files(folder: Path) -> dict[Path, bytes]:
+    paths = (path for path in folder.rglob("*") if path.is_file() and "__pycache__" not in path.parts)
+    return {path.relative_to(folder): path.read_bytes() for path in paths}
 
 
 @pytest.fixture(scope="session")

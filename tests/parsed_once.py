@@ -12,17 +12,25 @@ import pytest
 from mutator.config import yaml_files
 from mutator.config.yaml_files import Source
 from mutator.errors import MutatorError
+from mutator.faults import fault_models
+from mutator.faults.fault_models import Example, FaultModel, FaultModels
 from mutator.mutants import anchors
 from mutator.mutants.anchors import ParsedFile
+from mutator.verification import library
+
+_SMALL = 1 << 20  # bytes
 
 
 @contextmanager
 def parsed_once() -> Iterator[None]:
-    """Parse each YAML and Python text once, because tests copy the same templates and toys a thousand times.
+    """Parse each YAML and Python text and fault model, and run each example of a model, only once, because
+    tests copy the same templates and toys a thousand times.
 
     Each caller gets its own copy. A text with a mistake is parsed anew, so that the error names its file.
     """
-    parse_yaml, parse_python = yaml_files.parse, anchors.parse_file
+    parse_yaml, parse_python, load_model = yaml_files.parse, anchors.parse_file, fault_models._load
+    models: dict[tuple[str, bytes, bytes], FaultModel] = {}
+    run_example, examples = library.run_example, dict[str, str]()
 
     @lru_cache(maxsize=1024)
     def yaml_of(text: str) -> bytes:
@@ -47,7 +55,22 @@ def parsed_once() -> Iterator[None]:
             return parse_python(path, data, root)
         return dataclasses.replace(found, where=root / path, sound=set(), _sites={})
 
+    def model(path: Path) -> FaultModel:
+        template = path.with_suffix(".py.j2")
+        if not all(file.is_file() and file.stat().st_size < _SMALL for file in (path, template)):
+            return load_model(path)
+        key = path.name, path.read_bytes(), template.read_bytes()
+        found = models.get(key) or models.setdefault(key, load_model(path))
+        source = dataclasses.replace(found.source, path=path)
+        return dataclasses.replace(found, source=source, template_path=template)
+
+    def example_of(model: FaultModel, models: FaultModels, example: Example) -> str:
+        key = repr((model.kind, model.template, model.expression, model.params, example))
+        return examples.get(key) or examples.setdefault(key, run_example(model, models, example))
+
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(yaml_files, "parse", yaml)
         patch.setattr(anchors, "parse_file", python)
+        patch.setattr(fault_models, "_load", model)
+        patch.setattr(library, "run_example", example_of)
         yield
