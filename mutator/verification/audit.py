@@ -22,7 +22,14 @@ from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN, HEAD
 from mutator.targets.manifest import TargetManifest
 from mutator.verification.audited_head import checks as checks_of
-from mutator.verification.audited_head import engines, facts_of_target, idle_runs, seeds_and_sessions
+from mutator.verification.audited_head import (
+    chunks_of,
+    engines,
+    facts_of_target,
+    idle_runs,
+    seeds_and_sessions,
+    short,
+)
 from mutator.verification.audited_records import mutants, proof, recorded, verdicts
 from mutator.verification.audited_series import series
 from mutator.verification.audited_tables import tables
@@ -141,15 +148,17 @@ def _plan(folder: RunFolder) -> Problems:
         "experiments": len(plan.experiments),
         "campaign": campaign.name,
         "campaign_digest": digest(campaign.source),
+        "study": campaign.study,
         "target": campaign.target,
+        "chunks": chunks_of(folder),
         "limits": plain(campaign.limits),
         "goldens": [one.plain() for one in plan.goldens()],
         "canary_hazard": campaign.canary.hazard,
     }
     for key, value in follows.items():
-        if head[key] != value:
-            expected = f"{value}, which follows from {plan_file.EXPERIMENTS} and {CAMPAIGN}"
-            yield MutatorError(f"{key} {head[key]}", where=run / HEAD, expected=expected)
+        if head.get(key) != value:
+            expected = f"{short(value)}, which follows from {plan_file.EXPERIMENTS} and {CAMPAIGN}"
+            yield MutatorError(f"{key} {short(head.get(key))}", where=run / HEAD, expected=expected)
     if Digest.of_file(run / CSV) != Digest.of(plan_csv(plan)):
         yield MutatorError(
             "differs from the plan", where=run / CSV, expected=f"the rows of {plan_file.EXPERIMENTS}"

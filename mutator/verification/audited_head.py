@@ -2,11 +2,13 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
+from itertools import islice
 from typing import Any
 
 from mutator._common.below import inside
 from mutator._common.files import read_json
 from mutator.campaigns.freezing import target_facts
+from mutator.campaigns.shared_runs import run_key
 from mutator.errors import MutatorError
 from mutator.model import Outcome
 from mutator.outcomes.golden import trace_digest
@@ -25,12 +27,13 @@ _REMEDY = "verify with the library of the run"
 
 def facts_of_target(folder: RunFolder, workspace: Workspace, manifest: TargetManifest) -> Problems:
     """Yield what run.json says about the target and its hazards, but the library does not."""
-    for key, value in target_facts(workspace, manifest).items():
+    keys = {run_key(manifest, experiment) for experiment in plan_file.iterate(folder.path)}
+    for key, value in (target_facts(workspace, manifest) | {"runs": len(keys)}).items():
         if key in folder.head and folder.head[key] != value:
             yield MutatorError(
-                f"{key} {_short(folder.head[key])}",
+                f"{key} {short(folder.head[key])}",
                 where=folder.path / HEAD,
-                expected=f"{_short(value)}, as in the library",
+                expected=f"{short(value)}, as in the library",
                 remedy=_REMEDY,
             )
 
@@ -46,6 +49,9 @@ def seeds_and_sessions(folder: RunFolder) -> Problems:
         if experiment.fault.reading != folder.head["reading"]:
             got = f"reading {experiment.fault.reading}"
             yield MutatorError(got, where=path, line=number, expected=_of(folder, "reading"))
+    if folder.head["choices"].get("reading") not in (None, folder.head["reading"]):
+        got = f"choice of the reading {folder.head['choices']['reading']}"
+        yield MutatorError(got, where=folder.path / HEAD, expected=_of(folder, "reading"))
     patterns = [stretch.records for stretch in folder.stretches]
     for name in digests.segments(folder.path):
         stem = name.partition("/")[2].removesuffix(".jsonl")
@@ -55,6 +61,17 @@ def seeds_and_sessions(folder: RunFolder) -> Problems:
                 where=inside(folder.path, name),
                 expected=f"a stretch of work in {HEAD}",
             )
+
+
+def chunks_of(folder: RunFolder) -> list[list[int]]:
+    """The offset, length and number of experiments of each chunk, for the numbers in run.json."""
+    lines = plan_file.lines_of(folder.path / plan_file.EXPERIMENTS)
+    found, offset = [], 0
+    for *_, count in folder.head["chunks"]:
+        length = sum(map(len, islice(lines, count)))
+        found.append([offset, length, count])
+        offset += length
+    return found
 
 
 def checks(folder: RunFolder) -> Problems:
@@ -120,6 +137,7 @@ def _of(folder: RunFolder, key: str) -> str:
     return f"{key} {folder.head[key]}, as in {HEAD}"
 
 
-def _short(value: Any) -> str:
+def short(value: Any) -> str:
+    """The beginning of a value, as text for a message."""
     text = ", ".join(value) if isinstance(value, Mapping) else str(value)
     return text if len(text) <= 80 else f"{text[:80]}..."
