@@ -21,6 +21,7 @@ MOST_JSON = 6_000_000  # bytes of a JSON object; as Python objects they can take
 MOST_DATA = 8_000_000_000  # bytes of a file that grows with the number of experiments
 MOST_LINE = 4_000_000  # bytes of a line
 _DENSE = 64_000_000  # from this size, a file must not have holes
+_PIECE = 1_000_000
 _GZIP = zlib.MAX_WBITS | 16
 
 
@@ -54,8 +55,11 @@ def open_regular(path: Path) -> BufferedReader:
 def read_open(file: BinaryIO, where: Path, most: int = MOST_WHOLE) -> bytes:
     """Return the rest of an open file; TooLarge if it has more than `most` bytes."""
     check_open(file, where, most)
-    data = file.read(most + 1)
-    if len(data) > most:  # it grows, or does not have a size
+    left = os.fstat(file.fileno()).st_size - file.tell()
+    data = file.read(max(left, 0) + 1)  # not `most`, because that many bytes would be reserved
+    while len(data) <= most and (more := file.read(_PIECE)):  # it grows, or does not have a size
+        data += more
+    if len(data) > most:
         raise _too_large(len(data), where, most)
     return data
 

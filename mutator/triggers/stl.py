@@ -18,6 +18,8 @@ _PLACE = re.compile(r"1:(\d+): Syntax")
 _BOUNDED = ("TimedAlways", "TimedEventually", "TimedUntil")
 _UNBOUNDED = ("Always", "Eventually", "Until")
 _NEXT = ("Next", "StrongNext")
+_LONGEST = 1000  # characters of a formula
+MOST_STEPS = 3000  # of all intervals of a formula together; rtamt's time grows with the square of some
 _SAME_LENGTH = 0.01  # tolerance in steps; times are sums of steps, or rounded
 
 
@@ -52,6 +54,8 @@ def robustness(formula: str, values: Mapping[str, np.ndarray], step_s: float) ->
 
 
 def _evaluated(formula: str, values: Mapping[str, np.ndarray], step_s: float) -> np.ndarray:
+    if len(formula) > _LONGEST:
+        raise MutatorError(f"a formula of {len(formula)} characters", expected=f"at most {_LONGEST}")
     specification = _specification(step_s)
     formula = " ".join(formula.split())
     names, steps = names_in(formula, values), len(values[TIME])
@@ -59,6 +63,7 @@ def _evaluated(formula: str, values: Mapping[str, np.ndarray], step_s: float) ->
     rows = {name: [*values[name].tolist(), *values[name][-1:].tolist()] for name in names}
     try:
         _parse(specification, formula, names)
+        _check_intervals(specification.ast.specs[-1], specification.offline_interpreter)
         ahead = _ahead(specification.ast.specs[-1], specification.offline_interpreter)
         told = specification.evaluate({**rows, "time": [*range(steps + 1)]}) if steps else []
     except Exception as error:  # rtamt raises KeyError, ValueError, errors of its own, and arithmetic errors
@@ -97,12 +102,28 @@ def _parse(specification: Any, formula: str, names: Collection[str]) -> None:
         raise KeyError(unknown[0])
 
 
+def _check_intervals(node: Any, interpreter: Any) -> None:
+    """Raise ValueError if the intervals of a formula have too many steps together."""
+    total, waiting = 0, [node]
+    while waiting:
+        node = waiting.pop()
+        waiting += _children(node)
+        total += int(interpreter.time_unit_transformer(node)[1]) if hasattr(node, "begin") else 0
+    if total > MOST_STEPS:
+        raise ValueError(f"intervals of {total} steps")
+
+
+def _children(node: Any) -> list[Any]:
+    """Return a node's children; rtamt lists those of some operators twice."""
+    return list({id(child): child for child in node.children}.values())
+
+
 def _ahead(node: Any, interpreter: Any) -> int:
     """Return how many steps a formula looks ahead; ValueError if unbounded."""
     kind = type(node).__name__
     if kind in _UNBOUNDED:
         raise ValueError(f"unbounded {kind.lower()}")
-    below: int = max((_ahead(child, interpreter) for child in node.children), default=0)
+    below: int = max((_ahead(child, interpreter) for child in _children(node)), default=0)
     if not hasattr(node, "begin"):
         return below + (kind in _NEXT)
     begin, end = interpreter.time_unit_transformer(node)
@@ -123,6 +144,8 @@ def _refusal(error: Exception, formula: str, variables: Collection[str], step_s:
         said, remedy = f"unknown name '{name}'", f"correct it{suggestion(name, [*variables])}"
     elif "unbounded" in said:
         remedy = "bound the look-ahead, `always[0:2](x < 3)`, or look back: `historically(x < 3)`"
+    elif said.startswith("intervals of"):
+        remedy = f"shorten them: at most {MOST_STEPS} steps together, {MOST_STEPS * step_s:g} s here"
     elif "sampling period" in said:
         said, remedy = f"a time that is not a multiple of the step, {step_s:g} s,", "use a multiple"
     return MutatorError(
