@@ -76,7 +76,7 @@ def bound(folder: RunFolder, workspace: Workspace) -> tuple[Saved, float]:
 
 
 def _saved(record: Record, golden: str, series: SeriesFolder) -> tuple[str, float]:
-    found, active = series.read(record.experiment_id), record.activation
+    found, active = series.read(record.experiment_id, record), record.activation
     if found is None or active is None:
         return "without a series", 0.0
     end = float(found[0].about["end"])

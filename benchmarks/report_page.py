@@ -146,9 +146,11 @@ def write(size: int, out: Path) -> dict[str, float]:
     ways = embedded(run.paths.data([row.experiment_id for row in rows]), "paths")
     table_s = process_time() - began
     shown = [experiments[row.experiment_id] for row in rows]
-    details = report_browse.details(shown, shapes(patches(workspace, shown)), rows)
+    records = [record(e, n) for n, e in enumerate(shown)]
+    traces = [one.trace_digest for one in records]
+    details = report_browse.details(shown, shapes(patches(workspace, shown)), rows, traces)
     detail = embedded(details, "details")
-    index_kb = write_series(workspace, [record(e, n) for n, e in enumerate(shown)], out)
+    index_kb = write_series(workspace, records, out)
     browse = Browse(
         facts=Markup(json.dumps({"filmed": True, "series": {"packed": True, "kept": []}})),
         scripts=tuple(map(Markup, (table, detail, ways, embedded({}, "media")))),
