@@ -16,11 +16,12 @@ from mutator.campaigns.chunks import Pending
 from mutator.execution.pytest_session import Controller, configure
 from mutator.workspace import Workspace
 
+PLAIN = ("-p", "no:cacheprovider", "-p", "no:hypothesispytest", "--assert=plain")
+
 
 def pytest_campaign(toy: Workspace, *words: object) -> "subprocess.CompletedProcess[str]":
-    plain = ["-m", "pytest", "-p", "no:cacheprovider", "-p", "no:hypothesispytest", "--assert=plain"]
     return subprocess.run(
-        [sys.executable, *plain, *map(str, words)],
+        [sys.executable, "-m", "pytest", *PLAIN, *map(str, words)],
         env=os.environ | {"MUTATOR_ROOT": str(toy.library.parent)},
         cwd=toy.library.parent,
         capture_output=True,
@@ -44,17 +45,24 @@ def pytest_campaign(toy: Workspace, *words: object) -> "subprocess.CompletedProc
     ],
 )
 def test_mistakes_under_pytest_have_clear_errors(
-    toy: Workspace, words: list[str], code: int, told: str
+    toy: Workspace,
+    words: list[str],
+    code: int,
+    told: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
 ) -> None:
     root = toy.library.parent
+    monkeypatch.chdir(root)
+    monkeypatch.setenv("MUTATOR_ROOT", str(root))
     (root / "newer").mkdir()
     (root / "newer" / "run.json").write_text(json.dumps({"schema": "run/99"}))
     text = toy.campaign("small").read_text().replace("at_s: 1.0", "at_s: 5.9")
     (toy.library / "campaigns" / "unarmed.yaml").write_text(text)
-    answer = pytest_campaign(toy, *words)
-    assert answer.returncode == code, answer.stdout + answer.stderr
-    assert (answer.stdout + answer.stderr).count(told) == 1
-    assert "Traceback" not in answer.stdout + answer.stderr
+    assert pytest.main([*PLAIN, *words]) == code
+    printed = "".join(capfd.readouterr())
+    assert printed.count(told) == 1, printed
+    assert "Traceback" not in printed
 
 
 def test_the_plugin_does_nothing_without_a_campaign(toy: Workspace) -> None:
