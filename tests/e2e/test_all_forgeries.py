@@ -75,7 +75,7 @@ def other(value: Any) -> Any:
         case str():
             return f"{value}x"
         case None:
-            return "x"
+            return "1/1"  # also a shard
         case list():
             return ["x"]
         case _:
