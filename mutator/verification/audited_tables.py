@@ -4,9 +4,10 @@ from collections.abc import Iterator
 from itertools import zip_longest
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TextIO
+from typing import BinaryIO
 
 from mutator._common.below import inside
+from mutator._common.bounded import TooLarge, bounded_lines
 from mutator.errors import MutatorError
 from mutator.outcomes import results
 from mutator.outcomes.reader import same_parquet
@@ -31,15 +32,19 @@ def _differences(folder: RunFolder, there: list[str]) -> Iterator[MutatorError]:
         for name in there:
             path = inside(folder.path, name)
             if name == results.CSV:
-                yield from _cells(path, made[name])
+                try:
+                    yield from _cells(path, made[name])
+                except TooLarge as err:
+                    yield err
             elif name not in made or not same_parquet(path, made[name]):
                 yield MutatorError("does not follow from the records", where=path, remedy=_REMEDY)
 
 
 def _cells(path: Path, made: Path) -> Iterator[MutatorError]:
     """Yield the lines that differ, each with its first differing cell."""
-    with _opened(path) as found, _opened(made) as wanted:
-        for number, (got, expected) in enumerate(zip_longest(found, wanted), start=1):
+    with path.open("rb") as found, made.open("rb") as wanted:
+        pairs = zip_longest(_texts(found, path), _texts(wanted, made))
+        for number, (got, expected) in enumerate(pairs, start=1):
             if got is None or expected is None:
                 told = [f"'{line.rstrip()}'" if line is not None else "no line" for line in (got, expected)]
             elif got != expected:
@@ -50,5 +55,5 @@ def _cells(path: Path, made: Path) -> Iterator[MutatorError]:
             yield MutatorError(told[0], where=path, line=number, expected=told[1], remedy=_REMEDY)
 
 
-def _opened(path: Path) -> TextIO:
-    return path.open(encoding="utf-8", errors="replace", newline="\n")
+def _texts(file: BinaryIO, path: Path) -> Iterator[str]:
+    return (line.decode(errors="replace") for line in bounded_lines(file, path))

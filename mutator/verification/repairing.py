@@ -20,7 +20,7 @@ from mutator._common.below import (
     write_below,
     writing_below,
 )
-from mutator._common.bounded import MOST_DATA, read_bounded
+from mutator._common.bounded import MOST_DATA, TooLarge, check_open, read_bounded
 from mutator._common.files import raising_disk_full
 from mutator._common.locks import owned
 from mutator._common.text import counted
@@ -208,7 +208,7 @@ def _kept(
 
 
 def _put_aside(run: Path, name: str) -> None:
-    """Copy a file to a free name in `damaged/`; move a folder."""
+    """Copy a file to a free name in `damaged/`; move a folder, and a file too large to copy."""
     path = inside(run, name)
     if not os.path.lexists(path):
         return
@@ -218,9 +218,14 @@ def _put_aside(run: Path, name: str) -> None:
         place = f"{ASIDE}/{name}.{number}"
     if path.is_dir():
         move_below(run, name, place)
-    else:
-        with open_below(run, name) as file, writing_below(run, place) as copy:
-            shutil.copyfileobj(file, copy)
+        return
+    try:
+        with open_below(run, name) as file:
+            check_open(file, path)
+            with writing_below(run, place) as copy:
+                shutil.copyfileobj(file, copy)
+    except TooLarge:
+        move_below(run, name, place)
 
 
 def _carry_out(run: Path, changes: list[_Change], ledger: Ledger) -> None:

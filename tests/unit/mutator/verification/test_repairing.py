@@ -17,7 +17,7 @@ from mutator.store.patches import Patches
 from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.store.series import Index, write_index
-from mutator.verification.repairing import repair
+from mutator.verification.repairing import _put_aside, repair
 from mutator.workspace import Workspace
 
 
@@ -269,3 +269,14 @@ def test_a_file_outside_that_an_index_of_series_names_stays(run: Path, name: str
     write_index(run / "series" / "index.js", index)
     repaired(run)
     assert mine.read_text() == "mine"
+
+
+def test_a_file_with_holes_is_moved_and_not_copied(run: Path) -> None:
+    """A copy of a few bytes on the disk could fill it."""
+    name = "series/0001-a.blocks"
+    (run / "series").mkdir()
+    with (run / name).open("wb") as file:
+        file.truncate(1 << 40)
+    _put_aside(run, name)
+    aside = run / "damaged" / name
+    assert not (run / name).exists() and aside.stat().st_size == 1 << 40 and aside.stat().st_blocks < 100
