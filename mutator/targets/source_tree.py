@@ -1,6 +1,5 @@
 """A target's files in memory, with a cache of data derived from them."""
 
-import itertools
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -18,6 +17,7 @@ from mutator.errors import MutatorError
 T = TypeVar("T")
 MOST_SOURCE = 1_000_000  # bytes of a Python file
 MOST_TREE = 128_000_000  # bytes of all files, which are kept in memory
+_OF_LINK = 50  # files for which a link counts: it takes longer, and links in links multiply
 MOST_FILES = 50_000  # files and folders below the folders that a manifest's globs name
 _SPECIAL = re.compile(r"(\*\*/|\*\*|\*|\?)")  # special characters in a glob
 
@@ -120,12 +120,14 @@ def read_tree(
 def _read(root: Path, globs: tuple[str, ...], bounds: Path | None) -> dict[str, bytes]:
     """Read the files of `root` that match; Outside for a link that leads out of the folder `bounds`."""
 
-    numbers = itertools.count()
+    seen = 0
 
-    def count() -> None:
-        if next(numbers) == MOST_FILES:
+    def count(path: Path) -> None:
+        nonlocal seen
+        seen += _OF_LINK if path.is_symlink() else 1
+        if seen > MOST_FILES:
             raise MutatorError(
-                f"more than {MOST_FILES:,} files and folders",
+                f"more than {MOST_FILES:,} files and folders (a link counts as {_OF_LINK})",
                 where=root,
                 expected="the source of one controller",
                 remedy="name narrower folders in the manifest's `files`",
@@ -133,7 +135,7 @@ def _read(root: Path, globs: tuple[str, ...], bounds: Path | None) -> dict[str, 
 
     def enters(folder: Path) -> bool:
         """Whether to read a folder; Outside if its files could be part of the tree but are elsewhere."""
-        count()
+        count(folder)
         if bounds is None or is_inside(bounds, folder):
             return True
         if any(_may_match_below(folder.relative_to(root).parts, glob.split("/")) for glob in globs):
@@ -142,8 +144,8 @@ def _read(root: Path, globs: tuple[str, ...], bounds: Path | None) -> dict[str, 
 
     folders = {_SPECIAL.split(glob)[0].rpartition("/")[0] for glob in globs}
     found = {}
-    for path in itertools.chain.from_iterable(_below(root / name, enters) for name in folders):
-        count()
+    for path in (path for name in folders for path in _below(root / name, enters)):
+        count(path)
         found[path] = path.relative_to(root).as_posix()
     files: dict[str, bytes] = {}
     left = MOST_TREE
