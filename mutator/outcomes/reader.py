@@ -40,6 +40,8 @@ _NEEDED = (
 )
 _NAMES = ("module", "fault_type", "reading", "unit", "scenario", "method", "trigger", "variant", "aim")
 _SCALES = {"status": [s.value for s in Status], "outcome": [o.value for o in Outcome]}
+MOST_CELLS = 10_000_000  # of a small Parquet file
+_PACKED = 20  # further cells for each byte of a large one
 _REMEDY = "rebuild it: `mutator report DIR`"
 
 
@@ -231,7 +233,16 @@ def _table(source: Path | io.BytesIO) -> Any:
     """Read a Parquet file in this thread: pyarrow aborts the process if its threads free memory at exit."""
     from pyarrow import parquet
 
-    return parquet.ParquetFile(source, pre_buffer=False).read(use_threads=False)
+    file = parquet.ParquetFile(source, pre_buffer=False)
+    size = source.stat().st_size if isinstance(source, Path) else source.getbuffer().nbytes
+    cells = file.metadata.num_rows * file.metadata.num_columns
+    if cells > MOST_CELLS + _PACKED * size:
+        raise MutatorError(
+            f"a results table of {size:,} bytes that claims {cells:,} cells",
+            expected="the table that the run wrote",
+            remedy=_REMEDY,
+        )
+    return file.read(use_threads=False)
 
 
 def _units(frame: "pd.DataFrame") -> dict[str, str]:

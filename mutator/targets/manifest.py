@@ -8,6 +8,7 @@ from pathlib import Path
 from packaging.requirements import Requirement
 
 from mutator._common import caches
+from mutator._common.bounded import read_bounded
 from mutator._common.hashing import digest
 from mutator.config.yaml_files import Source
 from mutator.errors import MutatorError
@@ -178,7 +179,7 @@ class TargetManifest:
         """The name of the cache that runs share. In a sandbox, no other code or manifest writes to it."""
         if not self.sandbox:
             return self.name
-        return f"{self.name}-{digest(self.tree.digest.encode() + self.path.read_bytes())[:16]}"
+        return f"{self.name}-{digest(self.tree.digest.encode() + read_bounded(self.path))[:16]}"
 
     @property
     def cache(self) -> Path:
