@@ -26,6 +26,7 @@ from mutator.errors import MutatorError
 _FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
 _CAREFULLY = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
 _NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
+_DEEPEST, _DEEPEST_OUTPUT = 30, 20  # folders in each other; an output lies in a few others
 _LONGEST_NAME = 220  # bytes; Linux allows 255, and a half-written file has a longer name
 
 
@@ -197,17 +198,22 @@ def entries_below(
 
 
 def remove_odd(root: Path) -> None:
-    """Delete what `check_plain` refuses, and unprintable names, from a folder that a target wrote to."""
+    """Delete what `check_plain` refuses, unprintable names and deep folders, where a target wrote to."""
     if root.is_symlink():
         root.unlink()
         root.mkdir()
-    for _, entry in list(entries_below(root)):
-        if is_plain(entry) and entry.name.isprintable():
+    for name, entry in list(entries_below(root, lambda name: is_deep(name, _DEEPEST_OUTPUT))):
+        if is_plain(entry) and entry.name.isprintable() and not is_deep(name, _DEEPEST_OUTPUT):
             continue
         if entry.is_dir(follow_symlinks=False):
             remove_folder(Path(entry.path))
         else:
             Path(entry.path).unlink(missing_ok=True)
+
+
+def is_deep(name: str, most: int = _DEEPEST) -> bool:
+    """Whether a path has more folders than anything that belongs there; readers would recurse too deeply."""
+    return name.count("/") >= most
 
 
 def is_plain(entry: os.DirEntry[str]) -> bool:

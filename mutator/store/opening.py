@@ -12,7 +12,7 @@ Run folders travel: evidence comes from strangers. Two rules keep every command 
 from fnmatch import fnmatchcase
 from pathlib import Path
 
-from mutator._common.below import Outside, entries_below, is_plain, not_plain
+from mutator._common.below import Outside, entries_below, is_deep, is_plain, not_plain
 from mutator.store import digests
 from mutator.store.run_head import CAMPAIGN, HEAD
 
@@ -42,8 +42,8 @@ _CLOSED = (SCRATCH, ASIDE, f"{TRACES}/*/{SCRATCH}")
 
 
 def check_contents(run: Path) -> None:
-    """Raise Outside for a link, a special file, an unprintable name, a file in place of a folder, or two
-    names that differ only in case.
+    """Raise Outside for a link, a special file, an unprintable name, a file in place of a folder, folders
+    nested too deeply, or two names that differ only in case.
 
     Folders that can contain anything only have to be folders.
     """
@@ -53,6 +53,8 @@ def check_contents(run: Path) -> None:
             raise not_plain(Path(entry.path))
         if not entry.name.isprintable():
             raise _refused(f"the name {entry.name!a}", run, "names of printable characters")
+        if is_deep(name):
+            raise _refused("deeply nested folders", run / name.partition("/")[0], "few folders in each other")
         if name in _ALL_FOLDERS and not entry.is_dir():
             raise _refused("a file", Path(entry.path), "a folder")
         if "/" not in name and (before := tops.setdefault(name.casefold(), name)) != name:
