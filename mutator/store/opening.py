@@ -54,7 +54,7 @@ def check_contents(run: Path) -> None:
         if not entry.name.isprintable():
             raise _refused(f"the name {entry.name!a}", run, "names of printable characters")
         if is_deep(name):
-            raise _refused("deeply nested folders", run / name.partition("/")[0], "few folders in each other")
+            raise _refused("deeply nested folders", run, "few folders in each other")
         if name in _ALL_FOLDERS and not entry.is_dir():
             raise _refused("a file", Path(entry.path), "a folder")
         if "/" not in name and (before := tops.setdefault(name.casefold(), name)) != name:
