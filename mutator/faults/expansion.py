@@ -17,7 +17,8 @@ from mutator.model import Fault, Injection
 from mutator.targets.locations import check_location
 from mutator.targets.manifest import TargetManifest
 
-_REDRAWS = 100
+_REDRAWS = 100  # of one value
+_ALL_REDRAWS = 20_000  # of all values; more mean that the ranges have too few different values
 
 
 def expand(
@@ -50,11 +51,13 @@ def draw_values(draw: Draw, seed: int) -> tuple[int | float, ...]:
         return draw.values
     stream = generator(seed, draw.key).random(len(draw.ranges))
     values: list[int | float] = []
+    left = _ALL_REDRAWS
     for i, u in enumerate(map(float, stream)):
         value = _value(draw, i, u)
-        for attempt in range(_REDRAWS):
+        for attempt in range(min(_REDRAWS, left)):
             if value not in values and not (value == 0 and draw.kind == "reals"):
                 break
+            left -= 1
             value = _value(draw, i, float(generator(seed, f"{draw.key}/{i}/{attempt}").random()))
         values.append(value)
     return tuple(values)

@@ -10,6 +10,7 @@ from mutator.faults.expansion import draw_values, expand
 from mutator.faults.specs import Draw, load_spec
 from mutator.model import Fault, Hold
 from mutator.workspace import Workspace
+from tests.costs import is_cheap
 
 NAME = "sensor/distance"
 
@@ -318,3 +319,10 @@ def test_a_spec_outside_the_library_is_loaded_by_path(tmp_path: Path, toy: Works
 def test_an_unknown_reading_is_refused(toy: Workspace) -> None:
     with pytest.raises(MutatorError, match="reading 'as_built'; expected one of as_described, as_coded"):
         faults(toy, reading="as_built")
+
+
+def test_ranges_with_too_few_different_values_are_not_drawn_again_for_ever() -> None:
+    ranges = tuple((5.0 + i, 6.0 + i) for i in range(1000))
+    is_cheap(
+        lambda: draw_values(Draw(key="k", name="n", unit=None, kind="integers", ranges=ranges, cap=1), 1)
+    )
