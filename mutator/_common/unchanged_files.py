@@ -17,7 +17,7 @@ class UnchangedFiles:
 
     def __init__(self, files: Mapping[str, bytes]) -> None:
         self._files = files
-        self._states = {path: _state(os.lstat(path)) for path in files}
+        self._states = {path: _found(path) for path in files}  # None for a file that is already missing
 
     def first_changed(self) -> str:
         """Return the path of a file that was changed, replaced or removed; empty if there is none."""
@@ -35,6 +35,13 @@ class UnchangedFiles:
             return False
         finally:
             os.close(file)
+
+
+def _found(path: str) -> _State | None:
+    try:
+        return _state(os.lstat(path))
+    except OSError:
+        return None
 
 
 def _state(state: os.stat_result) -> _State:

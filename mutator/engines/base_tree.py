@@ -15,7 +15,7 @@ from importlib.machinery import all_suffixes
 from itertools import count
 from pathlib import Path
 
-from mutator._common.files import remove_folder
+from mutator._common.files import is_disk_full, remove_folder
 from mutator._common.unchanged_files import UnchangedFiles
 from mutator.engines import bytecode
 from mutator.targets.source_tree import SourceTree
@@ -35,7 +35,7 @@ class RunTree:
                 folder, _, last = name.rpartition("/")
                 self._expected.setdefault(folder, set()).add(last)
                 name = folder
-        self._folders = {folder: os.lstat(place / folder).st_ino for folder in self._expected}
+        self._folders = {folder: _number(place / folder) for folder in self._expected}
         self._files = UnchangedFiles({f"{place}/{name}": data for name, data in files.items()})
 
     def first_changed(self) -> str:
@@ -53,12 +53,15 @@ class RunTree:
                 found += [Path(entry.path) for entry in entries if entry.name not in names]
         return found
 
+    def move(self, place: Path) -> bool:
+        """Move the tree; return whether its folders are still the same, and no links in their place."""
+        self.place = self.place.rename(place)
+        return not self._first_moved()
+
     def _first_moved(self) -> str:
         for folder, number in self._folders.items():
-            with suppress(OSError):
-                if os.lstat(self.place / folder).st_ino == number:
-                    continue
-            return f"{self.place}/{folder}"
+            if not number or _number(self.place / folder) != number:
+                return f"{self.place}/{folder}"
         return ""
 
 
@@ -69,7 +72,7 @@ class BaseTree:
         self._sources = tree.files
         self._files = bytecode.with_bytecode(tree)
         self._work = work
-        self._unused: list[Path] = []  # threads share it, which `pop` and `append` allow
+        self._unused: list[RunTree] = []  # threads share it, which `pop` and `append` allow
         self._numbers = count()
 
     def lay_out(self, place: Path, changed: Mapping[str, bytes], *, new: bool = False) -> RunTree:
@@ -79,9 +82,9 @@ class BaseTree:
         """
         place.parent.mkdir(parents=True, exist_ok=True)
         pristine = self._sources if new else self._files
-        if new or not self._reused(place):
+        if new or not self._reused(place, changed):
             bytecode.write(pristine, place)
-        bytecode.put(changed, place)
+            bytecode.put(changed, place)
         stale = set(map(bytecode.bytecode_of, changed))
         files = {name: data for name, data in pristine.items() if name not in stale}
         return RunTree(place, {**files, **changed}, changed)
@@ -95,19 +98,38 @@ class BaseTree:
             changed = {*tree.changed, *map(bytecode.bytecode_of, tree.changed)}
             bytecode.write({name: self._files[name] for name in changed & self._files.keys()}, tree.place)
             unused = self._work / f"{os.getpid()}-tree-{next(self._numbers)}"
-            tree.place.rename(unused)
-            self._unused.append(unused)
+            if tree.move(unused):
+                self._unused.append(tree)
 
     def close(self) -> None:
         while self._unused:
-            remove_folder(self._unused.pop())
+            remove_folder(self._unused.pop().place)
 
-    def _reused(self, place: Path) -> bool:
+    def _reused(self, place: Path, changed: Mapping[str, bytes]) -> bool:
         while self._unused:
-            with suppress(OSError):  # a run can delete it
-                self._unused.pop().rename(place)
-                return True
+            try:
+                if self._unused.pop().move(place):
+                    bytecode.put(changed, place)
+                    return True
+            except OSError as err:
+                if is_disk_full(err):
+                    raise
+            _clear(place)  # a run has deleted the tree, or put something else in its place
         return False
+
+
+def _clear(place: Path) -> None:
+    if place.is_symlink() or place.is_file():
+        place.unlink()
+    remove_folder(place)
+
+
+def _number(folder: Path) -> int:
+    """Return the number of a folder's inode; 0 if it is missing."""
+    try:
+        return os.lstat(folder).st_ino
+    except OSError:
+        return 0
 
 
 def _files(path: Path) -> Iterator[str]:

@@ -16,7 +16,7 @@ from .misbehaving import ATTACKS, Came, Drawn, Misbehaving, misdeeds
 
 LONGEST_S = 300  # of a command, on a busy machine
 TOGETHER = 6  # attacks in one campaign
-HIT = "was changed while it was in use"
+HITS = ("was changed while it was in use", "its worker was stopped while it ran")
 OUTPUTS = ("log.npz", "said.json")
 NAMES = [*misdeeds(ATTACKS)]
 GROUPS = [NAMES[at : at + TOGETHER] for at in range(0, len(NAMES), TOGETHER)]
@@ -45,7 +45,7 @@ class Attacks:
             yield from wrong(self.run(engine, ()).rows, self.right, some=False)
         for name in names:
             status = came.status.get(known[name].model)
-            hit = HIT in came.bad.get(known[name].model, "")  # by another attack, twice
+            hit = is_hit(came.bad.get(known[name].model, ""))  # by another attack
             if status not in known[name].ends and not hit and not (status is None and noticed):
                 yield f"{name}: {status}, not {', '.join(known[name].ends)}"
         failed = Status.HARNESS_ERROR in came.status.values()
@@ -53,11 +53,15 @@ class Attacks:
             yield f"exit code {came.code}: {came.said}"
 
 
+def is_hit(row: str) -> bool:
+    return any(why in row for why in HITS)
+
+
 def wrong(rows: Mapping[str, str], right: Mapping[str, str], *, some: bool) -> Iterator[str]:
     """Yield the rows that differ; with `some`, rows can be missing, or say what was changed."""
     for name, row in right.items():
         found = rows.get(name, "")
-        if found != row and not (some and (not found or HIT in found)):
+        if found != row and not (some and (not found or is_hit(found))):
             yield f"{found}, not {row}"
 
 

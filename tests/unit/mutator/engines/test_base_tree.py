@@ -108,3 +108,25 @@ def test_a_tree_with_new_files_is_not_used_again(base: BaseTree, tmp_path: Path)
     base.take_back(tree)
     assert tree.place.is_dir()
     assert "car/left.json" not in content(base.lay_out(tmp_path / "b" / "tree", CHANGED))
+
+
+@pytest.mark.parametrize("within", ["", "car"])
+@pytest.mark.parametrize("change", [Path.touch, Path.mkdir, "link", "nothing"])
+def test_what_stands_in_the_place_of_an_unused_tree_is_not_used(
+    base: BaseTree, tmp_path: Path, within: str, change: Callable[[Path], None] | str
+) -> None:
+    """A run can delete an unused tree, or put a file or a link there. Nothing is written through the link."""
+    right = content(base.lay_out(tmp_path / "right" / "tree", CHANGED))
+    tree = base.lay_out(tmp_path / "a" / "tree", CHANGED)
+    base.take_back(tree)
+    (unused,) = tmp_path.glob("*-tree-*")
+    (unused / within).rename(tmp_path / "aside")
+    if change == "link":
+        (unused / within).symlink_to(tmp_path / "aside")
+    elif not isinstance(change, str):
+        change(unused / within)
+    before = {path: path.read_bytes() for path in (tmp_path / "aside").rglob("*.py")}
+    again = base.lay_out(tmp_path / "b" / "tree", CHANGED)
+    assert not again.first_changed()
+    assert content(again) == right
+    assert before == {path: path.read_bytes() for path in (tmp_path / "aside").rglob("*.py")}
