@@ -15,8 +15,9 @@ _DASK = "mutator.execution.cluster.dask_workers:ClusterWorkers"
 class Distributor(Protocol):
     """Distributes the pieces of a prepared session until none is left, or the session must stop.
 
-    When `run` returns, finished work is in the run folder. If `run` ends early, it sets
-    `session.problem` or `session.interrupted`.
+    When `run` returns, finished work is in the run folder, and `session.written` has what each closed worker
+    wrote: other lines are set aside. If `run` ends early, it sets `session.problem` or
+    `session.interrupted`.
     """
 
     def run(self, session: Session) -> None: ...

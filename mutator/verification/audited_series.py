@@ -90,11 +90,11 @@ def _packed(
 def _of_other_runs(folder: RunFolder, there: SeriesFolder, index: Index) -> Iterator[MutatorError]:
     records = folder.records()
     for name, number in index.entries.items():
+        if (record := records.get(name)) is None:  # lost; its series is not shown until it runs again
+            continue
         path = inside(there.path, f"{index.places[number][0]}.js")
         try:
-            check_run(about_of(there.entry(number)), records[name], path)
-        except KeyError:
-            yield MutatorError(f"a series of {name}, which has no record", where=path)
+            check_run(about_of(there.entry(number)), record, path)
         except MutatorError as err:
             if err.where == str(path):  # damaged chunks are reported above
                 yield _told(err, f"{name}: {err.got}", putting_aside(folder.path))

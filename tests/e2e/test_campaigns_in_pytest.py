@@ -118,6 +118,8 @@ def test_collecting_50000_experiments_is_fast(toy: Workspace, tmp_path: Path) ->
         pending=tuple(Pending(chunk, tuple(range(20))) for chunk in range(2500)),
         proof=(),
         engine="reference",
+        golden_digests={},
+        secret=b"",
         worker_name=lambda name: name,
         problem="",
         interrupted=False,

@@ -35,11 +35,17 @@ class OnePiece:
 
     def run(self, session: Session) -> None:
         name = session.worker_name("mine")
-        worker = Worker(
-            session.workspace, Assignment(run=session.folder.path, name=name, engine=session.engine)
+        assignment = Assignment(
+            run=session.folder.path,
+            name=name,
+            engine=session.engine,
+            goldens=session.golden_digests,
+            secret=session.secret,
         )
+        worker = Worker(session.workspace, assignment)
         worker.run(session.pending[0])
         worker.close()
+        session.written.report(worker.written)
         session.problem = "interrupted"
 
 

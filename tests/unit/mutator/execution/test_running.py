@@ -13,14 +13,20 @@ from mutator.workspace import Workspace
 class InOrder:
     def run(self, session: Session) -> None:
         name = session.worker_name("mine")
-        worker = Worker(
-            session.workspace, Assignment(run=session.folder.path, name=name, engine=session.engine)
+        assignment = Assignment(
+            run=session.folder.path,
+            name=name,
+            engine=session.engine,
+            goldens=session.golden_digests,
+            secret=session.secret,
         )
+        worker = Worker(session.workspace, assignment)
         for piece in session.pending:
             worker.run(piece)
         for sample in session.proof:
             worker.prove(sample)
         worker.close()
+        session.written.report(worker.written)
 
 
 class Idle:

@@ -131,5 +131,6 @@ def test_the_film_command_has_the_overlay_and_the_root_in_one_folder(pole: Works
     manifest = pole.library / MANIFEST
     manifest.write_text(manifest.read_text() + film)
     shot = Shot(out=tmp_path / "out.txt")
-    _show(pole.manifest("pole"), tmp_path / "scratch", {}, shot)
+    films = dict.fromkeys(("golden", "faulty"), str(tmp_path))
+    _show(pole.manifest("pole"), tmp_path / "scratch", films, shot)
     assert shot.out.read_text() == str(tmp_path / "scratch" / "tree" / "drive.py")

@@ -105,7 +105,7 @@ CHANGES: dict[str, Callable[[Path], None]] = {
     "the severity": lambda run: edit(
         run / "run.json",
         '"severity": null',
-        '"severity": {"name": "s", "about": "", "source": "", "classes": []}',
+        '"severity": {"name": "s", "about": "", "source": "", "classes": [["S0", 0, ""]]}',
     ),
     "a hazard's text": lambda run: edit(run / "run.json", '"about": "', '"about": "not '),
     "a limit": lambda run: edit(run / "run.json", '"steps": ', '"steps": 1'),

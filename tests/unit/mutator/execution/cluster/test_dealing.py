@@ -25,6 +25,7 @@ from mutator.execution.cluster.dask_workers import ClusterWorkers
 from mutator.execution.cluster.dealing import Deal
 from mutator.execution.cluster.intake import Intake
 from mutator.execution.cluster.pieces import Ending, Piece, Result
+from mutator.execution.written_files import WrittenFiles
 from mutator.model import Record, Status
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
@@ -133,6 +134,7 @@ def session(toycar: Workspace, folder: RunFolder, monkeypatch: pytest.MonkeyPatc
         engine="fork",
         accept_versions=True,
         worker_name=lambda name: f"0001-{name}",
+        written=WrittenFiles(),
         note_machine=lambda machine: None,
         problem="",
         interrupted=False,
