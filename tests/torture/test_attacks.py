@@ -16,7 +16,11 @@ from .misbehaving import ATTACKS, Came, Drawn, Misbehaving, misdeeds
 
 LONGEST_S = 300  # of a command, on a busy machine
 TOGETHER = 6  # attacks in one campaign
-HITS = ("was changed while it was in use", "its worker was stopped while it ran")
+HITS = (
+    "was changed while it was in use",
+    "in the tree that ran is not the one of this job",
+    "its worker was stopped while it ran",
+)
 OUTPUTS = ("log.npz", "said.json")
 NAMES = [*misdeeds(ATTACKS)]
 GROUPS = [NAMES[at : at + TOGETHER] for at in range(0, len(NAMES), TOGETHER)]
