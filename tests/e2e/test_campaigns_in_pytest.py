@@ -14,6 +14,7 @@ import pytest
 
 from mutator.campaigns.chunks import Pending
 from mutator.execution.pytest_session import Controller, configure
+from mutator.execution.written_files import WrittenFiles
 from mutator.workspace import Workspace
 
 PLAIN = ("-p", "no:cacheprovider", "-p", "no:hypothesispytest", "--assert=plain")
@@ -120,6 +121,7 @@ def test_collecting_50000_experiments_is_fast(toy: Workspace, tmp_path: Path) ->
         engine="reference",
         golden_digests={},
         secret=b"",
+        written=WrittenFiles(),
         worker_name=lambda name: name,
         problem="",
         interrupted=False,

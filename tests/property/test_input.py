@@ -23,9 +23,10 @@ from mutator.triggers.conditions import check_condition, evaluate
 
 QUIET = [HealthCheck.function_scoped_fixture]
 SPEC = Path(__file__).parents[2] / "fault_library" / "faults" / "car_sensors" / "speed.yaml"
+TEXT = st.text(st.characters(exclude_characters="\0", codec="utf-8"))  # YAML files may not have NUL
 PLAIN = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(),
-    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(), inner, max_size=3),
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | TEXT,
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(TEXT, inner, max_size=3),
     max_leaves=10,
 )
 
