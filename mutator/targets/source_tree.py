@@ -1,5 +1,6 @@
 """A target's files in memory, with a cache of data derived from them."""
 
+import errno
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -17,7 +18,7 @@ from mutator.errors import MutatorError
 T = TypeVar("T")
 MOST_SOURCE = 1_000_000  # bytes of a Python file
 MOST_TREE = 128_000_000  # bytes of all files, which are kept in memory
-_OF_LINK = 50  # files for which a link counts: it takes longer, and links in links multiply
+_OF_LINK = 100  # files for which a link counts: it takes longer, and links in links multiply
 MOST_FILES = 50_000  # files and folders below the folders that a manifest's globs name
 _SPECIAL = re.compile(r"(\*\*/|\*\*|\*|\?)")  # special characters in a glob
 
@@ -175,6 +176,15 @@ def _below(folder: Path, enters: Callable[[Path], bool], above: tuple[Path, ...]
         inside = list(folder.iterdir()) if folder.is_dir() and here not in above and enters(folder) else []
     except PermissionError:
         return
+    except OSError as err:
+        if err.errno != errno.ELOOP:
+            raise
+        raise MutatorError(
+            "more links in links than the system follows",
+            where=folder,
+            expected="the source of one controller",
+            remedy="remove the links, or name narrower folders in the manifest's `files`",
+        ) from None
     for path in inside:
         if path.is_dir():
             if path.name != "__pycache__":
