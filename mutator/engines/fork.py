@@ -87,14 +87,22 @@ class ForkEngine:
                 yield job, self.execute(job, folder)
             finally:
                 remove_folder(folder)
+                remove_folder(self.reference.folder_of(job))
 
     def execute(self, job: Job, folder: Path) -> Execution:
+        """Run one job in the new scratch folder `folder` or, if it cannot be forked, on the reference engine.
+
+        The reference engine has another folder: mutants of the fork server can write beside their own one, so
+        a link could be in its place.
+        """
         try:
             with raising_disk_full(self._work):
                 return self._execute(job, folder)
         except (NotSwappable, Refused) as why:
-            remove_folder(folder)
-            return replace(self.reference.execute(job, folder), why=steady(str(why), folder))
+            another = self.reference.folder_of(job)
+            remove_folder(another)
+            execution = self.reference.execute(job, another)
+            return replace(execution, why=steady(str(why), folder))
         except Lost as why:
             self.close()
             return _lost(str(why), folder)
@@ -177,7 +185,7 @@ class ForkEngine:
         self, waiting: Waiting, job: Job, folder: Path, swap: CodeSwap, start: Start, watch: bool = False
     ) -> Execution:
         out = folder / "out"
-        _make_folder(folder)
+        number = _make_folder(folder)
         request = {
             "home": str(folder),
             "out": str(out),
@@ -206,6 +214,9 @@ class ForkEngine:
         asked = {"do": "mutant", "job": marshal.dumps(request), "home": str(limited), **limits}
         with nullcontext() if waiting.key else used_unchanged(job.scenario):
             said, _ = waiting.ask(asked, self._patience_s)
+        if _number_of(folder) != number:
+            self.close()
+            raise Lost("the folder of the run was exchanged")
         self._running(job).clean(folder)
         if said["threads"]:
             raise Refused(too_many(said["threads"]), turned_off(said["threads"]))
@@ -312,14 +323,18 @@ _CODE_BYTES = 32
 _FROM_THE_START = Start(step=0, observed=0, began=None, t=None)
 
 
-def _make_folder(folder: Path) -> None:
-    """Make the folder of a run, without following a link that an earlier run left there."""
+def _make_folder(folder: Path) -> int:
+    """Make the folder of a run, without following a link that an earlier run left there; return its number.
+
+    Raises Lost if something else is in its place.
+    """
     try:
         folder.mkdir()
         handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
         try:
             os.mkdir("out", dir_fd=handle)
             os.close(os.open(inactive(folder).name, os.O_CREAT | os.O_EXCL, 0o644, dir_fd=handle))
+            return os.fstat(handle).st_ino
         finally:
             os.close(handle)
     except OSError as err:
@@ -363,6 +378,14 @@ def _lost(why: str, folder: Path) -> Execution:
         wall_s=0.0,
         mode=RunMode.FORK,
     )
+
+
+def _number_of(folder: Path) -> int:
+    """Return the number of what is at this place, without following a link; 0 if there is nothing."""
+    try:
+        return os.lstat(folder).st_ino
+    except OSError:
+        return 0
 
 
 def make_fork(setting: Setting) -> ForkEngine:

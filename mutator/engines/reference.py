@@ -72,11 +72,15 @@ class ReferenceEngine:
 
     def run(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Execution]]:
         for job in jobs:
-            folder = self.work / f"{os.getpid()}-{job.name}"
+            folder = self.folder_of(job)
             try:
                 yield job, self.execute(job, folder)
             finally:
                 remove_folder(folder)
+
+    def folder_of(self, job: Job) -> Path:
+        """Return the scratch folder in which `run` runs a job. In a sandbox, no other run reaches it."""
+        return self.work / f"{os.getpid()}-{job.name}"
 
     def close(self) -> None:
         self._base_tree.close()

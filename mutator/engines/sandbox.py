@@ -16,7 +16,7 @@ from functools import lru_cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from mutator._common.below import entries_below, is_inside
+from mutator._common.below import is_inside
 from mutator._common.files import remove_folder
 from mutator.engines.processes import environment
 from mutator.errors import MutatorError
@@ -37,6 +37,13 @@ class Sandbox:
     """A sandbox in which processes read `reads`, and write to the existing folder `folder` and to `cache`."""
 
     def __init__(self, folder: Path, reads: Iterable[Path], cache: Path | None = None) -> None:
+        if folder.is_symlink():
+            raise MutatorError(
+                "a link in the place of a run's folder",
+                where=folder,
+                expected="the folder that the harness made",
+                remedy="run the same command again; a mutant may have exchanged it",
+            )
         self._folder = folder
         binds: list[str] = []
         self._temporary: list[int] = []  # descriptors, because runs can exchange what is in `folder`
@@ -87,9 +94,13 @@ class Sandbox:
                 remove_folder(path)
             else:
                 path.unlink(missing_ok=True)
-        for _, entry in entries_below(run):
-            if entry.is_symlink() and not is_inside(run, Path(entry.path)):
-                Path(entry.path).unlink(missing_ok=True)
+        _open_up(run)
+        for folder, folders, files in os.walk(run):
+            for path in (Path(folder, name) for name in (*folders, *files)):
+                if not path.is_symlink():
+                    _open_up(path)
+                elif not is_inside(run, path):
+                    path.unlink(missing_ok=True)
 
     def close(self) -> None:
         while self._temporary:
@@ -99,6 +110,12 @@ class Sandbox:
         for handle in self._temporary:
             with suppress(OSError):
                 yield from Path(f"/proc/self/fd/{handle}").iterdir()
+
+
+def _open_up(path: Path) -> None:
+    """Let this user list and change a folder that a run left; not if it is a link."""
+    if path.is_dir() and not path.is_symlink():
+        path.chmod(0o700)
 
 
 def check() -> None:

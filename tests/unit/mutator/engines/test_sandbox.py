@@ -185,6 +185,36 @@ def test_what_a_run_left_is_cleared_even_if_it_exchanged_folders_for_links(tmp_p
 
 
 @needed
+def test_a_mutant_that_exchanges_its_folder_for_a_link_reaches_nothing(
+    toycar: Workspace, tmp_path: Path, edit: Edit
+) -> None:
+    """The harness neither follows the link nor runs the mutant again in the folder behind it."""
+    mine = tmp_path / "mine"
+    (mine / "out").mkdir(parents=True)
+    (mine / "out" / "tool").symlink_to("/usr/bin/env")
+    (mine / "kept").write_text("x")
+    body = (
+        "        here = __import__('os').path.dirname(__import__('os').getcwd())\n"
+        "        if here.endswith('/mutant'):\n"
+        "            __import__('os').rename(here, here + '-x')\n"
+        f"            __import__('os').symlink({str(mine)!r}, here)\n"
+        "            raise ValueError('run me again')\n"
+    )
+    edit(
+        "tree/toycar/sensing.py", "        offset = world.offset\n", f"        offset = world.offset\n{body}"
+    )
+    boxed = Fork(replace(toycar, sandbox=True), tmp_path)
+    job = replace(boxed.job(at_time(3.0)), name="mutant")
+    [(_, execution)] = boxed.engine.run([job])
+    boxed.close()
+    assert (execution.status, execution.detail) == (
+        Status.HARNESS_ERROR,
+        "the folder of the run was exchanged",
+    )
+    assert sorted(path.name for path in mine.rglob("*")) == ["kept", "out", "tool"]
+
+
+@needed
 def test_only_fault_free_runs_write_to_a_cache_of_this_target_alone(run: Run, toycar: Workspace) -> None:
     manifest = toycar.manifest("toycar")
     cache = replace(manifest, sandbox=True).cache
