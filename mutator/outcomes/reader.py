@@ -207,25 +207,29 @@ def row_of(
 
 
 def same_parquet(path: Path, made: Path) -> bool:
-    """Return whether two Parquet files have the same rows. Different versions of pyarrow can write different
-    bytes.
+    """Return whether two Parquet files have the same rows and metadata.
+
+    Different versions of pyarrow can write different bytes.
     """
     import pyarrow as pa
     from pyarrow import parquet
 
     try:
         files = [parquet.ParquetFile(one, pre_buffer=False) for one in (path, made)]
-        names, others = (file.schema_arrow.names for file in files)
-        return names == others and all(  # one column at a time: tables can be large
+        first, second = (file.schema_arrow for file in files)
+        # one column at a time, because tables can be large
+        return first.equals(second, check_metadata=True) and all(
             files[0].read([name], use_threads=False).equals(files[1].read([name], use_threads=False))
-            for name in names
+            for name in first.names
         )
     except (pa.ArrowException, OSError):
         return False
 
 
 def _frame(data: bytes) -> "pd.DataFrame":
-    frame: pd.DataFrame = _table(io.BytesIO(data)).to_pandas(use_threads=False)
+    # a run's tables have no metadata; in a forged one, it could give columns each other's names
+    table = _table(io.BytesIO(data))
+    frame: pd.DataFrame = table.to_pandas(use_threads=False, ignore_metadata=True)
     return frame
 
 

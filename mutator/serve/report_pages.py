@@ -1,6 +1,7 @@
 """Reports and comparisons, which the server builds from the data of the served runs, and files of runs."""
 
 import threading
+from collections.abc import Mapping
 from pathlib import Path
 
 from starlette.responses import HTMLResponse, Response
@@ -22,6 +23,7 @@ from mutator.serve.report_cache import ReportCache
 from mutator.serve.runs import Absent, Runs, open_in_run
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_script import read_script, script_of
+from mutator.verification.audited_tables import tables
 from mutator.workspace import Workspace
 
 _HEAD = """<meta name="mutator-page" content="{}">
@@ -71,7 +73,7 @@ class Shown:
         folder = RunFolder.open(run)
         with self._making:
             key = made_from(folder, self._workspace)
-            data = self._reports.file(key, name, lambda: building.build(folder, self._workspace).files)
+            data = self._reports.file(key, name, lambda: self._built(folder))
         if data is None:
             raise Absent("no such file", expected="a file of the report")
         if not name.endswith(".html"):
@@ -81,6 +83,14 @@ class Shown:
             data = head.join(data.split(b"</head>", 1))
             data = _SCRIPTS.join(data.rsplit(b"</body>", 1))
         return HTMLResponse(data)
+
+    def _built(self, folder: RunFolder) -> Mapping[str, bytes]:
+        """Build a report. Raise MutatorError if the tables of a finished run do not follow from its records:
+        the report shows them beside the run's seal."""
+        if folder.finished:
+            for problem in tables(folder)[1]:
+                raise problem
+        return building.build(folder, self._workspace).files
 
     def _comparison(self, a: Path, b: Path) -> dict[str, bytes]:
         made = comparing.compare(a, b, None, (self._alerts(a), self._alerts(b)))

@@ -98,7 +98,7 @@ def decode(data: bytes, golden: Series | None = None) -> Series:
 def about_of(data: bytes) -> dict[str, Any]:
     """Return what an encoded run says about itself; MutatorError if the bytes are damaged."""
     try:
-        raw = gzip.decompress(data)
+        raw = unpacked(data, MOST_BYTES, gzip=True)
         (length,) = _LENGTH.unpack_from(raw)
         return dict(json.loads(raw[_LENGTH.size : _LENGTH.size + length]))
     except (ValueError, TypeError, struct.error, EOFError, OSError, zlib.error) as err:

@@ -39,6 +39,8 @@ OUTSIDE = {
 _FILES = (CAMPAIGN, CSV, plan_file.EXPERIMENTS, plan_file.FAULTS)
 _UNSEALED_FILES = "times, engines and hosts of the experiments; series, kept traces, plots, stills, films"
 
+_APPROVALS = "only the review digest covers who approved what"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Seals:
@@ -106,7 +108,8 @@ def unsealed_facts(folder: RunFolder) -> dict[str, str]:
     choices = folder.head["choices"]
     chosen = {f"chosen: {name}": str(choices[name]) for name in ("shard", "series_mb") if choices.get(name)}
     environment = {name: text for name, text in told(folder.stretches).items() if name != "python"}
-    return {**environment, **chosen, "other files": _UNSEALED_FILES}
+    approvals = {"approvals": _APPROVALS} if review_digest(folder.path) else {}
+    return {**environment, **chosen, **approvals, "other files": _UNSEALED_FILES}
 
 
 def golden_digests(folder: RunFolder, names: Sequence[str]) -> dict[str, str]:

@@ -1,5 +1,6 @@
 """The module through which all others read the results of a run."""
 
+import json
 import os
 import re
 import subprocess
@@ -10,6 +11,7 @@ from typing import Any
 
 import pandas as pd
 import pytest
+from pyarrow import parquet
 
 import mutator
 from mutator.comparison.sides import read_side
@@ -20,7 +22,7 @@ from mutator.exports.write import export
 from mutator.model import Experiment, Outcome, Status
 from mutator.outcomes import result_rows, results
 from mutator.outcomes.columns import SEVERITY, SINCE, metric_columns, result_columns
-from mutator.outcomes.reader import Results
+from mutator.outcomes.reader import Results, same_parquet
 from mutator.report import building
 from mutator.statistics.frame import load
 from mutator.store import plan_file
@@ -207,3 +209,21 @@ def test_no_other_module_opens_the_tables() -> None:
         if opens.search(path.read_text()) or named.search(path.read_text())
     }
     assert found == allowed
+
+
+def test_metadata_of_a_table_give_no_column_another_name(run: Path) -> None:
+    """The cells of the forged table are the genuine ones."""
+    results.build(run)
+    path = run / "results.parquet"
+    genuine, table = Results.of_run(run).frame(), parquet.read_table(path)
+    swap = {"DROPPED": "CRUSHED", "CRUSHED": "DROPPED"}
+    columns = [
+        {"name": swap.get(n, n), "field_name": n, "pandas_type": "", "numpy_type": "", "metadata": None}
+        for n in table.column_names
+    ]
+    about = {"index_columns": [], "column_indexes": [], "columns": columns, "pandas_version": "2.2.0"}
+    forged = path.with_name("forged.parquet")
+    parquet.write_table(table.replace_schema_metadata({"pandas": json.dumps(about)}), forged)
+    assert not same_parquet(forged, path)
+    forged.replace(path)
+    assert Results.of_run(run).frame().equals(genuine)

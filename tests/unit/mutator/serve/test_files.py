@@ -2,19 +2,25 @@
 
 import json
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from urllib.parse import quote
 
 import pytest
 
 from mutator._common import caches
+from mutator.errors import MutatorError
+from mutator.outcomes import results
 from mutator.report import building
 from mutator.report.stamp import made_from, write_files
 from mutator.serve.answers import without_places
+from mutator.serve.page_tokens import PageTokens
 from mutator.serve.report_cache import ReportCache
+from mutator.serve.report_pages import Shown
+from mutator.serve.runs import Runs
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_script import script_of
+from mutator.workspace import Workspace
 
 from ..report.made_run import make_run
 from .conftest import SECRET, Client
@@ -225,6 +231,17 @@ def test_a_changed_run_gets_a_new_report(client: Client, linked: Path) -> None:
     results = linked / "results.csv"
     results.write_text(results.read_text().replace("18.25", "18.26"))
     assert client.get("/runs/linked/report/index.html").data != before
+
+
+def test_an_edited_table_is_not_shown_beside_the_seal_of_a_finished_run(
+    toycar: Workspace, tmp_path: Path, write_finished: Callable[..., Path]
+) -> None:
+    table = results.build(write_finished(toycar, tmp_path / "night"))
+    shown = Shown(toycar, Runs((tmp_path,)), PageTokens(b"secret"))
+    assert shown.file("night", "report/index.html").status_code == 200
+    table.write_text(table.read_text().replace(",masked,", ",sdc,", 1))
+    with pytest.raises(MutatorError, match=r"results\.csv:\d+: 'sdc'; expected 'masked'"):
+        shown.file("night", "report/index.html")
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from mutator.store.approvals import write_approvals
 from mutator.store.lines import written
 from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
-from mutator.verification.seal import seal_of, seal_or_why_not, seals_of
+from mutator.verification.seal import seal_of, seal_or_why_not, seals_of, unsealed_facts
 from mutator.workspace import Workspace
 
 Reseal = Callable[..., None]
@@ -187,3 +187,5 @@ def test_the_review_digest_covers_who_decided_what(made: Path, run: Path) -> Non
         found.append(seals_of(RunFolder.open(run)))
     assert len({one.review_digest for one in found} | {seals_of(RunFolder.open(made)).review_digest}) == 3
     assert {one.seal for one in found} == {sealed(made)}
+    assert "approvals" in unsealed_facts(RunFolder.open(run))
+    assert "approvals" not in unsealed_facts(RunFolder.open(made))
