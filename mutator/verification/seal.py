@@ -3,14 +3,15 @@
 * The *seal* covers a finished run's results and everything that results and pages are made from: all of
   run.json and checks.json but `OUTSIDE`, the campaign, the plan, golden runs, records with their patches, and
   the proof. It includes the versions of Python and packages.
-* The *results digest* covers plan, golden runs and records only, so that it does not depend on versions that
-  compute the same results.
+* The *results digest* covers golden runs, records, and run.json but `OUTSIDE_RESULTS`. It leaves out all
+  versions and the texts of exceptions, so that it does not depend on versions that compute the same results.
 * The *review digest* covers the decisions that allowed the run, with `--require-reviewed`.
 
 No digest depends on costs, hosts, or the division of the work into sessions, workers and shards.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,13 +31,16 @@ from mutator.store.run_head import CAMPAIGN, HEAD
 from mutator.store.stretches import told
 from mutator.verification.equivalence import FOLDER as PROOF
 
-SCHEMA, RESULTS_SCHEMA = "seal/2", "results-digest/1"
+SCHEMA, RESULTS_SCHEMA = "seal/2", "results-digest/2"
+_RUNS_SCHEMA = "results-digest/1"  # of the plan and its runs, as the seal includes them
 # Everything else in these files is sealed, including keys that later versions add.
 OUTSIDE = {
     HEAD: ("stretches", "choices.shard", "choices.series_mb"),
     CHECKS: ("digest", "run_cpu_s"),  # the key of a cache, which depends on the machine; a cost
 }
+OUTSIDE_RESULTS = ("schema", "provenance", *OUTSIDE[HEAD])  # of run.json
 _FILES = (CAMPAIGN, CSV, plan_file.EXPERIMENTS, plan_file.FAULTS)
+_TEXTS, _NO_TEXTS = ("detail", "error.message"), (b'"detail":""', b'"error":null')
 _UNSEALED_FILES = "times, engines and hosts of the experiments; series, kept traces, plots, stills, films"
 
 _APPROVALS = "only the review digest covers who approved what"
@@ -65,7 +69,16 @@ def seals_of(folder: RunFolder) -> Seals:
     review = review_digest(folder.path)
     if not folder.finished:
         return Seals(review_digest=review)
-    results = digest([RESULTS_SCHEMA, folder.head["plan"], golden_files(folder), _records(folder, "records")])
+    goldens = golden_files(folder)
+    runs = digest([_RUNS_SCHEMA, folder.head["plan"], goldens, _records(folder, "records")])
+    results = digest(
+        [
+            RESULTS_SCHEMA,
+            without(folder.head, OUTSIDE_RESULTS),
+            goldens,
+            _records(folder, "records", _without_texts),
+        ]
+    )
     facts = {
         HEAD: without(folder.head, OUTSIDE[HEAD]),
         CHECKS: without(read_json(folder.path / CHECKS, CHECKS_SCHEMA), OUTSIDE[CHECKS]),
@@ -73,7 +86,7 @@ def seals_of(folder: RunFolder) -> Seals:
         "files": _sha256(folder, _FILES),
         PROOF: _records(folder, PROOF),
     }
-    return Seals(seal=digest([SCHEMA, results, facts]), results_digest=results, review_digest=review)
+    return Seals(seal=digest([SCHEMA, runs, facts]), results_digest=results, review_digest=review)
 
 
 def seal_of(folder: RunFolder) -> str | None:
@@ -138,12 +151,21 @@ def _versions(folder: RunFolder) -> list[str]:
     return sorted({canonical([one.python, one.packages]) for one in folder.stretches})
 
 
-def _records(folder: RunFolder, kind: str) -> dict[str, str]:
-    """Digest of each valid record's line without its checksum, by experiment id."""
+def _records(
+    folder: RunFolder, kind: str, sealed: Callable[[bytes], bytes] = lambda body: body
+) -> dict[str, str]:
+    """Digest of what is `sealed` of each valid record's line without its checksum, by experiment id."""
     found = {}
     for path in sorted(inside(folder.path, kind).glob("*.jsonl")):
         segment = bare_segment(path, checksums=True)
         for number, line in intact_lines(path, checksums=True):
             if number > 1 and (ending := ending_on(line)).counts:
-                found[ending.experiment_id] = digest(segment.body_of(line))
+                found[ending.experiment_id] = digest(sealed(segment.body_of(line)))
     return found
+
+
+def _without_texts(body: bytes) -> bytes:
+    """A record's line without the texts of exceptions, which differ between versions of Python."""
+    if all(part in body for part in _NO_TEXTS):
+        return body
+    return canonical(without(json.loads(b"{" + body), _TEXTS)).encode()

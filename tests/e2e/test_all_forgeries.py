@@ -201,12 +201,34 @@ def passes(genuine: tuple[Workspace, Path, Seals], run: Path) -> bool:
     return mutator.verify(run, report=True, workspace=workspace).passed
 
 
+def has_results_digest(genuine: tuple[Workspace, Path, Seals], run: Path) -> bool:
+    try:
+        return seals_of(RunFolder.unverified(run)).results_digest == genuine[2].results_digest
+    except (MutatorError, LookupError, ValueError, TypeError, AttributeError):
+        return False
+
+
 def is_outside(forgery: Forgery) -> bool:
     return forgery.kind in OUTSIDE
 
 
 def test_the_genuine_run_passes(genuine: tuple[Workspace, Path, Seals]) -> None:
     assert passes(genuine, genuine[1])
+
+
+def is_of_results(forgery: Forgery) -> bool:
+    """Whether the results digest covers what is forged: what is recorded, and what it is judged by."""
+    in_head = forgery.kind.startswith("run.json") and "versions" not in forgery.kind
+    return forgery.kind in {"records", "golden"} or (in_head and forgery.kind != "run.json: provenance")
+
+
+def test_no_forgery_of_a_result_or_its_judgement_has_the_results_digest(
+    genuine: tuple[Workspace, Path, Seals], tmp_path: Path, reseal: Callable[..., None]
+) -> None:
+    of_results = [one for one in forgeries(genuine[1]) if is_of_results(one) and not is_outside(one)]
+    for forgery in {one.kind: one for one in of_results}.values():
+        run = forged(genuine, tmp_path / "run", forgery, reseal)
+        assert not has_results_digest(genuine, run), forgery.name
 
 
 def test_a_sample_of_forgeries_does_not_pass(
@@ -238,6 +260,8 @@ def test_no_forgery_passes_outside_the_list(
         seen[forgery.kind, "plain"] += plain
         if not caught and not is_outside(forgery):
             wrong.append(forgery.name)
+        if is_of_results(forgery) and not is_outside(forgery) and has_results_digest(genuine, run):
+            wrong.append(f"results digest: {forgery.name}")
         if is_outside(forgery):
             assert seals_of(RunFolder.unverified(run)) == genuine[2], forgery.name
             assert mutator.verify(run, workspace=genuine[0]).not_sealed["other files"]
