@@ -1,15 +1,15 @@
 """Reads the trace files of runs. The suffix selects the reader."""
 
 import io
-import json
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from mutator._common.bounded import MOST_WHOLE, check_open, open_regular, read_bounded
+from mutator._common.bounded import MOST_WHOLE, read_bounded
 from mutator.outcomes import npz
+from mutator.outcomes.mcap_files import BadTrace, read_topics
 from mutator.targets.channels import Channel
 from mutator.targets.manifest import TargetManifest
 
@@ -18,14 +18,6 @@ MOST_TRACE = MOST_WHOLE  # bytes of a trace, also when unpacked
 MOST_CSV = 64_000_000  # bytes; as numbers, text takes more memory
 _MOST_COLUMNS = 10_000
 _NUMERIC = ("BOOLEAN", "INT32", "INT64", "FLOAT", "DOUBLE")
-
-
-class BadTrace(ValueError):
-    """An invalid trace file: what was found, and what was expected."""
-
-    def __init__(self, got: str, expected: str) -> None:
-        super().__init__(got)
-        self.got, self.expected = got, expected
 
 
 def _check_size(size: int) -> None:
@@ -138,38 +130,22 @@ _COLUMNS: Mapping[str, Callable[[Path, Iterable[str] | None, Collection[str]], A
 
 def _read_mcap(path: Path, steps: str, channels: Iterable[Channel], also: Sequence[Channel]) -> Arrays:
     """Read JSON messages. Channels are named `/topic:field.of.field`. Log times are simulated time in ns."""
-    try:
-        from mcap.reader import make_reader
-    except ImportError:
-        raise BadTrace("an .mcap file, but the package mcap is missing", "pip install mcap") from None
     places = {channel.name: channel.in_trace.partition(":")[::2] for channel in channels}
     may_miss = {channel.name for channel in also}
-    topics = {steps, *(topic for topic, _ in places.values())}
-    seen: dict[str, list[tuple[float, Any]]] = {topic: [] for topic in topics}
-    with open_regular(path) as file:
-        check_open(file, path, MOST_TRACE)
-        reader = make_reader(file)
-        summary = reader.get_summary()
-        _check_size(sum(chunk.uncompressed_size for chunk in summary.chunk_indexes) if summary else 0)
-        for _, channel, message in reader.iter_messages(topics=sorted(topics)):
-            if channel.message_encoding != "json":
-                raise BadTrace(f"{channel.message_encoding} messages in {channel.topic}", "JSON messages")
-            seen[channel.topic].append((message.log_time / 1e9, json.loads(message.data)))
-    if not seen[steps]:
+    fields: dict[str, dict[str, None]] = {steps: {}}
+    for topic, field in places.values():
+        fields.setdefault(topic, {})[field] = None
+    topics = read_topics(path, fields)
+    if not topics[steps][0]:
         raise KeyError(steps)
-    values = {steps: np.array([t for t, _ in seen[steps]])}
+    values = {steps: np.array(topics[steps][0])}
     for name, (topic, field) in places.items():
-        if not seen[topic]:
+        times, columns = topics[topic]
+        if not times:
             if name in may_miss:
                 continue
             raise KeyError(topic)
-        values[name] = np.array([_field(data, field) for _, data in seen[topic]])
+        values[name] = np.array(columns[field])
         if topic != steps:
-            values[own_times(name)] = np.array([t for t, _ in seen[topic]])
+            values[own_times(name)] = np.array(times)
     return values
-
-
-def _field(data: Any, path: str) -> Any:
-    for key in path.split("."):
-        data = data[key]
-    return data
