@@ -14,6 +14,7 @@ import numpy as np
 
 from mutator.model import Record
 from mutator.outcomes.golden import Trace, on_steps
+from mutator.outcomes.trace_files import own_times
 from mutator.store.series import SeriesFolder, run_facts, write_kept
 from mutator.store.series_format import Points, Series, encode
 from mutator.targets.channels import Channel, Role
@@ -42,7 +43,11 @@ class Sampler:
             about={
                 "start": float(self._time[0]),
                 "end": float(self._time[-1]),
-                "channels": [_told(channel, manifest) for channel in self._channels],
+                "channels": [
+                    _told(channel, manifest)
+                    | ({"own_times": True} if own_times(channel.name) in golden else {})
+                    for channel in self._channels
+                ],
             },
         )
 
@@ -53,17 +58,21 @@ class Sampler:
     def series(self, faulty: Trace, record: Record) -> Series:
         own = np.asarray(faulty[self._clock], dtype=float)
         last = own[-1] if len(own) else -np.inf
+        is_prefix = _is_prefix(own, self._time)
         time, golden, values = self._together(faulty, own)
         known = self.golden.t[self.golden.t <= last + _TINY]
         late = np.flatnonzero(time > self._time[-1] + _TINY)
         at = np.concatenate((np.searchsorted(time, known), late[_thinned(time[late])])).astype(int)
         end = int(np.searchsorted(time, min(last, self._time[-1]), side="right")) - 1
+        compared = end + 1 if is_prefix else len(time)  # as `golden.deviation` compares them
         return Series(
             t=time[at],
             rows=self._rows(values[:, at]),
             every=self._every,
             about=run_facts(record) | {"end": float(max(self._time[-1], last))},
-            points=_points(time, golden, values, self._sampled(len(time), at), end, record),
+            points=_points(
+                time, golden[:, :compared], values[:, :compared], self._sampled(len(time), at), end, record
+            ),
         )
 
     def _sampled(self, count: int, at: np.ndarray) -> np.ndarray:
@@ -86,9 +95,9 @@ class Sampler:
         return [np.ascontiguousarray(row[::every]) for row, every in zip(single, self._every, strict=True)]
 
     def _together(self, faulty: Trace, own: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the union of both runs' step times, and each run's values, which are NaN after its end."""
-        rows = min(len(own), len(self._time))
-        if np.array_equal(own[:rows], self._time[:rows]):
+        """Return the union of both runs' step times, and each run's values. After its end, a run has no value
+        (NaN) or, if the runs have different times, its last one."""
+        if _is_prefix(own, self._time):
             time = max(own, self._time, key=len)
             return time, _filled(self._values, len(time)), _filled(self._on(faulty, own), len(time))
         time = np.union1d(own, self._time)
@@ -104,10 +113,15 @@ class Sampler:
 
     @staticmethod
     def _held(values: np.ndarray, own: np.ndarray, time: np.ndarray) -> np.ndarray:
-        """Return the newest value of each row at the given times; NaN before its first and after its last."""
+        """Return the newest value of each row at the given times; NaN before its first."""
         place = np.searchsorted(own, time + _TINY, side="right") - 1
-        there = (place >= 0) & (time <= own[-1] + _TINY)
-        return np.where(there, values[:, np.maximum(place, 0)], np.nan)
+        return np.where(place >= 0, values[:, np.maximum(place, 0)], np.nan)
+
+
+def _is_prefix(own: np.ndarray, other: np.ndarray) -> bool:
+    """Whether two runs have the same times up to the end of the shorter one."""
+    rows = min(len(own), len(other))
+    return bool(np.array_equal(own[:rows], other[:rows]))
 
 
 def _thinned(time: np.ndarray) -> np.ndarray:
@@ -152,9 +166,8 @@ def _points(
 ) -> Points:
     """Return the steps that each channel keeps in addition to the `sampled` ones.
 
-    `end` is the last step that both runs have.
+    `end` is the last step that both runs have. `golden` and `faulty` end with the last step that is compared.
     """
-    golden, faulty = golden[:, : end + 1], faulty[:, : end + 1]
     drive = end + 1 if record.t_end is None else _until(time, record.t_end)
     hazards = {_until(time, t) - 1 for _, t in record.hazards} & set(range(end + 1))
     found: list[tuple[int, int]] = []

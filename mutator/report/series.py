@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from mutator.errors import MutatorError
 from mutator.execution.traces import Traces
+from mutator.outcomes.columns import deviation_columns
 from mutator.outcomes.sampling import keep_series
 from mutator.store.run_folder import RunFolder
 from mutator.store.series import SeriesFolder
@@ -14,10 +15,12 @@ if TYPE_CHECKING:
 
 
 def series_facts(folder: RunFolder) -> dict[str, Any]:
-    """Whether series are packed, and which experiments have their own file. The page must not request a
-    missing file, because the browser's console would show an error."""
+    """Whether series are packed, which experiments have their own file, and the columns with the largest
+    deviation of each channel, which its curves must have. The page must not request a missing file, because
+    the browser's console would show an error."""
     series = SeriesFolder(folder.path)
-    return {"packed": series.is_packed, "kept": series.kept_ids()}
+    columns = dict(deviation_columns(folder.head["compared"]))
+    return {"packed": series.is_packed, "kept": series.kept_ids(), "deviations": columns}
 
 
 def sample_kept_traces(folder: RunFolder, workspace: "Workspace") -> None:

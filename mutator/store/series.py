@@ -19,6 +19,7 @@ from mutator.errors import MutatorError
 from mutator.model import Record
 from mutator.store.series_format import Series, decode
 from mutator.store.series_script import name_of, read_script, write_script
+from mutator.store.series_sizes import check_values
 
 SCHEMA, FOLDER, KEPT = "series/1", "series", "kept"
 INDEX = "index"
@@ -128,6 +129,7 @@ class SeriesFolder:
             found = self._read(experiment_id)
             if found is not None:
                 check_run(found[1].about, record)
+                check_values(*found, record)
             return found
         except MutatorError as err:
             remedy = f"rerun the experiment: {making_again(self.path.parent, experiment_id)}"

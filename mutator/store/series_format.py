@@ -95,16 +95,6 @@ def decode(data: bytes, golden: Series | None = None) -> Series:
         raise MutatorError(f"a damaged series ({err})", expected="unchanged bytes") from None
 
 
-def about_of(data: bytes) -> dict[str, Any]:
-    """Return what an encoded run says about itself; MutatorError if the bytes are damaged."""
-    try:
-        raw = unpacked(data, MOST_BYTES, gzip=True)
-        (length,) = _LENGTH.unpack_from(raw)
-        return dict(json.loads(raw[_LENGTH.size : _LENGTH.size + length]))
-    except (ValueError, TypeError, struct.error, EOFError, OSError, zlib.error) as err:
-        raise MutatorError(f"a damaged series ({err})", expected="unchanged bytes") from None
-
-
 def _decode(raw: bytes, golden: Series | None) -> Series:
     (length,) = _LENGTH.unpack_from(raw)
     at = _LENGTH.size + length

@@ -1,6 +1,7 @@
 """Audit series: check that their files are unchanged. No result depends on them."""
 
 from collections.abc import Iterator
+from contextlib import suppress
 
 import numpy as np
 
@@ -8,6 +9,7 @@ from mutator._common.below import inside
 from mutator.errors import MutatorError
 from mutator.outcomes.judging import load_channels
 from mutator.outcomes.sampling import Sampler
+from mutator.store import plan_file
 from mutator.store.blocks import read_blocks
 from mutator.store.run_folder import RunFolder
 from mutator.store.series import (
@@ -19,8 +21,9 @@ from mutator.store.series import (
     putting_aside,
     read_kept,
 )
-from mutator.store.series_format import Series, about_of, decode
+from mutator.store.series_format import Series, decode
 from mutator.store.series_packing import segments
+from mutator.store.series_sizes import check_values
 from mutator.targets.manifest import TargetManifest
 
 _ROUNDING = 1e-5  # relative; values have six digits
@@ -36,15 +39,9 @@ def series(folder: RunFolder, manifest: TargetManifest | None = None) -> tuple[i
 def _problems(
     folder: RunFolder, there: SeriesFolder, manifest: TargetManifest | None
 ) -> Iterator[MutatorError]:
-    run, records = folder.path, folder.records()
+    run = folder.path
     yield from _packed(folder, there, manifest)
-    for name in there.kept_ids():
-        try:
-            _, faulty = read_kept(there.kept(name))
-            if (record := records.get(name)) is not None:
-                check_run(faulty.about, record, there.kept(name))
-        except MutatorError as err:
-            yield _told(err, err.got, f"{making_again(run, name)} rebuilds it")
+    yield from _kept(folder, there, manifest)
     for path in segments(run):
         if read_blocks(path).damaged:
             yield MutatorError(
@@ -53,6 +50,24 @@ def _problems(
                 expected="series as a worker appended them",
                 remedy=putting_aside(run),
             )
+
+
+def _kept(folder: RunFolder, there: SeriesFolder, manifest: TargetManifest | None) -> Iterator[MutatorError]:
+    names, records = there.kept_ids(), folder.records()
+    planned = {one.id: one for one in plan_file.read_all(folder.path)} if names and manifest else {}
+    for name in names:
+        path = there.kept(name)
+        try:
+            golden, faulty = read_kept(path)
+            if (record := records.get(name)) is not None:
+                check_run(faulty.about, record, path)
+                check_values(golden, faulty, record, path)
+            if name in planned and (run := folder.golden_folder(planned[name])).is_dir():
+                assert manifest is not None
+                if not _are_same(golden, Sampler(manifest, load_channels(manifest, run)).golden):
+                    raise MutatorError("differs", where=path, expected=f"the series of golden/{run.name}")
+        except MutatorError as err:
+            yield _told(err, err.got, f"{making_again(folder.path, name)} rebuilds it")
 
 
 def _packed(
@@ -88,16 +103,29 @@ def _packed(
 
 
 def _of_other_runs(folder: RunFolder, there: SeriesFolder, index: Index) -> Iterator[MutatorError]:
-    records = folder.records()
+    records, goldens = folder.records(), _decoded(there, index)
     for name, number in index.entries.items():
         if (record := records.get(name)) is None:  # lost; its series is not shown until it runs again
             continue
         path = inside(there.path, f"{index.places[number][0]}.js")
+        if (golden := goldens.get(index.golden_of[name])) is None:  # reported elsewhere
+            continue
         try:
-            check_run(about_of(there.entry(number)), record, path)
+            faulty = decode(there.entry(number), golden)
+            check_run(faulty.about, record, path)
+            check_values(golden, faulty, record, path)
         except MutatorError as err:
             if err.where == str(path):  # damaged chunks are reported above
                 yield _told(err, f"{name}: {err.got}", putting_aside(folder.path))
+
+
+def _decoded(there: SeriesFolder, index: Index) -> dict[str, Series]:
+    """The series of golden runs that can be read."""
+    found = {}
+    for key, number in index.goldens.items():
+        with suppress(MutatorError):
+            found[key] = decode(there.entry(number))
+    return found
 
 
 def _of_other_goldens(
@@ -118,8 +146,11 @@ def _of_other_goldens(
 
 def _are_same(stored: Series, golden: Series) -> bool:
     """Whether two series have the same channels, times and values, up to the rounding of older versions."""
-    names, wanted = ([one["name"] for one in series.about["channels"]] for series in (stored, golden))
-    if names != wanted or stored.t.tobytes() != golden.t.tobytes() or stored.every != golden.every:
+    channels, wanted = (
+        [(one["name"], one.get("own_times")) for one in series.about["channels"]]
+        for series in (stored, golden)
+    )
+    if channels != wanted or stored.t.tobytes() != golden.t.tobytes() or stored.every != golden.every:
         return False
     rows = zip(stored.rows, golden.rows, strict=True)
     return all(np.allclose(one, other, rtol=_ROUNDING, equal_nan=True) for one, other in rows)

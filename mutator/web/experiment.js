@@ -146,8 +146,8 @@ class Experiment {
   async #fillLate(row) {
     const id = this.text("experiment_id");
     this.#path();
-    const details = await Details.read(), trace = details.trace(row);
-    const [media, series] = await Promise.all([Packed.read("media"), SeriesFile.load(id, trace).catch((error) => error)]);
+    const details = await Details.read(), known = { trace: details.trace(row), largest: this.#largest() };
+    const [media, series] = await Promise.all([Packed.read("media"), SeriesFile.load(id, known).catch((error) => error)]);
     if (this.row !== row) return; // another experiment was opened in the meantime
     this.#change(details.patch(row));
     const spec = details.spec(row);
@@ -155,7 +155,13 @@ class Experiment {
     this.#pictures(id, [media?.[id]].find((kept) => kept?.stills.length || kept?.films.length));
     const place = this.#content("replay");
     if (series && !(series instanceof Error)) Replay.show(place, series, this.facts);
-    else this.#noSeries(id, trace, series);
+    else this.#noSeries(id, known, series);
+  }
+
+  /** The largest deviation of each compared channel in the whole run, if the run ended normally. */
+  #largest() {
+    const columns = Object.entries(this.facts.series.deviations).map(([name, column]) => [name, this.table.number(this.row, column)]);
+    return Object.fromEntries(columns.filter(([, by]) => !Number.isNaN(by)));
   }
 
   /** Show how far the fault got. `Path` reads this experiment's results with `text(name)` and `number(name)`. */
@@ -224,7 +230,7 @@ class Experiment {
   }
 
   /** The reason why there is no replay, and how to get one. `error` says why an existing series cannot be read. */
-  #noSeries(id, trace, error) {
+  #noSeries(id, known, error) {
     const { el } = Dom;
     const place = this.#content("replay");
     if (!this.#endedWell) {
@@ -233,7 +239,7 @@ class Experiment {
     }
     const said = el("p", { role: "status" });
     const load = async () => {
-      const series = await SeriesFile.load(id, trace, { isNew: true }).catch((error) => error);
+      const series = await SeriesFile.load(id, known, { isNew: true }).catch((error) => error);
       if (this.text("experiment_id") !== id) return;
       if (!series || series instanceof Error) said.textContent = series ? series.message : "The series does not exist yet.";
       else Replay.show(place, series, this.facts);

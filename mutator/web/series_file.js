@@ -146,28 +146,51 @@ const SeriesFile = (() => {
     return made.sort((a, b) => a[1] - b[1]);
   }
 
-  /** The data of a replay. `trace`: the start of the digest of the experiment's trace; a series of another trace is an error. */
-  function shown(id, trace, golden, run) {
-    const { about } = run;
-    if (!trace || !about.trace?.startsWith(trace)) throw new Error("it belongs to another run than the record");
+  const ROUNDING = 2 ** -19, SMALLEST = 1e-37, LARGEST = 3e38; // as in store/series_sizes.py
+
+  /** Whether a channel deviates by `largest` at most and, unless it has times of its own, at least. */
+  function deviates(golden, run, channel, largest) {
+    if (largest > LARGEST && largest < Infinity) return true; // too large for single precision
+    let low = 0, high = golden.about.channels[channel].own_times ? Infinity : 0;
+    const add = (one, other) => {
+      const same = one === other || (Number.isNaN(one) && Number.isNaN(other)), gap = same ? 0 : Math.abs(one - other);
+      const by = Number.isNaN(gap) ? Infinity : gap, size = ROUNDING * (Math.abs(one) + Math.abs(other)) + SMALLEST;
+      const rounding = Number.isFinite(size) ? size : 0;
+      low = Math.max(low, by - rounding);
+      high = Math.max(high, by + rounding);
+    };
+    const one = golden.rows[channel], other = run.rows[channel];
+    for (let i = 0; i < Math.min(one.length, other.length); i++) add(one[i], other[i]);
+    for (const p of run.points) if (p.channel === channel) add(p.golden, p.faulty);
+    return low <= largest && largest <= high;
+  }
+
+  /** The data of a replay. `known` has what the record says: the start of the digest of its `trace`, and the `largest` deviation
+   *  of each compared channel. A series that does not match is an error. */
+  function shown(id, known, golden, run) {
+    const { about } = run, { channels } = golden.about, names = channels.map(({ name }) => name);
+    const matches = known.trace && about.trace?.startsWith(known.trace)
+      && run.t.every((t, i) => i >= golden.t.length || t === golden.t[i])
+      && Object.entries(known.largest).every(([name, by]) => names.includes(name) && deviates(golden, run, names.indexOf(name), by));
+    if (!matches) throw new Error("it belongs to another run than the record");
     return {
       id, start: golden.about.start, end: about.end, tEnd: about.t_end, active: about.active, marks: marks(about),
-      channels: golden.about.channels.map((channel, i) => ({ ...channel, ...together(golden, run, i) })),
+      channels: channels.map((channel, i) => ({ ...channel, ...together(golden, run, i) })),
     };
   }
 
   /** The two runs in the file of one rerun experiment. */
-  async function readKept(id, trace) {
+  async function readKept(id, known) {
     const bytes = await read(`kept/${id}`, id);
     if (!bytes) return null;
     const length = new DataView(bytes.buffer).getUint32(0, true), golden = await decoded(bytes.subarray(4, 4 + length), null);
-    return shown(id, trace, golden, await decoded(bytes.subarray(4 + length), golden));
+    return shown(id, known, golden, await decoded(bytes.subarray(4 + length), golden));
   }
 
-  async function found(id, trace, isNew) {
+  async function found(id, known, isNew) {
     const there = JSON.parse(document.getElementById("facts").textContent).series; // so that no missing files are requested
     if (isNew || there.kept.includes(id)) { // from a rerun, perhaps because the packed series is damaged
-      const own = await readKept(id, trace);
+      const own = await readKept(id, known);
       if (own) return own;
     }
     if (there.packed) index ??= readIndex();
@@ -176,14 +199,14 @@ const SeriesFile = (() => {
     const { places } = await index, [entry, reference] = place;
     if (!goldens.has(reference)) goldens.set(reference, bytesOf(places[reference]).then((bytes) => decoded(bytes, null)));
     const golden = await goldens.get(reference);
-    return shown(id, trace, golden, await decoded(await bytesOf(places[entry]), golden));
+    return shown(id, known, golden, await decoded(await bytesOf(places[entry]), golden));
   }
 
-  /** The series of an experiment; null if there is none. Rejects with a message if it is damaged or names another trace than
-   *  `trace`, the start of a digest. `isNew`: the series can be newer than this page. */
-  async function load(id, trace, { isNew = false } = {}) {
+  /** The series of an experiment; null if there is none. Rejects with a message if it is damaged or does not match what is
+   *  `known` from the record, {trace, largest}. `isNew`: the series can be newer than this page. */
+  async function load(id, known, { isNew = false } = {}) {
     try {
-      return await found(id, trace, isNew);
+      return await found(id, known, isNew);
     } catch (error) {
       throw new Error(`The series of ${id} cannot be read: ${error.message}`);
     }

@@ -2,6 +2,8 @@
 
 import json
 import shutil
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +17,10 @@ from mutator.web import asset
 
 TRACE = "0123456789abcdef"
 FIXTURE = Path(__file__).parents[1] / "fixtures" / "run-3"
-LOADED = """async ([id, trace]) => {
+LOADED = """async ([id, known]) => {
     const words = (values) => [...new Uint32Array(values.buffer)];
     try {
-        const series = await SeriesFile.load(id, trace);
+        const series = await SeriesFile.load(id, known);
         const bits = ({ t, golden, faulty }) => ({ t: [...t], golden: words(golden), faulty: words(faulty) });
         return series && { ...series, channels: series.channels.map((one) => ({ ...one, ...bits(one) })) };
     } catch (error) {
@@ -38,11 +40,13 @@ def run(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def load(browser: Any, run: Path, name: str, trace: str = TRACE) -> Any:
+def load(
+    browser: Any, run: Path, name: str, trace: str = TRACE, largest: Mapping[str, float] | None = None
+) -> Any:
     context = browser.new_context()
     page = context.new_page()
     page.goto((run / "report" / "index.html").as_uri())
-    found = page.evaluate(LOADED, [name, trace])
+    found = page.evaluate(LOADED, [name, {"trace": trace, "largest": largest or {}}])
     context.close()
     return found
 
@@ -69,7 +73,8 @@ def test_a_page_and_python_read_the_numbers_of_the_fixture(browser: Any, run: Pa
     for name, known in expected.items():
         told = [{key: one[key] for key in ("name", "t", "golden", "faulty")} for one in known["channels"]]
         assert as_read(run, name) == told
-        found = load(browser, run, name, known["about"]["trace"][:16])
+        largest = dict(RunFolder.unverified(FIXTURE / "small").records()[name].max_dev)
+        found = load(browser, run, name, known["about"]["trace"][:16], largest)
         assert [{key: one[key] for key in told[0]} for one in found["channels"]] == told
         assert (found["active"], found["tEnd"]) == (known["about"]["active"], known["about"]["t_end"])
         assert found["end"] == known["about"]["end"]
@@ -113,6 +118,24 @@ def test_the_series_of_another_run_is_not_shown(browser: Any, run: Path) -> None
     assert load(browser, run, name) == (
         f"The series of {name} cannot be read: it belongs to another run than the record"
     )
+
+
+def test_curves_that_deviate_otherwise_than_the_record_says_are_not_shown(browser: Any, run: Path) -> None:
+    """Such as those of the golden run, with everything else as in the record."""
+    for name, record in RunFolder.unverified(FIXTURE / "small").records().items():
+        found = SeriesFolder(run).read(name, record)
+        if found and any(by for _, by in record.max_dev):
+            golden, faulty = found
+            write_kept(
+                SeriesFolder(run).kept(name),
+                encode(golden),
+                encode(replace(golden, about=faulty.about), golden),
+            )
+            break
+    page = run / "report" / "index.html"
+    page.write_text(page.read_text().replace('"kept": [', f'"kept": ["{name}", '))
+    said = load(browser, run, name, record.trace_digest[:16], dict(record.max_dev))
+    assert said == f"The series of {name} cannot be read: it belongs to another run than the record"
 
 
 def test_a_damaged_series_gives_a_message(browser: Any, run: Path) -> None:

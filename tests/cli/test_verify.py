@@ -4,14 +4,18 @@ import re
 import shutil
 import subprocess
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from mutator.errors import MutatorError
 from mutator.store.run_folder import RunFolder
-from mutator.store.series import Index, SeriesFolder
+from mutator.store.series import Index, SeriesFolder, write_kept
+from mutator.store.series_format import encode
+from mutator.store.series_packing import EncodedSeries, SeriesWriter, pack
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
 
@@ -185,6 +189,57 @@ def test_the_series_of_another_run_is_not_used(cli: Cli, sealed: str) -> None:
     assert found.code == 1 and f"series/kept/{other}.js: the series of another run" in found.out
     kept.with_name(f"{other}.js").unlink()
     assert cli("verify", "run", "--expect", sealed).code == 0
+
+
+def curves_of_golden(name: str) -> tuple[bytes, bytes]:
+    """A forged series: everything as in the record, but the values of the golden run."""
+    found = SeriesFolder(Path("run")).read(name, RunFolder.unverified(Path("run")).records()[name])
+    assert found is not None
+    golden, faulty = found
+    return encode(golden), encode(replace(golden, about=faulty.about), golden)
+
+
+def deviating() -> str:
+    records = RunFolder.open(Path("run")).records()
+    return next(name for name, one in records.items() if any(by for _, by in one.max_dev))
+
+
+def test_curves_of_the_golden_run_are_not_shown_as_those_of_a_fault(cli: Cli, sealed: str) -> None:
+    """Whether they are in a rerun's file or in a chunk with a new name and index."""
+    name, there = deviating(), SeriesFolder(Path("run"))
+    golden, forged = curves_of_golden(name)
+    write_kept(there.kept(name), golden, forged)
+    found = cli("verify", "run")
+    assert found.code == 1 and f"- series/kept/{name}.js: the series of another run: " in found.out
+    with pytest.raises(MutatorError, match="the series of another run"):
+        series_of(name)
+    there.kept(name).unlink()
+    index = there.index
+    assert index is not None
+    writer = SeriesWriter(Path("run"), "forged")
+    for one in index.entries:
+        key = index.golden_of[one]
+        genuine = [there.entry(number) for number in (index.goldens[key], index.entries[one])]
+        faulty = forged if one == name else genuine[1]
+        writer.append(one, EncodedSeries(key=key, golden=genuine[0], faulty=faulty))
+    writer.close()
+    for path in Path("run/series").glob("*.js"):
+        path.unlink()
+    pack(Path("run"), index.plan, {one: place for place, one in enumerate(index.entries)}, index.budget_mb)
+    found = cli("verify", "run")
+    assert found.code == 1 and f"{name}: the series of another run: " in found.out
+    with pytest.raises(MutatorError, match="the series of another run"):
+        series_of(name)
+
+
+def test_a_rerun_s_golden_curves_must_be_those_of_the_golden_run(cli: Cli, sealed: str) -> None:
+    name, there = deviating(), SeriesFolder(Path("run"))
+    found = there.read(name, RunFolder.unverified(Path("run")).records()[name])
+    assert found is not None
+    golden, faulty = (replace(one, rows=[row + np.float32(1e-3) for row in one.rows]) for one in found)
+    write_kept(there.kept(name), encode(golden), encode(faulty, golden))
+    audit = cli("verify", "run")
+    assert audit.code == 1 and f"series/kept/{name}.js: differs; expected the series of golden/" in audit.out
 
 
 def test_damaged_blocks_of_patches_are_reported(cli: Cli, sealed: str) -> None:

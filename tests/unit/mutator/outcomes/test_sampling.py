@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mutator.errors import MutatorError
 from mutator.model import Record
-from mutator.outcomes.golden import Trace
+from mutator.outcomes.golden import Trace, compare
+from mutator.outcomes.propagation import departures
 from mutator.outcomes.sampling import Sampler, keep_series
-from mutator.store.series import SeriesFolder
+from mutator.store.series import SeriesFolder, write_kept
 from mutator.store.series_format import Series, decode, encode
 from mutator.targets.channels import Role
 from mutator.targets.manifest import TargetManifest
@@ -145,10 +147,74 @@ def test_a_channel_with_its_own_times_keeps_its_newest_value(
     assert (gap[1.0], gap[2.95], gap[3.0]) == (1.0, 1.0, 2.0)
 
 
+def recorded(manifest: TargetManifest, golden: Trace, faulty: Trace, one: Record) -> Record:
+    """The record with the deviations of two traces."""
+    difference = compare(golden, faulty, manifest.compared, "time")
+    left = departures(golden, faulty, manifest.channels, "time", one.t_end)
+    return replace(one, max_dev=difference.max_dev, left=left)
+
+
+SLOW = np.arange(0.0, 5.0, 0.03)
+PAIRS: dict[str, tuple[Trace, Trace]] = {
+    "between two samples": (trace(), trace(gas=np.where(T == 1.02, 0.5, 0.0))),
+    "by less than the rounding": (trace(gas=T + 1e6), trace(gas=T + 1e6 + 1e-3)),
+    "to no value": (trace(), trace(gas=np.where(T > 3, np.nan, 0.0))),
+    "from infinity": (trace(gas=np.full(500, np.inf)), trace(gas=np.where(T > 3, 1.0, np.inf))),
+    "beyond single precision": (trace(), trace(gas=1e300 * T)),
+    "in an early end": (trace(gas=T), trace(T[:303], gas=T[:303] ** 2)),
+    "in a late end": (trace(gas=T), trace(np.arange(700) / 100, gas=np.arange(700) / 50)),
+    "at other times": (trace(gas=T), trace(SLOW, gas=2 * SLOW)),
+    "at other times that end early": (trace(gas=T), trace(SLOW[:50], gas=2 * SLOW[:50])),
+    "of a channel with its own times": (
+        {**trace(), "gas": np.zeros(2), "gas@": np.array([1.001, 2.0])},
+        {**trace(), "gas": np.array([7.0, 1.0]), "gas@": np.array([1.001, 1.002])},
+    ),
+}
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_the_curves_of_every_run_match_its_record(
+    tmp_path: Path, manifest: TargetManifest, record: Callable[..., Record], name: str
+) -> None:
+    one = recorded(manifest, *PAIRS[name], record())
+    keep_series(tmp_path, manifest, *PAIRS[name], one)
+    assert SeriesFolder(tmp_path).read(one.experiment_id, one) is not None
+
+
+@pytest.mark.parametrize("forged", ["golden", "larger", "later", "renamed", "nothing"])
+def test_curves_that_deviate_otherwise_than_the_record_says_are_refused(
+    tmp_path: Path, manifest: TargetManifest, record: Callable[..., Record], forged: str
+) -> None:
+    """A forger can write the record's digest into any series."""
+    pair = trace(gas=T), trace(gas=T**2)
+    one = recorded(manifest, *pair, record())
+    golden, faulty = stored(Sampler(manifest, pair[0]), pair[1], one)
+    channels = golden.about["channels"]
+    curves = {
+        "golden": replace(golden, about=faulty.about),
+        "larger": replace(faulty, rows=[row + np.float32(1) for row in faulty.rows]),
+        "later": replace(faulty, t=np.concatenate((faulty.t[:1], faulty.t[1:] + 1))),
+    }
+    about = {
+        "renamed": {"channels": [channel | {"name": f"x{channel['name']}"} for channel in channels]},
+        "nothing": {},
+    }
+    forgery = curves.get(forged, faulty)
+    reference = replace(golden, about=about.get(forged, golden.about))
+    path = SeriesFolder(tmp_path).kept(one.experiment_id)
+    write_kept(
+        path,
+        encode(reference),
+        encode(forgery, golden if forged != "later" else replace(golden, t=golden.t[:0])),
+    )
+    with pytest.raises(MutatorError):
+        SeriesFolder(tmp_path).read(one.experiment_id, one)
+
+
 def test_a_series_is_read_back_from_its_file(
     tmp_path: Path, manifest: TargetManifest, record: Callable[..., Record]
 ) -> None:
-    one = record(alerts=(("brake_hard", 2.5),))
+    one = recorded(manifest, trace(), trace(speed=T), record(alerts=(("brake_hard", 2.5),)))
     keep_series(tmp_path, manifest, trace(), trace(speed=T), one)
     path = SeriesFolder(tmp_path).kept(one.experiment_id)
     before = path.read_bytes()
