@@ -4,6 +4,7 @@ What is signed is `seal.json` in the run folder: the digests, the plan and the v
 canonical text. The signature is beside it, in `seal.json.sig`. Neither is in the seal.
 """
 
+import re
 import subprocess
 from collections.abc import Sequence
 from contextlib import suppress
@@ -11,6 +12,7 @@ from pathlib import Path
 from tempfile import NamedTemporaryFile
 
 from mutator._common.below import open_below, write_below
+from mutator._common.bounded import read_bounded
 from mutator._common.hashing import canonical
 from mutator.errors import CheckFailed, MutatorError
 from mutator.store.run_folder import RunFolder
@@ -65,7 +67,8 @@ def sign(folder: RunFolder, seals: Seals, key: Path) -> None:
 
 
 def signer(folder: RunFolder, seals: Seals, allowed_signers: Path) -> str:
-    """Return the identity in `allowed_signers` whose key signed the digests of a run.
+    """Return the identities in `allowed_signers` whose key signed the digests of a run: those of the first
+    line with which the signature is valid. A pattern such as `*@example.com` stands for itself.
 
     CheckFailed if there is no valid signature of one of them, or if the run has changed since.
     """
@@ -77,18 +80,19 @@ def signer(folder: RunFolder, seals: Seals, allowed_signers: Path) -> str:
             expected="a file of allowed signers: lines of an identity and a public SSH key",
         )
     said, signature = (_content(folder, name) for name in (FILE, SIGNATURE))
-    with NamedTemporaryFile(prefix="mutator-seal-") as copy:
-        copy.write(signature)
-        copy.flush()
-        of = ["-f", str(allowed_signers.resolve()), "-s", copy.name]
-        identity = _identity(folder, _ssh_keygen("find-principals", of), allowed_signers)
-        done = _ssh_keygen("verify", [*of, "-I", identity, "-n", NAMESPACE], said)
-    if done.returncode:
+    identity, whys = "", []
+    for line in read_bounded(allowed_signers, _MOST).splitlines():
+        if line.strip() and not line.lstrip().startswith(b"#"):
+            identity, why = _identities(line, said, signature)
+            whys += [why] if why else []
+        if identity:
+            break
+    if not identity:
         raise CheckFailed(
-            f"not a valid signature of {identity} ({_said(done)})",
+            f"signed by nobody in the list ({whys[0] if whys else 'no signer matches'})",
             where=folder.path / SIGNATURE,
-            expected=f"the signature of {FILE}",
-            remedy=_SIGN,
+            expected=f"the signature of {FILE} by one of {allowed_signers}",
+            remedy=f"add the signer's identity and public key, if you trust them; {_SIGN}",
         )
     if said != statement(folder, seals):
         raise CheckFailed(
@@ -100,23 +104,40 @@ def signer(folder: RunFolder, seals: Seals, allowed_signers: Path) -> str:
     return identity
 
 
+def _identities(line: bytes, said: bytes, signature: bytes) -> tuple[str, str]:
+    """Return the identities on a line of allowed signers with which a signature is valid, or else why the
+    signature of the line's key is not. ssh-keygen itself names only the first line with the key."""
+    with (
+        NamedTemporaryFile(prefix="mutator-seal-") as copy,
+        NamedTemporaryFile(prefix="mutator-seal-") as one,
+    ):
+        for file, content in ((copy, signature), (one, line + b"\n")):
+            file.write(content)
+            file.flush()
+        of = ["-f", one.name, "-s", copy.name]
+        found = _ssh_keygen("find-principals", of)
+        names = found.stdout.decode("utf-8", "replace").replace(",", "\n").splitlines()
+        names = [name for name in names if name.isprintable() and not name.startswith("!")]
+        if found.returncode or not names:
+            return "", _about_line(found, one.name)
+        tried = {name: _ssh_keygen("verify", [*of, "-I", name, "-n", NAMESPACE], said) for name in names}
+    valid = [name for name, done in tried.items() if not done.returncode]
+    done = tried[names[0]]
+    why = f"not a valid signature of {names[0]}: {_about_line(done, one.name) or _said(done)}"
+    return ", ".join(valid), "" if valid else why
+
+
+def _about_line(done: subprocess.CompletedProcess[bytes], file: str) -> str:
+    """What ssh-keygen said about the only line of a file, such as that its key has expired."""
+    found = re.search(f"^{re.escape(file)}:1: (.*)", done.stderr.decode("utf-8", "replace"), re.MULTILINE)
+    return found[1].strip() if found else ""
+
+
 def _content(folder: RunFolder, name: str) -> bytes:
     with suppress(FileNotFoundError), open_below(folder.path, name) as file:
         if len(data := file.read(_MOST + 1)) <= _MOST:
             return data
     raise CheckFailed("not signed", where=folder.path / name, expected="a signed run", remedy=_SIGN)
-
-
-def _identity(folder: RunFolder, found: subprocess.CompletedProcess[bytes], allowed_signers: Path) -> str:
-    identities = found.stdout.decode("utf-8", "replace").replace(",", "\n").split("\n")
-    if found.returncode or not identities[0].isprintable() or not identities[0]:
-        raise CheckFailed(
-            f"signed by nobody in the list ({_said(found)})",
-            where=folder.path / SIGNATURE,
-            expected=f"a signature by one of {allowed_signers}",
-            remedy="add the signer's identity and public key, if you trust them",
-        )
-    return identities[0]
 
 
 def _ssh_keygen(verb: str, words: Sequence[str], data: bytes = b"") -> subprocess.CompletedProcess[bytes]:
