@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from mutator._common.bounded import MOST_WHOLE, read_open
-from mutator._common.files import raising_disk_full, remove_folder
+from mutator._common.files import clear_place, let_in, raising_disk_full
 from mutator.errors import MutatorError
 
 _FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
@@ -197,18 +197,44 @@ def entries_below(
                     folders.append(f"{name}/")
 
 
-def remove_odd(root: Path) -> None:
-    """Delete what `check_plain` refuses, unprintable names and deep folders, where a target wrote to."""
-    if root.is_symlink():
-        root.unlink()
-        root.mkdir()
-    for name, entry in list(entries_below(root, lambda name: is_deep(name, _DEEPEST_OUTPUT))):
-        if is_plain(entry) and entry.name.isprintable() and not is_deep(name, _DEEPEST_OUTPUT):
-            continue
-        if entry.is_dir(follow_symlinks=False):
-            remove_folder(Path(entry.path))
-        else:
-            Path(entry.path).unlink(missing_ok=True)
+def move_plain(source: int, target: int, depth: int = 0) -> None:
+    """Move regular files between open folders, whoever can change the first one meanwhile.
+
+    Folders are made anew. Links, pipes and the like, unprintable names and deep folders stay behind.
+    """
+    if depth >= _DEEPEST_OUTPUT:
+        return
+    with suppress(OSError):
+        os.fchmod(source, stat.S_IRWXU)
+    with os.scandir(source) as entries:
+        found = [entry.name for entry in entries if entry.name.isprintable()]
+    for name in sorted(found):
+        with suppress(FileNotFoundError, NotADirectoryError):
+            kind = _kind(source, name)
+            if kind == stat.S_IFREG:
+                os.rename(name, name, src_dir_fd=source, dst_dir_fd=target)
+                if _kind(target, name) != stat.S_IFREG:  # exchanged between look and move
+                    clear_place(Path(f"/proc/self/fd/{target}", name))
+            elif kind == stat.S_IFDIR:
+                os.mkdir(name, dir_fd=target)
+                with open_folder(name, source) as below, open_folder(name, target) as there:
+                    move_plain(below, there, depth + 1)
+
+
+@contextmanager
+def open_folder(name: str | Path, parent: int | None = None) -> Iterator[int]:
+    """Yield a descriptor of a folder; NotADirectoryError for anything else, also for a link."""
+    with suppress(OSError):
+        let_in(name, parent)
+    handle = os.open(name, _FOLDER, dir_fd=parent)
+    try:
+        yield handle
+    finally:
+        os.close(handle)
+
+
+def _kind(folder: int, name: str) -> int:
+    return stat.S_IFMT(os.stat(name, dir_fd=folder, follow_symlinks=False).st_mode)
 
 
 def is_deep(name: str, most: int = _DEEPEST) -> bool:

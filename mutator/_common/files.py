@@ -101,30 +101,40 @@ def remove_folder(path: Path) -> None:
     """Delete a folder that a run wrote to, as far as permissions allow, even if it is nested deeply or
     read-only.
 
-    `shutil.rmtree` recurses, and fails at a depth of a few hundred folders.
+    `shutil.rmtree` recurses, and fails at a depth of a few hundred folders. If a process moves or exchanges
+    folders meanwhile, nothing outside is deleted or changed.
     """
     if path.is_symlink():
         return
     with suppress(OSError):
         here = _opened(str(path))
-        way = [("", _emptied(here))]  # folders on the way down, each with its remaining subfolders
+        way = [("", _emptied(here), _identity(here))]  # folders on the way down, with remaining subfolders
         try:
             while way:
-                name, left = way[-1]
+                name, left, _ = way[-1]
                 if left:
                     with suppress(OSError):
                         below = left.pop()
                         here = _instead(here, _opened(below, here))
-                        way.append((below, _emptied(here)))
+                        way.append((below, _emptied(here), _identity(here)))
                     continue
                 way.pop()
                 if way:
                     here = _instead(here, os.open("..", _FOLDER, dir_fd=here))
+                    if _identity(here) != way[-1][2]:
+                        return  # the folder was moved, so its parent is another one
                     with suppress(OSError):
                         os.rmdir(name, dir_fd=here)
         finally:
             os.close(here)
         path.rmdir()
+
+
+def clear_place(path: Path) -> None:
+    """Delete whatever is at this place: a folder with its content, or a file or link."""
+    remove_folder(path)
+    with suppress(FileNotFoundError, NotADirectoryError, IsADirectoryError, PermissionError):
+        path.unlink()
 
 
 class ScratchFolder:
@@ -143,8 +153,22 @@ class ScratchFolder:
 
 def _opened(name: str, parent: int | None = None) -> int:
     with suppress(OSError):
-        os.chmod(name, stat.S_IRWXU, dir_fd=parent)
+        let_in(name, parent)
     return os.open(name, _FOLDER, dir_fd=parent)
+
+
+def let_in(name: str | Path, parent: int | None = None) -> None:
+    """Let this user list and change a folder; OSError for a link."""
+    place = os.open(name, os.O_PATH | os.O_DIRECTORY | os.O_NOFOLLOW, dir_fd=parent)
+    try:
+        Path(f"/proc/self/fd/{place}").chmod(stat.S_IRWXU)  # fchmod refuses O_PATH
+    finally:
+        os.close(place)
+
+
+def _identity(folder: int) -> tuple[int, int]:
+    state = os.fstat(folder)
+    return state.st_dev, state.st_ino
 
 
 def _instead(old: int, new: int) -> int:

@@ -15,7 +15,7 @@ from importlib.machinery import all_suffixes
 from itertools import count
 from pathlib import Path
 
-from mutator._common.files import is_disk_full, remove_folder
+from mutator._common.files import clear_place, is_disk_full, remove_folder
 from mutator._common.unchanged_files import UnchangedFiles
 from mutator.engines import bytecode
 from mutator.targets.source_tree import SourceTree
@@ -114,14 +114,8 @@ class BaseTree:
             except OSError as err:
                 if is_disk_full(err):
                     raise
-            _clear(place)  # a run has deleted the tree, or put something else in its place
+            clear_place(place)  # a run has deleted the tree, or put something else in its place
         return False
-
-
-def _clear(place: Path) -> None:
-    if place.is_symlink() or place.is_file():
-        place.unlink()
-    remove_folder(place)
 
 
 def _number(folder: Path) -> int:

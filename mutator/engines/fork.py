@@ -5,7 +5,6 @@ and reruns those that crash. The `warm` engine forks before the first step. So d
 at its first terminal hazard and the golden run has one, too.
 """
 
-import errno
 import hmac
 import marshal
 import os
@@ -18,24 +17,21 @@ from secrets import token_bytes
 from typing import Any
 
 from mutator._common.bounded import read_bounded
-from mutator._common.files import disk_full, raising_disk_full, remove_folder, write_atomic
+from mutator._common.files import clear_place, disk_full, raising_disk_full, remove_folder, write_atomic
 from mutator._common.hashing import content_id
 from mutator.engines.activation import Observed, Start, first_active
 from mutator.engines.code_swap import CodeSwap, NotSwappable, plan_swap
 from mutator.engines.fork_pool import Golden, Lost, Pool, Refused, Waiting, used_unchanged
-from mutator.engines.jobs import Execution, Job, RunMode, Setting
+from mutator.engines.jobs import Execution, Job, RunMode, Setting, failed
 from mutator.engines.processes import (
     PATIENCE_S,
     Ended,
-    inactive,
     is_full,
     judge,
-    read_report,
     steady,
-    tail,
-    was_active,
 )
 from mutator.engines.reference import ReferenceEngine
+from mutator.engines.run_home import OUTPUT, RunHome, is_disturbance, make_work
 from mutator.engines.threads import too_many, turned_off
 from mutator.model import Limits, Status
 from mutator.mutants.building import build
@@ -92,20 +88,27 @@ class ForkEngine:
     def execute(self, job: Job, folder: Path) -> Execution:
         """Run one job in the new scratch folder `folder` or, if it cannot be forked, on the reference engine.
 
-        The reference engine has another folder: mutants of the fork server can write beside their own one, so
-        a link could be in its place.
+        The reference engine has another folder, which also gets the output: mutants of the fork server can
+        write beside their own one, so a link could be in its place.
         """
         try:
             with raising_disk_full(self._work):
                 return self._execute(job, folder)
         except (NotSwappable, Refused) as why:
-            another = self.reference.folder_of(job)
-            remove_folder(another)
-            execution = self.reference.execute(job, another)
-            return replace(execution, why=steady(str(why), folder))
+            return self._by_reference(job, steady(str(why), folder))
         except Lost as why:
             self.close()
-            return _lost(str(why), folder)
+            return failed(str(why), folder / OUTPUT, RunMode.FORK)
+        except OSError as err:
+            if not is_disturbance(err):
+                raise
+            self.close()
+            return self._by_reference(job, f"its folders were changed during the run ({err.strerror})")
+
+    def _by_reference(self, job: Job, why: str) -> Execution:
+        another = self.reference.folder_of(job)
+        clear_place(another)
+        return replace(self.reference.execute(job, another), why=why)
 
     def refusal(self, job: Job) -> Refused | None:
         """Return why a job's golden run cannot be forked up to its last step; None if it can."""
@@ -184,14 +187,21 @@ class ForkEngine:
     def _become(
         self, waiting: Waiting, job: Job, folder: Path, swap: CodeSwap, start: Start, watch: bool = False
     ) -> Execution:
-        out = folder / "out"
-        number = _make_folder(folder)
+        make_work(self._work)
+        with RunHome(folder) as home:
+            ended = self._forked(waiting, job, home, swap, start, watch)
+            place = self.reference.folder_of(job) / OUTPUT
+            return replace(self._judged(job, home, ended, place, watch), start=start.step)
+
+    def _forked(
+        self, waiting: Waiting, job: Job, home: RunHome, swap: CodeSwap, start: Start, watch: bool
+    ) -> Ended:
         request = {
-            "home": str(folder),
-            "out": str(out),
-            "log": str(folder / "log"),
-            "report": str(folder / "report.json"),
-            "inactive": str(inactive(folder)),
+            "home": str(home.path),
+            "out": str(home.out),
+            "log": str(home.log),
+            "report": str(home.report),
+            "inactive": str(home.inactive),
             "args": None,
             "cpu_s": self._limits.cpu_s,
             "memory_mb": self._limits.memory_mb,
@@ -207,27 +217,24 @@ class ForkEngine:
         }
         # the child must begin the run; a watched run has the arguments of the waiting processes
         if waiting.key is None:
-            request["args"] = self._arguments(job, self._running(job).home if watch else out)
+            request["args"] = self._arguments(job, self._running(job).home if watch else home.out)
         limits = {"wall_s": self._limits.wall_s, "disk_mb": self._limits.disk_mb}
         # a sandbox's /tmp is beside the run's folder
-        limited = self._runs if self._manifest.sandbox else folder
+        limited = self._runs if self._manifest.sandbox else home.path
         asked = {"do": "mutant", "job": marshal.dumps(request), "home": str(limited), **limits}
         with nullcontext() if waiting.key else used_unchanged(job.scenario):
             said, _ = waiting.ask(asked, self._patience_s)
-        if _number_of(folder) != number:
-            self.close()
-            raise Lost("the folder of the run was exchanged")
-        self._running(job).clean(folder)
+        self._running(job).clean()
         if said["threads"]:
             raise Refused(too_many(said["threads"]), turned_off(said["threads"]))
         if said["touched"]:
             self.close()
             raise Refused("it writes into its own tree")
-        ended = Ended(**{name: said[name] for name in Ended.__slots__})
-        return replace(self._judged(job, folder, ended), start=start.step)
+        return Ended(**{name: said[name] for name in Ended.__slots__})
 
-    def _judged(self, job: Job, folder: Path, ended: Ended) -> Execution:
-        report = read_report(folder / "report.json", threads=list)
+    def _judged(self, job: Job, home: RunHome, ended: Ended, place: Path, watch: bool) -> Execution:
+        home.let_in()
+        report = home.read_report(threads=list)
         if report is not None:
             self._check(job, report)
         status, detail = judge(self._limits, ended, report)
@@ -238,13 +245,14 @@ class ForkEngine:
         return Execution(
             status=status,
             detail=detail,
-            out=folder / "out",
+            out=home.move_output(place),
             probe=report["probe"] if report else None,
             cpu_s=ended.cpu_s,
             wall_s=ended.wall_s,
-            active=was_active(folder),
-            log=tail(folder / "log"),
+            active=home.was_active(),
+            log=home.log_tail(),
             stopped=bool(report and report.get("stopped")),
+            watched={name: report[name] for name in _WATCHED} if watch and report else {},
             mode=RunMode.WARM if self._warm else RunMode.FORK,
         )
 
@@ -293,13 +301,8 @@ class ForkEngine:
             for name in self._manifest.outputs:
                 if read_bounded(execution.out / name) != read_bounded(golden / name):
                     raise Refused(f"its {name} differs when it is driven step by step")
-            report = read_report(folder / "report.json")
-            assert report is not None
-            found = (
-                tuple(map(tuple, report["seen"])),
-                tuple(report["before"]),
-                tuple(report["libraries"]),
-            )
+            seen, *others = (execution.watched[name] for name in _WATCHED)
+            found = (tuple(map(tuple, seen)), *map(tuple, others))
             if found[0] and found[1][:1] != (0,):
                 raise Refused("it observes before its first step")
             data = marshal.dumps(found)
@@ -320,27 +323,8 @@ class ForkEngine:
 
 
 _CODE_BYTES = 32
+_WATCHED = ("seen", "before", "libraries")
 _FROM_THE_START = Start(step=0, observed=0, began=None, t=None)
-
-
-def _make_folder(folder: Path) -> int:
-    """Make the folder of a run, without following a link that an earlier run left there; return its number.
-
-    Raises Lost if something else is in its place.
-    """
-    try:
-        folder.mkdir()
-        handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
-        try:
-            os.mkdir("out", dir_fd=handle)
-            os.close(os.open(inactive(folder).name, os.O_CREAT | os.O_EXCL, 0o644, dir_fd=handle))
-            return os.fstat(handle).st_ino
-        finally:
-            os.close(handle)
-    except OSError as err:
-        if err.errno not in (errno.EEXIST, errno.ENOTDIR, errno.ELOOP):
-            raise
-        raise Lost(f"something else is in the place of a run's folder ({err.strerror})") from None
 
 
 def _needed(swap: CodeSwap) -> list[str]:
@@ -366,26 +350,6 @@ def _golden(job: Job, golden: Path) -> Execution:
         wall_s=0.0,
         mode=RunMode.GOLDEN,
     )
-
-
-def _lost(why: str, folder: Path) -> Execution:
-    return Execution(
-        status=Status.HARNESS_ERROR,
-        detail=why,
-        out=folder / "out",
-        probe=None,
-        cpu_s=0.0,
-        wall_s=0.0,
-        mode=RunMode.FORK,
-    )
-
-
-def _number_of(folder: Path) -> int:
-    """Return the number of what is at this place, without following a link; 0 if there is nothing."""
-    try:
-        return os.lstat(folder).st_ino
-    except OSError:
-        return 0
 
 
 def make_fork(setting: Setting) -> ForkEngine:

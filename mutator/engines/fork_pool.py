@@ -200,10 +200,10 @@ class Pool:
         if self._sandbox:
             self._sandbox.begin()
 
-    def clean(self, run: Path) -> None:
-        """Delete what a run has left in the temporary folders of the sandbox, and links to the outside."""
+    def clean(self) -> None:
+        """Delete what a run has left in the temporary folders of the sandbox."""
         if self._sandbox:
-            self._sandbox.clear(run)
+            self._sandbox.clear()
 
     def before(self, step: int, golden: Golden, modules: Sequence[str], patience_s: float) -> Waiting:
         """Return a process that waits before `step` of the golden run, with these modules loaded."""

@@ -111,6 +111,13 @@ class Execution:
     lines: Mapping[str, list[int]] = field(default_factory=dict)
 
 
+def failed(why: str, out: Path, mode: RunMode) -> Execution:
+    """Return the result of a job that the harness could not run."""
+    return Execution(
+        status=Status.HARNESS_ERROR, detail=why, out=out, probe=None, cpu_s=0.0, wall_s=0.0, mode=mode
+    )
+
+
 class Engine(Protocol):
     """Runs jobs and yields each with its result, in any order. `out` stays valid until the next result.
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any
 
-from mutator._common.bounded import read_bounded
+from mutator._common.below import Outside, open_below
 from mutator._common.files import is_disk_full
 from mutator.engines.in_target import guard
 from mutator.engines.jobs import Raised
@@ -129,44 +129,40 @@ def end(guarding: subprocess.Popen[bytes]) -> None:
         guarding.wait()
 
 
-def tail(path: Path) -> str:
-    if not path.is_file():
+def tail(folder: Path, name: str) -> str:
+    """Return the end of a text file that a run wrote; empty if there is none."""
+    try:
+        with open_below(folder, name) as file:
+            file.seek(max(0, os.fstat(file.fileno()).st_size - _LOG_TAIL))
+            return file.read(_LOG_TAIL).decode("utf-8", "replace")
+    except (OSError, Outside):
         return ""
-    with path.open("rb") as file:
-        file.seek(max(0, path.stat().st_size - _LOG_TAIL))
-        return file.read(_LOG_TAIL).decode("utf-8", "replace")
 
 
-def read_report(path: Path, **more: type) -> dict[str, Any] | None:
-    """Return the child's report; None if it is missing, incomplete or invalid.
+def parsed_report(data: bytes, **more: type) -> dict[str, Any] | None:
+    """Return the child's report; None if it is incomplete or invalid.
 
     Each field is checked, because a run can write anything to this file. `more` has fields that only
     one engine reports.
     """
     try:
-        report: dict[str, Any] = json.loads(read_bounded(path))
+        report: dict[str, Any] = json.loads(data)
         raised_in(report)
         sound = all(isinstance(report[key], kind) for key, kind in (_REPORT | more).items())
         sound = sound and all(isinstance(name, str) for key in _NAMES for name in report.get(key, ()))
-    except (OSError, LookupError, TypeError, ValueError, RecursionError):
+    except (LookupError, TypeError, ValueError, RecursionError):
         return None
     return report if sound else None
-
-
-def inactive(folder: Path) -> Path:
-    """Return the file in a run's folder that the first activation deletes."""
-    return folder / "inactive"
-
-
-def was_active(folder: Path) -> bool:
-    return not inactive(folder).exists()
 
 
 def is_full(work: Path, report: dict[str, Any] | None) -> bool:
     """Return whether a failed run lacked space on the disk or in a quota."""
     if report is not None and report["disk_full"]:
         return True
-    state = os.statvfs(work)
+    try:
+        state = os.statvfs(work)
+    except OSError as err:
+        return is_disk_full(err)  # a run can delete the folder
     if state.f_bavail * state.f_frsize < _LEAST_FREE:
         return True
     try:

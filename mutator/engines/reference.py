@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import Any
 
 from mutator._common.bounded import read_bounded
-from mutator._common.files import disk_full, raising_disk_full, remove_folder
+from mutator._common.files import clear_place, disk_full, raising_disk_full, remove_folder
 from mutator._common.hashing import digest
 from mutator._common.unchanged_files import UnchangedFiles
 from mutator.engines.base_tree import BaseTree
-from mutator.engines.jobs import Execution, Job, Raised, Setting
+from mutator.engines.jobs import Execution, Job, Raised, RunMode, Setting, failed
 from mutator.engines.processes import (
     LOST,
     PATIENCE_S,
@@ -24,15 +24,12 @@ from mutator.engines.processes import (
     check_limits,
     end,
     environment,
-    inactive,
     is_full,
     judge,
     raised_in,
-    read_report,
     steady,
-    tail,
-    was_active,
 )
+from mutator.engines.run_home import OUTPUT, RunHome, is_disturbance, make_work
 from mutator.engines.sandbox import Sandbox
 from mutator.model import Limits, Status
 from mutator.mutants.anchors import parsed
@@ -86,72 +83,95 @@ class ReferenceEngine:
         self._base_tree.close()
 
     def execute(self, job: Job, folder: Path) -> Execution:
-        """Run one job in the new scratch folder `folder`, which the caller deletes."""
+        """Run one job in the new scratch folder `folder`, which the caller deletes.
+
+        It runs again, once, if it or another run changed what it uses.
+        """
         with raising_disk_full(self.work):
-            ended, changed = self._try(job, folder)
-            if changed:  # by this run, or by another one at the same time
-                remove_folder(folder)
-                ended, changed = self._try(job, folder, new=True)
-        log = tail(folder / "log")
-        report = read_report(folder / "report.json", files=dict, modules=list)
+            try:
+                execution, disturbed = self._try(job, folder)
+            except OSError as err:
+                if not is_disturbance(err):
+                    raise
+                disturbed = True
+            if disturbed:
+                clear_place(folder)
+                try:
+                    execution, _ = self._try(job, folder, new=True)
+                except OSError as err:
+                    if not is_disturbance(err):
+                        raise
+                    why = f"the folder of the run was changed while it was in use ({err.strerror})"
+                    return failed(why, folder, RunMode.REFERENCE)
+        return execution
+
+    def _try(self, job: Job, folder: Path, *, new: bool = False) -> tuple[Execution, bool]:
+        """Run a job; return the result, and whether its input or folders were changed meanwhile.
+
+        With `new`, the job gets a tree of its own, without bytecode.
+        """
+        make_work(self.work)
+        with RunHome(folder) as home:
+            ended, changed = self._run(job, home, new=new)
+            moved = home.is_moved()
+            return self._execution(job, home, ended, changed), bool(changed) or moved
+
+    def _run(self, job: Job, home: RunHome, *, new: bool) -> tuple[Ended, str]:
+        """Run a job; return how it ended, and a file of its input that was changed meanwhile (or nothing)."""
+        folder = home.path
+        tree = self._base_tree.lay_out(folder / "tree", job.files, new=new)
+        request = json.dumps(self._request(job, home)).encode()
+        path = folder / "job.json"
+        path.write_bytes(request)
+        scenario = job.scenario.resolve()
+        given = UnchangedFiles({str(path): request, str(scenario): read_bounded(scenario)})
+        ended = self._guarded(job, path, home)
+        changed = tree.first_changed() or given.first_changed().removeprefix(f"{folder}/")
+        if not (changed or new):
+            self._base_tree.take_back(tree)
+        return ended, changed
+
+    def _execution(self, job: Job, home: RunHome, ended: Ended, changed: str) -> Execution:
+        home.let_in()
+        report = home.read_report(files=dict, modules=list)
         status, detail = self._judge(job, ended, report, changed)
         if status is not Status.OK and is_full(self.work, report):
             raise disk_full(self.work)
         raised = raised_in(report) if report and status is Status.CRASHED else None
         return Execution(
             status=status,
-            detail=steady(detail, folder),
-            out=folder / "out",
+            detail=steady(detail, home.path),
+            out=home.move_output(home.path / OUTPUT),
             probe=report["probe"] if report else None,
             cpu_s=ended.cpu_s,
             wall_s=ended.wall_s,
-            raised=raised and _steady(raised, folder),
-            active=was_active(folder),
-            log=log,
+            raised=raised and _steady(raised, home.path),
+            active=home.was_active(),
+            log=home.log_tail(),
             stopped=bool(report and report.get("stopped")),
             modules=tuple(report["modules"]) if report else (),
             watched=report.get("watched", {}) if report else {},
             lines=report.get("lines", {}) if report else {},
         )
 
-    def _try(self, job: Job, folder: Path, *, new: bool = False) -> tuple[Ended, str]:
-        """Run a job; return how it ended, and a file of its input that was changed meanwhile (or nothing).
-
-        With `new`, the job gets a tree of its own, without bytecode.
-        """
-        tree = self._base_tree.lay_out(folder / "tree", job.files, new=new)
-        (folder / "out").mkdir()
-        inactive(folder).touch()
-        request = json.dumps(self._request(job, folder)).encode()
-        path = folder / "job.json"
-        path.write_bytes(request)
-        scenario = job.scenario.resolve()
-        given = UnchangedFiles({str(path): request, str(scenario): read_bounded(scenario)})
-        ended = self._run(job, path, folder)
-        changed = tree.first_changed() or given.first_changed().removeprefix(f"{folder}/")
-        if not (changed or new):
-            self._base_tree.take_back(tree)
-        return ended, changed
-
-    def _request(self, job: Job, folder: Path) -> dict[str, Any]:
-        out = folder / "out"
+    def _request(self, job: Job, home: RunHome) -> dict[str, Any]:
         arguments = self.manifest.arguments(
             scenario=job.scenario.resolve(),
             seed=job.seed,
-            out=out,
+            out=home.out,
             changes=job.changes,
             independent=self._independent or self.manifest.reads_any(job.files),
         )
         return {
-            "home": str(folder),
-            "tree": str(folder / "tree"),
+            "home": str(home.path),
+            "tree": str(home.path / "tree"),
             "packages": list(self.manifest.import_names),
             "module": self.manifest.entry_module,
             "args": list(arguments),
             "probe": probe_module(self.manifest.package) if job.mutant is not None else None,
-            "out": str(out),
-            "report": str(folder / "report.json"),
-            "inactive": str(inactive(folder)),
+            "out": str(home.out),
+            "report": str(home.report),
+            "inactive": str(home.inactive),
             "cpu_s": self.limits.cpu_s,
             "wall_s": self.limits.wall_s,
             "memory_mb": self.limits.memory_mb,
@@ -173,9 +193,9 @@ class ReferenceEngine:
         holder, _ = state_after(0, None, None)
         return holder, [value.name for value in self.manifest.observation.values]
 
-    def _run(self, job: Job, request: Path, folder: Path) -> Ended:
+    def _guarded(self, job: Job, request: Path, home: RunHome) -> Ended:
         """Run the job in a guarded process. Process and guard end when the connection is closed."""
-        began = time.monotonic()
+        began, folder = time.monotonic(), home.path
         ours, theirs = socket.socketpair()
         command = [sys.executable, "-P", "-s", str(_CHILD), str(request), str(theirs.fileno())]
         scenario, fault_free = job.scenario.resolve(), not job.files
@@ -183,7 +203,7 @@ class ReferenceEngine:
         if sandbox:
             command = sandbox.command(command)
         with ours:
-            with theirs, (folder / "log").open("wb") as log:
+            with theirs, home.log.open("wb") as log:
                 guarding = subprocess.Popen(
                     command,
                     cwd=folder,
@@ -200,7 +220,7 @@ class ReferenceEngine:
                 ours.close()
                 end(guarding)
                 if sandbox:
-                    sandbox.clear(folder)
+                    sandbox.clear()
                     sandbox.close()
         if not told:
             seconds = time.monotonic() - began

@@ -16,8 +16,7 @@ from functools import lru_cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from mutator._common.below import is_inside
-from mutator._common.files import remove_folder
+from mutator._common.files import clear_place
 from mutator.engines.processes import environment
 from mutator.errors import MutatorError
 from mutator.targets.manifest import TargetManifest
@@ -84,23 +83,10 @@ class Sandbox:
         """Note what /tmp and /dev/shm contain before the first run. Folders can be mounted there."""
         self._first = set(self._left())
 
-    def clear(self, run: Path) -> None:
-        """Delete what a run left in /tmp and /dev/shm, and the links in its folder that point out of it.
-
-        Such a link leads nowhere in the sandbox, but the harness could follow it.
-        """
+    def clear(self) -> None:
+        """Delete what a run left in /tmp and /dev/shm."""
         for path in set(self._left()) - self._first:
-            if path.is_dir() and not path.is_symlink():
-                remove_folder(path)
-            else:
-                path.unlink(missing_ok=True)
-        _open_up(run)
-        for folder, folders, files in os.walk(run):
-            for path in (Path(folder, name) for name in (*folders, *files)):
-                if not path.is_symlink():
-                    _open_up(path)
-                elif not is_inside(run, path):
-                    path.unlink(missing_ok=True)
+            clear_place(path)
 
     def close(self) -> None:
         while self._temporary:
@@ -110,12 +96,6 @@ class Sandbox:
         for handle in self._temporary:
             with suppress(OSError):
                 yield from Path(f"/proc/self/fd/{handle}").iterdir()
-
-
-def _open_up(path: Path) -> None:
-    """Let this user list and change a folder that a run left; not if it is a link."""
-    if path.is_dir() and not path.is_symlink():
-        path.chmod(0o700)
 
 
 def check() -> None:

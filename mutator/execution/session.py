@@ -17,7 +17,7 @@ from pathlib import Path
 from secrets import token_bytes
 from typing import Any
 
-from mutator._common.files import DiskFull, is_half_written, remove_folder
+from mutator._common.files import DiskFull, clear_place, is_half_written
 from mutator._common.interrupts import terminable
 from mutator._common.locks import owned, wait_for_workers
 from mutator.campaigns.chunks import Pending, pending
@@ -26,6 +26,7 @@ from mutator.campaigns.plans import Choices
 from mutator.campaigns.provenance import add_machine, begin_stretch, check_versions
 from mutator.engines.kinds import REFERENCE
 from mutator.engines.registry import choose_engine, not_worth_forking
+from mutator.engines.run_home import make_work
 from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK, MutatorError, MutatorWarning
 from mutator.execution.ended_runs import Ended, ended_before, keep_end
 from mutator.execution.run_plan import open_frozen
@@ -190,6 +191,7 @@ class Session:
         self.notify(Progress(stage="tables"))
         if self._known:
             return self._finish_again(self._known)
+        make_work(self.folder.work)  # readers refuse what a mutant can put in its place
         self._undo_writes_of_mutants()
         records = self.folder.records() if self._records is None else self._records
         ends = Counter((one.status, one.outcome) for one in endings(records))
@@ -317,7 +319,7 @@ def open_session(
                 shutil.rmtree(out, ignore_errors=True)
             raise
         digests.close_segments(folder.path)
-        remove_folder(folder.work)
+        clear_place(folder.work)
         folders = ("plan", "report", "series", "patches")
         written = (folder.path.iterdir(), *((folder.path / name).rglob("*") for name in folders))
         for path in chain(*written):
@@ -333,4 +335,4 @@ def open_session(
                 notify=notify,
             )
         finally:
-            remove_folder(folder.work)
+            clear_place(folder.work)

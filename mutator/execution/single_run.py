@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import mkdtemp
 
-from mutator._common.below import inside, remove_odd
+from mutator._common.below import inside
 from mutator._common.files import make_folder, raising_disk_full, remove_folder, write_atomic
 from mutator._common.locks import alone_in
 from mutator.campaigns.provenance import check_sources, sources
@@ -163,8 +163,7 @@ def _kept(runs: Iterator[Finished], out: Path) -> Iterator[Finished]:
 
 
 def _replace(new: Path, place: Path) -> None:
-    """Replace a folder that another process might be reading, without the links that a target made."""
-    remove_odd(new)
+    """Replace a folder that another process might be reading."""
     aside = Path(mkdtemp(dir=new.parent))
     if os.path.lexists(place):
         place.rename(inside(aside, place.name))

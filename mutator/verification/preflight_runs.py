@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from mutator._common import caches
-from mutator._common.below import inside, remove_odd
+from mutator._common.below import inside
 from mutator._common.files import remove_folder
 from mutator.engines.jobs import Job
 from mutator.engines.reference import ReferenceEngine
@@ -98,7 +98,6 @@ class CheckDriver:
         scratch = inside(engine.work, job.name)
         try:
             execution = engine.execute(job, scratch)
-            remove_odd(execution.out)  # before it is judged, because a run folder has no links
             run = look(self.manifest, execution)
             if name[0] == GOLDEN and name[1].seed is not None:
                 caches.make_room(self.manifest.cache_name)

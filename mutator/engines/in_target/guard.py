@@ -28,14 +28,21 @@ _libc = ctypes.CDLL(None)
 
 
 class Space:
-    """A limit on how much the folder `home` can grow: `disk_mb` MiB."""
+    """A limit on how much the folder `home` can grow: `disk_mb` MiB.
+
+    The folder is held open, because a run can rename it and put a link to a large one in its place.
+    """
 
     def __init__(self, home: str, disk_mb: int) -> None:
-        self._home = home
-        self._most = used(home) + (disk_mb << 20)
+        self._handle = os.open(home, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+        self._home = f"/proc/self/fd/{self._handle}"
+        self._most = used(self._home) + (disk_mb << 20)
 
     def is_used_up(self) -> bool:
         return used(self._home) >= self._most
+
+    def close(self) -> None:
+        os.close(self._handle)
 
 
 def fork(
@@ -51,6 +58,8 @@ def fork(
     _prctl(_PR_SET_CHILD_SUBREAPER, 1)
     began, parent, pid = time.monotonic(), os.getpid(), os.fork()
     if not pid:
+        if space is not None:
+            space.close()
         os.setsid()
         _mind_signals()
         die_with_parent(parent)
@@ -65,6 +74,8 @@ def fork(
         _end_what_is_left()
     if not stopped and space is not None and space.is_used_up():
         stopped = DISK
+    if space is not None:
+        space.close()
     return {
         "code": os.waitstatus_to_exitcode(code),
         "cpu_s": usage.ru_utime + usage.ru_stime,

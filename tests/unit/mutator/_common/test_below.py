@@ -12,9 +12,10 @@ from mutator._common.below import (
     check_plain,
     entries_below,
     move_below,
+    move_plain,
     open_below,
+    open_folder,
     read_below,
-    remove_odd,
     unlink_below,
     write_below,
 )
@@ -128,19 +129,39 @@ def test_a_folder_with_anything_else_is_not_plain(folder: Path, kind: str) -> No
         check_plain(folder)
 
 
-def test_links_that_a_target_made_are_deleted_and_not_followed(folder: Path) -> None:
-    (folder / "a" / "link").symlink_to(folder.parent / "elsewhere")
+def moved(source: Path, target: Path) -> None:
+    target.mkdir()
+    with open_folder(source) as one, open_folder(target) as other:
+        move_plain(one, other)
+
+
+def test_only_plain_files_are_moved(folder: Path) -> None:
+    (folder / "a" / "link").symlink_to(folder / "a" / "b.txt")
+    (folder / "links").symlink_to(folder / "a")
     (folder / "a" / "c\n").mkdir()
     (folder / "a" / "c\n" / "file").touch()
     os.mkfifo(folder / "pipe")
     (folder / "d").joinpath(*"d" * 100).mkdir(parents=True)
-    remove_odd(folder)
-    assert sum(1 for _ in (folder / "d").rglob("*")) < 40
-    check_plain(folder)
-    assert not (folder / "a" / "c\n").exists() and read_below(folder, "a/b.txt")
-    (folder.parent / "out").symlink_to(folder)
-    remove_odd(folder.parent / "out")
-    assert [*(folder.parent / "out").iterdir()] == [] and read_below(folder, "a/b.txt")
+    target = folder.parent / "target"
+    moved(folder, target)
+    assert read_below(target, "a/b.txt") and sum(1 for _ in (target / "d").rglob("*")) < 40
+    assert sorted(path.name for path in target.iterdir()) == ["a", "d"]
+    assert [path.name for path in (target / "a").iterdir()] == ["b.txt"]
+
+
+def test_what_is_exchanged_while_it_is_moved_does_not_arrive(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real = os.rename
+
+    def exchanging(name: str, to: str, *, src_dir_fd: int, dst_dir_fd: int) -> None:
+        os.unlink(name, dir_fd=src_dir_fd)
+        os.symlink("/etc/passwd", name, dir_fd=src_dir_fd)
+        real(name, to, src_dir_fd=src_dir_fd, dst_dir_fd=dst_dir_fd)
+
+    monkeypatch.setattr(os, "rename", exchanging)
+    moved(folder, folder.parent / "target")
+    assert [path.name for path in (folder.parent / "target").rglob("*")] == ["a"]
 
 
 def test_a_move_does_not_follow_links(folder: Path) -> None:

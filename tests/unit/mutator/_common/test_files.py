@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from mutator._common import files
 from mutator._common.files import (
     DiskFull,
     ScratchFolder,
@@ -139,3 +140,24 @@ def test_a_full_disk_is_recognized_in_other_errors(tmp_path: Path, monkeypatch: 
         raise one
     with pytest.raises(MutatorError, match="mine"), raising_disk_full(tmp_path):
         raise MutatorError("mine") from OSError(errno.ENOSPC, "")
+
+
+def test_deleting_a_folder_that_is_moved_meanwhile_deletes_nothing_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """While `deep` is open, a process moves it out of `run/a`, so that its parent is another folder."""
+    run, kept = tmp_path / "run", tmp_path / "b" / "kept"
+    for folder in (run / "a" / "deep", run / "a" / "b", kept):
+        folder.mkdir(parents=True)
+    (kept / "file").touch()
+    real = files._emptied
+
+    def moving(folder: int) -> list[str]:
+        name, found = Path(f"/proc/self/fd/{folder}").readlink().name, real(folder)
+        if name == "deep":
+            (run / "a" / "deep").rename(tmp_path / "deep")
+        return sorted(found)  # the last one is emptied first
+
+    monkeypatch.setattr(files, "_emptied", moving)
+    remove_folder(run)
+    assert (kept / "file").exists()

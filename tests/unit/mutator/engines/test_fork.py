@@ -1,6 +1,7 @@
 """The fork engine's server processes: their number, their starting points, and what happens if one is
 killed."""
 
+import marshal
 import os
 import signal
 import subprocess
@@ -11,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from mutator.engines import fork_pool
 from mutator.engines.activation import Observed
 from mutator.engines.jobs import RunMode
 from mutator.model import Status, Trigger
@@ -152,3 +154,33 @@ def test_the_cpu_limit_of_a_fork_excludes_the_time_before_it(fork: Fork, edit: E
     execution = fork.run(fork.job(at_time(0.5)))
     assert (execution.mode, execution.status) == (RunMode.FORK, Status.TIMEOUT)
     assert execution.detail == "CPU time limit of 1 s"
+
+
+def test_a_server_whose_first_message_was_exchanged_is_not_used(
+    fork: Fork, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another run writes to the file before the server reads it, and puts it back afterwards."""
+    start, welcome = subprocess.Popen, fork_pool.Pool._welcome
+    originals: dict[Path, bytes] = {}
+
+    def forging(command: list[str], **more: object) -> object:
+        path = Path(command[-1])
+        if path.name == "start.marshal":
+            originals[path] = path.read_bytes()
+            path.write_bytes(marshal.dumps(marshal.loads(originals[path]) | {"packages": []}))
+        return start(command, **more)  # type: ignore[call-overload]
+
+    def putting_back(pool: fork_pool.Pool) -> None:
+        reply = pool.first.reply
+        monkeypatch.setattr(pool.first, "reply", lambda patience_s: (reply(patience_s), restore())[0])
+        welcome(pool)
+
+    def restore() -> None:
+        for path, data in originals.items():
+            path.write_bytes(data)
+
+    monkeypatch.setattr(fork_pool.subprocess, "Popen", forging)
+    monkeypatch.setattr(fork_pool.Pool, "_welcome", putting_back)
+    execution = fork.run(fork.job(at_time(2.0)))
+    assert execution.status is Status.HARNESS_ERROR and originals
+    assert execution.detail == "the tree of the fork server is not the pristine one"
