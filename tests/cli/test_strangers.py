@@ -1,7 +1,9 @@
 """Commands in a folder that a stranger filled run none of its code except the target's."""
 
 import os
+import shutil
 import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -165,3 +167,39 @@ def test_every_way_to_run_in_a_sandbox_gives_the_results_of_one_without(cli: Cli
         answer = cli(*words, "--sandbox")
         assert answer.code == 0, (words, answer.err)
     assert open_runs.read_text() == "", "something ran outside"
+
+
+def run_by_pytest(root: Path, programs: Path) -> "subprocess.CompletedProcess[str]":
+    """Run a campaign with `--campaign-sandbox`; the programs in the folder `programs` come first."""
+    words = ["-m", "pytest", "-q", "-p", "no:cacheprovider", "--campaign", "small", "--campaign-out", "run"]
+    environment = os.environ | {"PATH": f"{programs}:{os.environ['PATH']}"}
+    words += ["--campaign-sandbox", "-n", "0"]
+    return subprocess.run(
+        [sys.executable, *words], cwd=root, env=environment, capture_output=True, text=True, check=False
+    )
+
+
+def program(folder: Path, text: str) -> Path:
+    folder.mkdir()
+    (folder / "bwrap").write_text(f"#!/bin/sh\n{text}\n")
+    (folder / "bwrap").chmod(0o755)
+    return folder
+
+
+@pytest.mark.slow
+def test_pytest_without_a_sandbox_runs_nothing(root: Path, tmp_path: Path) -> None:
+    """Rather than run the target outside of one, where namespaces are refused."""
+    done = run_by_pytest(root, program(tmp_path / "bin", "echo 'bwrap: no namespaces' >&2; exit 1"))
+    assert done.returncode not in (0, 1) and "no sandbox: bwrap: no namespaces" in done.stdout + done.stderr
+    assert not (root / "run" / "records").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(bool(sandbox.shortcoming()), reason=f"no sandbox: {sandbox.shortcoming()}")
+def test_pytest_runs_a_campaign_in_a_sandbox(root: Path, tmp_path: Path) -> None:
+    calls = tmp_path / "calls"
+    text = f'echo "$@" >> {calls}; exec {shutil.which("bwrap")} "$@"'
+    done = run_by_pytest(root, program(tmp_path / "bin", text))
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "_once" in calls.read_text() or "fork_server" in calls.read_text()
+    assert (root / "run" / "results.csv").read_text().count("\n") == 13
