@@ -77,7 +77,7 @@ _TESTS = (
 )
 _LOOP = ("first", "index", "index0", "last", "length", "revindex", "revindex0")  # attributes of `loop`
 _KEPT_FILTERS = ("abs", "default", "float", "int", "length")  # of Jinja2's
-_TURNS = "turns"  # the filter that counts a loop's turns; no template can name it
+_TURNS, _READ = "turns", "read"  # filters that count; no template can name them
 
 
 class Context(_Context):
@@ -115,7 +115,7 @@ class TemplateEnvironment(ImmutableSandboxedEnvironment):
         kept = {name: self.filters[name] for name in _KEPT_FILTERS}
         self.filters = {name: _counting(function) for name, function in {**kept, **filters}.items()}
         self.filter_names = frozenset(self.filters)
-        self.filters[_TURNS] = _turns
+        self.filters |= {_TURNS: _turns, _READ: _counting(lambda value: value)}
         self.globals = dict(functions)
         self.compiled = lru_cache(maxsize=256)(self._compiled)
 
@@ -127,7 +127,8 @@ class TemplateEnvironment(ImmutableSandboxedEnvironment):
         self._check(tree)
         for loop in tree.find_all(nodes.For):
             size = nodes.Const(_size_of(loop))
-            loop.iter = nodes.Filter(loop.iter, _TURNS, [size], [], None, None, lineno=loop.lineno)
+            loop.iter = _filtered(loop.iter, _TURNS, size)
+        _count_readers(tree)
         return Template.from_code(self, self.compile(tree), self.make_globals(None))
 
     def _check(self, tree: nodes.Template) -> None:
@@ -190,6 +191,22 @@ class TemplateEnvironment(ImmutableSandboxedEnvironment):
     def concat(pieces: Iterable[str]) -> str:
         """Join the pieces of a result."""
         return "".join(_limited(pieces))
+
+
+def _filtered(node: nodes.Expr, name: str, *args: nodes.Expr) -> nodes.Filter:
+    return nodes.Filter(node, name, list(args), [], None, None, lineno=node.lineno)
+
+
+def _count_readers(tree: nodes.Template) -> None:
+    """Count what comparisons, the test `in` and slices read, each time they are evaluated."""
+    for node in list(tree.find_all((nodes.Compare, nodes.Operand, nodes.Test, nodes.Getitem))):
+        if isinstance(node, nodes.Compare | nodes.Operand):
+            node.expr = _filtered(node.expr, _READ)
+        elif isinstance(node, nodes.Test) and node.name == "in":
+            node.node = _filtered(node.node, _READ)
+            node.args = [_filtered(value, _READ) for value in node.args]
+        elif isinstance(node, nodes.Getitem) and isinstance(node.arg, nodes.Slice):
+            node.node = _filtered(node.node, _READ)
 
 
 def _limited(pieces: Iterable[str]) -> Iterator[str]:

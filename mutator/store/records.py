@@ -14,6 +14,7 @@ from mutator.store.indexed_lines import IndexedLines, Line
 
 SCHEMA = "records/2"
 TIMINGS_SCHEMA = "timings/2"
+_LONGEST_S = 1e9  # of a run; sums of such times are finite
 _NAMES = tuple(field.name for field in fields(Record))
 _RECORDS = ("activation", "error")  # fields that contain dataclasses
 
@@ -120,9 +121,23 @@ def _replaces(line: Line, known: Line) -> bool:
 
 
 def read_timings(run: Path, *, checksums: bool = True) -> IndexedLines[dict[str, Any]]:
-    """Return the newest timing line of each experiment that has one."""
+    """Return the newest timing line of each experiment that has one; MutatorError for a damaged line."""
     paths = sorted((run / "timings").glob("*.jsonl"))
-    return IndexedLines(paths, TIMINGS_SCHEMA, dict, lambda line, known: True, checksums=checksums)
+    return IndexedLines(paths, TIMINGS_SCHEMA, _timing_from, lambda line, known: True, checksums=checksums)
+
+
+def _timing_from(data: dict[str, Any]) -> dict[str, Any]:
+    """Check the types of a timing line, which anybody can edit: the seal leaves it out."""
+    for name in ("cpu_s", "wall_s"):
+        if type(data[name]) not in (int, float) or not 0.0 <= data[name] <= _LONGEST_S:
+            raise ValueError(name)
+    for name in ("host", "worker", "engine", "why"):  # `engine` is None if nothing ran
+        value = data.get(name, "")  # older folders lack some
+        if not (isinstance(value, str) or (name == "engine" and value is None)):
+            raise ValueError(name)
+        if name != "why" and value and not value.isprintable():
+            raise ValueError(name)
+    return data
 
 
 def second_record(path: Path, line: int, experiment_id: str, *, same: bool) -> MutatorError:
