@@ -7,6 +7,7 @@ import csv
 import io
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -40,8 +41,9 @@ _NEEDED = (
 )
 _NAMES = ("module", "fault_type", "reading", "unit", "scenario", "method", "trigger", "variant", "aim")
 _SCALES = {"status": [s.value for s in Status], "outcome": [o.value for o in Outcome]}
-MOST_CELLS = 10_000_000  # of a small Parquet file
-_PACKED = 20  # further cells for each byte of a large one
+MOST_CELLS, MOST_TEXT = 10_000_000, 100_000_000  # cells and bytes of text of a small Parquet file
+_PACKED = 20  # further ones for each byte of a large file
+_ROWS, _SPARE = 1000, 100_000  # rows to compare at a time; bytes that other versions of pyarrow may add
 _REMEDY = "rebuild it: `mutator report DIR`"
 
 
@@ -217,13 +219,30 @@ def same_parquet(path: Path, made: Path) -> bool:
     try:
         files = [parquet.ParquetFile(one, pre_buffer=False) for one in (path, made)]
         first, second = (file.schema_arrow for file in files)
-        # one column at a time, because tables can be large
-        return first.equals(second, check_metadata=True) and all(
-            files[0].read([name], use_threads=False).equals(files[1].read([name], use_threads=False))
-            for name in first.names
+        sizes, wanted = (_row_groups(file.metadata) for file in files)
+        return (
+            first.equals(second, check_metadata=True)
+            and [rows for rows, _ in sizes] == [rows for rows, _ in wanted]
+            and all(a <= 2 * b + _SPARE for (_, a), (_, b) in zip(sizes, wanted, strict=True))
+            and all(_same_columns(*files, group) for group in range(len(wanted)))
         )
     except (pa.ArrowException, OSError):
         return False
+
+
+def _row_groups(metadata: Any) -> list[tuple[int, int]]:
+    """Return the rows and the unpacked bytes of each part of a Parquet file."""
+    groups = map(metadata.row_group, range(metadata.num_row_groups))
+    return [(group.num_rows, group.total_byte_size) for group in groups]
+
+
+def _same_columns(first: Any, second: Any, group: int) -> bool:
+    """Compare a few rows of one column at a time: a text that is stored once can be in each row."""
+    for name in first.schema_arrow.names:
+        parts = (file.iter_batches(_ROWS, [group], [name], use_threads=False) for file in (first, second))
+        if not all(one is not None and one.equals(other) for one, other in zip_longest(*parts)):
+            return False
+    return True
 
 
 def _frame(data: bytes) -> "pd.DataFrame":
@@ -235,18 +254,35 @@ def _frame(data: bytes) -> "pd.DataFrame":
 
 def _table(source: Path | io.BytesIO) -> Any:
     """Read a Parquet file in this thread: pyarrow aborts the process if its threads free memory at exit."""
+    import pyarrow as pa
     from pyarrow import parquet
 
-    file = parquet.ParquetFile(source, pre_buffer=False)
+    schema = parquet.read_schema(source)
+    texts = [field.name for field in schema if pa.types.is_string(field.type)]
+    file = parquet.ParquetFile(source, read_dictionary=texts, pre_buffer=False)
     size = source.stat().st_size if isinstance(source, Path) else source.getbuffer().nbytes
-    cells = file.metadata.num_rows * file.metadata.num_columns
-    if cells > MOST_CELLS + _PACKED * size:
+    _check_claim(file.metadata.num_rows * file.metadata.num_columns, "cells", size, MOST_CELLS)
+    _check_claim(sum(unpacked for _, unpacked in _row_groups(file.metadata)), "bytes", size, MOST_TEXT)
+    table = file.read(use_threads=False)
+    _check_claim(sum(_text_bytes(table[name]) for name in texts), "bytes of text", size, MOST_TEXT)
+    return table.cast(schema)
+
+
+def _check_claim(count: int, what: str, size: int, most: int) -> None:
+    if count > most + _PACKED * size:
         raise MutatorError(
-            f"a results table of {size:,} bytes that claims {cells:,} cells",
+            f"a results table of {size:,} bytes that claims {count:,} {what}",
             expected="the table that the run wrote",
             remedy=_REMEDY,
         )
-    return file.read(use_threads=False)
+
+
+def _text_bytes(column: Any) -> int:
+    """Return the bytes of a column in which each text is stored once."""
+    import pyarrow.compute as pc
+
+    lengths = (pc.binary_length(part.dictionary).take(part.indices) for part in column.chunks)
+    return sum(pc.sum(pc.cast(part, "int64")).as_py() or 0 for part in lengths)
 
 
 def _units(frame: "pd.DataFrame") -> dict[str, str]:

@@ -4,6 +4,7 @@ import json
 from collections.abc import Mapping
 from hashlib import sha256
 
+from mutator._common.bounded import MOST_JSON
 from mutator.errors import MutatorError
 
 _MARK, _DIGEST, _LENGTH = b"FIP1", 32, 4
@@ -32,6 +33,8 @@ def unpack(data: bytes) -> dict[str, bytes]:
 
 def _head(data: bytes, begin: int, end: int) -> list[tuple[str, int]]:
     """Return the names and lengths of a parcel's parts, which begin at `end`."""
+    if end - begin > MOST_JSON:
+        raise _damaged(data)
     try:
         head = [(str(name), int(length)) for name, length in json.loads(data[begin:end])]
     except (ValueError, TypeError, RecursionError):

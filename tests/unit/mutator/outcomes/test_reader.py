@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
+import pyarrow as pa
 import pytest
 from pyarrow import parquet
 
@@ -22,12 +23,13 @@ from mutator.exports.write import export
 from mutator.model import Experiment, Outcome, Status
 from mutator.outcomes import result_rows, results
 from mutator.outcomes.columns import SEVERITY, SINCE, metric_columns, result_columns
-from mutator.outcomes.reader import Results, same_parquet
+from mutator.outcomes.reader import Results, _table, same_parquet
 from mutator.report import building
 from mutator.statistics.frame import load
 from mutator.store import plan_file
 from mutator.targets.environment import THREADS
 from mutator.workspace import Workspace
+from tests.costs import is_cheap, is_refused
 
 SOURCES = Path(mutator.__file__).parent
 WriteRun = Callable[..., Path]
@@ -227,3 +229,19 @@ def test_metadata_of_a_table_give_no_column_another_name(run: Path) -> None:
     assert not same_parquet(forged, path)
     forged.replace(path)
     assert Results.of_run(run).frame().equals(genuine)
+
+
+def _bomb(path: Path, rows: int, length: int) -> None:
+    """Write a small file in which a long text, stored once, is in each row."""
+    text = pa.DictionaryArray.from_arrays(pa.array([0] * rows, pa.int32()), pa.array(["x" * length]))
+    parquet.write_table(pa.table({"a": text}), path, compression="zstd", store_schema=False)
+
+
+def test_a_long_text_that_is_stored_once_is_not_copied_into_each_row(tmp_path: Path) -> None:
+    path, genuine = tmp_path / "results.parquet", tmp_path / "genuine.parquet"
+    _bomb(path, 20_000, 50_000)
+    _bomb(genuine, 20_000, 5)
+    assert path.stat().st_size < 10_000
+    assert "bytes of text" in is_refused(lambda: _table(path))
+    is_cheap(lambda: same_parquet(path, genuine))
+    assert not same_parquet(path, genuine) and same_parquet(genuine, genuine)

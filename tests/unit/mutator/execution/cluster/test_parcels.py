@@ -37,6 +37,7 @@ def test_any_damage_is_detected() -> None:
         b'[["a", 9]]',
         b'[["a", 1], ["a", 1]]',
         b"[" * 9999,
+        b'[["a", 2]]' + b" " * 6_000_000,
     ],
 )
 def test_a_parcel_whose_head_does_not_fit_is_refused(head: bytes) -> None:
