@@ -245,6 +245,8 @@ class ReferenceEngine:
         if report is not None and (problem := self._wrong_tree(job, report, changed)):
             return Status.HARNESS_ERROR, problem
         status, detail = judge(self.limits, ended, report)
+        if report is None and changed and status is Status.CRASHED:  # whoever changed it can have caused this
+            return Status.HARNESS_ERROR, _in_use(changed)
         if report is None or (status is not Status.OK and report["probe"] is None):
             return status, detail
         problem = job.problem_of(report["probe"])
@@ -260,7 +262,11 @@ class ReferenceEngine:
         for path in sorted(expected.keys() | more):
             if report["files"].get(path) != expected.get(path):
                 return f"{path} in the tree that ran is not the one of this job"
-        return f"{changed} was changed while it was in use" if changed else ""
+        return _in_use(changed) if changed else ""
+
+
+def _in_use(changed: str) -> str:
+    return f"{changed} was changed while it was in use"
 
 
 def _steady(raised: Raised, folder: Path) -> Raised:

@@ -16,6 +16,7 @@ from mutator._common.hashing import digest
 from mutator._common.shortages import shortage
 from mutator.errors import MutatorError
 from mutator.outcomes import trace_files
+from mutator.outcomes.mcap_files import BadTrace
 from mutator.outcomes.trace_files import own_times
 from mutator.targets.channels import Channel
 from mutator.targets.manifest import TargetManifest
@@ -60,7 +61,7 @@ def load_trace(
     kind = f"an {path.suffix} file" if path.suffix in (".npz", ".mcap") else f"a {path.suffix} file"
     try:
         trace = trace_files.read(path, manifest, channels, also)
-    except trace_files.BadTrace as err:
+    except BadTrace as err:
         raise BadOutput(err.got, where=path, expected=err.expected) from None
     except KeyError as err:
         raise BadOutput(f"no channel {err}", where=path, expected="the manifest's channels") from None

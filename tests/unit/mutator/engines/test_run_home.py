@@ -20,18 +20,18 @@ FILED = f"{WORK}shutil.rmtree(work)\nopen(work, 'w').close()"
 MOVE = "home = os.environ['TMPDIR']\nos.rename(home, f'{home}-{os.getpid()}')"
 EXCHANGE = "atexit.register(lambda: (os.rename('../out', '../out2'), {}))"
 CASES = {
-    "deletes_all_folders": (Status.CRASHED, (), f"{WORK}shutil.rmtree(work)"),
-    "renames_all_folders": (Status.CRASHED, (), f"{WORK}os.rename(work, f'{{work}}-{{os.getpid()}}')"),
+    "deletes_all_folders": (Status.HARNESS_ERROR, (), f"{WORK}shutil.rmtree(work)"),
+    "renames_all_folders": (Status.HARNESS_ERROR, (), f"{WORK}os.rename(work, f'{{work}}-{{os.getpid()}}')"),
     "makes_all_folders_a_file": (Status.HARNESS_ERROR, (), FILED),
     "links_all_folders": (
         Status.OK,
         ("log.npz", "said.json"),
         f"{WORK}os.rename(work, f'{{work}}-{{os.getpid()}}')\nos.symlink(f'work-{{os.getpid()}}', work)",
     ),
-    "deletes_its_folder": (Status.CRASHED, (), "shutil.rmtree(os.environ['TMPDIR'])"),
-    "renames_its_folder": (Status.CRASHED, (), MOVE),
+    "deletes_its_folder": (Status.HARNESS_ERROR, (), "shutil.rmtree(os.environ['TMPDIR'])"),
+    "renames_its_folder": (Status.HARNESS_ERROR, (), MOVE),
     "a_link_instead_of_its_folder": (
-        Status.CRASHED,
+        Status.HARNESS_ERROR,
         (),
         f"{MOVE}\nos.symlink('/', home)",
     ),
