@@ -193,7 +193,7 @@ class TemplateEnvironment(ImmutableSandboxedEnvironment):
         return "".join(_limited(pieces))
 
 
-def _filtered(node: nodes.Expr, name: str, *args: nodes.Expr) -> nodes.Filter:
+def _filtered(node: nodes.Node, name: str, *args: nodes.Expr) -> nodes.Filter:
     return nodes.Filter(node, name, list(args), [], None, None, lineno=node.lineno)
 
 

@@ -224,7 +224,7 @@ def same_parquet(path: Path, made: Path) -> bool:
             first.equals(second, check_metadata=True)
             and [rows for rows, _ in sizes] == [rows for rows, _ in wanted]
             and all(a <= 2 * b + _SPARE for (_, a), (_, b) in zip(sizes, wanted, strict=True))
-            and all(_same_columns(*files, group) for group in range(len(wanted)))
+            and all(_same_columns(files[0], files[1], group) for group in range(len(wanted)))
         )
     except (pa.ArrowException, OSError):
         return False
@@ -279,7 +279,7 @@ def _check_claim(count: int, what: str, size: int, most: int) -> None:
 
 def _text_bytes(column: Any) -> int:
     """Return the bytes of a column in which each text is stored once."""
-    import pyarrow.compute as pc
+    import pyarrow.compute as pc  # type: ignore[import-untyped]
 
     lengths = (pc.binary_length(part.dictionary).take(part.indices) for part in column.chunks)
     return sum(pc.sum(pc.cast(part, "int64")).as_py() or 0 for part in lengths)
