@@ -20,6 +20,8 @@ HITS = (
     "was changed while it was in use",
     "in the tree that ran is not the one of this job",
     "its worker was stopped while it ran",
+    "a process of the fork server is gone",
+    "the tree of the fork server is not the pristine one",
 )
 OUTPUTS = ("log.npz", "said.json")
 NAMES = [*misdeeds(ATTACKS)]
