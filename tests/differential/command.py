@@ -51,7 +51,7 @@ class Command:
         self._wait(path.exists)
 
     def _wait(self, reached: Callable[[], bool]) -> None:
-        deadline = time.monotonic() + 300.0  # a command of two workers takes 130 s at a load of 12
+        deadline = time.monotonic() + 300.0  # on a busy machine, the first record once took over 120 s
         while not reached():
             assert self.process.poll() is None, self.process.communicate()[0]
             assert time.monotonic() < deadline
