@@ -234,7 +234,8 @@ class Controller:
     @pytest.hookimpl(optionalhook=True)
     def pytest_configure_node(self, node: Any) -> None:
         assert self.begun is not None
-        node.workerinput[_INPUT] = self.begun.worker_input()
+        given = node.workerinput[_INPUT] = self.begun.worker_input()
+        self.begun.written.begin(given["session"] + node.gateway.id)
 
     @pytest.hookimpl(optionalhook=True)
     def pytest_testnodedown(self, node: Any, error: object | None) -> None:
@@ -244,9 +245,7 @@ class Controller:
         output, given = getattr(node, "workeroutput", {}), node.workerinput[_INPUT]
         self._note(output.get(_PROBLEM, ""))
         if _WRITTEN in output:
-            self.begun.written.report(output[_WRITTEN])
-        else:
-            self.begun.written.lose(given["session"] + node.gateway.id)
+            self.begun.written.report(output[_WRITTEN], given["session"] + node.gateway.id)
 
     def pytest_collection(self, session: pytest.Session) -> bool | None:
         if session.config.pluginmanager.hasplugin("dsession"):

@@ -19,12 +19,15 @@ class WrittenFiles:
         self._sums: dict[str, str] = {}
         self._unreported: set[str] = set()
 
-    def report(self, sums: Sums) -> None:
-        self._sums |= sums
-
-    def lose(self, worker: str) -> None:
-        """Note that a worker ended without a report. Its files are believed, so that its work is kept."""
+    def begin(self, worker: str) -> None:
+        """Note that a process began to work. Its files are believed until it reports, so that work is kept
+        when the process dies or the command is interrupted."""
         self._unreported.add(worker)
+
+    def report(self, sums: Sums, worker: str = "") -> None:
+        """Add what a worker wrote. `worker` names one that began in another process."""
+        self._sums |= sums
+        self._unreported.discard(worker)
 
     def set_others_aside(self, run: Path) -> list[str]:
         """Move new files of lines that no worker wrote so to `damaged/`; return their names."""

@@ -142,6 +142,10 @@ class SeriesFolder:
         index = self.index
         if index is None or experiment_id not in index.entries:
             return None
+        return self.packed(index, experiment_id)
+
+    def packed(self, index: Index, experiment_id: str) -> tuple[Series, Series]:
+        """Return the golden and the faulty series in the chunks; MutatorError for damage."""
         key = index.golden_of[experiment_id]
         if key not in self._goldens:
             self._goldens[key] = decode(self.entry(index.goldens[key]))

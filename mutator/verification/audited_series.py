@@ -1,7 +1,6 @@
 """Audit series: check that their files are unchanged. No result depends on them."""
 
-from collections.abc import Iterator
-from contextlib import suppress
+from collections.abc import Iterator, Set
 
 import numpy as np
 
@@ -89,43 +88,40 @@ def _packed(
         got, expected = f"series of plan {index.plan[:16]}", folder.head["plan"][:16]
         yield MutatorError(got, where=path, expected=expected, remedy=putting_aside(run))
         return
+    damaged = set()
     for name, _ in index.chunks:
         try:
             there.chunk(name)
         except MutatorError as err:
+            damaged.add(name)
             ids = [one for one in _users(index, name) if not there.kept(one).is_file()]
             more = f" and {len(ids) - 1} more" if len(ids) > 1 else ""
             got = f"{err.got}; the series of {ids[0]}{more} cannot be read" if ids else err.got
             yield _told(err, got, putting_aside(run))
 
-    yield from _of_other_runs(folder, there, index)
+    yield from _of_other_runs(folder, there, index, damaged)
     yield from _of_other_goldens(folder, there, index, manifest)
 
 
-def _of_other_runs(folder: RunFolder, there: SeriesFolder, index: Index) -> Iterator[MutatorError]:
-    records, goldens = folder.records(), _decoded(there, index)
+def _of_other_runs(
+    folder: RunFolder, there: SeriesFolder, index: Index, damaged: Set[str]
+) -> Iterator[MutatorError]:
+    """Series that do not belong to the records. Those in `damaged` chunks are reported with their chunk."""
+    records = folder.records()
     for name, number in index.entries.items():
         if (record := records.get(name)) is None:  # lost; its series is not shown until it runs again
             continue
-        path = inside(there.path, f"{index.places[number][0]}.js")
-        if (golden := goldens.get(index.golden_of[name])) is None:  # reported elsewhere
+        chunk, golden_chunk = (index.places[one][0] for one in (number, index.goldens[index.golden_of[name]]))
+        if damaged & {chunk, golden_chunk}:
             continue
+        path = inside(there.path, f"{chunk}.js")
         try:
-            faulty = decode(there.entry(number), golden)
-            check_run(faulty.about, record, path)
-            check_values(golden, faulty, record, path)
+            golden, faulty = there.packed(index, name)
+            check_run(faulty.about, record)
+            check_values(golden, faulty, record)
         except MutatorError as err:
-            if err.where == str(path):  # damaged chunks are reported above
-                yield _told(err, f"{name}: {err.got}", putting_aside(folder.path))
-
-
-def _decoded(there: SeriesFolder, index: Index) -> dict[str, Series]:
-    """The series of golden runs that can be read."""
-    found = {}
-    for key, number in index.goldens.items():
-        with suppress(MutatorError):
-            found[key] = decode(there.entry(number))
-    return found
+            remedy = putting_aside(folder.path)
+            yield MutatorError(f"{name}: {err.got}", where=path, expected=err.expected, remedy=remedy)
 
 
 def _of_other_goldens(

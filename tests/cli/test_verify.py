@@ -204,6 +204,20 @@ def deviating() -> str:
     return next(name for name, one in records.items() if any(by for _, by in one.max_dev))
 
 
+def pack_with(name: str, forged: bytes) -> None:
+    """Pack the series again, under new names and with an index, with another series of one experiment."""
+    there, index = SeriesFolder(Path("run")), packed()
+    writer = SeriesWriter(Path("run"), "forged")
+    for one in index.entries:
+        key = index.golden_of[one]
+        golden, faulty = [there.entry(number) for number in (index.goldens[key], index.entries[one])]
+        writer.append(one, EncodedSeries(key=key, golden=golden, faulty=forged if one == name else faulty))
+    writer.close()
+    for path in Path("run/series").glob("*.js"):
+        path.unlink()
+    pack(Path("run"), index.plan, {one: place for place, one in enumerate(index.entries)}, index.budget_mb)
+
+
 def test_curves_of_the_golden_run_are_not_shown_as_those_of_a_fault(cli: Cli, sealed: str) -> None:
     """Whether they are in a rerun's file or in a chunk with a new name and index."""
     name, there = deviating(), SeriesFolder(Path("run"))
@@ -214,21 +228,20 @@ def test_curves_of_the_golden_run_are_not_shown_as_those_of_a_fault(cli: Cli, se
     with pytest.raises(MutatorError, match="the series of another run"):
         series_of(name)
     there.kept(name).unlink()
-    index = there.index
-    assert index is not None
-    writer = SeriesWriter(Path("run"), "forged")
-    for one in index.entries:
-        key = index.golden_of[one]
-        genuine = [there.entry(number) for number in (index.goldens[key], index.entries[one])]
-        faulty = forged if one == name else genuine[1]
-        writer.append(one, EncodedSeries(key=key, golden=genuine[0], faulty=faulty))
-    writer.close()
-    for path in Path("run/series").glob("*.js"):
-        path.unlink()
-    pack(Path("run"), index.plan, {one: place for place, one in enumerate(index.entries)}, index.budget_mb)
+    pack_with(name, forged)
     found = cli("verify", "run")
     assert found.code == 1 and f"{name}: the series of another run: " in found.out
     with pytest.raises(MutatorError, match="the series of another run"):
+        series_of(name)
+
+
+def test_a_packed_series_that_is_none_is_reported(cli: Cli, sealed: str) -> None:
+    """Also if its chunk has the right name."""
+    name = deviating()
+    pack_with(name, b"no series")
+    found = cli("verify", "run")
+    assert found.code == 1 and "1 difference" in found.out and f": {name}: " in found.out
+    with pytest.raises(MutatorError):
         series_of(name)
 
 

@@ -189,7 +189,9 @@ def test_a_starting_worker_ends_when_its_command_is_killed(
 ) -> None:
     out = tmp_path / "run"
     command = Command(toy, out, *(pytest_words(out, workers=1) if words is None else [*words, str(out)]))
-    while not (started := [pid for pid, line in command.others() if re.match("[^ ]+ -u -c .*stdin", line)]):
+    while not (
+        started := [pid for pid, line in command.others() if re.match("[^ ]+ -P -u -c .*stdin", line)]
+    ):
         assert command.process.poll() is None, command.end()
     os.kill(started[0], signal.SIGSTOP)
     try:

@@ -45,8 +45,11 @@ def test_lines_of_nobody_are_set_aside_and_lost_lines_are_named(run: Path) -> No
     assert written.set_others_aside(run) == ["records/0001-gw7.jsonl", NAME]
 
 
-def test_lines_of_a_worker_that_died_count(run: Path) -> None:
+def test_lines_of_a_worker_count_until_it_reports_others(run: Path) -> None:
+    """It reports nothing if it dies, or if the command is interrupted."""
     write(run)
     written = WrittenFiles()
-    written.lose("0001-gw0")
+    written.begin("0001-gw0")
     assert written.set_others_aside(run) == []
+    written.report({}, "0001-gw0")
+    assert written.set_others_aside(run) == [NAME]
