@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from rich.table import Table as RichTable
 
 NO_BREAK = "\u00a0"  # printed as a space at which text is not folded
+_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")  # not tabs and new lines
 PIPE_COLUMNS = 100  # line width outside a terminal, unless COLUMNS is set
 
 STYLES = {
@@ -248,6 +249,7 @@ def _console(*, stderr: bool) -> "Console":
 
 
 def _print(console: "Console", text: str, style: str | None, *, whole: bool = False) -> None:
+    text = _visible(text)
     if not whole:
         width = console.width if console.is_terminal else _columns()
         text = folded(text, width).replace(NO_BREAK, " ")
@@ -260,7 +262,12 @@ def _columns() -> int:
 
 
 def _cell(value: object) -> str:
-    return "" if value is None else str(value)
+    return "" if value is None else _visible(str(value))
+
+
+def _visible(text: str) -> str:
+    """Escape what controls a terminal; texts can come from somebody else's run folder."""
+    return _CONTROL.sub(lambda found: repr(found[0])[1:-1], text)
 
 
 def _jsonable(value: Any) -> Any:

@@ -165,7 +165,7 @@ class RunFolder:
     def shard(self) -> Shard | None:
         """The share of the plan that runs in this folder; None: all of it."""
         text = self.head["choices"].get("shard")  # older runs do not have this key
-        return Shard.parse(text) if text else None
+        return Shard.parse(str(text)) if text else None
 
     @property
     def limits(self) -> Limits:

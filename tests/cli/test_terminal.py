@@ -167,3 +167,13 @@ def test_json_is_never_folded(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPa
     wide = cli("list", "specs", "--json").out
     monkeypatch.setenv("COLUMNS", "20")
     assert cli("list", "specs", "--json").out == wide
+
+
+def test_no_text_controls_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    terminal = Terminal()
+    terminal.say("kernel \x1b[2J\x9b1m\r\tx")
+    terminal.table(["a"], [["\x1b]0;x\x07"]])
+    terminal.complain("\x08")
+    out, err = capsys.readouterr()
+    assert "kernel \\x1b[2J\\x9b1m\\r" in out and "\\x1b]0;x\\x07" in out and "\\x08" in err
+    assert not {"\x1b", "\x9b", "\r", "\x07", "\x08"} & {*out, *err}

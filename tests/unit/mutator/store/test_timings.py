@@ -37,6 +37,7 @@ def test_a_timing_is_read(tmp_path: Path) -> None:
     [
         *[(name, value) for name in ("cpu_s", "wall_s") for value in ("x", None, True, [1], -1e308, 1e308)],
         *[(name, value) for name in ("host", "worker", "engine", "why") for value in (["a"], {"a": 1}, 1)],
+        ("experiment_id", True),
         *[(name, "\x1b[2J") for name in ("host", "worker", "engine")],
     ],
 )
