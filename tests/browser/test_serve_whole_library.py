@@ -90,8 +90,10 @@ def test_twenty_marks_survive_reloads_and_killed_servers(browser: Any, root: Pat
         marks |= marked(page, 5)
         page.wait_for_selector("#banner:visible")
     with serving(root, int(address.partition(PORT_IN)[2].partition("/")[0])) as (_, again):
-        context.new_page().goto(again)
-        page.bring_to_front()
+        with page.expect_event("load"):  # the new server does not know the page, which reloads itself
+            context.new_page().goto(again)
+            page.bring_to_front()
+        page.wait_for_selector("html[data-ready]", state="attached")
         page.wait_for_selector("#banner", state="hidden")
         marks |= marked(page, 5)
         page.wait_for_timeout(2000)
