@@ -18,11 +18,12 @@ from pathlib import Path
 from time import process_time
 
 from mutator._common.hashing import digest
+from mutator.audit.seal import seal_of
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plans import Plan, make_plan
 from mutator.model import Activation, Experiment, Outcome, Record, Status
 from mutator.mutants.building import build
-from mutator.outcomes import results
+from mutator.results import table_building
 from mutator.statistics.frame import load
 from mutator.store import digests, plan_file
 from mutator.store.check_results import FILE as CHECKS
@@ -31,7 +32,6 @@ from mutator.store.lines import LineWriter
 from mutator.store.patches import PatchWriter
 from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
-from mutator.verification.seal import seal_of
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -168,7 +168,7 @@ def opening(size: int, out: Path) -> dict[str, float]:
 def table(size: int, out: Path) -> dict[str, float]:
     written_run(size, out)
     began = process_time()
-    path = results.build(out)
+    path = table_building.build(out)
     built = process_time()
     times = []
     for _ in range(3):

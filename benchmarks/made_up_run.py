@@ -22,6 +22,7 @@ import numpy as np
 from growth import record
 
 from mutator._common.hashing import canonical, digest
+from mutator.audit.seal import seal_of
 from mutator.campaigns import machine
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plans import Planning
@@ -31,6 +32,8 @@ from mutator.model import Experiment, Record
 from mutator.mutants.building import build
 from mutator.outcomes.golden import load_trace
 from mutator.outcomes.sampling import Sampler
+from mutator.preflight import equivalence
+from mutator.preflight.preflight_rules import digest_of
 from mutator.store import digests, plan_file
 from mutator.store.blocks import as_block
 from mutator.store.check_results import FILE as CHECKS
@@ -43,9 +46,6 @@ from mutator.store.series import INDEX, Index, write_index
 from mutator.store.series_format import encode
 from mutator.store.series_script import name_of, write_script
 from mutator.store.stretches import Stretch
-from mutator.verification import equivalence
-from mutator.verification.preflight_rules import digest_of
-from mutator.verification.seal import seal_of
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[1]

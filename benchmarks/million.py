@@ -25,8 +25,8 @@ import report_page
 from playwright.sync_api import sync_playwright
 
 from mutator.execution.running import run_campaign
-from mutator.outcomes import results
 from mutator.report import building
+from mutator.results import table_building
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -58,7 +58,7 @@ def resume(size: int, run: Path) -> None:
 
 
 def table(size: int, run: Path) -> None:
-    results.build(run)
+    table_building.build(run)
 
 
 def report(size: int, run: Path) -> None:

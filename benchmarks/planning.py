@@ -21,12 +21,12 @@ from mutator.engines.jobs import Execution, Job
 from mutator.engines.reference import ReferenceEngine
 from mutator.execution.running import run_campaign
 from mutator.model import Experiment, Outcome, Record, Status
+from mutator.preflight import preflight, preflight_cache, preflight_rules
 from mutator.store.check_results import FILE
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.lines import LineWriter
 from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
-from mutator.verification import preflight, preflight_cache, preflight_rules
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[1]

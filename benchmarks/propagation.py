@@ -11,10 +11,11 @@ from pathlib import Path
 from resource import RUSAGE_CHILDREN, getrusage
 from time import process_time
 
+from mutator.outcomes.channel_departures import departures
+
 import mutator
 from mutator.outcomes.golden import compare, load_trace
 from mutator.outcomes.judging import load_channels
-from mutator.outcomes.propagation import departures
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[1]

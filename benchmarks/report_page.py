@@ -26,9 +26,6 @@ from mutator.campaigns.plans import make_plan
 from mutator.model import Experiment, Record, Trigger
 from mutator.mutants.building import build
 from mutator.mutants.readable_diffs import readable
-from mutator.outcomes import results
-from mutator.outcomes.counting import outcome_counts
-from mutator.outcomes.reader import Results
 from mutator.outcomes.sampling import Sampler
 from mutator.report import browse as report_browse
 from mutator.report import page as report_page
@@ -38,6 +35,9 @@ from mutator.report.panels.answers import answers_panel
 from mutator.report.panels.paths import paths_panel
 from mutator.report.studies import ReportedRun
 from mutator.report.words import words_of
+from mutator.results import table_building
+from mutator.results.counting import outcome_counts
+from mutator.results.table_reader import Results
 from mutator.review.groups import shapes
 from mutator.store.lines import LineWriter
 from mutator.store.records import SCHEMA
@@ -95,7 +95,7 @@ def written_run(workspace: Workspace, size: int, out: Path) -> list[Experiment]:
         metrics = tuple(zip(names, map(float, draw.normal(10.0, 5.0, len(names))), strict=True))
         lines.append(asdict(replace(record(experiment, number), metrics=metrics)))
     lines.close()
-    results.build(out)
+    table_building.build(out)
     return experiments
 
 

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from mutator.api.run_experiments import RunExperiment
     from mutator.api.runs import Run, load_run, merge_runs
     from mutator.api.trials import Trial, try_fault
+    from mutator.audit.seal import Seals
     from mutator.campaigns.plans import Choices, Plan
     from mutator.comparison.comparison import Gate
     from mutator.errors import CheckFailed, MutatorError, MutatorWarning
@@ -42,7 +43,6 @@ if TYPE_CHECKING:
     from mutator.report.film import Shot
     from mutator.report.history import History
     from mutator.store.progress import Progress
-    from mutator.verification.seal import Seals
     from mutator.workspace import Workspace
 
 __version__ = VERSION
@@ -82,7 +82,7 @@ _HOMES = {
     "mutator.report.film": ("Shot",),
     "mutator.report.history": ("History",),
     "mutator.store.progress": ("Progress",),
-    "mutator.verification.seal": ("Seals",),
+    "mutator.audit.seal": ("Seals",),
     "mutator.workspace": ("Workspace",),
 }
 _LAZY = {name: home for home, names in _HOMES.items() for name in names}

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from mutator.checks import library_check
 from mutator.config import yaml_files
 from mutator.config.yaml_files import Source
 from mutator.errors import MutatorError
@@ -16,7 +17,6 @@ from mutator.faults import fault_models
 from mutator.faults.fault_models import Example, FaultModel, FaultModels
 from mutator.mutants import anchors
 from mutator.mutants.anchors import ParsedFile
-from mutator.verification import library
 
 _SMALL = 1 << 20  # bytes
 
@@ -30,7 +30,7 @@ def parsed_once() -> Iterator[None]:
     """
     parse_yaml, parse_python, load_model = yaml_files.parse, anchors.parse_file, fault_models._load
     models: dict[tuple[str, bytes, bytes], FaultModel] = {}
-    run_example, examples = library.run_example, dict[str, str]()
+    run_example, examples = library_check.run_example, dict[str, str]()
 
     @lru_cache(maxsize=1024)
     def yaml_of(text: str) -> bytes:
@@ -72,5 +72,5 @@ def parsed_once() -> Iterator[None]:
         patch.setattr(yaml_files, "parse", yaml)
         patch.setattr(anchors, "parse_file", python)
         patch.setattr(fault_models, "_load", model)
-        patch.setattr(library, "run_example", example_of)
+        patch.setattr(library_check, "run_example", example_of)
         yield

@@ -12,16 +12,16 @@ from mutator._common.locks import owned
 from mutator._common.tables import Table
 from mutator._common.text import counted
 from mutator.api.selection import WorkspaceLike, open_workspace
+from mutator.audit.repair import repair as put_aside
+from mutator.audit.run_audit import Check, audit_checks
+from mutator.audit.seal import Seals, seals_of, unsealed_facts
+from mutator.audit.signatures import sign as write_signature
+from mutator.audit.signatures import signer
 from mutator.errors import CheckFailed, MutatorError
 from mutator.execution.spot_check import drawn, driven_again
 from mutator.report.audited_pages import pages
 from mutator.store.run_folder import RunFolder
 from mutator.store.stretches import package_versions, told
-from mutator.verification.audit import Check, audit_checks
-from mutator.verification.repairing import repair as put_aside
-from mutator.verification.seal import Seals, seals_of, unsealed_facts
-from mutator.verification.signatures import sign as write_signature
-from mutator.verification.signatures import signer
 from mutator.workspace import Workspace
 
 SHOWN = 20  # differences listed in the text of an audit

@@ -8,6 +8,11 @@ from pathlib import Path
 from mutator._common.files import write_atomic
 from mutator._common.shipped import write_library
 from mutator.api.selection import WorkspaceLike, open_workspace
+from mutator.checks import fast_engines, library_check
+from mutator.checks.doctor import examine
+from mutator.checks.draws import unused_draws
+from mutator.checks.drive import check_drive
+from mutator.checks.findings import Finding
 from mutator.errors import MutatorError
 from mutator.mutants.anchors import parsed
 from mutator.mutants.listed_places import ListedPlace, places_of
@@ -20,11 +25,6 @@ from mutator.stpa.drawing import draw
 from mutator.targets import manifest_files
 from mutator.targets.locations import check_file
 from mutator.targets.upgrade import Upgrade
-from mutator.verification import fast_engines, library
-from mutator.verification.doctor import examine
-from mutator.verification.draws import unused_draws
-from mutator.verification.drive import check_drive
-from mutator.verification.findings import Finding
 from mutator.workspace import Workspace
 
 
@@ -68,7 +68,7 @@ def check_library(workspace: WorkspaceLike = None, *, target: str | None = None)
     `target` names a manifest; default: the library's only one.
     """
     found = open_workspace(workspace)
-    return library.check_library(found, found.target_name(target))
+    return library_check.check_library(found, found.target_name(target))
 
 
 def find_places(

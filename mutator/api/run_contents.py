@@ -11,9 +11,9 @@ from mutator.campaigns.plans import Plan, load_plan
 from mutator.errors import MutatorError
 from mutator.execution.traces import Traces
 from mutator.model import Experiment, Fault, Record, Status
-from mutator.outcomes import counting
-from mutator.outcomes.paths import Ways, ways_of
-from mutator.outcomes.reader import Results
+from mutator.outcomes.fault_paths import Ways, ways_of
+from mutator.results import counting
+from mutator.results.table_reader import Results
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace

@@ -13,8 +13,8 @@ from mutator.api.run_contents import RunContents, from_here
 from mutator.api.trials import Trial, trial_of
 from mutator.errors import MutatorError
 from mutator.execution.single_run import rerun
+from mutator.outcomes.fault_paths import Path as FaultPath
 from mutator.outcomes.golden import Trace, load_trace
-from mutator.outcomes.paths import Path as FaultPath
 from mutator.outcomes.sampling import keep_series
 from mutator.report.film import Filming, Shot
 from mutator.store.series import SeriesFolder

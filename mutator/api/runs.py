@@ -16,6 +16,7 @@ from mutator.api.html import facts_html, text_html
 from mutator.api.run_contents import RunContents, from_here
 from mutator.api.run_experiments import RunExperiment
 from mutator.api.selection import WorkspaceLike, open_workspace
+from mutator.audit.seal import Seals, not_verifiable, seals_of
 from mutator.errors import MutatorError
 from mutator.execution.merging import merge
 from mutator.execution.session import Notify, Summary
@@ -23,20 +24,19 @@ from mutator.exports import Format
 from mutator.exports import Table as ExportedTable
 from mutator.exports.write import Parts, export
 from mutator.model import OPERATORS
-from mutator.outcomes import counting
-from mutator.outcomes import results as results_table
 from mutator.outcomes.fault_free import FaultFreeRun, alerts_by_drive, fault_free_runs, own_alerts
 from mutator.outcomes.golden import load_trace
-from mutator.outcomes.rows import count_table
+from mutator.preflight import equivalence
 from mutator.report import building
 from mutator.report.stills import take_stills
+from mutator.results import counting
+from mutator.results import table_building as results_table
+from mutator.results.rows import count_table
 from mutator.statistics.frame import prepare
 from mutator.statistics.mutation_score import score_sheet, totals
 from mutator.statistics.sheet import Sheet
 from mutator.store import cleaning
 from mutator.store.run_folder import GoldenRun, RunFolder
-from mutator.verification import equivalence
-from mutator.verification.seal import Seals, not_verifiable, seals_of
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -11,6 +11,7 @@ from typing import TypeAlias
 
 from mutator._common.arguments import check_number, check_whole
 from mutator.campaigns.plan_warnings import changes_nothing
+from mutator.checks.library_check import check_spec
 from mutator.config import units
 from mutator.errors import MutatorError, MutatorWarning
 from mutator.faults.expansion import expand
@@ -20,7 +21,6 @@ from mutator.model import Fault, Trigger
 from mutator.stpa.context_tables import ContextTable
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.kinds import TYPED, read_trigger
-from mutator.verification.library import check_spec
 from mutator.workspace import Workspace
 
 WorkspaceLike: TypeAlias = "Workspace | str | PathLike[str] | None"

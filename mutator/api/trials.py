@@ -13,9 +13,9 @@ from mutator.errors import MutatorError
 from mutator.execution.single_run import Single, run_single
 from mutator.figures.run_plot import save
 from mutator.model import Experiment, Method, Record
+from mutator.outcomes.channel_departures import channel_facts
 from mutator.outcomes.golden import Trace, load_trace
 from mutator.outcomes.judging import load_judged
-from mutator.outcomes.propagation import channel_facts
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.severity import Scale
 

@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from mutator.campaigns.filters import compile_filter
-from mutator.outcomes.columns import is_text
-from mutator.outcomes.ranking import places
-from mutator.outcomes.reader import Results
-from mutator.outcomes.rows import Row, lines_of, row_from
+from mutator.results.ranking import places
+from mutator.results.result_columns import is_text
+from mutator.results.rows import Row, lines_of, row_from
+from mutator.results.table_reader import Results
 
 _BATCH = 10_000  # rows filtered at a time
 

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from mutator.api.run_experiments import RunExperiment
     from mutator.api.trials import Trial
     from mutator.model import Experiment, Record
-    from mutator.outcomes.paths import Stage
-    from mutator.outcomes.rows import Row
+    from mutator.outcomes.fault_paths import Stage
+    from mutator.results.rows import Row
     from mutator.targets.manifest import TargetManifest
     from mutator.workspace import Workspace
 

@@ -16,7 +16,7 @@ from mutator.cli.options import Json, Manifest, Place, with_place
 from mutator.errors import EXIT_CHECK_FAILED, MutatorError
 
 if TYPE_CHECKING:
-    from mutator.verification.findings import Finding
+    from mutator.checks.findings import Finding
     from mutator.workspace import Workspace
 
 

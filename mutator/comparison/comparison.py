@@ -28,7 +28,7 @@ from mutator.comparison.sheets import (
 from mutator.comparison.sides import Side, read_side
 from mutator.errors import MutatorError
 from mutator.model import Experiment
-from mutator.outcomes.rows import Row
+from mutator.results.rows import Row
 from mutator.statistics.sheet import Sheet
 
 

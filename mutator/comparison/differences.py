@@ -4,12 +4,12 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from mutator.audit.seal import not_verifiable
 from mutator.comparison.pairs import Matching, Pair
 from mutator.comparison.sides import Side
 from mutator.store.run_folder import RunFolder
 from mutator.store.stretches import package_versions
 from mutator.store.stretches import told as ran_with
-from mutator.verification.seal import not_verifiable
 
 _SHORT = 12  # shown digits of a digest
 _HEAD = ("campaign", "target", "seed", "reading")

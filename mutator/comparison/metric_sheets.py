@@ -8,7 +8,7 @@ import pandas as pd
 from mutator.comparison.pairs import Pair
 from mutator.comparison.sheets import Names, adjusted, whole_and_parts
 from mutator.comparison.sides import Side
-from mutator.outcomes.rows import by_fault_type
+from mutator.results.rows import by_fault_type
 from mutator.statistics.medians import median_difference
 from mutator.statistics.paired import wilcoxon
 from mutator.statistics.sheet import Cell, P, Sheet

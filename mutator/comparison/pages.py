@@ -15,7 +15,7 @@ from mutator._common.text import counted
 from mutator.comparison.comparison import Comparison, Gate, ending_change
 from mutator.comparison.differences import Fact
 from mutator.comparison.pairs import Change, Pair, time_to_hazard
-from mutator.outcomes.rows import Row
+from mutator.results.rows import Row
 from mutator.web import asset
 
 LISTED = 50  # number of experiments that the Markdown lists for each change; the page and the CSV list all

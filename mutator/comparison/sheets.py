@@ -9,7 +9,7 @@ import pandas as pd
 
 from mutator.comparison.pairs import Change, Pair, time_to_hazard
 from mutator.model import Outcome, Status
-from mutator.outcomes.rows import Row, by_fault_type
+from mutator.results.rows import Row, by_fault_type
 from mutator.statistics.contrasts import holm
 from mutator.statistics.paired import mcnemar, rate_difference, times
 from mutator.statistics.shares import share

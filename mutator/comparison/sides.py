@@ -6,13 +6,13 @@ from typing import NamedTuple
 
 from mutator.campaigns.filters import compile_filter
 from mutator.model import Experiment, Record, Value
-from mutator.outcomes.columns import PLAN_COLUMNS, T_END, plan_row
-from mutator.outcomes.reader import row_of
-from mutator.outcomes.rows import Row
+from mutator.preflight import equivalence
+from mutator.results.result_columns import PLAN_COLUMNS, T_END, plan_row
+from mutator.results.rows import Row
+from mutator.results.table_reader import row_of
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.targets.severity import Scale
-from mutator.verification import equivalence
 
 
 class Key(NamedTuple):

@@ -3,10 +3,10 @@
 from collections import Counter
 from dataclasses import asdict, dataclass
 
+from mutator.audit.seal import Seals
+from mutator.preflight.equivalence import Proof
 from mutator.store import integrity, verified_runs
 from mutator.store.run_folder import RunFolder
-from mutator.verification.equivalence import Proof
-from mutator.verification.seal import Seals
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

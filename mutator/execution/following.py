@@ -6,8 +6,8 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 from mutator.execution.session import Session
+from mutator.preflight import equivalence
 from mutator.store.progress import Progress, Tail
-from mutator.verification import equivalence
 
 _NOTIFY_S = 0.5
 

@@ -14,13 +14,15 @@ from mutator._common.files import json_bytes, raising_disk_full, read_json, writ
 from mutator._common.hashing import plain
 from mutator._common.locks import owned
 from mutator._common.text import counted
+from mutator.audit.seal import OUTSIDE, without
 from mutator.campaigns.freezing import make_run_folder
 from mutator.campaigns.provenance import other_versions
 from mutator.errors import CheckFailed, MutatorError
-from mutator.outcomes import results
-from mutator.outcomes.ranking import worth
-from mutator.outcomes.reader import row_of
-from mutator.outcomes.rows import Row
+from mutator.preflight import equivalence
+from mutator.results import table_building
+from mutator.results.ranking import worth
+from mutator.results.rows import Row
+from mutator.results.table_reader import row_of
 from mutator.store import cleaning, digests, integrity, plan_file
 from mutator.store.approvals import FILE as REVIEWED
 from mutator.store.check_results import FILE as CHECKS
@@ -36,8 +38,6 @@ from mutator.store.run_head import SCHEMA as HEAD_SCHEMA
 from mutator.store.series import FOLDER as SERIES
 from mutator.store.series_packing import pack
 from mutator.store.stretches import Stretch, differences
-from mutator.verification import equivalence
-from mutator.verification.seal import OUTSIDE, without
 
 _SEGMENTS = {"records": SCHEMA, "timings": TIMINGS_SCHEMA, equivalence.FOLDER: SCHEMA}
 _MARK = f".{HEAD}."  # followed by a process id: marks an unfinished merge
@@ -76,7 +76,7 @@ def merge(shards: Sequence[Path], out: Path, *, accept_versions: bool = False) -
             with raising_disk_full(out):
                 inside(out, f"{_MARK}{os.getpid()}").touch()
                 _copy(folders, out, stretches)
-            return results.build(out)
+            return table_building.build(out)
         except BaseException:
             cleaning.clear(out)
             raise

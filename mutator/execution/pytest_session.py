@@ -24,7 +24,7 @@ from mutator.execution.session import Notify, Session, Summary, open_session
 from mutator.execution.stopped_workers import Continuing, on_stop
 from mutator.execution.worker import Assignment, Worker, bind_to_parent, dying_python
 from mutator.execution.written_files import Sums
-from mutator.verification.equivalence import Sample
+from mutator.preflight.equivalence import Sample
 from mutator.workspace import Workspace
 
 _INPUT = "mutator_campaign"

@@ -20,16 +20,16 @@ from mutator.mutants.building import InvalidMutant, Mutant, build
 from mutator.mutants.probe import activation_of
 from mutator.outcomes import golden
 from mutator.outcomes.blame import assign_blame, error_of
+from mutator.outcomes.channel_departures import departures
 from mutator.outcomes.golden import BadOutput, Trace
 from mutator.outcomes.judging import Judged, load_channels, load_judged
-from mutator.outcomes.propagation import departures
 from mutator.outcomes.sampling import Sampler
 from mutator.outcomes.verdicts import first_events, judge
+from mutator.preflight.preflight_rules import digest_of
 from mutator.store.run_folder import GoldenRun
 from mutator.store.series_format import encode
 from mutator.store.series_packing import EncodedSeries
 from mutator.targets.manifest import TargetManifest
-from mutator.verification.preflight_rules import digest_of
 
 _T = TypeVar("_T")
 _KEPT = 32  # golden runs in memory: enough for the current seed and the next

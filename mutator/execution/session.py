@@ -20,6 +20,7 @@ from typing import Any
 from mutator._common.files import DiskFull, clear_place, is_half_written
 from mutator._common.interrupts import terminable
 from mutator._common.locks import owned, wait_for_workers
+from mutator.audit.seal import Seals, seals_of
 from mutator.campaigns.chunks import Pending, pending
 from mutator.campaigns.freezing import make_run_folder
 from mutator.campaigns.plans import Choices
@@ -32,9 +33,11 @@ from mutator.execution.ended_runs import Ended, ended_before, keep_end
 from mutator.execution.run_plan import open_frozen
 from mutator.execution.written_files import WrittenFiles
 from mutator.model import Record
-from mutator.outcomes import results
-from mutator.outcomes.ranking import worth_of
-from mutator.outcomes.reader import Results
+from mutator.preflight import equivalence
+from mutator.preflight.preflight import are_there, run_checks, unreached_triggers
+from mutator.results import table_building
+from mutator.results.ranking import worth_of
+from mutator.results.table_reader import Results
 from mutator.store import digests
 from mutator.store.check_results import golden_digests
 from mutator.store.progress import Progress, label
@@ -42,9 +45,6 @@ from mutator.store.records import endings
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_packing import pack, segments
 from mutator.targets.requirements import check_requirements
-from mutator.verification import equivalence
-from mutator.verification.preflight import are_there, run_checks, unreached_triggers
-from mutator.verification.seal import Seals, seals_of
 from mutator.workspace import Workspace
 
 EXIT_INTERRUPTED = 130
@@ -201,7 +201,7 @@ class Session:
         built = None
         with self._noting_full_disk():
             self._close_segments()
-            built = results.ensure(self.folder.path)
+            built = table_building.ensure(self.folder.path)
             self._pack_series()
         proven = equivalence.judge(self.folder, records)
         not_forked = "" if proven else self._not_forked
@@ -253,7 +253,7 @@ class Session:
     def _finish_again(self, known: Ended) -> Summary:
         built = None
         with self._noting_full_disk():
-            built = results.ensure(self.folder.path)
+            built = table_building.ensure(self.folder.path)
             self._pack_series()
         return Summary(
             planned=self.folder.planned,

@@ -8,9 +8,9 @@ from mutator._common.files import ScratchFolder
 from mutator.errors import MutatorError
 from mutator.execution.single_run import manifest_of, run_single
 from mutator.model import Status
+from mutator.preflight import equivalence
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
-from mutator.verification import equivalence
 from mutator.workspace import Workspace
 
 

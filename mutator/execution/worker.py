@@ -20,6 +20,8 @@ from mutator.engines.registry import make_engine
 from mutator.execution.runner import Finished, Goldens, Runner, without_outcome
 from mutator.execution.written_files import Sums
 from mutator.model import Experiment, Status
+from mutator.preflight import equivalence
+from mutator.preflight.equivalence import Sample
 from mutator.store import plan_file
 from mutator.store.lines import LineWriter
 from mutator.store.patches import PatchWriter
@@ -27,8 +29,6 @@ from mutator.store.planned import Planned
 from mutator.store.records import SCHEMA, TIMINGS_SCHEMA, line_of
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_packing import SeriesWriter
-from mutator.verification import equivalence
-from mutator.verification.equivalence import Sample
 from mutator.workspace import Workspace
 
 

@@ -10,9 +10,9 @@ from collections.abc import Collection, Sequence
 
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Outcome, Status
-from mutator.outcomes.columns import plan_row
-from mutator.outcomes.reader import Results
-from mutator.outcomes.rows import Row
+from mutator.results.result_columns import plan_row
+from mutator.results.rows import Row
+from mutator.results.table_reader import Results
 from mutator.store.plan_file import read_all
 from mutator.store.run_folder import RunFolder
 

@@ -25,8 +25,8 @@ from mutator.errors import MutatorError, MutatorWarning
 from mutator.execution.traces import Traces
 from mutator.model import Experiment, Record
 from mutator.outcomes.golden import Trace
-from mutator.outcomes.reader import Results
 from mutator.outcomes.trace_files import own_times
+from mutator.results.table_reader import Results
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.store.series import SeriesFolder, making_again

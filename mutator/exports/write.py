@@ -6,7 +6,7 @@ from mutator._common.below import inside
 from mutator._common.files import make_folder, write_atomic
 from mutator.errors import MutatorError
 from mutator.exports import Format, Table, elements, junit, mcap_export
-from mutator.outcomes.reader import Results
+from mutator.results.table_reader import Results
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 

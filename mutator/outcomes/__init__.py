@@ -1,1 +1,4 @@
-"""The outcome of a run: golden runs, differences from them, verdicts, and the results table."""
+"""The judgement of one run: golden runs, differences from them, metrics, the path of a fault, the verdict.
+
+Nothing here knows about other experiments; `results` makes the table of all of them.
+"""

@@ -3,7 +3,9 @@
 from collections.abc import Iterable, Iterator
 
 from mutator._common.tables import Table
-from mutator.outcomes.columns import (
+from mutator.reference.tables import generated
+from mutator.results.propagation import COLUMNS as PROPAGATION
+from mutator.results.result_columns import (
     PLAN_COLUMNS,
     TIMINGS,
     Column,
@@ -11,8 +13,6 @@ from mutator.outcomes.columns import (
     result_columns,
     severity_columns,
 )
-from mutator.outcomes.propagation import COLUMNS as PROPAGATION
-from mutator.reference.tables import generated
 from mutator.targets.channels import Channel
 from mutator.targets.judging import Hazard, Metric
 from mutator.targets.manifest import TargetManifest

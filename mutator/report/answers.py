@@ -5,7 +5,6 @@ import pandas as pd
 from mutator._common.text import counted
 from mutator.engines.jobs import RunMode
 from mutator.execution.phases import duration
-from mutator.outcomes.rows import Row, lines_of, row_from
 from mutator.report.answer_parts import (
     Answer,
     Link,
@@ -23,6 +22,7 @@ from mutator.report.fix_order import first_to_fix
 from mutator.report.seen import COURSE, PLACE
 from mutator.report.studies import ReportedRun
 from mutator.report.warnings import FIRST, LATE, NO_ALERT, SILENT, warnings_of
+from mutator.results.rows import Row, lines_of, row_from
 
 TYPES = 6  # maximum number of fault types that an answer lists
 

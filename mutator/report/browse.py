@@ -18,9 +18,6 @@ from mutator.config.locations import as_written_at
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Fault
 from mutator.mutants.readable_diffs import readable
-from mutator.outcomes.columns import is_text
-from mutator.outcomes.ranking import worst
-from mutator.outcomes.rows import Row, lines_of, row_from
 from mutator.report.panel import FOLDER
 from mutator.report.paths import FoundPaths
 from mutator.report.scenes import scene_facts
@@ -30,6 +27,9 @@ from mutator.report.studies import ReportedRun
 from mutator.report.warnings import warning
 from mutator.report.whole_map import map_of
 from mutator.report.words import meanings_of
+from mutator.results.ranking import worst
+from mutator.results.result_columns import is_text
+from mutator.results.rows import Row, lines_of, row_from
 from mutator.review.groups import Shape, shapes
 from mutator.statistics.mutation_score import PERMANENT, TRANSIENT
 from mutator.store.run_folder import RunFolder

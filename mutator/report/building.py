@@ -10,8 +10,6 @@ from pathlib import Path
 from mutator._common.processes import beside, processes_for
 from mutator._common.tables import Table
 from mutator._common.text import counted
-from mutator.outcomes.counting import outcome_counts
-from mutator.outcomes.reader import Results
 from mutator.report.browse import Browse, browse_data
 from mutator.report.page import Content, markdown, page_html, study_html, study_markdown
 from mutator.report.panel import FOLDER
@@ -21,6 +19,8 @@ from mutator.report.series import sample_kept_traces
 from mutator.report.stamp import is_current, made_from, write_files
 from mutator.report.studies import ReportedRun
 from mutator.report.words import words_of
+from mutator.results.counting import outcome_counts
+from mutator.results.table_reader import Results
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 

@@ -10,8 +10,8 @@ from mutator.engines.jobs import RunMode
 from mutator.engines.registry import WORTH_IT
 from mutator.errors import CheckFailed
 from mutator.model import Record
+from mutator.preflight import equivalence
 from mutator.store.run_folder import RunFolder
-from mutator.verification import equivalence
 
 if TYPE_CHECKING:
     from pandas import DataFrame

@@ -6,7 +6,7 @@ from math import inf
 
 import pandas as pd
 
-from mutator.outcomes.paths import Course
+from mutator.outcomes.fault_paths import Course
 from mutator.report.answer_parts import Answer, Cell, Link, Listing, kind_link, share, to_list
 from mutator.report.dangers import NO_CONTACT, SEVERITY
 from mutator.report.paths import FoundPaths, link_text

@@ -15,9 +15,9 @@ from mutator._common.text import counted
 from mutator.errors import MutatorError
 from mutator.execution.phases import duration
 from mutator.model import Outcome
-from mutator.outcomes.reader import Results
-from mutator.outcomes.rows import Row
 from mutator.report.panel import FOLDER, rendered
+from mutator.results.rows import Row
+from mutator.results.table_reader import Results
 from mutator.store.run_folder import RunFolder
 from mutator.web import asset
 

@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from mutator.model import Experiment, Record
-from mutator.outcomes.paths import Course, Passage, Path, Ways
+from mutator.outcomes.fault_paths import Course, Passage, Path, Ways
 from mutator.store.run_folder import RunFolder
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ import numpy as np
 
 from mutator._common.processes import processes_for, shared
 from mutator.model import Record
-from mutator.outcomes.paths import Course, Sight, Ways
-from mutator.outcomes.ranking import places
+from mutator.outcomes.fault_paths import Course, Sight, Ways
+from mutator.results.ranking import places
 from mutator.statistics.times import Alerts
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from mutator.errors import MutatorError
 from mutator.model import OPERATORS, Fault, Outcome, Status
 from mutator.mutants.anchors import ParsedFile, parsed
-from mutator.outcomes.counting import endings
+from mutator.results.counting import endings
 from mutator.statistics.mutation_score import PERMANENT, TRANSIENT
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder

@@ -10,9 +10,9 @@ from mutator._common.below import inside
 from mutator._common.files import ScratchFolder
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Record, Status
-from mutator.outcomes.ranking import places
-from mutator.outcomes.reader import Results
 from mutator.report.film import Filming, Shot
+from mutator.results.ranking import places
+from mutator.results.table_reader import Results
 from mutator.store.planned import Planned
 from mutator.store.progress import Pace, Progress
 from mutator.store.run_folder import GoldenRun, RunFolder

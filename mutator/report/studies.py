@@ -9,15 +9,15 @@ from mutator.errors import MutatorError
 from mutator.figures.figures import Drawing
 from mutator.model import Experiment, Record, Status
 from mutator.outcomes.fault_free import FaultFreeRun, fault_free_runs
+from mutator.outcomes.fault_paths import ways_of
 from mutator.outcomes.golden import load_trace
-from mutator.outcomes.paths import ways_of
-from mutator.outcomes.reader import Results
-from mutator.outcomes.rows import Row
 from mutator.report.engines import EngineSummary, engine_summary
 from mutator.report.panel import Panel
 from mutator.report.paths import FoundPaths
 from mutator.report.seen import COURSE, PLACE, Seen
 from mutator.report.source_lines import SourceLines
+from mutator.results.rows import Row
+from mutator.results.table_reader import Results
 from mutator.statistics.frame import prepare
 from mutator.statistics.published import Published
 from mutator.store.planned import Planned

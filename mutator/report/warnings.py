@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mutator.outcomes.rows import Row
+from mutator.results.rows import Row
 
 if TYPE_CHECKING:
     import pandas as pd

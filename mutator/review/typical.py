@@ -8,10 +8,10 @@ from threading import Lock
 from typing import TYPE_CHECKING
 
 from mutator.model import Outcome, Status
-from mutator.outcomes.counting import endings
-from mutator.outcomes.ranking import places
-from mutator.outcomes.reader import Results
-from mutator.outcomes.rows import UNUSABLE, Row, lines_of, row_from
+from mutator.results.counting import endings
+from mutator.results.ranking import places
+from mutator.results.rows import UNUSABLE, Row, lines_of, row_from
+from mutator.results.table_reader import Results
 from mutator.review.catalogue import Group
 from mutator.review.groups import group_label
 from mutator.store import plan_file

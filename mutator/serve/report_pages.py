@@ -9,21 +9,21 @@ from starlette.responses import HTMLResponse, Response
 from mutator._common.below import check_plain
 from mutator._common.bounded import read_open
 from mutator._common.hashing import digest
+from mutator.audit.table_audit import tables
 from mutator.comparison import comparison as comparing
 from mutator.comparison import pages
 from mutator.errors import MutatorError
 from mutator.outcomes.fault_free import fault_free_runs, own_alerts
-from mutator.outcomes.reader import Results
 from mutator.report import building
 from mutator.report.panel import FOLDER
 from mutator.report.stamp import made_from
+from mutator.results.table_reader import Results
 from mutator.serve.answers import STORED, OpenFile, kind_of
 from mutator.serve.page_tokens import PageTokens, run_page
 from mutator.serve.report_cache import ReportCache
 from mutator.serve.runs import Absent, Runs, open_in_run
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_script import read_script, script_of
-from mutator.verification.audited_tables import tables
 from mutator.workspace import Workspace
 
 _HEAD = """<meta name="mutator-page" content="{}">

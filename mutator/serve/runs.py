@@ -11,8 +11,8 @@ from urllib.parse import quote
 from mutator._common.below import Outside, open_below
 from mutator._common.places import RUN_HEAD
 from mutator.errors import MutatorError
-from mutator.outcomes.counting import outcome_counts
-from mutator.outcomes.reader import Results
+from mutator.results.counting import outcome_counts
+from mutator.results.table_reader import Results
 from mutator.store.run_folder import RunFolder
 
 REPORT = "report/index.html"

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from mutator.outcomes.columns import hazards_in
-from mutator.outcomes.reader import Results
-from mutator.outcomes.rows import UNUSABLE
+from mutator.results.result_columns import hazards_in
+from mutator.results.rows import UNUSABLE
+from mutator.results.table_reader import Results
 
 _TIMES = ("t_activation", "t_manifest", "t_alert")
 _RANDOM = "random/"  # prefix of a random run's trigger: random/C1

@@ -19,10 +19,10 @@ from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plans import make_plan
 from mutator.model import Activation, Experiment, Outcome, Record, Status
 from mutator.mutants.building import build
-from mutator.outcomes import results
 from mutator.outcomes.sampling import Sampler, keep_series
 from mutator.report import building
 from mutator.report.panels import figures
+from mutator.results import table_building
 from mutator.store.lines import LineWriter
 from mutator.store.patches import PatchWriter
 from mutator.store.records import SCHEMA
@@ -95,7 +95,7 @@ def run(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], 
         patches.append(experiment.id, data)
     lines.close()
     patches.close()
-    results.build(out.path)
+    table_building.build(out.path)
     t = np.arange(0.0, 6.0, 0.05)
     names = ("gas", "brake", "wheel_turn", "gap", "speed")
     golden = {"time": t, **{name: np.sin(t + i) for i, name in enumerate(names)}}

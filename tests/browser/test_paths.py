@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from mutator.model import Activation, Experiment, Outcome
-from mutator.outcomes import results
 from mutator.report import building
 from mutator.report.panels import figures
+from mutator.results import table_building
 from mutator.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def report(
     manifest.write_text(text)
     (workspace.library / "stpa" / "control_structure.yaml").write_text(STRUCTURE)
     run = write_run(workspace, folder / "run", result_of)
-    results.build(run)
+    table_building.build(run)
     with pytest.MonkeyPatch.context() as patch:  # figures take seconds and are tested elsewhere
         patch.setattr(figures, "drawings", lambda frame: ())
         building.write(run, None)

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from mutator.model import Experiment, Outcome
-from mutator.outcomes import results
 from mutator.report import building
 from mutator.report.panels import figures
+from mutator.results import table_building
 from mutator.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def report(
     folder = tmp_path_factory.mktemp("source")
     workspace = copy_toycar(folder)
     out = write_run(workspace, folder / "run", result_of, changed=of_operators(workspace, "toycar/driver.py"))
-    results.build(out)
+    table_building.build(out)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(figures, "drawings", lambda frame: ())
         building.write(out, workspace)

@@ -11,8 +11,8 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.execution.session import Session
-from mutator.outcomes.ranking import worth
-from mutator.outcomes.reader import Results
+from mutator.results.ranking import worth
+from mutator.results.table_reader import Results
 from mutator.store import blocks, lines
 from mutator.store.blocks import read_blocks
 from mutator.store.lines import read_segment

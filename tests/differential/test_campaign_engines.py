@@ -13,8 +13,8 @@ import pytest
 
 from mutator._common.locks import living_workers, wait_for_workers
 from mutator.execution.running import run_campaign
+from mutator.preflight.equivalence import Proof
 from mutator.store.records import read_records
-from mutator.verification.equivalence import Proof
 from mutator.workspace import Workspace
 
 TABLES = ("results.csv", "results.parquet", "propagation.parquet")

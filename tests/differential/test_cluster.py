@@ -197,7 +197,7 @@ _UNLIKE = """\
 import sys
 if any("cluster.child" in word for word in sys.orig_argv):
     from dataclasses import replace
-    from mutator.verification import preflight_rules
+    from mutator.preflight import preflight_rules
     real = preflight_rules.look
     preflight_rules.look = lambda *given: replace(real(*given), digest="f" * 64)
 """

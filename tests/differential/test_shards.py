@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from mutator.audit.seal import seal_of
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plans import Choices, make_plan
 from mutator.engines import registry
@@ -17,12 +18,11 @@ from mutator.execution import merging
 from mutator.execution.merging import merge
 from mutator.execution.running import run_campaign
 from mutator.execution.session import Session
-from mutator.outcomes import results
+from mutator.results import table_building
 from mutator.store import approvals
 from mutator.store.patches import Patches
 from mutator.store.records import read_records
 from mutator.store.run_folder import RunFolder
-from mutator.verification.seal import seal_of
 from mutator.workspace import Workspace
 
 Runs = dict[str, Path]
@@ -80,7 +80,7 @@ def test_a_killed_merge_loses_no_series(runs: Runs, tmp_path: Path, monkeypatch:
 
     def build(run: Path) -> Path:
         seen.append(len(list((run / "series").iterdir())))
-        return results.build(run)
+        return table_building.build(run)
 
     monkeypatch.setattr(merging, "results", SimpleNamespace(build=build))
     merge([runs["1/2"], runs["2/2"]], tmp_path / "out")
@@ -239,7 +239,7 @@ def test_a_failed_merge_leaves_nothing_and_can_be_repeated(
     runs: Runs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as patch, pytest.raises(RuntimeError):
-        patch.setattr("mutator.outcomes.results.build", fail)
+        patch.setattr("mutator.results.table_building.build", fail)
         merge([runs["1/2"], runs["2/2"]], tmp_path / "out")
     assert not (tmp_path / "out").exists()
     assert merge([runs["1/2"], runs["2/2"]], tmp_path / "out").is_file()

@@ -21,10 +21,10 @@ from mutator.execution.cluster.board import Board
 from mutator.execution.cluster.bundle import Bundle, Site
 from mutator.execution.cluster.child import PieceRunner
 from mutator.execution.running import run_campaign
+from mutator.preflight.preflight import run_checks
 from mutator.store import plan_file
 from mutator.store.records import line_of
 from mutator.store.run_folder import RunFolder
-from mutator.verification.preflight import run_checks
 from mutator.workspace import Workspace
 
 CopyToycar = Callable[[Path], Workspace]

@@ -16,6 +16,7 @@ import pytest
 
 import mutator
 from mutator._common.hashing import canonical
+from mutator.audit.seal import Seals, seals_of
 from mutator.errors import MutatorError
 from mutator.execution.running import run_campaign
 from mutator.report import building
@@ -23,7 +24,6 @@ from mutator.store import digests
 from mutator.store.approvals import write_approvals
 from mutator.store.digests import Digest
 from mutator.store.run_folder import RunFolder
-from mutator.verification.seal import Seals, seals_of
 from mutator.workspace import Workspace
 
 SAMPLE = 10  # the ordinary suite tries every nth forgery

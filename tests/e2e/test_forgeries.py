@@ -14,6 +14,7 @@ import pytest
 
 import mutator
 from mutator._common.hashing import canonical, digest
+from mutator.audit.seal import golden_digests, seal_of
 from mutator.campaigns.freezing import plan_csv
 from mutator.campaigns.plan_parts import plan_digest
 from mutator.campaigns.plans import load_plan
@@ -21,12 +22,11 @@ from mutator.cli.app import main
 from mutator.errors import MutatorError
 from mutator.execution.running import run_campaign
 from mutator.model import Experiment
-from mutator.outcomes import results
+from mutator.results import table_building
 from mutator.store import plan_file
 from mutator.store.patches import Patches
 from mutator.store.patches import rewrite as rewrite_patches
 from mutator.store.run_folder import RunFolder
-from mutator.verification.seal import golden_digests, seal_of
 from mutator.workspace import Workspace
 
 CLONE = Path(__file__).parents[2]
@@ -325,13 +325,13 @@ def test_the_seal_reveals_a_forgery_with_consistent_digests(
     forge(run, True)
     if forge is not the_table:
         reseal(run)
-        for name in (results.STAMP, results.CSV, results.PARQUET):
+        for name in (table_building.STAMP, table_building.CSV, table_building.PARQUET):
             (run / name).unlink()
-        results.ensure(run)
+        table_building.ensure(run)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert RunFolder.open(run).finished
-        results.ensure(run)
+        table_building.ensure(run)
     found = mutator.verify(run, expect=known, workspace=genuine[0])
     assert not found.passed
     assert (found.seal == known) == (forge is the_table)

@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
+from mutator.audit.seal import seal_of
 from mutator.campaigns.plans import Choices
 from mutator.execution.running import run_campaign
 from mutator.store.run_folder import RunFolder
-from mutator.verification.seal import seal_of
 from mutator.workspace import Workspace
 
 CHOICES = Choices(limit=2)

@@ -14,7 +14,19 @@ import pytest
 
 CLONE = Path(__file__).parents[2]
 PACKAGES = (
-    *("store", "outcomes", "verification", "execution", "exports", "comparison", "report", "api"),
+    *(
+        "store",
+        "outcomes",
+        "results",
+        "preflight",
+        "audit",
+        "checks",
+        "execution",
+        "exports",
+        "comparison",
+        "report",
+        "api",
+    ),
     *("targets", "faults", "stpa", "mutants", "operators", "onboarding", "campaigns", "review"),
 )
 ALLOWED = {  # joins of names that no file contains

@@ -14,7 +14,7 @@ ALLOWED = {
     "comparison/pages.py: read_text": "installed with the harness",
     "execution/stopped_workers.py: read_text": "the kernel's file",
     "glue.py: read_text": "runs in the target's process",
-    "outcomes/reader.py: read": "checks the number of cells before",
+    "results/table_reader.py: read": "checks the number of cells before",
     "review/pictures.py: read_bytes": "installed with the harness",
     "review/pictures.py: read_text": "installed with the harness",
     "serve/home.py: read_text": "installed with the harness",

@@ -11,9 +11,9 @@ from itertools import chain
 from pathlib import Path
 from types import FrameType
 
+from mutator.audit.seal import seal_of
 from mutator.errors import MutatorError
 from mutator.store.run_folder import RunFolder
-from mutator.verification.seal import seal_of
 
 from .damages import DAMAGES, damage
 from .readers import TABLES, Place, Reader, Told, expect

@@ -14,9 +14,9 @@ from itertools import islice
 from mutator.campaigns.chunks import Pending
 from mutator.execution.cluster.groups import Group, Run, faults_of, golden_of, groups_of, id_of
 from mutator.execution.cluster.pieces import Kind, Piece
+from mutator.preflight.equivalence import Sample
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
-from mutator.verification.equivalence import Sample
 
 LEAST_S, MOST_S = 0.5, 8.0  # shortest and longest intended duration of a piece
 _SHARE = 4  # a piece is the remaining work divided by the number of workers and by this

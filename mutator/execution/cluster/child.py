@@ -31,13 +31,13 @@ from mutator.execution.cluster.pieces import Ending, Kind, Piece, Result
 from mutator.execution.runner import Finished, Goldens, Runner
 from mutator.execution.worker import timing_of
 from mutator.model import Experiment
+from mutator.preflight.preflight_rules import look
 from mutator.store.blocks import as_block
 from mutator.store.patches import packed_patches
 from mutator.store.records import line_of
 from mutator.store.run_folder import GoldenRun
 from mutator.store.series_packing import series_block
 from mutator.targets.requirements import check_requirements
-from mutator.verification.preflight_rules import look
 
 
 class Unlike(Exception):

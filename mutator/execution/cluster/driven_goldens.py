@@ -15,8 +15,8 @@ from mutator._common.hashing import digest
 from mutator._common.version import VERSION
 from mutator.campaigns import machine
 from mutator.execution.cluster.bundle import Site
+from mutator.preflight.preflight_rules import digest_of
 from mutator.store.run_folder import GoldenRun
-from mutator.verification.preflight_rules import digest_of
 
 _SOURCES = ("manifest", "target", "overlay")  # folders of a bundle
 

@@ -12,13 +12,13 @@ from mutator.execution.written_files import Sums
 from mutator.model import Status
 from mutator.outcomes.judging import load_channels
 from mutator.outcomes.sampling import Sampler
+from mutator.preflight import equivalence
 from mutator.store.lines import LineWriter
 from mutator.store.patches import PatchWriter
 from mutator.store.records import SCHEMA, TIMINGS_SCHEMA, line_of
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_packing import SeriesWriter
 from mutator.targets.manifest import TargetManifest
-from mutator.verification import equivalence
 
 
 class Intake:

@@ -6,9 +6,9 @@ from pandas import DataFrame
 
 from mutator._common.tables import Table
 from mutator.model import Status
-from mutator.outcomes.rows import Row, lines_of, row_from
 from mutator.report.panel import Panel, rendered
 from mutator.report.studies import ReportedRun
+from mutator.results.rows import Row, lines_of, row_from
 
 _HEADS = ("status", "experiment", "fault", "scenario", "message")
 LISTED, PAGE_LISTED = 30, 200  # maximum number of runs in Markdown and on the page, whose search finds all

@@ -1,13 +1,13 @@
 """The provenance panel: how the experiments were executed, and what is needed to reproduce them."""
 
 from mutator._common.tables import Table
+from mutator.audit.seal import OUTSIDE, seal_or_why_not, unsealed_facts, without
 from mutator.campaigns.studies import study_problems
 from mutator.report.panel import Panel, rendered
 from mutator.report.studies import ReportedRun
 from mutator.store.approvals import approval_summary
 from mutator.store.run_head import HEAD
 from mutator.store.stretches import package_versions, told
-from mutator.verification.seal import OUTSIDE, seal_or_why_not, unsealed_facts, without
 
 PACKAGES = ("jinja2", "libcst", "numpy")  # packages that build mutants and compare runs; run.json lists all
 _NOTE = "The seal does not cover this. Whoever can write to the run folder can change it unnoticed."

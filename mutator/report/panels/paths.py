@@ -3,11 +3,11 @@
 from collections.abc import Mapping, Sequence
 
 from mutator._common.tables import Table
-from mutator.outcomes.counting import kinds
 from mutator.report.panel import Panel, rendered
 from mutator.report.path_drawing import draw_ways, share_text
 from mutator.report.paths import ALL, FoundPaths, PathCounts, counts_by_fault_type
 from mutator.report.studies import ReportedRun
+from mutator.results.counting import kinds
 from mutator.web import plainly_embedded
 
 _ABOUT = (

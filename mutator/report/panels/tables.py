@@ -5,11 +5,11 @@ from dataclasses import replace
 from operator import itemgetter
 
 from mutator._common.tables import Table
-from mutator.outcomes.counting import counts_by, hazard_names, kinds
 from mutator.outcomes.fault_free import fault_free_table, own_alerts
-from mutator.outcomes.rows import count_table
 from mutator.report.panel import Panel, rendered
 from mutator.report.studies import ReportedRun
+from mutator.results.counting import counts_by, hazard_names, kinds
+from mutator.results.rows import count_table
 from mutator.statistics.metric_tables import metrics_sheet, severity_sheet, tolerant_times_sheet
 from mutator.statistics.published import Published
 from mutator.statistics.sheet import Sheet

@@ -7,7 +7,7 @@ import pytest
 
 import mutator
 from mutator.model import Experiment, Method, Value, fault_label
-from mutator.outcomes.reader import row_of
+from mutator.results.table_reader import row_of
 
 SOURCES = Path(mutator.__file__).parent
 

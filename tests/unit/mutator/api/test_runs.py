@@ -21,7 +21,7 @@ from mutator.api.runs import Run
 from mutator.errors import MutatorError
 from mutator.execution.single_run import rerun, run_single
 from mutator.model import Experiment, Outcome, Status
-from mutator.outcomes.reader import Results
+from mutator.results.table_reader import Results
 from mutator.store import plan_file
 from mutator.store.lines import LineWriter
 from mutator.store.patches import PatchWriter

@@ -7,9 +7,9 @@ import pytest
 
 from mutator.campaigns.campaign_files import check_readings, load_campaign, load_study
 from mutator.campaigns.plans import Choices, make_plan
+from mutator.checks.library_check import check_library
 from mutator.errors import MutatorError
 from mutator.model import Method
-from mutator.verification.library import check_library
 from mutator.workspace import Workspace
 
 TEXT = """\

@@ -11,10 +11,10 @@ from mutator.campaigns import studies
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plans import load_plan, make_plan
 from mutator.campaigns.studies import find_study, study_names
+from mutator.checks.library_check import check_library
 from mutator.errors import MutatorError
 from mutator.report import building
 from mutator.report.studies import Study
-from mutator.verification.library import check_library
 from mutator.workspace import Workspace
 
 from ..report.made_run import make_run

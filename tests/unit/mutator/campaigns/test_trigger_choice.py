@@ -7,9 +7,9 @@ import pytest
 from mutator.api.mutant_files import MutantSet
 from mutator.api.selection import find_trigger
 from mutator.campaigns.plans import make_plan
+from mutator.checks.library_check import check_library
 from mutator.errors import MutatorError
 from mutator.model import Hold, Method
-from mutator.verification.library import check_library
 from mutator.workspace import Workspace
 
 

@@ -10,7 +10,7 @@ import pytest
 from mutator.comparison.pairs import Change, Pair, match
 from mutator.comparison.sides import Side
 from mutator.model import Experiment, Method, Outcome, Status
-from mutator.outcomes.rows import Row
+from mutator.results.rows import Row
 from mutator.store.run_folder import RunFolder
 
 Make = Callable[..., Experiment]

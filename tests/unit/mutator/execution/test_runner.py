@@ -13,7 +13,7 @@ from mutator.engines.jobs import Execution, Job
 from mutator.errors import MutatorError
 from mutator.execution.runner import Goldens, Runner
 from mutator.model import Activation, Experiment, Outcome, Record, Status
-from mutator.verification.preflight_rules import digest_of
+from mutator.preflight.preflight_rules import digest_of
 from mutator.workspace import Workspace
 
 T = np.arange(20) * 0.05

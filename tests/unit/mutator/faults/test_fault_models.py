@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from mutator.checks.library_check import check_examples, run_example
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import SnippetKind, load_fault_models
-from mutator.verification.library import check_examples, run_example
 from mutator.workspace import Workspace
 
 NAMES = [

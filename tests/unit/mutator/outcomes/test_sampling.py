@@ -10,8 +10,8 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.model import Record
+from mutator.outcomes.channel_departures import departures
 from mutator.outcomes.golden import Trace, compare
-from mutator.outcomes.propagation import departures
 from mutator.outcomes.sampling import Sampler, keep_series
 from mutator.store.series import SeriesFolder, write_kept
 from mutator.store.series_format import Series, decode, encode

@@ -10,9 +10,7 @@ from typing import cast
 import pandas as pd
 import pytest
 
-from mutator.outcomes.columns import result_columns
-from mutator.outcomes.paths import Course, Crossing, Passage
-from mutator.outcomes.rows import lines_of
+from mutator.outcomes.fault_paths import Course, Crossing, Passage
 from mutator.report.answer_parts import Answer, Link, Part, to_list
 from mutator.report.answers import answers_of
 from mutator.report.dangers import dangerous
@@ -21,6 +19,8 @@ from mutator.report.panels.answers import answers_panel
 from mutator.report.paths import FoundPaths
 from mutator.report.studies import ReportedRun
 from mutator.report.warnings import NO_ALERT
+from mutator.results.result_columns import result_columns
+from mutator.results.rows import lines_of
 from mutator.store.run_folder import RunFolder
 
 from .made_run import HEAD, make_run

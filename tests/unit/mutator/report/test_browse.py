@@ -7,9 +7,9 @@ import pytest
 
 from mutator._common.files import write_json
 from mutator.model import Experiment, Outcome, Status
-from mutator.outcomes.rows import Row
 from mutator.report import browse
 from mutator.report.browse import column, details, media, table
+from mutator.results.rows import Row
 from mutator.review.groups import shapes
 from mutator.store.run_folder import RunFolder
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from math import inf
 
 from mutator.model import Record
-from mutator.outcomes.paths import Crossing, Passage, Path, Stage, State, Ways
+from mutator.outcomes.fault_paths import Crossing, Passage, Path, Stage, State, Ways
 from mutator.report.paths import FoundPaths, PathCounts
 
 CHANNELS = [

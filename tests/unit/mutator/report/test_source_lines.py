@@ -8,12 +8,12 @@ import pytest
 
 from mutator.api.runs import load_run
 from mutator.model import Experiment, Outcome, Status
-from mutator.outcomes import results
 from mutator.report.browse import _listed, _tables
 from mutator.report.panels.mutation_score import score_panel
 from mutator.report.panels.source import source_panel
 from mutator.report.source_lines import Mark
 from mutator.report.studies import ReportedRun
+from mutator.results import table_building
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -47,7 +47,7 @@ def run(
     toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path], of_operators: Callable[..., Any]
 ) -> Path:
     out = write_run(toycar, tmp_path / "run", result_of, changed=of_operators(toycar, DRIVER))
-    results.build(out)
+    table_building.build(out)
     (out / "report").mkdir()
     return out
 
@@ -117,7 +117,7 @@ def test_a_run_without_operators_has_no_source_view_and_no_score(
     toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path]
 ) -> None:
     out = write_run(toycar, tmp_path / "run")
-    results.build(out)
+    table_building.build(out)
     reported = ReportedRun.open(RunFolder.open(out), toycar)
     assert source_panel(reported) is None and score_panel(reported) is None
     rows, lines = _listed(reported)

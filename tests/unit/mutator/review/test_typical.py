@@ -12,9 +12,9 @@ import pytest
 from mutator.campaigns.plans import Choices, make_plan
 from mutator.errors import MutatorError
 from mutator.model import Outcome, Status
-from mutator.outcomes import results
-from mutator.outcomes.reader import Results
-from mutator.outcomes.rows import Row
+from mutator.results import table_building
+from mutator.results.rows import Row
+from mutator.results.table_reader import Results
 from mutator.review.catalogue import of_plan
 from mutator.review.typical import of_group, verdict_of
 from mutator.store.run_folder import RunFolder
@@ -32,7 +32,7 @@ def test_a_group_has_counts_a_typical_and_a_worst_experiment(
     lane = [e.id for e in plan.experiments if e.fault.fault_type == "lane"]
     bad = {name: {"hazards": (("H3", 3.0 + i),), **HAZARD} for i, name in enumerate(lane[:2])}
     run = write_run(toycar, tmp_path / "run", lambda e: bad.get(e.id, {}))
-    results.ensure(run)
+    table_building.ensure(run)
     group = next(g for g in of_plan(toycar, plan) if "offset: offset" in g.what)
     found = of_group(RunFolder.open(run), group)
     assert found is not None
@@ -50,7 +50,7 @@ def test_a_group_without_experiments_has_no_verdict(
 ) -> None:
     """The group of the probe has no experiments, because all mutants share the probe."""
     run = RunFolder.open(write_run(toycar, tmp_path / "run", only='fault_type == "silence"'))
-    results.ensure(run.path)
+    table_building.ensure(run.path)
     groups = of_plan(toycar, make_plan(toycar, "toy", Choices()))
     told = {group.models for group in groups if of_group(run, group)}
     assert told == {("omission",)}
@@ -61,10 +61,10 @@ def test_later_results_are_counted(toycar: Workspace, tmp_path: Path, write_run:
     write_run(toycar, tmp_path / "run", lambda e: None)
     with pytest.raises(MutatorError, match="no results here"):
         of_group(RunFolder.open(tmp_path / "run"), group)
-    results.ensure(tmp_path / "run")
+    table_building.ensure(tmp_path / "run")
     assert of_group(RunFolder.open(tmp_path / "run"), group) is None
     shutil.rmtree(tmp_path / "run")
-    results.ensure(write_run(toycar, tmp_path / "run"))
+    table_building.ensure(write_run(toycar, tmp_path / "run"))
     assert of_group(RunFolder.open(tmp_path / "run"), group)
 
 
@@ -73,7 +73,7 @@ def test_the_results_are_read_once_for_many_groups(
 ) -> None:
     """Reading a large table takes seconds and much memory."""
     run = RunFolder.open(write_run(toycar, tmp_path / "run"))
-    results.ensure(run.path)
+    table_building.ensure(run.path)
     groups = of_plan(toycar, make_plan(toycar, "toy", Choices()))
     read: list[Results] = []
     texts = Results.texts

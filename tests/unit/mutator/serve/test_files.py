@@ -10,9 +10,9 @@ import pytest
 
 from mutator._common import caches
 from mutator.errors import MutatorError
-from mutator.outcomes import results
 from mutator.report import building
 from mutator.report.stamp import made_from, write_files
+from mutator.results import table_building
 from mutator.serve.answers import without_places
 from mutator.serve.page_tokens import PageTokens
 from mutator.serve.report_cache import ReportCache
@@ -236,7 +236,7 @@ def test_a_changed_run_gets_a_new_report(client: Client, linked: Path) -> None:
 def test_an_edited_table_is_not_shown_beside_the_seal_of_a_finished_run(
     toycar: Workspace, tmp_path: Path, write_finished: Callable[..., Path]
 ) -> None:
-    table = results.build(write_finished(toycar, tmp_path / "night"))
+    table = table_building.build(write_finished(toycar, tmp_path / "night"))
     shown = Shown(toycar, Runs((tmp_path,)), PageTokens(b"secret"))
     assert shown.file("night", "report/index.html").status_code == 200
     table.write_text(table.read_text().replace(",masked,", ",sdc,", 1))

@@ -6,13 +6,13 @@ from pathlib import Path
 import pytest
 
 from mutator.api.trials import try_fault
+from mutator.checks.doctor import examine
 from mutator.errors import MutatorError
 from mutator.faults.expansion import expand
 from mutator.model import Outcome
 from mutator.mutants.building import build
 from mutator.report.film import Shot, _show
 from mutator.triggers.kinds import always
-from mutator.verification.doctor import examine
 from mutator.workspace import Workspace
 
 MANIFEST = "targets/pole.yaml"

@@ -10,10 +10,10 @@ from mutator.api.trials import try_fault
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plans import make_plan
 from mutator.campaigns.provenance import begin_stretch, check_versions
+from mutator.checks.doctor import Level, examine
+from mutator.checks.library_check import check_library
 from mutator.errors import MutatorError
 from mutator.store.run_folder import RunFolder
-from mutator.verification.doctor import Level, examine
-from mutator.verification.library import check_library
 from mutator.workspace import Workspace
 
 MESSAGE = (

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from mutator.api.trials import try_fault
+from mutator.checks.library_check import check_library
 from mutator.errors import MutatorError
 from mutator.model import Outcome
-from mutator.verification.library import check_library
 from mutator.workspace import Workspace
 
 

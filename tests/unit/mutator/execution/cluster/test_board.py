@@ -12,9 +12,9 @@ from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plans import make_plan
 from mutator.execution.cluster.board import Board
 from mutator.execution.cluster.pieces import Kind, Piece
+from mutator.preflight.equivalence import Sample
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
-from mutator.verification.equivalence import Sample
 from mutator.workspace import Workspace
 
 CLONE = Path(__file__).parents[5]

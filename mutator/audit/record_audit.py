@@ -1,0 +1,226 @@
+"""Audit records: check that trees, patches and verdicts follow from the rest of the run."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import inf
+from pathlib import Path
+from typing import Any
+
+from mutator._common.below import inside
+from mutator._common.hashing import digest
+from mutator._common.text import counted
+from mutator.engines.jobs import FAST
+from mutator.errors import MutatorError
+from mutator.faults.fault_models import FaultModels
+from mutator.model import Activation, Fault, Record, Status, Trigger
+from mutator.mutants.building import InvalidMutant, build
+from mutator.outcomes.verdicts import Events, judge
+from mutator.preflight import equivalence
+from mutator.store import plan_file
+from mutator.store.lines import read_segment
+from mutator.store.records import record_from
+from mutator.store.run_folder import RunFolder
+from mutator.targets.manifest import TargetManifest
+
+_DIGEST = 64  # hex digits
+_TINY = 1e-9  # s
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    path: Path
+    line: int
+    record: Record
+
+    def difference(self, got: str, expected: str) -> MutatorError:
+        name = self.record.experiment_id
+        return MutatorError(f"{name}: {got}", where=self.path, line=self.line, expected=expected)
+
+
+def recorded(folder: RunFolder, kind: str) -> list[Recorded]:
+    """The readable records of one kind, without harness errors."""
+    found = []
+    for path in sorted(path for path in inside(folder.path, kind).glob("*.jsonl") if path.is_file()):
+        segment = read_segment(path, checksums=folder.verifiable)
+        for number in segment.lines:
+            try:
+                record = record_from(segment.content(number))
+            except (
+                MutatorError,
+                KeyError,
+                TypeError,
+                ValueError,
+            ):  # a head, or damage that is reported elsewhere
+                continue
+            if record.status is not Status.HARNESS_ERROR:
+                found.append(Recorded(path, number, record))
+    return found
+
+
+def mutants(
+    folder: RunFolder, records: Sequence[Recorded], manifest: TargetManifest, models: FaultModels
+) -> Iterator[MutatorError]:
+    """Rebuild the mutants. Yield an error for each record with another tree or patch, and for each stored
+    patch that differs, is missing, or belongs to no experiment."""
+    experiments = {experiment.id: experiment for experiment in plan_file.read_all(folder.path)}
+    built: dict[tuple[str, Trigger], tuple[str, str]] = {}
+    for one in records:
+        if (experiment := experiments.get(one.record.experiment_id)) is None:
+            continue
+        key = (experiment.fault.id, experiment.trigger)
+        if key not in built:
+            built[key] = _built(manifest, models, experiment.fault, experiment.trigger)
+        tree, patch = built[key]
+        if one.record.tree != tree:
+            yield one.difference(f"tree {one.record.tree[:16] or 'none'}", tree[:16] or "none")
+        if folder.verifiable and one.record.patch != patch:
+            yield one.difference(f"patch {one.record.patch[:16] or 'none'}", patch[:16] or "none")
+        stored = folder.patches.read(one.record.experiment_id)
+        found = "" if stored is None else digest(stored)
+        if found != patch:
+            name = one.record.experiment_id
+            got = f"a patch of {name} with SHA-256 {found[:16]}" if found else f"no patch of {name}"
+            where = folder.patches.file(one.record.experiment_id)
+            none = "no patch, because the mutant cannot be built"
+            expected = f"the mutant's patch, {patch[:16]}" if patch else none
+            yield MutatorError(got, where=where, expected=expected)
+    known = {one.record.experiment_id for one in records}
+    for name in folder.patches if folder.verifiable and folder.finished else ():
+        if name not in known:
+            got, where = (
+                f"a patch of {name}, which is not an experiment of this run",
+                folder.patches.file(name),
+            )
+            yield MutatorError(got, where=where, expected="patches only of experiments that ran")
+
+
+def _built(manifest: TargetManifest, models: FaultModels, fault: Fault, trigger: Trigger) -> tuple[str, str]:
+    """Digests of a mutant's tree and patch; empty if it cannot be built."""
+    try:
+        mutant = build(manifest, models, fault, trigger)
+    except InvalidMutant:
+        return "", ""
+    return mutant.tree_digest, digest(mutant.patch_bytes)
+
+
+def verdicts(
+    head: Mapping[str, Any], records: Sequence[Recorded], manifest: TargetManifest | None
+) -> Iterator[MutatorError]:
+    """Yield an error for each field that contradicts another field, run.json or the manifest."""
+    tolerances = {channel.name: channel.tolerance for channel in manifest.compared} if manifest else {}
+    for one in records:
+        flaws = _flaws_of_end(one.record) if one.record.status is Status.OK else _flaws_of_bad_end(one.record)
+        flaws_of_names = _flaws_of_names(one.record, head, tolerances)
+        for got, expected in (*flaws, *flaws_of_names, *_flaws_of_path(one.record, head)):
+            yield one.difference(got, expected)
+
+
+Flaws = Iterator[tuple[str, str]]  # found, expected
+
+
+def _flaws_of_end(record: Record) -> Flaws:
+    activation = record.activation
+    follows = judge(activation=activation, t_manifest=record.t_manifest, hazards=record.hazards)
+    if record.outcome != follows:
+        yield f"outcome {record.outcome}", f"{follows}, which follows from the recorded times"
+    if record.t_manifest is not None and (activation is None or record.t_manifest < activation.first):
+        yield f"manifested at {record.t_manifest} s", "a time at or after the activation"
+    for what, events in (("hazards", record.hazards), ("alerts", record.alerts)):
+        if not _in_order(events, activation):
+            yield f"{what} {events}", "each once, in order, at or after the activation"
+    if activation and not (activation.first <= activation.last and activation.count > 0):
+        got = f"active {counted(activation.count, 'time')}, from {activation.first} s to {activation.last} s"
+        yield got, "at least one activation, the first not after the last"
+    if len(record.trace_digest) != _DIGEST:
+        yield f"trace digest '{record.trace_digest}'", "that of the recorded trace"
+
+
+def _flaws_of_bad_end(record: Record) -> Flaws:
+    told = {
+        "outcome": record.outcome,
+        "t_manifest": record.t_manifest,
+        "max_dev": record.max_dev,
+        "dev": record.dev,
+        "t_end": record.t_end,
+        "metrics": record.metrics,
+        "left": record.left,
+        "hazards": record.hazards,
+        "alerts": record.alerts,
+        "trace_digest": record.trace_digest,
+    }
+    for name, value in told.items():
+        if value:
+            yield f"{name} {value}", f"none, because the experiment ended as {record.status.value}"
+
+
+def _flaws_of_names(record: Record, head: Mapping[str, Any], tolerances: Mapping[str, float]) -> Flaws:
+    """Hazards or channels that the target does not have, and differences beyond the tolerance without a
+    manifestation."""
+    strangers = [name for name, _ in record.hazards if name not in head["hazards"]]
+    if strangers:
+        yield f"hazard {strangers[0]}", f"one of {', '.join(head['hazards'])}"
+    channels = [name for name, _ in record.max_dev]
+    if record.status is Status.OK and channels != list(head["compared"]):
+        yield f"differences of {', '.join(channels)}", f"those of {', '.join(head['compared'])}"
+    beyond = [name for name, value in record.max_dev if value > tolerances.get(name, float("inf"))]
+    largest = dict(record.max_dev)
+    if any(value > largest.get(name, -1.0) for name, value in record.dev):
+        yield f"differences {record.dev} up to the drive's end", f"none larger than {record.max_dev}"
+    if beyond and record.t_manifest is None:
+        yield f"{beyond[0]} differs, but no manifestation is recorded", "the time of the first difference"
+
+
+def _flaws_of_path(record: Record, head: Mapping[str, Any]) -> Flaws:
+    """Channels that the target does not have, times after the end of the drive, and a manifestation time that
+    is not the first time at which an actuator differs from the golden run."""
+    if "channels" not in head:
+        return
+    end = inf if record.t_end is None else record.t_end + _TINY
+    known = [name for name, *_ in head["channels"]]
+    for name, first, _ in record.left:
+        if name not in known:
+            yield f"channel {name} left golden", f"one of {', '.join(known)}"
+        elif first > end:
+            yield (
+                f"{name} left golden at {first} s",
+                f"a time up to the end of the drive, {record.t_end} s",
+            )
+    times = [first for name, first, _ in record.left if name in head["compared"]]
+    manifested = record.t_manifest if record.t_manifest is not None and record.t_manifest <= end else None
+    if record.status is Status.OK and min(times, default=None) != manifested:
+        when = f"first at {manifested} s" if manifested is not None else "at no time"
+        yield f"actuators left golden at {times or 'no time'}", f"{when}, as recorded"
+
+
+def _in_order(events: Events, activation: Activation | None) -> bool:
+    if activation is None:
+        return not events
+    times = [time for _, time in events]
+    once = len({name for name, _ in events}) == len(events)
+    return once and times == sorted(times) and all(time >= activation.first for time in times)
+
+
+def proof(
+    folder: RunFolder, records: Sequence[Recorded], proven: Sequence[Recorded]
+) -> Iterator[MutatorError]:
+    """Yield records of the proof that differ from those of the run or are not in the sample, and experiments
+    of the sample that have no record."""
+    place = folder.path / equivalence.FOLDER
+    if not place.is_dir():
+        modes = {str(line.get("engine")) for line in folder.timings().values()}
+        if forked := sorted(modes & FAST):
+            yield MutatorError("missing", where=place, expected=f"a proof of the engine `{forked[0]}`")
+        return
+    known = {one.record.experiment_id: one.record for one in records}
+    sampled = set(equivalence.sampled(folder))
+    for one in proven:
+        record = known.get(one.record.experiment_id)
+        if record is not None and record != one.record:
+            yield one.difference(equivalence.difference(one.record, record), "what the run recorded")
+        if one.record.experiment_id not in sampled:
+            yield one.difference("in the proof", "only experiments of the sample that the plan determines")
+    missing = sorted(sampled - {one.record.experiment_id for one in proven})
+    if folder.verifiable and folder.finished and missing:
+        yield MutatorError(
+            f"no record of {missing[0]}", where=place, expected="a record of each sampled experiment"
+        )

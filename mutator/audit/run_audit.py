@@ -1,0 +1,208 @@
+"""Audit a run folder: check, without running anything, that its files are unchanged and consistent."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import chain
+from pathlib import Path
+
+from mutator._common.below import inside
+from mutator._common.files import read_json
+from mutator._common.hashing import digest, plain
+from mutator.audit.head_audit import checks as checks_of
+from mutator.audit.head_audit import (
+    chunks_of,
+    engines,
+    facts_of_target,
+    idle_runs,
+    seeds_and_sessions,
+    short,
+)
+from mutator.audit.record_audit import mutants, proof, recorded, verdicts
+from mutator.audit.seal import golden_digests, not_verifiable
+from mutator.audit.series_audit import series
+from mutator.audit.table_audit import tables
+from mutator.campaigns.freezing import CSV, plan_csv
+from mutator.campaigns.plan_parts import plan_digest
+from mutator.campaigns.plans import load_plan
+from mutator.campaigns.provenance import sources
+from mutator.errors import MutatorError
+from mutator.store import digests, plan_file
+from mutator.store.blocks import read_blocks
+from mutator.store.check_results import FILE as CHECKS
+from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
+from mutator.store.digests import Digest
+from mutator.store.run_folder import RunFolder
+from mutator.store.run_head import CAMPAIGN, HEAD
+from mutator.targets.manifest import TargetManifest
+from mutator.workspace import Workspace
+
+Problems = Iterator[MutatorError]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Check:
+    """One step of an audit. `what` describes the `count` parts of the run that were checked."""
+
+    what: str
+    count: int
+    differences: tuple[MutatorError, ...] = ()
+
+    @classmethod
+    def of(cls, what: str, count: int, problems: Problems) -> "Check":
+        """Collect all problems in a check. An error that `problems` raises becomes the last problem."""
+        found = []
+        try:
+            for problem in problems:
+                found.append(problem)
+        except MutatorError as err:
+            found.append(err)
+        except (
+            OSError,
+            LookupError,
+            TypeError,
+            ValueError,
+            AttributeError,
+        ) as err:  # damaged data
+            found.append(MutatorError(f"the check '{what}' failed ({type(err).__name__}: {err})"))
+        return cls(what=what, count=count, differences=tuple(found))
+
+
+def audit_checks(folder: RunFolder, workspace: Workspace | None) -> list[Check]:
+    """Run all checks of an audit.
+
+    Trees and patches are compared only if `workspace` has the run's sources; otherwise, a difference is
+    reported.
+    """
+    head = folder.head
+    here = Check.of("sources that match those of the run", len(head["sources"]), _sources(folder, workspace))
+    manifest = workspace.manifest(head["target"]) if workspace and not here.differences else None
+    records, proven = recorded(folder, "records"), recorded(folder, "proof")
+    idle = idle_runs(folder, manifest, records) if manifest else ()
+    checks = [
+        Check.of("files, lines and ids that are unchanged", _files(folder), _content(folder)),
+        Check.of(
+            "ids, plan digest and run.json that follow from the plan",
+            head["experiments"],
+            chain(_plan(folder), seeds_and_sessions(folder)),
+        ),
+        Check.of(
+            "golden runs that match the checks",
+            len(head["goldens"]),
+            chain(checks_of(folder), _goldens(folder, manifest), idle),
+        ),
+        here,
+    ]
+    if workspace and manifest:
+        told = facts_of_target(folder, workspace, manifest)
+        checks.append(Check.of("facts about the target that follow from the library", 1, told))
+        compared = mutants(folder, records, manifest, workspace.fault_models())
+        checks.append(Check.of("trees and patches that follow from plan and sources", len(records), compared))
+    checks += [
+        Check.of(
+            "verdicts that follow from what was recorded", len(records), verdicts(head, records, manifest)
+        ),
+        Check.of(
+            "records of the proof that match those of the run",
+            len(proven),
+            chain(proof(folder, records, proven), engines(folder, records)),
+        ),
+        Check.of("series that are unchanged", *series(folder, manifest)),
+        Check.of("tables that follow from the records", *tables(folder)),
+    ]
+    return checks
+
+
+def _files(folder: RunFolder) -> int:
+    """The number of files with digests."""
+    try:
+        return len(digests.read(folder.path).names) if folder.verifiable else 0
+    except MutatorError:
+        return 0
+
+
+def _content(folder: RunFolder) -> Problems:
+    if not folder.verifiable:
+        yield MutatorError(
+            not_verifiable(folder), where=folder.path / HEAD, expected="a run made with this version"
+        )
+    yield from folder.problems(anew=True)
+    for path in filter(Path.is_file, folder.patches.files()):
+        if read_blocks(path).damaged:
+            yield MutatorError(
+                "damaged blocks",
+                where=path,
+                expected="patches as a worker appended them",
+                remedy=f"`mutator verify {folder.path} --repair` sets them aside",
+            )
+
+
+def _plan(folder: RunFolder) -> Problems:
+    """Check that ids follow from the plan's lines, the digest from the ids, and run.json and plan.csv from
+    both."""
+    run, head = folder.path, folder.head
+    yield from plan_file.problems(run)
+    plan = load_plan(folder)
+    campaign = plan.campaign
+    follows = {
+        "plan": plan_digest([e.id for e in plan.experiments], plan.chunks, plan.canary.id, campaign),
+        "experiments": len(plan.experiments),
+        "campaign": campaign.name,
+        "campaign_digest": digest(campaign.source),
+        "study": campaign.study,
+        "target": campaign.target,
+        "chunks": chunks_of(folder),
+        "limits": plain(campaign.limits),
+        "goldens": [one.plain() for one in plan.goldens()],
+        "canary_hazard": campaign.canary.hazard,
+    }
+    for key, value in follows.items():
+        if head.get(key) != value:
+            expected = f"{short(value)}, which follows from {plan_file.EXPERIMENTS} and {CAMPAIGN}"
+            yield MutatorError(f"{key} {short(head.get(key))}", where=run / HEAD, expected=expected)
+    if Digest.of_file(run / CSV) != Digest.of(plan_csv(plan)):
+        yield MutatorError(
+            "differs from the plan", where=run / CSV, expected=f"the rows of {plan_file.EXPERIMENTS}"
+        )
+
+
+def _goldens(folder: RunFolder, manifest: TargetManifest | None) -> Problems:
+    """Check that every check passed, and that the golden runs are the ones checked."""
+    path = folder.path / CHECKS
+    if not path.exists():  # no experiment has run yet
+        return
+    checks = read_json(path, CHECKS_SCHEMA)
+    for result in checks["results"]:
+        if not result["passed"]:
+            yield MutatorError(f"check `{result['name']}` failed: {result['detail']}", where=path)
+    old = list(manifest.outputs) if manifest else []
+    for name, found in golden_digests(folder, folder.head.get("golden_files", old)).items():
+        if checks["goldens"].get(name) != found:
+            known = str(checks["goldens"].get(name))
+            got = f"golden run {name} with digest {found[:16]}"
+            yield MutatorError(got, where=inside(folder.path / "golden", name), expected=known[:16])
+
+
+def _sources(folder: RunFolder, workspace: Workspace | None) -> Problems:
+    where, head = folder.path / HEAD, folder.head
+    if workspace is None:
+        yield MutatorError(
+            "no library found",
+            where=where,
+            expected="the run's sources (trees and patches were not compared)",
+        )
+        return
+    manifest = workspace.manifest(head["target"])
+    now = sources(workspace, manifest, folder.scenarios)
+    for name, known in head["sources"].items():
+        if now.get(name) != known:
+            yield MutatorError(
+                f"{name} {known[:16]}",
+                where=where,
+                expected=f"{str(now.get(name))[:16]}, the digest here",
+                remedy="verify with the run's sources (trees and patches were not compared)",
+            )
+    for path, known in head.get("target_files", {}).items():
+        if (found := manifest.tree.digests.get(path)) != known:
+            yield MutatorError(
+                f"{path} {known[:16]}", where=where, expected=f"{str(found)[:16]}, the digest here"
+            )

@@ -1,0 +1,171 @@
+"""The digests of a run folder: what somebody publishes or signs, and compares later.
+
+* The *seal* covers a finished run's results and everything that results and pages are made from: all of
+  run.json and checks.json but `OUTSIDE`, the campaign, the plan, golden runs, records with their patches, and
+  the proof. It includes the versions of Python and packages.
+* The *results digest* covers golden runs, records, and run.json but `OUTSIDE_RESULTS`. It leaves out all
+  versions and the texts of exceptions, so that it does not depend on versions that compute the same results.
+* The *review digest* covers the decisions that allowed the run, with `--require-reviewed`.
+
+No digest depends on costs, hosts, or the division of the work into sessions, workers and shards.
+"""
+
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from mutator._common.below import inside
+from mutator._common.bounded import read_bounded
+from mutator._common.files import read_json
+from mutator._common.hashing import canonical, digest
+from mutator.campaigns.freezing import CSV
+from mutator.preflight.equivalence import FOLDER as PROOF
+from mutator.store import digests, plan_file
+from mutator.store.approvals import review_digest
+from mutator.store.check_results import FILE as CHECKS
+from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
+from mutator.store.lines import bare_segment, intact_lines
+from mutator.store.records import ending_on
+from mutator.store.run_folder import RunFolder
+from mutator.store.run_head import CAMPAIGN, HEAD
+from mutator.store.stretches import told
+
+SCHEMA, RESULTS_SCHEMA = "seal/2", "results-digest/2"
+_RUNS_SCHEMA = "results-digest/1"  # of the plan and its runs, as the seal includes them
+# Everything else in these files is sealed, including keys that later versions add.
+OUTSIDE = {
+    HEAD: ("stretches", "choices.shard", "choices.series_mb"),
+    CHECKS: ("digest", "run_cpu_s"),  # the key of a cache, which depends on the machine; a cost
+}
+OUTSIDE_RESULTS = ("schema", "provenance", *OUTSIDE[HEAD])  # of run.json
+_FILES = (CAMPAIGN, CSV, plan_file.EXPERIMENTS, plan_file.FAULTS)
+_TEXTS, _NO_TEXTS = ("detail", "error.message"), (b'"detail":""', b'"error":null')
+_UNSEALED_FILES = "times, engines and hosts of the experiments; series, kept traces, plots, stills, films"
+
+_APPROVALS = "only the review digest covers who approved what"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Seals:
+    """The digests of a run to publish or sign, 64 hex digits each."""
+
+    seal: str | None = None  #: the seal; None for a run that is unfinished or not verifiable
+    results_digest: str | None = None  #: the results digest; None like the seal
+    review_digest: str | None = None  #: the review digest; None for a run without `reviewed.json`
+
+    def texts(self) -> dict[str, str]:
+        """The digests that the run has, by name."""
+        names = {
+            "seal": self.seal,
+            "results digest": self.results_digest,
+            "review digest": self.review_digest,
+        }
+        return {name: value for name, value in names.items() if value}
+
+
+def seals_of(folder: RunFolder) -> Seals:
+    """Compute the digests of a run folder from its content."""
+    review = review_digest(folder.path)
+    if not folder.finished:
+        return Seals(review_digest=review)
+    goldens = golden_files(folder)
+    runs = digest([_RUNS_SCHEMA, folder.head["plan"], goldens, _records(folder, "records")])
+    results = digest(
+        [
+            RESULTS_SCHEMA,
+            without(folder.head, OUTSIDE_RESULTS),
+            goldens,
+            _records(folder, "records", _without_texts),
+        ]
+    )
+    facts = {
+        HEAD: without(folder.head, OUTSIDE[HEAD]),
+        CHECKS: without(read_json(folder.path / CHECKS, CHECKS_SCHEMA), OUTSIDE[CHECKS]),
+        "versions": _versions(folder),
+        "files": _sha256(folder, _FILES),
+        PROOF: _records(folder, PROOF),
+    }
+    return Seals(seal=digest([SCHEMA, runs, facts]), results_digest=results, review_digest=review)
+
+
+def seal_of(folder: RunFolder) -> str | None:
+    return seals_of(folder).seal
+
+
+def seal_or_why_not(folder: RunFolder) -> dict[str, str]:
+    """The texts of `seals_of`; the seal of a run without one is the reason."""
+    none = "the run is not finished" if folder.verifiable else not_verifiable(folder)
+    return {"seal": f"none: {none}"} | seals_of(folder).texts()
+
+
+def not_verifiable(folder: RunFolder) -> str:
+    return f"not verifiable, because {folder.head['schema']} has no digests"
+
+
+def without(content: Mapping[str, Any], paths: Iterable[str]) -> dict[str, Any]:
+    """Copy JSON content without the keys at `paths`, such as `choices.shard`."""
+    found = dict(content)
+    for path in paths:
+        key, _, rest = path.partition(".")
+        if rest and isinstance(found.get(key), Mapping):
+            found[key] = without(found[key], [rest])
+        elif not rest:
+            found.pop(key, None)
+    return found
+
+
+def unsealed_facts(folder: RunFolder) -> dict[str, str]:
+    """The facts of a run folder that its seal does not cover, by name: who can write to the folder can change
+    them."""
+    choices = folder.head["choices"]
+    chosen = {f"chosen: {name}": str(choices[name]) for name in ("shard", "series_mb") if choices.get(name)}
+    environment = {name: text for name, text in told(folder.stretches).items() if name != "python"}
+    approvals = {"approvals": _APPROVALS} if review_digest(folder.path) else {}
+    return {**environment, **chosen, **approvals, "other files": _UNSEALED_FILES}
+
+
+def golden_digests(folder: RunFolder, names: Sequence[str]) -> dict[str, str]:
+    """Digest of each golden run's files `names` (trace and record)."""
+    found = {}
+    for one in folder.goldens:
+        place = folder.golden(*one)
+        files = [digest(read_bounded(inside(place, name))) for name in names]
+        found[one.key] = digest(files)
+    return found
+
+
+def golden_files(folder: RunFolder) -> dict[str, str]:
+    """SHA-256 of every file of the golden runs, by name in the run folder."""
+    paths = sorted(path for path in (folder.path / "golden").rglob("*") if path.is_file())
+    return _sha256(folder, [path.relative_to(folder.path).as_posix() for path in paths])
+
+
+def _sha256(folder: RunFolder, names: Sequence[str]) -> dict[str, str]:
+    found = digests.of_files(folder.path, names)
+    return {name: one.sha256 for name, one in found.items() if one}
+
+
+def _versions(folder: RunFolder) -> list[str]:
+    """The distinct sets of versions that computed anything, as canonical text."""
+    return sorted({canonical([one.python, one.packages]) for one in folder.stretches})
+
+
+def _records(
+    folder: RunFolder, kind: str, sealed: Callable[[bytes], bytes] = lambda body: body
+) -> dict[str, str]:
+    """Digest of what is `sealed` of each valid record's line without its checksum, by experiment id."""
+    found = {}
+    for path in sorted(inside(folder.path, kind).glob("*.jsonl")):
+        segment = bare_segment(path, checksums=True)
+        for number, line in intact_lines(path, checksums=True):
+            if number > 1 and (ending := ending_on(line)).counts:
+                found[ending.experiment_id] = digest(sealed(segment.body_of(line)))
+    return found
+
+
+def _without_texts(body: bytes) -> bytes:
+    """A record's line without the texts of exceptions, which differ between versions of Python."""
+    if all(part in body for part in _NO_TEXTS):
+        return body
+    return canonical(without(json.loads(b"{" + body), _TEXTS)).encode()

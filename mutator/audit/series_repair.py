@@ -1,0 +1,67 @@
+"""Set aside damaged series of a run folder, so that the others can be read.
+
+A chunk of golden series is rebuilt from the golden runs if that gives the same bytes.
+"""
+
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from mutator._common.below import check_name, inside, unlink_below, write_below
+from mutator.audit.series_audit import series
+from mutator.errors import MutatorError
+from mutator.outcomes.judging import load_channels
+from mutator.outcomes.sampling import Sampler
+from mutator.store.run_folder import RunFolder
+from mutator.store.series import INDEX, Index, SeriesFolder, making_again
+from mutator.store.series_packing import SUFFIX, pack_again
+from mutator.store.series_script import name_of, script_of
+from mutator.workspace import Workspace
+
+
+def repair_series(
+    folder: RunFolder, workspace: Workspace | None, put_aside: Callable[[str], None]
+) -> Iterator[str]:
+    """Set aside damaged series, and yield a sentence for each action.
+
+    `put_aside` copies a file of the run folder. Golden runs can be read only with a `workspace`.
+    """
+    run, there = folder.path, SeriesFolder(folder.path)
+    paths = {Path(problem.where) for problem in series(folder)[1] if problem.where}
+    index = None
+    if there.path / f"{INDEX}.js" in paths:  # the content of the chunks is unknown
+        paths |= {*there.path.glob("*.js")}
+    elif paths:
+        index = there.index
+    for path in sorted(paths):
+        name = path.relative_to(run).as_posix()
+        check_name(name, run)
+        found = "set aside" if os.path.lexists(path) else "is gone"
+        put_aside(name)
+        if path.suffix == SUFFIX:
+            yield f"{name}: damaged blocks set aside; `mutator run` packs the others"
+        elif index and (data := _golden_chunk(folder, workspace, index, path.stem)):
+            write_below(run, name, script_of(path.stem, data))
+            yield f"{name} rebuilt from the golden runs"
+        else:
+            unlink_below(run, name)
+            yield f"{name} {found}: {making_again(run)} recreates the series of an experiment"
+    if index:
+        pack_again(run, index)
+
+
+def _golden_chunk(folder: RunFolder, workspace: Workspace | None, index: Index, name: str) -> bytes | None:
+    """The rebuilt content of a chunk of golden series, if that is still possible."""
+    keys = {number: key for key, number in index.goldens.items()}
+    numbers = [number for number, (chunk, _) in enumerate(index.places) if chunk == name]
+    if workspace is None or not keys.keys() >= {*numbers}:
+        return None
+    try:
+        manifest = workspace.manifest(folder.head["target"])
+        goldens = [
+            load_channels(manifest, inside(folder.path / "golden", keys[number])) for number in numbers
+        ]
+    except MutatorError:
+        return None
+    data = b"".join(Sampler(manifest, golden).encoded for golden in goldens)
+    return data if name_of(data) == name else None

@@ -1,0 +1,64 @@
+"""Find draws that no parameter uses, so that all their faults are the same, and parameters that no template
+uses."""
+
+from collections.abc import Iterator
+
+from jinja2 import TemplateError
+from jinja2.meta import find_undeclared_variables
+from jinja2.sandbox import ImmutableSandboxedEnvironment
+
+from mutator.checks.findings import Finding, Level, Place
+from mutator.faults.fault_models import NAMES, FaultModels, SnippetKind
+from mutator.faults.injections import Drawn, InjectionSpec, reference
+from mutator.faults.specs import FaultSpec
+
+_NAME = "draws"
+
+
+def unused_draws(specs: tuple[FaultSpec, ...], models: FaultModels) -> Finding:
+    places = [*_of_specs(specs, models), *_of_models(models)]
+    if not places:
+        return Finding(name=_NAME, level=Level.OK, found="all drawn values are used")
+    return Finding(
+        name=_NAME,
+        level=Level.WARN,
+        found=f"{len(places)} unused",
+        remedy="use the value in a parameter (`by_m: NAME`), or remove it, because no fault depends on it",
+        places=tuple(places),
+    )
+
+
+def _of_specs(specs: tuple[FaultSpec, ...], models: FaultModels) -> Iterator[Place]:
+    for spec in specs:
+        for variant in spec:
+            draw = variant.draw
+            for reading, injections in variant.readings.items():
+                if draw and not any(_uses(one, draw.name, models) for one in injections):
+                    what = f"{spec.name}/{variant.name} draws '{draw.name}', unused in reading {reading}"
+                    yield Place(file=str(spec.path), line=spec.source.line(draw.keys), what=what)
+
+
+def _uses(injection: InjectionSpec, name: str, models: FaultModels) -> bool:
+    model = models.get(injection.model)
+    for param in injection.params:
+        schema = model.param(param.name)
+        drawn = param.value if isinstance(param.value, Drawn) else reference(str(param.value))
+        if schema and schema.type not in NAMES and drawn and drawn.name == name:
+            return True
+    return False
+
+
+def _of_models(models: FaultModels) -> Iterator[Place]:
+    environment = ImmutableSandboxedEnvironment()
+    for model in models:
+        try:
+            used = find_undeclared_variables(environment.parse(model.template))
+        except TemplateError:  # reported when the template is rendered
+            continue
+        if model.kind is SnippetKind.VALUE:
+            used.add("target")  # the expression to change, which the template calls `original`
+        for param in model.params:
+            if param.name not in used:
+                what = f"parameter '{param.name}' of model {model.name}, unused in its template"
+                line = model.source.line(("params", param.name))
+                yield Place(file=str(model.source.path), line=line, what=what)

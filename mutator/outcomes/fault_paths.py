@@ -1,0 +1,322 @@
+"""Finds the path of a fault along the control structure, from the injected components to the process.
+
+The path excludes links out of the process (feedback), links from or to people, and links that are not
+studied. A change of a component is attributed to feedback if the component left golden only after the
+process did, and feedback could reach it no later than the fault could.
+"""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import lru_cache
+from math import inf
+from typing import NamedTuple
+
+from mutator.errors import MutatorError
+from mutator.model import Experiment, Fault, Outcome, Record
+from mutator.outcomes.channel_departures import Departure
+from mutator.outcomes.topology import Way, chained, links_of, steps_from, structured
+from mutator.store.run_head import REMEDY, Head
+from mutator.stpa.analysis import Kind, StructureModel
+from mutator.targets.channels import Role
+
+
+class State(StrEnum):
+    """The effect of the fault at a component."""
+
+    INJECTED = "injected"
+    REACHED = "reached"  # one of its channels left golden
+    PASSED = "passed"  # none of its channels left golden, but a component that only it feeds did
+    FEEDBACK = "feedback"  # one of its channels left golden, but only after the process
+    HELD = "held"  # it has channels, and none left golden
+    UNSEEN = "unseen"  # it has no recorded channels
+
+
+class Passage(StrEnum):
+    """Whether the fault got through a link of its path."""
+
+    THROUGH = "through"
+    STOPPED = "stopped"
+    UNKNOWN = "unknown"  # the end of the link is not recorded
+    NONE = "none"  # the fault did not reach the start of the link
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stage:
+    """A component on a path, and its channels that left golden.
+
+    If a component that only this one feeds left golden before this one's own channels did, `t_by` is the time
+    (s) when that happened: this component must have changed by then.
+    """
+
+    component: str
+    state: State
+    channels: tuple[Departure, ...]
+    t_by: float | None = None
+
+    @property
+    def t_first(self) -> float | None:
+        return min((first for _, first, _ in self.channels), default=None)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Crossing:
+    """A link of a path with its ends, and whether the fault got through."""
+
+    link: str
+    tail: str
+    tip: str
+    passage: Passage
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Path:
+    """The stages of a path in causal order, and whether the fault got through each link."""
+
+    stages: tuple[Stage, ...]
+    crossings: tuple[Crossing, ...]
+    reached: str  # of the components that left golden, the nearest to the process; '' if none
+    stopped_at: tuple[str, ...]  # the components that held the fault, if it changed no actuator
+
+    @property
+    def injected(self) -> tuple[str, ...]:
+        return tuple(stage.component for stage in self.stages if stage.state is State.INJECTED)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Course:
+    """A path without times. Paths have the same course if they have the same injected components, and
+    components left golden in the same order.
+
+    `late` has the components that must have changed before their own channels did, each with the rank of
+    `Stage.t_by` among all times. `entered` is the link by which the fault reached the first actuator.
+    """
+
+    states: Mapping[str, State]  # in causal order
+    late: Mapping[str, int]
+    crossings: tuple[Crossing, ...]
+    reached: str
+    stopped_at: tuple[str, ...]
+    entered: Crossing | None
+
+    @property
+    def injected(self) -> tuple[str, ...]:
+        return tuple(name for name, state in self.states.items() if state is State.INJECTED)
+
+
+class Sight(NamedTuple):
+    """The facts about an experiment that determine its course."""
+
+    injected: frozenset[str]
+    order: tuple[tuple[str, int], ...]  # the rank of the time at which each component left golden
+    masked: bool
+
+
+class Ways:
+    """The paths of faults through a target.
+
+    `channels` have name, unit, role, component and meaning, as in run.json. Without a `structure`, the
+    components form a chain: those of internal channels, then those of actuators, then those of ground truth.
+    In a chain, the place of injection is unknown.
+    """
+
+    def __init__(self, channels: Sequence[Sequence[str]], structure: StructureModel | None) -> None:
+        self.component_of = {name: component for name, _, _, component, _ in channels}
+        self._roles = {component: role for _, _, role, component, _ in channels if component}
+        self._actuators = {component for _, _, role, component, _ in channels if role == Role.ACTUATOR.value}
+        self.structure = structure
+        self._links = links_of(structure) if structure else {}
+        # links from unrecorded components back to the components that feed them
+        self._back = [(tip, tail) for tail, tip in self._links.values() if tip not in self._roles]
+        self._course = lru_cache(maxsize=None)(self._course_of)
+        self._where: dict[str, frozenset[str]] = {}  # the components of each fault, by fault id
+
+    @property
+    def processes(self) -> frozenset[str]:
+        if self.structure is None:
+            return frozenset(name for name, role in self._roles.items() if role == Role.TRUTH.value)
+        return frozenset(n for n, c in self.structure.components.items() if c.kind is Kind.PROCESS)
+
+    def _injected(self, fault: Fault) -> frozenset[str]:
+        if fault.id not in self._where:
+            files = {injection.location.path for injection in fault.injections}
+            components = self.structure.components if self.structure else {}
+            found = frozenset(name for name, one in components.items() if files.intersection(one.modules))
+            self._where[fault.id] = found
+        return self._where[fault.id]
+
+    def path(self, experiment: Experiment, record: Record) -> Path | None:
+        """Return the path of an experiment.
+
+        None if the fault was not active, if the run has no outcome, or if the fault is in no known component.
+        """
+        course = self.course(experiment.fault, record)
+        if course is None:
+            return None
+        left: dict[str, list[Departure]] = {}
+        for departure in record.left:
+            left.setdefault(self.component_of.get(departure[0], ""), []).append(departure)
+        times = sorted({min(t for _, t, _ in found) for found in left.values()})
+        stages = [
+            Stage(
+                component=name,
+                state=state,
+                channels=tuple(left.get(name, ())),
+                t_by=times[course.late[name]] if name in course.late else None,
+            )
+            for name, state in course.states.items()
+        ]
+        return Path(
+            stages=tuple(stages),
+            crossings=course.crossings,
+            reached=course.reached,
+            stopped_at=course.stopped_at,
+        )
+
+    def course(self, fault: Fault, record: Record) -> Course | None:
+        """Return the course of an experiment; None in the same cases as `path`."""
+        sight = self.sight(fault, record)
+        return sight and self.course_of(sight)
+
+    def course_of(self, sight: Sight) -> Course | None:
+        return self._course(*sight)
+
+    def sight(self, fault: Fault, record: Record) -> Sight | None:
+        """Return the inputs of a course; None if the fault was not active or the run has no outcome."""
+        if record.outcome in (None, Outcome.NOT_ACTIVATED):
+            return None
+        firsts: dict[str, float] = {}
+        for channel, first, _ in record.left:
+            component = self.component_of.get(channel, "")
+            if first < firsts.get(component, inf):
+                firsts[component] = first
+        place = {time: i for i, time in enumerate(sorted(set(firsts.values())))}
+        order = tuple(sorted((name, place[time]) for name, time in firsts.items()))
+        return Sight(self._injected(fault), order, record.outcome is Outcome.MASKED)
+
+    def _course_of(
+        self, injected: frozenset[str], order: tuple[tuple[str, int], ...], masked: bool
+    ) -> Course | None:
+        way = self._way_of(injected)
+        if not way.components:
+            return None
+        times = dict(order)
+        latest = self._latest(way, times)
+        states, arrived = self._states(way, times.keys(), latest)
+        late = {name: _sooner(latest, times, name) for name, state in states.items() if state in _CHANGED}
+        changed = [
+            n for n, state in states.items() if n in times and state in (State.INJECTED, State.REACHED)
+        ]
+        crossings = tuple(
+            Crossing(link=name, tail=tail, tip=tip, passage=_passage(tail, tip, states, arrived))
+            for name, (tail, tip) in way.links.items()
+        )
+        through = [c for c in crossings if c.tip in self._actuators and c.passage is Passage.THROUGH]
+        return Course(
+            states=states,
+            late={name: int(place) for name, place in late.items() if place is not None},
+            crossings=crossings,
+            reached=min(reversed(changed), key=way.steps.__getitem__, default=""),
+            stopped_at=_holding(way, states, arrived) if masked else (),
+            entered=min(through, key=lambda c: times.get(c.tip, inf), default=None),
+        )
+
+    def _states(
+        self, way: Way, shown: Collection[str], left: Mapping[str, float]
+    ) -> tuple[dict[str, State], set[str]]:
+        """Return the state of each component of a way, and the components that the fault reached.
+
+        `left` has the rank of the time by which each component left golden. Components in `shown` have
+        channels that left golden. The fault reaches an unrecorded component if it reached one that feeds it.
+        """
+        moved = self._moved(left)
+        states: dict[str, State] = {}
+        arrived: set[str] = set()
+        for name in way.components:
+            came = name in way.sources or bool(way.feeders(name) & arrived)
+            if way.injected and name in way.sources:
+                states[name] = State.INJECTED
+            elif name not in self._roles:
+                states[name] = State.UNSEEN
+            elif name not in left:
+                states[name] = State.HELD
+            elif left[name] <= moved:
+                states[name] = State.REACHED if name in shown else State.PASSED
+            else:
+                back = self._fed_back(way.fed.get(name, ()), left)
+                along = min((left[f] for f in way.feeders(name) & arrived if f in left), default=inf)
+                by_loop = not came or (back <= left[name] and back <= along)
+                states[name] = State.FEEDBACK if by_loop else State.REACHED
+            if states[name] in _CAME or (states[name] is State.UNSEEN and came):
+                arrived.add(name)
+        return states, arrived
+
+    def _moved(self, left: Mapping[str, float]) -> float:
+        """Return the rank of the time at which the process left golden; infinite if it did not."""
+        return min((left[name] for name in self.processes if name in left), default=inf)
+
+    def _latest(self, way: Way, left: Mapping[str, float]) -> dict[str, float]:
+        """Return the rank of the time by which each component left golden.
+
+        If a component is the only one that feeds another, it left golden no later than the other did, unless
+        feedback could have reached the other. If the place of injection is unknown, nothing is inferred.
+        """
+        moved, times = self._moved(left), dict(left)
+        for name in reversed(way.components if way.injected else ()):
+            only = way.feeders(name) | way.fed.get(name, frozenset())
+            if name in times and len(only) == 1 and name not in way.sources:
+                (feeder,) = only
+                if feeder in left or times[name] <= moved:
+                    times[feeder] = min(times.get(feeder, inf), times[name])
+        return times
+
+    def _way_of(self, injected: frozenset[str]) -> Way:
+        if self.structure is None:
+            return chained(self._roles, self.processes)
+        return structured(self.structure.components, self._links, self.processes, injected)
+
+    def _fed_back(self, names: Collection[str], left: Mapping[str, float]) -> float:
+        """Return the rank of the earliest time of feedback through one of these components, or infinity.
+
+        A recorded component feeds back once it has left golden, an unrecorded one once a component that leads
+        to it has left golden.
+        """
+        unseen = steps_from([name for name in names if name not in self._roles], self._back).keys()
+        return min((left[name] for name in {*names, *unseen} if name in left), default=inf)
+
+
+def ways_of(head: Head) -> Ways | None:
+    """Return the ways of a run's target, from run.json. None if no channel names a component."""
+    if not any(component for *_, component, _ in head.get("channels", ())):
+        return None
+    try:
+        structure = StructureModel.model_validate(head["structure"]) if head.get("structure") else None
+    except ValueError:
+        raise MutatorError("damaged at 'structure'", where=head.path, remedy=REMEDY) from None
+    return Ways(head["channels"], structure)
+
+
+_CHANGED = (State.REACHED, State.PASSED, State.FEEDBACK)
+_CAME = (State.INJECTED, State.REACHED, State.PASSED)
+
+
+def _sooner(some: Mapping[str, float], others: Mapping[str, float], name: str) -> float | None:
+    return some[name] if some.get(name, inf) < others.get(name, inf) else None
+
+
+def _passage(tail: str, tip: str, states: Mapping[str, State], arrived: Collection[str]) -> Passage:
+    if tail not in arrived or states[tip] is State.INJECTED:
+        return Passage.NONE
+    if states[tip] is State.UNSEEN:
+        return Passage.UNKNOWN
+    return Passage.THROUGH if states[tip] in _CAME else Passage.STOPPED
+
+
+def _holding(way: Way, states: Mapping[str, State], arrived: Collection[str]) -> tuple[str, ...]:
+    """Return the components that held a fault: those fed by a component that the fault reached or, if there
+    are none, the first ones on its path.
+    """
+    held = [name for name in way.components if states[name] is State.HELD]
+    reached = {name for name in way.components if states[name] is State.REACHED}
+    after_reached = [name for name in held if way.feeders(name) & reached]
+    return tuple(after_reached or (n for n in held if n in way.sources or way.feeders(n) & {*arrived}))

@@ -1,0 +1,61 @@
+"""The canary: a fault known to be harmful. The check fails only if every value of the canary's variant is
+harmless."""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+
+from mutator.engines.jobs import Job
+from mutator.errors import MutatorError
+from mutator.faults.expansion import expand
+from mutator.model import Experiment, Fault, fault_label
+from mutator.mutants.building import build
+from mutator.preflight.preflight_rules import CheckRun
+from mutator.targets.manifest import TargetManifest
+from mutator.workspace import Workspace
+
+
+def tries(workspace: Workspace, manifest: TargetManifest, canary: Experiment) -> Iterator[Experiment]:
+    """The canary, then the same fault with each other value of its variant, largest first."""
+    yield canary
+    models, known = workspace.fault_models(), canary.fault
+    others: dict[str, Fault] = {}
+    for spec in workspace.specs():
+        if known.spec.startswith(f"{spec.name}/") and known.reading in spec.readings.names:
+            faults = expand(spec, canary.seed, known.reading, models=models, manifest=manifest)
+            others |= {one.id: one for one in faults if one.spec == known.spec and one.id != known.id}
+    for fault in sorted(others.values(), key=lambda one: one.size, reverse=True):
+        yield replace(canary, fault=fault)
+
+
+def job(workspace: Workspace, manifest: TargetManifest, experiment: Experiment) -> Job:
+    built = build(manifest, workspace.fault_models(), experiment.fault, experiment.trigger)
+    return Job(
+        name=f"canary-{experiment.id}",
+        scenario=workspace.scenario(experiment.scenario),
+        seed=experiment.seed,
+        changes=experiment.changes,
+        files=built.files,
+        mutant=built.id,
+        injections=built.injections,
+    )
+
+
+def judge(
+    experiments: Iterable[Experiment], run: Callable[[Experiment], CheckRun], hazard: str
+) -> tuple[str, str]:
+    """Run experiments until one causes `hazard`; return the problem ('': none) and the success message."""
+    harmless: list[str] = []
+    for experiment in experiments:
+        value = fault_label("", experiment.fault.value, experiment.fault.unit).strip()
+        try:
+            result = run(experiment)
+            if result.problem:  # retry: a cause outside the target must not change the message
+                result = run(experiment)
+        except MutatorError as error:  # no mutant can be built with this value
+            result = CheckRun(problem=error.got)
+        if not result.problem and hazard in dict(result.hazards):
+            others = f" with {value}, and not with {', '.join(harmless)}" if harmless else ""
+            return "", f"reached {hazard}{others}"
+        harmless.append(" ".join(filter(None, (value, result.problem and f"({result.problem})"))))
+    tried = ", ".join(filter(None, harmless))
+    return f"did not reach {hazard}" + (f" with any of its values: {tried}" if tried else ""), ""

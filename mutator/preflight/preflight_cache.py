@@ -1,0 +1,29 @@
+"""Cache passed checks and their golden runs on this machine for other run folders with the same sources."""
+
+import platform
+import shutil
+from pathlib import Path
+
+from mutator._common import caches, kept_folders
+from mutator._common.below import inside
+from mutator._common.hashing import digest
+from mutator.preflight.unreached import FOLDER
+
+
+def entry(key: str) -> Path:
+    """The path for checks with this digest. Machines with a shared home folder have separate entries, because
+    the digest might not cover everything that changes last digits."""
+    return inside(caches.of_checks(), digest([key, platform.node()]))
+
+
+def store(place: Path, run: Path, file: str, observed: Path) -> None:
+    """Store a run folder's golden runs, check results (`file`) and observations at `place`, if the cache is
+    writable."""
+
+    def fill(made: Path) -> None:
+        shutil.copytree(run / "golden", made / "golden")
+        shutil.copy(inside(run, file), inside(made, file))
+        if (observed / FOLDER).is_dir():
+            shutil.copytree(observed / FOLDER, made / FOLDER)
+
+    kept_folders.store(place, fill)

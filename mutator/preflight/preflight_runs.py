@@ -1,0 +1,120 @@
+"""The runs of the checks before a campaign: golden runs, each twice, null mutants, the canary."""
+
+from collections.abc import Callable, Collection, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor, as_completed
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mutator._common import caches
+from mutator._common.below import inside
+from mutator._common.files import remove_folder
+from mutator.engines.jobs import Job
+from mutator.engines.reference import ReferenceEngine
+from mutator.model import Experiment
+from mutator.mutants.building import build
+from mutator.preflight import canary, unreached
+from mutator.preflight.preflight_rules import CheckRun, look
+from mutator.store.progress import Pace, Progress
+from mutator.store.run_folder import RunFolder
+from mutator.targets.manifest import TargetManifest
+from mutator.triggers.kinds import always
+from mutator.workspace import Workspace
+
+GOLDEN, AGAIN, NULL = "golden", "golden again", "null mutant"
+_CANARY = "canary"
+_OTHER_HASH_SEED = 4242
+
+Notify = Callable[[Progress], None]
+Runs = dict[tuple[str, Any], CheckRun]  # kind of run, and `GoldenRun`
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CheckDriver:
+    """Executes the runs that the checks judge. Golden runs and their observations stay in `kept`."""
+
+    workspace: Workspace
+    folder: RunFolder
+    manifest: TargetManifest
+    kept: Path
+
+    def drive(self, workers: int, notify: Notify) -> tuple[Runs, tuple[str, str]]:
+        """Do all runs of all checks, `workers` at a time. Return them with the result of `canary.judge`."""
+        with self._working(workers) as (engine, pool):
+            judged = pool.submit(self._judge_canary, engine)
+            futures = {name: pool.submit(self._run, engine, name, job) for name, job in self._jobs().items()}
+            nulls = [future for name, future in futures.items() if name[0] == NULL]
+            _follow("checks", [judged, *nulls], notify)
+            _follow("golden", [future for name, future in futures.items() if name[0] != NULL], notify)
+            canary_verdict = judged.result()
+            return {name: future.result() for name, future in futures.items()}, canary_verdict
+
+    def drive_goldens(self, workers: int, notify: Notify) -> dict[str, str]:
+        """Do each golden run once; return the digests by key."""
+        jobs = {name: job for name, job in self._jobs().items() if name[0] == GOLDEN}
+        with self._working(workers) as (engine, pool):
+            futures = {name[1].key: pool.submit(self._run, engine, name, job) for name, job in jobs.items()}
+            _follow("golden", [*futures.values()], notify)
+            return {key: future.result().digest for key, future in futures.items()}
+
+    @contextmanager
+    def _working(self, workers: int) -> Iterator[tuple[ReferenceEngine, ThreadPoolExecutor]]:
+        work = self.folder.work / "checks"
+        for scratch in (work, self.kept):
+            remove_folder(scratch)
+        work.mkdir(parents=True)
+        pool = ThreadPoolExecutor(max(1, workers))
+        try:
+            yield ReferenceEngine(self.manifest, work, self.folder.limits), pool
+        finally:
+            pool.shutdown(cancel_futures=True)
+            remove_folder(work)
+
+    def _judge_canary(self, engine: ReferenceEngine) -> tuple[str, str]:
+
+        def run(experiment: Experiment) -> CheckRun:
+            return self._run(engine, (_CANARY, None), canary.job(self.workspace, self.manifest, experiment))
+
+        hazard: str = self.folder.head["canary_hazard"]
+        return canary.judge(canary.tries(self.workspace, self.manifest, self.folder.canary), run, hazard)
+
+    def _jobs(self) -> dict[tuple[str, Any], Job]:
+        jobs: dict[tuple[str, Any], Job] = {}
+        null = build(self.manifest, self.workspace.fault_models(), None, always())
+        for key in self.folder.goldens:
+            common: dict[str, Any] = {
+                "scenario": self.workspace.scenario(key.scenario),
+                "seed": self.folder.head["seed"] if key.seed is None else key.seed,
+                "changes": key.changes,
+            }
+            name = key.key
+            jobs[NULL, key] = Job(name=f"n-{name}", files=null.files, mutant=null.id, observe=True, **common)
+            jobs[GOLDEN, key] = Job(name=f"a-{name}", **common)
+            jobs[AGAIN, key] = Job(name=f"b-{name}", hash_seed=_OTHER_HASH_SEED, **common)
+        return dict(sorted(jobs.items(), key=lambda one: one[0][0] != NULL))  # null mutants last
+
+    def _run(self, engine: ReferenceEngine, name: tuple[str, Any], job: Job) -> CheckRun:
+        scratch = inside(engine.work, job.name)
+        try:
+            execution = engine.execute(job, scratch)
+            run = look(self.manifest, execution)
+            if name[0] == GOLDEN and name[1].seed is not None:
+                caches.make_room(self.manifest.cache_name)
+            if name[0] == NULL:
+                unreached.write_observed(self.kept, name[1].key, execution.watched.get("seen", ()))
+            if name[0] == GOLDEN and not run.problem:
+                place = inside(self.kept / "golden", name[1].key)
+                place.parent.mkdir(parents=True, exist_ok=True)
+                execution.out.rename(place)
+            return run
+        finally:
+            remove_folder(scratch)
+
+
+def _follow(stage: str, futures: Collection[Future[Any]], notify: Notify) -> None:
+    pace = Pace(stage, len(futures))
+    notify(pace.at(0))
+    for done, future in enumerate(as_completed(futures), 1):
+        future.result()
+        notify(pace.at(done))

@@ -1,0 +1,311 @@
+"""The paths of faults through a structure with two controllers, and through chains of components without a
+structure."""
+
+from pathlib import Path as Folder
+from typing import Any
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.model import (
+    Activation,
+    Anchor,
+    AnchorKind,
+    Experiment,
+    Fault,
+    FaultLocation,
+    Injection,
+    Method,
+    Outcome,
+    Record,
+    Status,
+    Trigger,
+)
+from mutator.outcomes.fault_paths import Passage, Path, State, Ways, ways_of
+from mutator.store.run_head import Head
+from mutator.stpa.analysis import StructureModel
+
+# eyes -> finder -> speed -> pedals -> car, and gauge -> wheel -> rack -> car; the gauge also feeds `speed`
+KINDS = {
+    "driver": "human",
+    "speed": "controller",
+    "wheel": "controller",
+    "pedals": "actuator",
+    "rack": "actuator",
+    "finder": "estimator",
+    "eyes": "sensor",
+    "gauge": "sensor",
+    "car": "process",
+}
+LINKS = {
+    "orders": ("driver", "speed"),
+    "light": ("car", "eyes"),
+    "motion": ("car", "gauge"),
+    "picture": ("eyes", "finder"),
+    "lead": ("finder", "speed"),
+    "pace": ("gauge", "speed"),
+    "angle": ("gauge", "wheel"),
+    "gas": ("speed", "pedals"),
+    "torque": ("wheel", "rack"),
+    "force": ("pedals", "car"),
+    "turn": ("rack", "car"),
+    "show": ("speed", "driver"),
+}
+STRUCTURE = StructureModel.model_validate(
+    {
+        "about": "",
+        "components": {
+            name: {"kind": kind, "label": name, "about": "", "modules": [f"{name}.py"], "drawn": [i, 0, 1]}
+            for i, (name, kind) in enumerate(KINDS.items())
+        },
+        "control_actions": {},
+        "links": {name: {"from": tail, "to": tip, "label": ""} for name, (tail, tip) in LINKS.items()},
+    }
+)
+CHANNELS = [
+    ["seen", "m", "internal", "finder", ""],
+    ["wanted", "m/s", "internal", "speed", ""],
+    ["angle", "rad", "internal", "wheel", ""],
+    ["gas", "-", "actuator", "pedals", ""],
+    ["torque", "-", "actuator", "rack", ""],
+    ["place", "m", "truth", "car", ""],
+]
+WAYS = Ways(CHANNELS, STRUCTURE)
+
+
+def experiment(*modules: str) -> Experiment:
+    places = [
+        FaultLocation(path=f"{m}.py", function="f", anchor=Anchor(kind=AnchorKind.ENTRY)) for m in modules
+    ]
+    fault = Fault(
+        spec="a/b/c",
+        module="a",
+        fault_type="b",
+        reading="r",
+        value=1,
+        unit="-",
+        aim="",
+        injections=tuple(Injection(location=place, model="offset") for place in places),
+    )
+    trigger = Trigger(name="t", condition="t >= 1")
+    return Experiment(
+        fault=fault, scenario="S", scenario_digest="", method=Method.RANDOM, trigger=trigger, seed=1
+    )
+
+
+def record(outcome: Outcome | None, **left: float) -> Record:
+    return Record(
+        experiment_id="",
+        status=Status.OK if outcome else Status.CRASHED,
+        outcome=outcome,
+        detail="",
+        tree="",
+        activation=Activation(first=1.0, last=1.0, count=1),
+        t_manifest=None,
+        max_dev=(),
+        hazards=(),
+        alerts=(),
+        trace_digest="",
+        left=tuple((name, t, 1.0) for name, t in left.items()),
+    )
+
+
+def path(*modules: str, outcome: Outcome = Outcome.SDC, ways: Ways = WAYS, **left: float) -> Path:
+    found = ways.path(experiment(*modules), record(outcome, **left))
+    assert found is not None
+    return found
+
+
+def states(found: Path) -> dict[str, State]:
+    return {stage.component: stage.state for stage in found.stages}
+
+
+def passages(found: Path) -> dict[str, Passage]:
+    return {crossing.link: crossing.passage for crossing in found.crossings}
+
+
+def test_an_estimator_that_did_not_change_stopped_the_fault() -> None:
+    found = path("eyes", outcome=Outcome.MASKED)
+    assert [*states(found).items()] == [
+        ("eyes", State.INJECTED),
+        ("finder", State.HELD),
+        ("speed", State.HELD),
+        ("pedals", State.HELD),
+        ("car", State.HELD),
+    ]
+    assert (found.reached, found.stopped_at) == ("", ("finder",))
+    assert passages(found) == {
+        "picture": Passage.STOPPED,
+        "lead": Passage.NONE,
+        "gas": Passage.NONE,
+        "force": Passage.NONE,
+    }
+
+
+def test_a_controller_that_did_not_change_stopped_the_fault() -> None:
+    found = path("eyes", outcome=Outcome.MASKED, seen=1.2)
+    assert (found.reached, found.stopped_at) == ("finder", ("speed",))
+    assert passages(found)["picture"] is Passage.THROUGH
+    assert passages(found)["lead"] is Passage.STOPPED
+
+
+def test_a_fault_that_changed_the_car_reached_it() -> None:
+    found = path("eyes", seen=1.2, wanted=1.3, gas=1.3, place=1.4)
+    assert [(s.component, s.t_first) for s in found.stages[1:]] == [
+        ("finder", 1.2),
+        ("speed", 1.3),
+        ("pedals", 1.3),
+        ("car", 1.4),
+    ]
+    assert {*passages(found).values()} == {Passage.THROUGH}
+    assert (found.reached, found.stopped_at) == ("car", ())
+
+
+def test_feedback_is_not_part_of_the_path() -> None:
+    """A car that moves differently is also observed differently."""
+    found = path("wheel", angle=1.0, torque=1.0, place=1.1, seen=1.2, wanted=1.3, gas=1.4)
+    assert states(found) == {"wheel": State.INJECTED, "rack": State.REACHED, "car": State.REACHED}
+
+
+def test_links_that_the_study_ignores_are_not_part_of_the_path() -> None:
+    ends = {"from": "speed", "to": "wheel", "label": ""}
+    links = {name: {"from": tail, "to": tip, "label": ""} for name, (tail, tip) in LINKS.items()}
+    for studied, names in ((True, {"wheel", "rack"}), (False, set())):
+        structure = replace_links({**links, "engaged": {**ends, "studied": studied}})
+        found = states(path("speed", ways=Ways(CHANNELS, structure), wanted=1.1, gas=1.1))
+        assert found.keys() - {"speed", "pedals", "car"} == names
+
+
+def test_a_component_that_changed_after_the_car_only_received_feedback() -> None:
+    """The speed control changed after the car and has an input that is not on the path."""
+    found = path("finder", "wheel", angle=1.0, torque=1.0, place=1.1, wanted=1.5, gas=1.6)
+    assert states(found) == {
+        "finder": State.INJECTED,
+        "wheel": State.INJECTED,
+        "rack": State.REACHED,
+        "speed": State.FEEDBACK,
+        "pedals": State.FEEDBACK,
+        "car": State.REACHED,
+    }
+    assert passages(found)["lead"] is Passage.STOPPED
+    assert passages(found)["gas"] is Passage.NONE
+
+
+def test_the_only_input_of_a_reached_component_passed_the_fault_on() -> None:
+    """The rack changed before the car, and the wheel control is the rack's only input."""
+    found = path("gauge", torque=1.0, place=1.1)
+    assert states(found)["wheel"] is State.PASSED
+    assert passages(found)["angle"] is passages(found)["torque"] is Passage.THROUGH
+    assert states(path("gauge", torque=1.0, place=1.1, angle=1.2))["wheel"] is State.REACHED
+
+
+def test_a_component_changed_no_later_than_those_that_it_alone_feeds() -> None:
+    """Only the speed control feeds the pedals."""
+    found = path("finder", gas=1.2, place=1.3, wanted=1.25)
+    assert {s.component: s.t_by for s in found.stages if s.t_by is not None} == {"speed": 1.2}
+    assert [s.t_first for s in found.stages if s.component == "speed"] == [1.25]
+    late = path("eyes", "wheel", torque=1.0, place=1.1, gas=1.2, wanted=1.5)
+    assert {s.component: s.t_by for s in late.stages if s.t_by is not None} == {"speed": 1.2}
+
+
+@pytest.mark.parametrize(
+    ("left", "state"),
+    [
+        ({"pace": 1.6}, State.REACHED),  # the gauge had not yet observed the car's different motion
+        ({"pace": 1.5}, State.FEEDBACK),
+        ({"pace": 1.5, "seen": 1.2}, State.REACHED),  # the fault reached it earlier
+        ({"pace": 1.2, "seen": 1.4}, State.FEEDBACK),
+    ],
+)
+def test_the_first_changed_input_decides_between_fault_and_feedback(
+    left: dict[str, float], state: State
+) -> None:
+    """The car moved differently before the speed control changed."""
+    ways = Ways([*CHANNELS, ["pace", "m/s", "internal", "gauge", ""]], STRUCTURE)
+    found = path("finder", "wheel", ways=ways, torque=1.0, place=1.1, wanted=1.5, **left)
+    assert states(found)["speed"] is state
+
+
+def test_a_component_with_a_single_input_is_reached_even_after_the_car() -> None:
+    """Only the speed control feeds the pedals."""
+    found = path("eyes", "wheel", seen=1.0, wanted=1.0, torque=1.0, place=1.1, gas=3.0)
+    assert states(found)["pedals"] is State.REACHED
+
+
+def test_components_without_channels_are_unobserved() -> None:
+    ways = Ways([channel for channel in CHANNELS if channel[0] != "seen"], STRUCTURE)
+    found = path("eyes", ways=ways, wanted=1.2, gas=1.2, place=1.3)
+    assert states(found)["finder"] is State.UNSEEN
+    assert passages(found)["picture"] is Passage.UNKNOWN
+    assert passages(found)["lead"] is Passage.THROUGH
+    held = path("eyes", ways=ways, outcome=Outcome.MASKED)
+    assert held.stopped_at == ("speed",)
+
+
+def test_two_controllers_can_stop_one_fault() -> None:
+    assert path("gauge", outcome=Outcome.MASKED).stopped_at == ("speed", "wheel")
+    assert path("gauge", outcome=Outcome.MASKED, angle=2.0).stopped_at == ("rack",)
+
+
+@pytest.mark.parametrize("outcome", [Outcome.NOT_ACTIVATED, None])
+def test_an_inactive_fault_or_a_failed_run_has_no_path(outcome: Outcome | None) -> None:
+    assert WAYS.path(experiment("eyes"), record(outcome)) is None
+
+
+def test_a_fault_outside_all_components_has_no_path() -> None:
+    """The start of the path is unknown."""
+    assert WAYS.path(experiment("other"), record(Outcome.SDC, gas=1.0)) is None
+
+
+def test_without_a_structure_components_are_ordered_by_role() -> None:
+    ways = Ways(CHANNELS[::-1], None)
+    found = path("eyes", ways=ways, outcome=Outcome.MASKED, angle=1.0)
+    assert [*states(found)] == ["wheel", "speed", "finder", "rack", "pedals", "car"]
+    assert (found.reached, found.stopped_at) == ("wheel", ("speed",))
+    none = path("eyes", ways=ways, outcome=Outcome.MASKED)
+    assert (none.reached, none.stopped_at) == ("", ("wheel",))
+
+
+def test_a_chain_has_feedback_too() -> None:
+    """The fault is injected after the interface, whose channels change only after the car."""
+    ways = Ways(
+        [
+            ["seen", "", "internal", "interface", ""],
+            ["ask", "", "actuator", "control", ""],
+            ["gap", "", "truth", "car", ""],
+        ],
+        None,
+    )
+    found = path("x", ways=ways, ask=1.0, gap=1.1, seen=1.2)
+    assert states(found) == {
+        "interface": State.FEEDBACK,
+        "control": State.REACHED,
+        "car": State.REACHED,
+    }
+
+
+def test_a_path_through_a_loop_has_each_component_once() -> None:
+    links: dict[str, Any] = {name: one.model_dump(by_alias=True) for name, one in STRUCTURE.links.items()}
+    links["back"] = {"from": "speed", "to": "finder", "label": ""}
+    circle = replace_links(links)
+    found = path("eyes", ways=Ways(CHANNELS, circle), seen=1.0, wanted=1.0, gas=1.0, place=1.1)
+    assert [stage.component for stage in found.stages] == ["eyes", "finder", "speed", "pedals", "car"]
+    assert found.reached == "car"
+
+
+def replace_links(links: dict[str, Any]) -> StructureModel:
+    return StructureModel.model_validate(STRUCTURE.model_dump(mode="json", by_alias=True) | {"links": links})
+
+
+def test_the_structure_is_read_from_run_json() -> None:
+    """Older runs have no components, so they have no paths."""
+    structure = STRUCTURE.model_dump(mode="json", by_alias=True)
+    head = Head(Folder("run.json"), {"channels": CHANNELS, "structure": structure})
+    found = ways_of(head)
+    assert found is not None and found.structure == STRUCTURE
+    assert ways_of(Head(Folder("run.json"), {})) is None
+    nothing = [[name, unit, role, "", about] for name, unit, role, _, about in CHANNELS]
+    assert ways_of(Head(Folder("run.json"), {"channels": nothing, "structure": None})) is None
+    structure["links"]["lead"]["to"] = 3
+    with pytest.raises(MutatorError, match="structure"):
+        ways_of(head)

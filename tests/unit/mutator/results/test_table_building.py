@@ -1,0 +1,370 @@
+"""The results table: its columns, cells and bytes."""
+
+import csv
+import io
+import os
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from mutator._common.files import half_written
+from mutator.campaigns.freezing import freeze
+from mutator.campaigns.plans import make_plan
+from mutator.errors import MutatorWarning
+from mutator.model import Experiment, Method, Outcome, Record, Status
+from mutator.results import propagation, table_building, table_cells, table_files
+from mutator.results.result_columns import TIMINGS, Column, result_columns, severity_columns
+from mutator.store import plan_file
+from mutator.store.lines import LineWriter
+from mutator.store.records import SCHEMA, TIMINGS_SCHEMA
+from mutator.store.run_folder import RunFolder
+from mutator.targets.severity import Scale
+from mutator.workspace import Workspace
+
+HAZARDS = ("H1", "H2", "H3")
+MakeRecord = Callable[..., Record]
+
+
+def test_the_row_of_a_run_with_a_hazard_has_the_expected_cells(
+    experiment: Callable[..., Experiment], record: MakeRecord
+) -> None:
+    one = experiment(24, method=Method.RANDOM, trigger="random/C2")
+    kept = record(
+        one.id,
+        outcome=Outcome.HAZARD,
+        t_manifest=0.35000000000000003,
+        hazards=(("H3", 5.13), ("H1", 7.0)),
+        alerts=(("steer_saturated", 3.02), ("fcw", 6.0)),
+        max_dev=(("gas", 0.1), ("brake", 0.0), ("steer_torque", 1.5)),
+    )
+    cells = table_cells.row(one, kept, HAZARDS)
+    expected = {
+        "value": 24,
+        "unit": "m",
+        "method": "random",
+        "trigger": "random/C2",
+        "status": "ok",
+        "outcome": "hazard",
+        "activated": 1,
+        "t_activation": 2.0,
+        "activations": 5,
+        "manifested": 1,
+        "t_manifest": 0.35,
+        "h1": 1,
+        "t_h1": 7.0,
+        "h2": 0,
+        "t_h2": None,
+        "h3": 1,
+        "t_h3": 5.13,
+        "alerts": "steer_saturated;fcw",
+        "t_alert": 3.02,
+        "reaction_time": 2.11,
+        "max_dev_gas": 0.1,
+        "max_dev_brake": 0.0,
+        "max_dev_steer": 1.5,
+        "condition": "t >= 2.0",
+        "variant": "distance",
+        "aim": "H1",
+        "detail": None,
+    }
+    assert {name: cells[name] for name in expected} == expected
+
+
+SCALE = Scale(
+    name="x",
+    about="",
+    source="",
+    classes=(("S0", 0.0, ""), ("S1", 1.0, ""), ("S2", 5.0, ""), ("S3", 11.0, "")),
+)
+
+
+@pytest.mark.parametrize(
+    ("given", "severity", "tolerant", "after_manifest"),
+    [
+        ({}, "S2", 3.5, 3.25),
+        ({"metrics": (("delta_v", 0.0),)}, "S0", 3.5, 3.25),
+        ({"metrics": (("delta_v", 11.0),)}, "S3", 3.5, 3.25),  # the limit belongs to the higher class
+        ({"metrics": ()}, None, 3.5, 3.25),  # no contact
+        ({"t_end": 1.5}, None, 3.5, 3.25),  # a contact before the fault was active
+        ({"t_manifest": 6.0}, "S2", 3.5, None),  # the hazard came before the manifestation
+        ({"t_manifest": None}, "S2", 3.5, None),
+        ({"hazards": (), "outcome": Outcome.SDC, "metrics": ()}, None, None, None),
+    ],
+)
+def test_a_row_has_the_severity_and_the_times_to_the_hazard(
+    experiment: Callable[..., Experiment],
+    record: MakeRecord,
+    given: dict[str, object],
+    severity: str | None,
+    tolerant: float | None,
+    after_manifest: float | None,
+) -> None:
+    """The fault is activated at 2 s."""
+    hit = {"outcome": Outcome.HAZARD, "t_manifest": 2.25, "t_end": 5.5, "metrics": (("delta_v", 5.5),)}
+    kept = record(**hit | {"hazards": (("H1", 5.5), ("H2", 7.0))} | given)
+    cells = table_cells.row(experiment(), kept, HAZARDS, scale=SCALE)
+    told = (cells["severity"], cells["fault_tolerant_time"], cells["manifest_to_hazard"])
+    assert told == (severity, tolerant, after_manifest)
+    assert table_cells.row(experiment(), kept, HAZARDS)["severity"] is None  # without a scale
+
+
+def test_run_json_determines_the_columns_of_severity(experiment: Callable[..., Experiment]) -> None:
+    scale = {"severity": SCALE.plain()}
+    times = ["fault_tolerant_time", "manifest_to_hazard"]
+    heads: list[tuple[dict[str, object], list[str]]] = [
+        (scale, ["severity", *times]),
+        ({"severity": None}, times),
+        ({}, []),
+    ]
+    for head, names in heads:
+        columns = [c.name for c in result_columns(("H1",), ("gas",), (), severity_columns(head))]
+        assert columns[columns.index("max_dev_gas") + 1 : columns.index("variant")] == names
+    assert Scale.from_plain(SCALE.plain()) == SCALE
+
+
+@pytest.mark.parametrize(
+    ("status", "activation", "activated"),
+    [
+        (Status.CRASHED, True, 1),
+        (Status.CRASHED, False, None),
+        (Status.TIMEOUT, False, None),
+        (Status.INVALID_MUTANT, False, None),
+        (Status.HARNESS_ERROR, False, None),
+    ],
+)
+def test_unknown_values_of_a_failed_run_are_empty(
+    experiment: Callable[..., Experiment],
+    record: MakeRecord,
+    status: Status,
+    activation: bool,
+    activated: int | None,
+) -> None:
+    given = {} if activation else {"activation": None}
+    cells = table_cells.row(
+        experiment(), record(status=status, outcome=None, detail="why", max_dev=(), **given), HAZARDS
+    )
+    assert (cells["status"], cells["activated"], cells["detail"]) == (status.value, activated, "why")
+    for name in ("outcome", "manifested", "t_manifest", "h1", "h2", "h3", "alerts", "reaction_time"):
+        assert cells[name] is None
+
+
+def test_flags_and_counts_of_a_run_without_activation_are_zero(
+    experiment: Callable[..., Experiment], record: MakeRecord
+) -> None:
+    cells = table_cells.row(experiment(), record(outcome=Outcome.NOT_ACTIVATED, activation=None), HAZARDS)
+    assert (cells["activated"], cells["activations"], cells["manifested"], cells["h1"]) == (0, 0, 0, 0)
+    assert cells["t_activation"] is None
+
+
+@pytest.fixture
+def folder(toycar: Workspace, tmp_path: Path, record: MakeRecord) -> RunFolder:
+    """A run with records of all experiments except two, in two files."""
+    plan = make_plan(toycar, "toy")
+    folder = freeze(plan, tmp_path / "run", toycar)
+    for i in (0, 1):
+        writer = LineWriter(
+            folder.path / "records" / f"0001-gw{i}.jsonl", {"schema": SCHEMA, "plan": folder.head["plan"]}
+        )
+        timings = LineWriter(folder.path / "timings" / f"0001-gw{i}.jsonl", {"schema": TIMINGS_SCHEMA})
+        for experiment in plan.experiments[i:22:2]:
+            writer.append(asdict(record(experiment.id, max_dev=(("gas", 0.5), ("wheel_turn", 0.25)))))
+            timings.append(
+                {"experiment_id": experiment.id, "cpu_s": 1.0, "wall_s": 2.0, "host": "h", "worker": "gw"}
+            )
+        writer.close()
+        timings.close()
+    return folder
+
+
+def test_tables_are_sorted_and_complete(folder: RunFolder) -> None:
+    rows = list(csv.DictReader(table_building.build(folder.path).open()))
+    assert (len(rows), folder.planned) == (22, 24)
+    ids = [row["experiment_id"] for row in rows]
+    assert ids == sorted(ids)
+    table = pq.read_table(folder.path / "results.parquet")
+    assert table.column_names == list(rows[0])
+    assert [name for name in table.column_names if f"t_{name}" in table.column_names] == [
+        "h1",
+        "h3",
+        "too_fast",
+    ]
+    assert [name for name in table.column_names if name.startswith("max_dev_")] == [
+        "max_dev_gas",
+        "max_dev_brake",
+        "max_dev_wheel",
+    ]
+    assert table.column("experiment_id").to_pylist() == ids
+    for name in ("value", "t_activation", "max_dev_wheel", "activated"):
+        texts = [row[name] for row in rows]
+        assert [float(text) if text else None for text in texts] == table.column(name).to_pylist()
+    timings = pq.read_table(folder.path / "timings.parquet")
+    assert timings.column("experiment_id").to_pylist() == ids
+
+
+def test_building_again_gives_the_same_bytes(folder: RunFolder, reseal: Callable[[Path], None]) -> None:
+    tables = table_building.build(folder.path), folder.path / "results.parquet"
+    before = [table.read_bytes() for table in tables]
+    one, two = sorted((folder.path / "records").iterdir())
+    heads, lines = zip(*(path.read_text().split("\n", 1) for path in (one, two)), strict=True)
+    for path, head, line in zip((one, two), heads, reversed(lines), strict=True):
+        path.write_text("\n".join((head, line)))
+    reseal(folder.path)
+    table_building.build(folder.path)
+    assert [table.read_bytes() for table in tables] == before
+
+
+def made_at_once(folder: RunFolder) -> dict[str, bytes]:
+    records = folder.records()
+    planned = sorted(plan_file.read_all(folder.path), key=lambda e: e.id)
+    done = [(e, records[e.id]) for e in planned if e.id in records]
+    columns = table_cells.ResultRows(folder).columns
+    names = [column.name for column in columns]
+    rows = [dict(zip(names, table_cells.ResultRows(folder).cells(*one), strict=True)) for one in done]
+    text = io.StringIO()
+    writer = csv.DictWriter(text, names, lineterminator="\n", restval="")
+    writer.writeheader()
+    writer.writerows(rows)
+    lines = [line for _, line in sorted(folder.timings().items())]
+    left = [(r.experiment_id, *one) for _, r in done for one in r.left]
+    facts = {name: (component, role) for name, _, role, component, _ in folder.head["channels"]}
+    cells = [(name, ch, *facts.get(ch, ("", "")), round(first, 6), most) for name, ch, first, most in left]
+    left_names = [column.name for column in propagation.COLUMNS]
+    return {
+        table_building.CSV: text.getvalue().encode(),
+        table_building.PARQUET: parquet_at_once(rows, columns),
+        table_building.TIMINGS_PARQUET: parquet_at_once(lines, TIMINGS),
+        table_building.PROPAGATION: parquet_at_once(
+            [dict(zip(left_names, one, strict=True)) for one in cells], propagation.COLUMNS
+        ),
+    }
+
+
+def parquet_at_once(rows: Sequence[Mapping[str, Any]], columns: Sequence[Column]) -> bytes:
+    types = {"text": pa.string(), "flag": pa.int8(), "count": pa.int64(), "number": pa.float64()}
+    schema = pa.schema([(column.name, types[column.type]) for column in columns])
+    arrays = {c.name: pa.array([row.get(c.name) for row in rows], types[c.type]) for c in columns}
+    sink = io.BytesIO()
+    pq.write_table(pa.table(arrays, schema), sink, compression="zstd")
+    return sink.getvalue()
+
+
+@pytest.mark.parametrize(("batch", "processes"), [(1, 1), (7, 2), (5_000, 1)])
+def test_tables_built_in_batches_have_the_same_bytes(
+    folder: RunFolder, monkeypatch: pytest.MonkeyPatch, record: MakeRecord, batch: int, processes: int
+) -> None:
+    left = (("gas", 2.0000001, 0.5), ("v_ego", 2.05, 1e-7), ("strange", 2.1, 3.0))
+    last = plan_file.read_all(folder.path)[22]
+    lines = LineWriter(
+        folder.path / "records" / "0002-gw0.jsonl", {"schema": SCHEMA, "plan": folder.head["plan"]}
+    )
+    lines.append(asdict(record(last.id, left=left, detail='a "b",\nc', t_manifest=2.05)))
+    lines.close()
+    monkeypatch.setattr(table_building, "_BATCH", batch)
+    monkeypatch.setattr(table_building, "processes_for", lambda experiments: processes)
+    for _ in range(2):
+        table_building.build(folder.path)
+        made = {name: (folder.path / name).read_bytes() for name in table_building.TABLES}
+        assert made == made_at_once(folder)
+        for kind in ("records", "timings"):
+            for path in (folder.path / kind).iterdir():
+                path.unlink()
+
+
+def test_row_groups_of_a_long_table_have_the_same_size(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(table_files, "_ROWS", 4)
+    columns = (Column("n", "count", "", ""),)
+    for size, groups in ((0, [0]), (4, [4]), (8, [4, 4]), (11, [4, 4, 3])):
+        for batch in (1, 3, 20):
+            with table_files.ParquetTable(tmp_path / "t.parquet", columns) as file:
+                for first in range(0, size, batch):
+                    some = range(first, min(size, first + batch))
+                    file.append(table_files.record_batch(columns, [some]))
+            found = pq.ParquetFile(tmp_path / "t.parquet")
+            assert [found.metadata.row_group(i).num_rows for i in range(found.num_row_groups)] == groups
+            assert found.read()["n"].to_pylist() == list(range(size))
+
+
+def is_rebuilt(folder: RunFolder, monkeypatch: pytest.MonkeyPatch) -> bool:
+    built: list[Path] = []
+    monkeypatch.setattr(table_building, "build", lambda run: built.append(run) or run / table_building.CSV)
+    assert table_building.ensure(folder.path) == folder.path / table_building.CSV
+    return bool(built)
+
+
+def test_nothing_is_built_while_the_digests_are_the_same(
+    folder: RunFolder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    table_building.build(folder.path)
+    os.utime(folder.path / "records" / "0001-gw0.jsonl")
+    os.utime(folder.path / "results.csv", (1, 1))
+    assert not is_rebuilt(folder, monkeypatch)
+
+
+@pytest.mark.parametrize(
+    "changed",
+    ["more records", "fewer timings", "results.csv", "results.parquet", "timings.parquet", "results.json"],
+)
+@pytest.mark.parametrize("gone", [True, False])
+def test_tables_are_rebuilt_after_any_change(
+    folder: RunFolder, monkeypatch: pytest.MonkeyPatch, changed: str, gone: bool
+) -> None:
+    table_building.build(folder.path)
+    if changed == "more records":
+        head = {"schema": SCHEMA, "plan": folder.head["plan"]}
+        LineWriter(folder.path / "records" / "0002-gw0.jsonl", head).close()
+    elif changed == "fewer timings":
+        (folder.path / "timings" / "0001-gw1.jsonl").unlink()
+    elif gone:
+        (folder.path / changed).unlink()
+    else:
+        path = folder.path / changed
+        path.write_bytes(path.read_bytes().replace(b"1", b"2", 1))
+    assert is_rebuilt(folder, monkeypatch)
+
+
+@pytest.mark.parametrize("stamp", [True, False])
+def test_replacing_an_edited_table_is_reported(folder: RunFolder, stamp: bool) -> None:
+    table = table_building.build(folder.path)
+    made = table.read_bytes()
+    table.write_bytes(made.replace(b"masked", b"hazard", 1))
+    if not stamp:
+        (folder.path / table_building.STAMP).unlink()
+    with pytest.warns(MutatorWarning, match=r"results\.csv: the table did not match the plan and records"):
+        table_building.ensure(folder.path)
+    assert table.read_bytes() == made
+
+
+def test_an_interrupted_build_is_not_reported_as_an_edited_table(
+    folder: RunFolder, monkeypatch: pytest.MonkeyPatch, record: MakeRecord
+) -> None:
+    table_building.build(folder.path)
+    planned = plan_file.read_all(folder.path)
+    for killed_before, number in ((table_building.CSV, 2), (table_building.PARQUET, 3)):
+        head = {"schema": SCHEMA, "plan": folder.head["plan"]}
+        lines = LineWriter(folder.path / "records" / f"000{number}-gw0.jsonl", head)
+        lines.append(asdict(record(planned[20 + number].id, max_dev=(("gas", 0.5),))))
+        lines.close()
+
+        @contextmanager
+        def written(path: Path, stop: str = killed_before) -> Iterator[Path]:
+            with half_written(path) as temporary:
+                yield temporary
+                if path.name == stop:
+                    raise KeyboardInterrupt
+
+        with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+            patch.setattr(table_building, "half_written", written)
+            table_building.ensure(folder.path)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        table_building.ensure(folder.path)
+    assert (folder.path / table_building.CSV).read_bytes().count(b"\n") == 25

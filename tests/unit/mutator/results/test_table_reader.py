@@ -1,0 +1,247 @@
+"""The module through which all others read the results of a run."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pyarrow as pa
+import pytest
+from pyarrow import parquet
+
+import mutator
+from mutator.comparison.sides import read_side
+from mutator.errors import MutatorError
+from mutator.execution.single_run import run_single
+from mutator.exports import Format
+from mutator.exports.write import export
+from mutator.model import Experiment, Outcome, Status
+from mutator.report import building
+from mutator.results import table_building, table_cells
+from mutator.results.result_columns import SEVERITY, SINCE, metric_columns, result_columns
+from mutator.results.table_reader import Results, _table, same_parquet
+from mutator.statistics.frame import load
+from mutator.store import plan_file
+from mutator.targets.environment import THREADS
+from mutator.workspace import Workspace
+from tests.costs import is_cheap, is_refused
+
+SOURCES = Path(mutator.__file__).parent
+WriteRun = Callable[..., Path]
+# Names of the toy car, and their replacements for another target.
+OF_A_CRANE = {r"\bH1\b": "CRUSHED", r"\bH3\b": "DROPPED", r"\bgas\b": "winch", r"\bbrake\b": "clamp"}
+
+
+@pytest.fixture
+def crane(toycar: Workspace) -> Workspace:
+    """The toy with other names for hazards and channels."""
+    for path in toycar.library.parent.rglob("*"):
+        if path.suffix in (".py", ".yaml") and "templates" not in path.parts:
+            text = path.read_text()
+            for old, new in OF_A_CRANE.items():
+                text = re.sub(old, new, text)
+            path.write_text(text)
+    return toycar
+
+
+def became(e: Experiment) -> dict[str, Any] | None:
+    if e.fault.fault_type == "silence":
+        return {"status": Status.CRASHED, "outcome": None, "max_dev": ()}
+    hazard = {"outcome": Outcome.HAZARD, "hazards": (("DROPPED", 4.0), ("CRUSHED", 4.5))}
+    return hazard if e.fault.fault_type == "lane" else {}
+
+
+@pytest.fixture
+def run(crane: Workspace, tmp_path: Path, write_run: WriteRun) -> Path:
+    return write_run(crane, tmp_path / "run", became)
+
+
+ALONE = """
+import sys
+from pathlib import Path
+from mutator.results.table_reader import Results, same_parquet
+table = Results.of_run(Path(sys.argv[1]))
+assert same_parquet(*[table.path.with_name("results.parquet")] * 2)
+table.frame(), table.timings(), table.propagation()
+print(*(path.read_text().strip() for path in Path("/proc/self/task").glob("*/comm")))
+"""
+
+
+def test_reading_tables_leaves_no_thread(run: Path) -> None:
+    """A pyarrow thread that releases Python memory during shutdown kills the process. Threads of the
+    allocator and of BLAS do not use Python."""
+    table_building.build(run)
+    words, env = [sys.executable, "-c", ALONE, str(run)], os.environ | dict.fromkeys(THREADS, "1")
+    ended = subprocess.run(words, capture_output=True, text=True, check=True, timeout=120, env=env)
+    assert [name for name in ended.stdout.split() if name != "jemalloc_bg_thd"] == [ended.stdout.split()[0]]
+
+
+def test_columns_follow_the_targets_hazards_and_channels(run: Path) -> None:
+    table = Results.up_to_date(run)
+    columns = list(next(table.lines()))
+    at = columns.index("t_manifest")
+    assert columns[at + 1 : at + 7] == [
+        "crushed",
+        "t_crushed",
+        "dropped",
+        "t_dropped",
+        "too_fast",
+        "t_too_fast",
+    ]
+    at = columns.index("reaction_time")
+    assert columns[at + 1 : at + 4] == ["max_dev_winch", "max_dev_clamp", "max_dev_wheel"]
+    assert not [name for name in columns if re.search(r"h[123]\b|gas|brake|steer", name)]
+    assert list(table.texts().columns) == columns
+    frame = table.frame()
+    assert [frame.index.name, *frame.columns][: len(columns)] == columns
+    assert frame.attrs["units"]["max_dev_winch"] == "as its channel"
+
+
+def test_numbers_have_the_units_of_their_metric_or_channel(
+    crane: Workspace, tmp_path: Path, write_run: WriteRun
+) -> None:
+    path = crane.library / "targets" / "toycar.yaml"
+    hazards = "hazards: {DROPPED: {when: speed > 90, terminal: true, unit: m/s}, "
+    hazards += "CRUSHED: {when: speed > 91}, TOO_FAST: {when: speed > 92}}\n"
+    metrics = "metrics: {way: {integral: speed, unit: m, worse: lower, about: x}}\n"
+    path.write_text(re.sub("hazards: .*\n", hazards + metrics, path.read_text()))
+    run = write_run(crane, tmp_path / "run", lambda e: {"hazards": ()})
+    units = Results.up_to_date(run).frame().attrs["units"]
+    assert (units["way"], units["margin_dropped"], units["t_end"]) == ("m", "m/s", "s")
+    assert units["max_dev_winch"] == units["dev_winch"] == "as its channel"
+
+
+def test_every_way_of_reading_gives_the_same_hazards(run: Path) -> None:
+    table = Results.up_to_date(run)
+    rows = table.rows()
+    frame, statistics = table.frame(), load(run / "results.csv").set_index("experiment_id")
+    assert [row.experiment_id for row in rows] == list(frame.index)
+    assert read_side(run).rows == {row.experiment_id: row for row in rows}
+    assert {row.hazards for row in rows} == {(), (("DROPPED", 4.0), ("CRUSHED", 4.5))}
+    for row in rows:
+        first = row.hazards[0][1] if row.hazards else None
+        for time in (frame.loc[row.experiment_id, "t_hazard"], statistics.loc[row.experiment_id, "t_hazard"]):
+            assert (None if pd.isna(time) else time) == first
+        assert row.checked == (("CRUSHED", "DROPPED", "TOO_FAST") if row.status is Status.OK else ())
+
+
+def test_the_column_hazard_is_unknown_for_crashes(run: Path) -> None:
+    frame = Results.up_to_date(run).frame()
+    assert list(frame["hazard"].isna()) == list(frame["status"] == "crashed")
+    assert frame["hazard"].isna().any()
+
+
+def test_a_target_without_hazards_has_no_hazard_in_any_row(run: Path, reseal: Callable[[Path], None]) -> None:
+    head = run / "run.json"
+    head.write_text(re.sub(r'"hazards":\s*\[[^]]*\]', '"hazards": []', head.read_text()))
+    reseal(run)
+    table_building.build(run)
+    table = Results.of_run(run)
+    frame = table.frame()
+    assert frame["hazard"].dropna().eq(False).all()
+    assert frame["hazard"].notna().any()
+    assert frame["t_hazard"].dtype == float
+    assert not load(run / "results.csv")["is_hazard"].any()
+    assert {row.checked for row in table.rows()} == {()}
+
+
+def test_exports_and_the_report_use_the_names_of_the_target(run: Path, crane: Workspace) -> None:
+    table = Results.up_to_date(run)
+    assert export(run, Format.CSV).read_bytes() == table.csv()
+    assert export(run, Format.PARQUET).read_bytes() == table.parquet()
+    assert "hazard CRUSHED [s]" in export(run, Format.JUNIT).read_text()
+    elements = export(run, Format.MUTATION_ELEMENTS, workspace=crane).read_text()
+    assert "CRUSHED, DROPPED in" in elements
+    text = building.write(run, crane).markdown.read_text()
+    assert "CRUSHED" in text
+    assert "H1" not in text
+
+
+def test_a_real_run_fills_each_column(crane: Workspace, tmp_path: Path, write_run: WriteRun) -> None:
+    only = 'fault_type == "lane" and method == "random"'
+    folder = write_run(crane, tmp_path / "one", lambda e: None, campaign="small", only=only, limit=1)
+    [experiment] = plan_file.read_all(folder)
+    manifest = crane.manifest("toycar")
+    record = run_single(crane, manifest, experiment, tmp_path / "single").record
+    assert record.status is Status.OK
+    compared = [channel.name for channel in manifest.compared]
+    columns = result_columns(manifest.hazards, compared, metric_columns(manifest), (SEVERITY, *SINCE))
+    cells = table_cells.row(experiment, record, manifest.hazards)
+    assert {*cells} == {column.name for column in columns}
+    assert cells["max_dev_wheel"]
+
+
+def test_a_missing_table_is_reported(tmp_path: Path) -> None:
+    table = Results.of_run(tmp_path)
+    for read in (table.rows, table.texts, table.csv, table.frame):
+        with pytest.raises(MutatorError, match=f"{tmp_path}: no results here"):
+            read()
+
+
+@pytest.mark.parametrize("text", ["a,b\n1,2\n", "", "\xff"])
+def test_a_file_that_is_not_a_results_table_is_refused(tmp_path: Path, text: str) -> None:
+    table = Results.of_run(tmp_path)
+    table.path.write_bytes(text.encode("latin-1"))
+    for read in (table.rows, table.texts):
+        with pytest.raises(MutatorError, match="not a results table"):
+            read()
+
+
+def test_an_unknown_status_or_incomplete_line_is_refused(run: Path) -> None:
+    table = Results.up_to_date(run)
+    whole = table.csv()
+    for damaged in (whole.replace(b",crashed,", b",melted,"), whole[: whole.rindex(b",")]):
+        table.path.write_bytes(damaged)
+        with pytest.raises(MutatorError, match="not a results table"):
+            table.rows()
+
+
+def test_no_other_module_opens_the_tables() -> None:
+    allowed = {"results/table_reader.py", "outcomes/trace_files.py"}
+    opens = re.compile(r"read_csv|read_parquet|read_table\(|ParquetFile")
+    named = re.compile(r"results\.(csv|parquet)\"\)?\.(open|read_)|open\([^)]*results\.(csv|parquet)")
+    found = {
+        path.relative_to(SOURCES).as_posix()
+        for path in SOURCES.rglob("*.py")
+        if opens.search(path.read_text()) or named.search(path.read_text())
+    }
+    assert found == allowed
+
+
+def test_metadata_of_a_table_give_no_column_another_name(run: Path) -> None:
+    """The cells of the forged table are the genuine ones."""
+    table_building.build(run)
+    path = run / "results.parquet"
+    genuine, table = Results.of_run(run).frame(), parquet.read_table(path)
+    swap = {"DROPPED": "CRUSHED", "CRUSHED": "DROPPED"}
+    columns = [
+        {"name": swap.get(n, n), "field_name": n, "pandas_type": "", "numpy_type": "", "metadata": None}
+        for n in table.column_names
+    ]
+    about = {"index_columns": [], "column_indexes": [], "columns": columns, "pandas_version": "2.2.0"}
+    forged = path.with_name("forged.parquet")
+    parquet.write_table(table.replace_schema_metadata({"pandas": json.dumps(about)}), forged)
+    assert not same_parquet(forged, path)
+    forged.replace(path)
+    assert Results.of_run(run).frame().equals(genuine)
+
+
+def _bomb(path: Path, rows: int, length: int) -> None:
+    """Write a small file in which a long text, stored once, is in each row."""
+    text = pa.DictionaryArray.from_arrays(pa.array([0] * rows, pa.int32()), pa.array(["x" * length]))
+    parquet.write_table(pa.table({"a": text}), path, compression="zstd", store_schema=False)
+
+
+def test_a_long_text_that_is_stored_once_is_not_copied_into_each_row(tmp_path: Path) -> None:
+    path, genuine = tmp_path / "results.parquet", tmp_path / "genuine.parquet"
+    _bomb(path, 20_000, 50_000)
+    _bomb(genuine, 20_000, 5)
+    assert path.stat().st_size < 10_000
+    assert "bytes of text" in is_refused(lambda: _table(path))
+    is_cheap(lambda: same_parquet(path, genuine))
+    assert not same_parquet(path, genuine) and same_parquet(genuine, genuine)
