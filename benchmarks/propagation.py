@@ -11,9 +11,8 @@ from pathlib import Path
 from resource import RUSAGE_CHILDREN, getrusage
 from time import process_time
 
-from mutator.outcomes.channel_departures import departures
-
 import mutator
+from mutator.outcomes.channel_departures import departures
 from mutator.outcomes.golden import compare, load_trace
 from mutator.outcomes.judging import load_channels
 from mutator.workspace import Workspace
