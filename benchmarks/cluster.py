@@ -83,7 +83,8 @@ def overhead(campaign: str, rounds: int) -> None:
 
 def cpu_s(command: list[str], env: dict[str, str]) -> float:
     """Return the CPU time (s) of a command and all its descendants, including those that outlive their
-    parent."""
+    parent.
+    """
     ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run(command, cwd=ROOT, env=env, capture_output=True, check=True)

@@ -63,7 +63,8 @@ def pictures(model: CameraModel) -> dict[str, np.ndarray]:
 
 def measure(model: CameraModel, picture: np.ndarray, repeat: int) -> list[float]:
     """Return the median times (ms) of the compiled detection (NaN if there is none), of the detection in
-    Python and of its steps, then the number of edge pixels."""
+    Python and of its steps, then the number of edge pixels.
+    """
     fast, plain, region = build_paper_detector(model), PaperDetector(model), RoadRegion(model)
     view = CameraView(0.0, 0.0, 0.0, (), 0.0, picture)
     hog, lines = Hog(*region.shape), EdgeLines(model, region)

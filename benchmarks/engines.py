@@ -85,7 +85,8 @@ class Bench:
 
     def measure(self, name: str, experiments: Sequence[Experiment]) -> tuple[Measured, float]:
         """Return the measurements, and the CPU time (s) of a first pass over one experiment per golden
-        run."""
+        run.
+        """
         engine = self.engines[name]()
         runner = Runner(
             self.manifest, self.models, engine, Goldens(self.manifest, self.golden), self.workspace.scenario

@@ -45,7 +45,8 @@ def drive(name: str, step: float) -> Trace:
 def measure(trace: Trace, start: float, band: float) -> tuple[float, ...]:
     """Return the largest offset and the overshoot to the other side (m), the settling time (s), the steady
     error (m), the largest torque, and the time (s) at full torque. Settled means within `band` of the steady
-    offset."""
+    offset.
+    """
     t, offset = trace["t"], trace["lateral_offset"]
     steady = offset[-100:].mean()
     side = np.sign(offset[np.abs(offset).argmax()])

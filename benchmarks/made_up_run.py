@@ -114,7 +114,8 @@ def _experiments(folder: RunFolder) -> Iterator[Experiment]:
 
 def goldens(workspace: Workspace, folder: RunFolder, experiments: Sequence[Experiment]) -> None:
     """Simulate the golden runs of the first seed, copy them for the others, and record the checks as
-    passed."""
+    passed.
+    """
     manifest, run = workspace.manifest(folder.head["target"]), folder.path
     known, driven = {}, dict[GoldenRun, Path]()
     for one in folder.goldens:

@@ -65,7 +65,8 @@ class Version:
 
 def answers(cache: Path) -> Iterator[object]:
     """Yield the answers to the parent's requests: existing detectors and effects, or the times and lines of
-    frames."""
+    frames.
+    """
     import cv2
     from selfdrive.common import compiled
     from selfdrive.sim import effects, vision

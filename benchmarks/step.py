@@ -184,7 +184,8 @@ def _folder_option(root: Path, place: str) -> str:
 
 def _fresh(root: Path, place: str, *words: str) -> str:
     """Return the output of a fresh interpreter with the target of the clone `root` and its bytecode in
-    `place`."""
+    `place`.
+    """
     environment = os.environ | {
         "PYTHONPATH": str(root / "target"),
         "PYTHONPYCACHEPREFIX": f"{place}/bytecode",

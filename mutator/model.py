@@ -147,7 +147,7 @@ class Trigger:
 
 
 def fault_label(spec: str, value: Value, unit: str) -> str:
-    """A fault's label for tables and messages: `sensor/bias/distance 35 m`.
+    """Return a fault's label for tables and messages: `sensor/bias/distance 35 m`.
 
     `value` is None or '' for no value, `unit` is `-` or '' for no unit.
     """

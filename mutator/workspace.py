@@ -94,14 +94,14 @@ class Workspace:
         )
 
     def manifest(self, name: str) -> TargetManifest:
-        """The manifest with this name or path."""
+        """Return the manifest with this name or path."""
         manifest = load_manifest(self._file("targets", name, "target"), self.target)
         manifest = replace(manifest, sandbox=self.sandbox)
         check_names(manifest)
         return manifest
 
     def scale_of(self, manifest: TargetManifest) -> Scale | None:
-        """The severity scale for a target's contacts; None without contacts.
+        """Return the severity scale for a target's contacts; None without contacts.
 
         MutatorError, at the manifest's line, for an unknown scale.
         """
@@ -124,19 +124,19 @@ class Workspace:
         return self._files("targets")
 
     def fault_models(self) -> FaultModels:
-        """The fault models of the templates folder."""
+        """Return the fault models of the templates folder."""
         return load_fault_models(self.templates)
 
     def readings(self) -> Readings:
-        """The readings that the library declares."""
+        """Return the readings that the library declares."""
         return load_readings(self.library)
 
     def spec_files(self) -> tuple[Path, ...]:
-        """The file of every fault spec in the library, sorted."""
+        """Return the file of every fault spec in the library, sorted."""
         return tuple(files_inside(self.library, "faults", "*.yaml"))
 
     def spec(self, name: str | Path) -> FaultSpec:
-        """The spec with this name, `<module>/<fault_type>`, or path."""
+        """Return the spec with this name, `<module>/<fault_type>`, or path."""
         return load_spec(self._file("faults", name, "fault spec"), self.readings())
 
     def specs(self) -> tuple[FaultSpec, ...]:
@@ -162,7 +162,7 @@ class Workspace:
         seed: int = 0,
         target: str | None = None,
     ) -> tuple[Fault, ...]:
-        """The faults that match `pattern`, in the library's order, with values drawn from `seed`.
+        """Return the faults that match `pattern`, in the library's order, with values drawn from `seed`.
 
         `pattern` is `<module>/<fault_type>` or `<module>/<fault_type>/<variant>`, with * for any text, or a
         spec file. `target` names a manifest; default: the library's only target. MutatorError if nothing
@@ -193,7 +193,9 @@ class Workspace:
         return faults
 
     def target_name(self, given: str | None = None) -> str:
-        """The given target, or the library's only target; MutatorError if the library has none or several."""
+        """Return the given target, or the library's only target; MutatorError if the library has none or
+        several.
+        """
         names = tuple(self.targets)
         if given is None and not names:
             raise MutatorError(
@@ -212,7 +214,7 @@ class Workspace:
         return self._files("scenarios")
 
     def scenario(self, name: str | Path) -> Path:
-        """The file of the scenario with this name or path."""
+        """Return the file of the scenario with this name or path."""
         return self._file("scenarios", name, "scenario")
 
     @property
@@ -221,7 +223,7 @@ class Workspace:
         return self._files("campaigns")
 
     def campaign(self, name: str | Path) -> Path:
-        """The file of the campaign with this name or path."""
+        """Return the file of the campaign with this name or path."""
         return self._file("campaigns", name, "campaign")
 
     @property
@@ -230,22 +232,22 @@ class Workspace:
         return self._files("stpa/contexts")
 
     def context_table(self, name: str | Path, variables: Collection[str] | None = None) -> ContextTable:
-        """The context table with this name or path; `variables` are those that a target observes."""
+        """Return the context table with this name or path; `variables` are those that a target observes."""
         return load_context_table(self._file("stpa/contexts", name, "context table"), variables)
 
     def hazards(self) -> HazardList | None:
-        """The accidents and hazards in fault_library/stpa/hazards.yaml; None without that file."""
+        """Return the accidents and hazards in fault_library/stpa/hazards.yaml; None without that file."""
         path = check_inside(self.library, self.library / "stpa" / "hazards.yaml")
         return load_hazards(path) if os.path.lexists(path) else None
 
     def analysis(self) -> Analysis | None:
-        """The hazard analysis in fault_library/stpa/; None without a control structure."""
+        """Return the hazard analysis in fault_library/stpa/; None without a control structure."""
         folder = self.library / "stpa"
         files_inside(self.library, "stpa", "*.yaml")  # all that it reads
         return load_analysis(folder) if (folder / "control_structure.yaml").exists() else None
 
     def structure(self, manifest: TargetManifest) -> StructureModel | None:
-        """A target's control structure; None if no channel names one of its components."""
+        """Return a target's control structure; None if no channel names one of its components."""
         path = check_inside(self.library, self.library / "stpa" / "control_structure.yaml")
         structure = load_structure(path) if path.exists() else None
         known = structure.components if structure else {}

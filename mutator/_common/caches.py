@@ -52,7 +52,7 @@ class Entry:
 
 
 def folder() -> Path:
-    """The folder of all caches, which need not exist."""
+    """Return the folder of all caches, which need not exist."""
     named = Path(os.environ.get("XDG_CACHE_HOME", ""))
     if named.is_absolute():
         return named / "mutator"
@@ -87,7 +87,7 @@ def of_pages() -> Path:
 
 
 def of_target(name: str) -> Path:
-    """The folder that all runs of a target share."""
+    """Return the folder that all runs of a target share."""
     quoted = quote(name, safe="").replace(".", "%2E")
     return folder() / TARGETS / (quoted if len(quoted) <= _LONGEST_NAME else content_id(name))
 

@@ -5,7 +5,7 @@ _QUOTA = Path("/sys/fs/cgroup/cpu.max")  # a container's cgroup v2 quota: micros
 
 
 def usable_cores() -> int:
-    """The number of cores that this process can use, limited by a container's quota."""
+    """Return the number of cores that this process can use, limited by a container's quota."""
     cores = len(os.sched_getaffinity(0))
     try:
         quota, period = _QUOTA.read_text().split()

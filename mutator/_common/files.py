@@ -67,7 +67,8 @@ def raising_disk_full(where: Path) -> Iterator[None]:
 
 def check_is_text(path: Path) -> None:
     """Raise MutatorError for a path that this environment cannot encode, because digests and tables contain
-    paths."""
+    paths.
+    """
     try:
         str(path).encode()
     except UnicodeEncodeError:
@@ -225,7 +226,7 @@ def is_half_written(name: str) -> bool:
 
 
 def complete(name: str) -> str:
-    """The final name of a half-written file; any other name unchanged."""
+    """Return the final name of a half-written file; any other name unchanged."""
     found = re.fullmatch(r"\.(.+)\.\d+", name)
     return found[1] if found else name
 
@@ -236,7 +237,7 @@ def write_json(path: Path, data: dict[str, Any]) -> None:
 
 
 def json_bytes(data: dict[str, Any]) -> bytes:
-    """The bytes that `write_json` writes."""
+    """Return the bytes that `write_json` writes."""
     return (json.dumps(data, indent=1, ensure_ascii=False) + "\n").encode()
 
 

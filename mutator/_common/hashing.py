@@ -26,7 +26,7 @@ def added(default: Any) -> Any:
 
 
 def added_values(record: Any) -> dict[str, Any]:
-    """The `added` fields of a dataclass instance that differ from their defaults, as `plain` values."""
+    """Return the `added` fields of a dataclass instance that differ from the defaults, as `plain` values."""
     _, later = _fields(type(record))  # type: ignore[arg-type]  # classes are hashable
     if not later:
         return {}
@@ -78,11 +78,11 @@ def canonical(value: Any) -> str:
 
 
 def digest(value: Any) -> str:
-    """The SHA-256 in hex of `value` itself if it is bytes, of its canonical text otherwise."""
+    """Return the SHA-256 in hex of `value` itself if it is bytes, of its canonical text otherwise."""
     data = value if isinstance(value, bytes) else canonical(value).encode()
     return hashlib.sha256(data).hexdigest()
 
 
 def content_id(value: Any) -> str:
-    """The first 16 hex digits of `digest`. Among 10^6 items, the odds of a clash are 1 in 37 million."""
+    """Return the first 16 digits of `digest`. Among 10^6 items, the odds of a clash are 1 in 37 million."""
     return digest(value)[:16]

@@ -1,5 +1,6 @@
 """Locks that let only one command at a time use a run folder. They use `flock`, so the kernel releases them
-when the process ends."""
+when the process ends.
+"""
 
 import fcntl
 import os

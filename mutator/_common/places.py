@@ -15,15 +15,15 @@ _Given = str | Path | None
 
 
 def library_folder(root: _Given = None, library: _Given = None) -> Path:
-    """The fault library: from an argument, the environment, the current folder or a parent, or the shipped
-    library. It need not exist.
+    """Return the fault library: from an argument, the environment, the current folder or a parent, or the
+    shipped library. It need not exist.
     """
     named = _named(library, root, _LIBRARY, "MUTATOR_LIBRARY")
     return named or (_upward(_LIBRARY) or shipped_folder()) / _LIBRARY
 
 
 def templates_folder(root: _Given = None, templates: _Given = None) -> Path:
-    """The templates folder, found like `library_folder`. It need not exist."""
+    """Return the templates folder, found like `library_folder`. It need not exist."""
     named = _named(templates, root, _TEMPLATES, "MUTATOR_TEMPLATES")
     return named or (_upward(_LIBRARY, _TEMPLATES) or shipped_folder()) / _TEMPLATES
 
@@ -34,7 +34,7 @@ def environment_path(variable: str) -> Path | None:
 
 
 def library_files(library: Path, folder: str) -> dict[str, Path]:
-    """The YAML files in a folder of the library by name, sorted; errors are those of `files_inside`."""
+    """Return the YAML files in a library folder by name, sorted; errors are those of `files_inside`."""
     base = library / folder
     paths = files_inside(library, folder, "*.yaml")
     files = {check_name(p.relative_to(base).with_suffix("").as_posix(), p): p for p in paths}
@@ -42,7 +42,7 @@ def library_files(library: Path, folder: str) -> dict[str, Path]:
 
 
 def run_folders(root: Path) -> list[Path]:
-    """The run folders in runs/ of the current folder and of `root`, the most recently used first."""
+    """Return the run folders in runs/ of the current folder and of `root`, the most recently used first."""
     bases = {base.resolve() for base in (RUNS, root / RUNS)}
     heads = [head for base in bases for head in base.glob(f"*/{RUN_HEAD}")]
     heads.sort(key=lambda head: (head.stat().st_mtime_ns, str(head)), reverse=True)
@@ -57,7 +57,7 @@ def _named(folder: _Given, root: _Given, name: str, variable: str) -> Path | Non
 
 
 def _upward(*folders: str) -> Path | None:
-    """The current folder or its nearest parent that contains fault_library/; None if it lacks one of
+    """Return the current folder or its nearest parent that contains fault_library/; None if it lacks one of
     `folders`.
     """
     here = Path.cwd()

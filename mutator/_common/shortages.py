@@ -21,7 +21,7 @@ class Shortage(MutatorError):
 
 
 def shortage(err: BaseException | None) -> Shortage | None:
-    """The shortage that an error or one of its causes reports; None if there is none."""
+    """Return the shortage that an error or one of its causes reports; None if there is none."""
     while err is not None:
         number = getattr(err, "errno", None)
         loading = isinstance(err, ImportError) and any(words in str(err) for words in _LOADING)

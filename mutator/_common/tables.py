@@ -25,7 +25,7 @@ class Table:
     named: bool = False
 
     def as_text(self) -> str:
-        """The table as text, without trailing spaces."""
+        """Return the table as text, without trailing spaces."""
         lines = [self.heads, *self.rows]
         widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
         return "\n".join(self._padded(line, widths) for line in lines)
@@ -35,7 +35,7 @@ class Table:
         return "  ".join(c.rjust(w) if i in self.right else c.ljust(w) for i, (c, w) in pairs).rstrip()
 
     def as_markdown(self, *, escape: bool = True) -> str:
-        """The table in Markdown; with `escape=False`, the cells are already Markdown."""
+        """Return the table in Markdown; with `escape=False`, the cells are already Markdown."""
 
         def line(cells: Sequence[str]) -> str:
             texts = [markdown_line(c).replace("|", "\\|") for c in cells] if escape else cells
@@ -45,7 +45,7 @@ class Table:
         return "\n".join([line(self.heads), rule, *map(line, self.rows)])
 
     def as_html(self, style: str = "") -> "Markup":
-        """A scrollable HTML table of class `style`, without a head row if all heads are empty.
+        """Return a scrollable HTML table of class `style`, without a head row if all heads are empty.
 
         A row with an empty first cell continues the row above and has the class `group`; cells of columns in
         `right` have the class `number`.

@@ -19,7 +19,7 @@ def one_of(names: Iterable[str]) -> str:
 
 
 def shown(value: Any) -> str:
-    """A value as errors show it: at most 60 characters; text is quoted, numbers are not."""
+    """Return a value as errors show it: at most 60 characters; text is quoted, numbers are not."""
     if value is None:
         return "nothing"
     if isinstance(value, bool):

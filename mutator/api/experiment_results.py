@@ -120,7 +120,8 @@ class ExperimentResult(ABC):
     def propagation(self) -> "pd.DataFrame":
         """Return the channels that differ from the golden run, earliest first: name (index), component, role,
         unit, time of the first difference (`t_first`, s), largest difference up to the end of the drive
-        (`max_dev`). Empty until the experiment has run."""
+        (`max_dev`). Empty until the experiment has run.
+        """
         import pandas as pd
 
         facts = {name: (component, role, unit) for name, unit, role, component, _ in self._channels()}

@@ -56,7 +56,8 @@ class ReviewedGroups:
 
     def find(self, starts: Sequence[str]) -> list[Group]:
         """Return the groups whose ids start with `starts`; MutatorError unless each start fits exactly
-        one."""
+        one.
+        """
         found: dict[str, Group] = {}
         for start in starts:
             hits = [group for group in self.groups if group.id.startswith(start)]

@@ -52,7 +52,8 @@ class RunContents:
     @property
     def provenance(self) -> dict[str, Any]:
         """Campaign, target, seed, reading and choices; digests of the sources; under `stretches`, the
-        versions and machine of each stretch of work."""
+        versions and machine of each stretch of work.
+        """
         head = self.folder.head
         keys = ("campaign", "target", "plan", "choices", "limits")
         return {key: head[key] for key in keys} | self.folder.provenance

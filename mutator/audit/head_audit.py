@@ -64,7 +64,7 @@ def seeds_and_sessions(folder: RunFolder) -> Problems:
 
 
 def chunks_of(folder: RunFolder) -> list[list[int]]:
-    """The offset, length and number of experiments of each chunk, for the numbers in run.json."""
+    """Return the offset, length and number of experiments of each chunk, for the numbers in run.json."""
     lines = plan_file.lines_of(folder.path / plan_file.EXPERIMENTS)
     found, offset = [], 0
     for *_, count in folder.head["chunks"]:
@@ -138,6 +138,6 @@ def _of(folder: RunFolder, key: str) -> str:
 
 
 def short(value: Any) -> str:
-    """The beginning of a value, as text for a message."""
+    """Return the beginning of a value, as text for a message."""
     text = ", ".join(value) if isinstance(value, Mapping) else str(value)
     return text if len(text) <= 80 else f"{text[:80]}..."

@@ -38,7 +38,7 @@ class Recorded:
 
 
 def recorded(folder: RunFolder, kind: str) -> list[Recorded]:
-    """The readable records of one kind, without harness errors."""
+    """Return the readable records of one kind, without harness errors."""
     found = []
     for path in sorted(path for path in inside(folder.path, kind).glob("*.jsonl") if path.is_file()):
         segment = read_segment(path, checksums=folder.verifiable)
@@ -61,7 +61,8 @@ def mutants(
     folder: RunFolder, records: Sequence[Recorded], manifest: TargetManifest, models: FaultModels
 ) -> Iterator[MutatorError]:
     """Rebuild the mutants. Yield an error for each record with another tree or patch, and for each stored
-    patch that differs, is missing, or belongs to no experiment."""
+    patch that differs, is missing, or belongs to no experiment.
+    """
     experiments = {experiment.id: experiment for experiment in plan_file.read_all(folder.path)}
     built: dict[tuple[str, Trigger], tuple[str, str]] = {}
     for one in records:
@@ -155,7 +156,8 @@ def _flaws_of_bad_end(record: Record) -> Flaws:
 
 def _flaws_of_names(record: Record, head: Mapping[str, Any], tolerances: Mapping[str, float]) -> Flaws:
     """Hazards or channels that the target does not have, and differences beyond the tolerance without a
-    manifestation."""
+    manifestation.
+    """
     strangers = [name for name, _ in record.hazards if name not in head["hazards"]]
     if strangers:
         yield f"hazard {strangers[0]}", f"one of {', '.join(head['hazards'])}"
@@ -172,7 +174,8 @@ def _flaws_of_names(record: Record, head: Mapping[str, Any], tolerances: Mapping
 
 def _flaws_of_path(record: Record, head: Mapping[str, Any]) -> Flaws:
     """Channels that the target does not have, times after the end of the drive, and a manifestation time that
-    is not the first time at which an actuator differs from the golden run."""
+    is not the first time at which an actuator differs from the golden run.
+    """
     if "channels" not in head:
         return
     end = inf if record.t_end is None else record.t_end + _TINY
@@ -204,7 +207,8 @@ def proof(
     folder: RunFolder, records: Sequence[Recorded], proven: Sequence[Recorded]
 ) -> Iterator[MutatorError]:
     """Yield records of the proof that differ from those of the run or are not in the sample, and experiments
-    of the sample that have no record."""
+    of the sample that have no record.
+    """
     place = folder.path / equivalence.FOLDER
     if not place.is_dir():
         modes = {str(line.get("engine")) for line in folder.timings().values()}

@@ -120,7 +120,8 @@ def _lost_patches(folder: RunFolder) -> list[str]:
 
 def _drop_patches(folder: RunFolder, lost: Collection[str]) -> list[str]:
     """Set aside the files of these patches, and files with damaged blocks; return a sentence for each
-    file with damaged blocks. Other patches in these files are kept."""
+    file with damaged blocks. Other patches in these files are kept.
+    """
     run, patches, said = folder.path, folder.patches, []
     for one in lost:
         name = patches.old_file(one).relative_to(run).as_posix()
@@ -177,7 +178,7 @@ def _in_place(segment: Segment, schema: str, known: Digest | None, data: bytes) 
 
 
 def _trusted(segment: Segment, known: Digest | None, data: bytes) -> list[dict[str, Any]]:
-    """The content of the trustworthy lines after the head.
+    """Return the content of the trustworthy lines after the head.
 
     If all checksums match although the file's digest changed, somebody recomputed the checksums. Lines are
     then trusted only if the file was merely extended, and only up to the old length.

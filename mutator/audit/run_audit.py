@@ -113,7 +113,7 @@ def audit_checks(folder: RunFolder, workspace: Workspace | None) -> list[Check]:
 
 
 def _files(folder: RunFolder) -> int:
-    """The number of files with digests."""
+    """Return the number of files with digests."""
     try:
         return len(digests.read(folder.path).names) if folder.verifiable else 0
     except MutatorError:
@@ -138,7 +138,8 @@ def _content(folder: RunFolder) -> Problems:
 
 def _plan(folder: RunFolder) -> Problems:
     """Check that ids follow from the plan's lines, the digest from the ids, and run.json and plan.csv from
-    both."""
+    both.
+    """
     run, head = folder.path, folder.head
     yield from plan_file.problems(run)
     plan = load_plan(folder)

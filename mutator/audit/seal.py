@@ -55,7 +55,7 @@ class Seals:
     review_digest: str | None = None  #: the review digest; None for a run without `reviewed.json`
 
     def texts(self) -> dict[str, str]:
-        """The digests that the run has, by name."""
+        """Return the digests that the run has, by name."""
         names = {
             "seal": self.seal,
             "results digest": self.results_digest,
@@ -94,7 +94,7 @@ def seal_of(folder: RunFolder) -> str | None:
 
 
 def seal_or_why_not(folder: RunFolder) -> dict[str, str]:
-    """The texts of `seals_of`; the seal of a run without one is the reason."""
+    """Return the texts of `seals_of`; the seal of a run without one is the reason."""
     none = "the run is not finished" if folder.verifiable else not_verifiable(folder)
     return {"seal": f"none: {none}"} | seals_of(folder).texts()
 
@@ -116,8 +116,9 @@ def without(content: Mapping[str, Any], paths: Iterable[str]) -> dict[str, Any]:
 
 
 def unsealed_facts(folder: RunFolder) -> dict[str, str]:
-    """The facts of a run folder that its seal does not cover, by name: who can write to the folder can change
-    them."""
+    """Return the facts of a run folder that its seal does not cover, by name: who can write to the folder can
+    change them.
+    """
     choices = folder.head["choices"]
     chosen = {f"chosen: {name}": str(choices[name]) for name in ("shard", "series_mb") if choices.get(name)}
     environment = {name: text for name, text in told(folder.stretches).items() if name != "python"}
@@ -147,7 +148,7 @@ def _sha256(folder: RunFolder, names: Sequence[str]) -> dict[str, str]:
 
 
 def _versions(folder: RunFolder) -> list[str]:
-    """The distinct sets of versions that computed anything, as canonical text."""
+    """Return the distinct sets of versions that computed anything, as canonical text."""
     return sorted({canonical([one.python, one.packages]) for one in folder.stretches})
 
 
@@ -165,7 +166,7 @@ def _records(
 
 
 def _without_texts(body: bytes) -> bytes:
-    """A record's line without the texts of exceptions, which differ between versions of Python."""
+    """Return a record's line without the texts of exceptions, which differ between versions of Python."""
     if all(part in body for part in _NO_TEXTS):
         return body
     return canonical(without(json.loads(b"{" + body), _TEXTS)).encode()

@@ -29,8 +29,9 @@ _ROUNDING = 1e-5  # relative; values have six digits
 
 
 def series(folder: RunFolder, manifest: TargetManifest | None = None) -> tuple[int, Iterator[MutatorError]]:
-    """The number of series files, and their problems: damaged files, missing files that others need, series
-    of other runs than the records, and, with a `manifest`, series that differ from the golden runs."""
+    """Return the number of series files, and their problems: damaged files, missing files that others need,
+    series of other runs than the records, and, with a `manifest`, series that differ from the golden runs.
+    """
     there = SeriesFolder(folder.path)
     return sum(path.is_file() for path in there.path.rglob("*")), _problems(folder, there, manifest)
 
@@ -157,7 +158,7 @@ def _told(err: MutatorError, got: str, remedy: str) -> MutatorError:
 
 
 def _users(index: Index, chunk: str) -> list[str]:
-    """The experiments that need a chunk for their own series or for that of their golden run."""
+    """Return the experiments that need a chunk for their own series or for that of their golden run."""
     inside = {number for number, (name, _) in enumerate(index.places) if name == chunk}
     goldens = {key for key, number in index.goldens.items() if number in inside}
     return [

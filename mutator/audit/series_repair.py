@@ -51,7 +51,7 @@ def repair_series(
 
 
 def _golden_chunk(folder: RunFolder, workspace: Workspace | None, index: Index, name: str) -> bytes | None:
-    """The rebuilt content of a chunk of golden series, if that is still possible."""
+    """Return the rebuilt content of a chunk of golden series, if that is still possible."""
     keys = {number: key for key, number in index.goldens.items()}
     numbers = [number for number, (chunk, _) in enumerate(index.places) if chunk == name]
     if workspace is None or not keys.keys() >= {*numbers}:

@@ -27,7 +27,7 @@ _SIGN = "`mutator seal RUN --sign KEY` signs the run as it is now"
 
 
 def statement(folder: RunFolder, seals: Seals) -> bytes:
-    """What a signature of a run says; MutatorError for a run without a seal."""
+    """Return what a signature of a run says; MutatorError for a run without a seal."""
     if seals.seal is None:
         raise MutatorError(
             "no seal",
@@ -106,7 +106,8 @@ def signer(folder: RunFolder, seals: Seals, allowed_signers: Path) -> str:
 
 def _identities(line: bytes, said: bytes, signature: bytes) -> tuple[str, str]:
     """Return the identities on a line of allowed signers with which a signature is valid, or else why the
-    signature of the line's key is not. ssh-keygen itself names only the first line with the key."""
+    signature of the line's key is not. ssh-keygen itself names only the first line with the key.
+    """
     with (
         NamedTemporaryFile(prefix="mutator-seal-") as copy,
         NamedTemporaryFile(prefix="mutator-seal-") as one,
@@ -128,7 +129,7 @@ def _identities(line: bytes, said: bytes, signature: bytes) -> tuple[str, str]:
 
 
 def _about_line(done: subprocess.CompletedProcess[bytes], file: str) -> str:
-    """What ssh-keygen said about the only line of a file, such as that its key has expired."""
+    """Return what ssh-keygen said about the only line of a file, such as that its key has expired."""
     found = re.search(f"^{re.escape(file)}:1: (.*)", done.stderr.decode("utf-8", "replace"), re.MULTILINE)
     return found[1].strip() if found else ""
 

@@ -17,8 +17,9 @@ _REMEDY = "`mutator report` rebuilds it"
 
 
 def tables(folder: RunFolder) -> tuple[int, Iterator[MutatorError]]:
-    """The number of tables, and their differences. A missing table is not a difference: it is built when
-    needed."""
+    """Return the number of tables, and their differences. A missing table is not a difference: it is built
+    when needed.
+    """
     there = [name for name in table_building.TABLES if (folder.path / name).is_file()]
     return len(there), _differences(folder, there)
 

@@ -174,7 +174,7 @@ def _head(
 
 
 def target_facts(workspace: Workspace, manifest: TargetManifest) -> dict[str, Any]:
-    """What run.json says about the target: keys and values in JSON types."""
+    """Return what run.json says about the target: keys and values in JSON types."""
     structure, scale = workspace.structure(manifest), workspace.scale_of(manifest)
     facts = {
         "hazards": manifest.hazards,

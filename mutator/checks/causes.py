@@ -24,7 +24,7 @@ _UNKNOWN = (
 
 
 def likely(manifest: TargetManifest, watched: Mapping[str, Any], *, by_hash: bool) -> tuple[list[Place], str]:
-    """The most suspicious lines, likeliest first, and the remedies.
+    """Return the most suspicious lines, likeliest first, and the remedies.
 
     `by_hash` means that runs agree with equal PYTHONHASHSEED and differ otherwise, which points to set order
     or hashes. `watched` has the notes of a watched run.
@@ -43,7 +43,8 @@ def likely(manifest: TargetManifest, watched: Mapping[str, Any], *, by_hash: boo
 
 def sets(manifest: TargetManifest) -> list[Place]:
     """Lines of target files that depend on the order of a set. Files in which faults are forbidden come
-    last."""
+    last.
+    """
     found = []
     for path in sorted(manifest.tree.files, key=lambda path: (matches(path, manifest.forbid), path)):
         if path.endswith(".py"):

@@ -33,7 +33,8 @@ LITTLE_MEMORY = 1e9  # bytes; two controllers with their solvers, and the runner
 
 def examine(workspace: "Workspace | MutatorError") -> list[Finding]:
     """Check interpreter, packages, machine, current folder, child processes, library and targets (including
-    whether each can be forked). If no workspace was found, `workspace` is the error, which is reported."""
+    whether each can be forked). If no workspace was found, `workspace` is the error, which is reported.
+    """
     findings = [_python(), *_packages(), _cores(), _memory(), _disk(), _folder(), _child(), _sandbox()]
     if isinstance(workspace, MutatorError):
         remedy = workspace.remedy or ""

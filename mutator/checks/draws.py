@@ -1,5 +1,6 @@
 """Find draws that no parameter uses, so that all their faults are the same, and parameters that no template
-uses."""
+uses.
+"""
 
 from collections.abc import Iterator
 

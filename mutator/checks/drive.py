@@ -43,7 +43,8 @@ _MOST = 20  # places listed in a finding
 
 
 def check_drive(workspace: Workspace, target: str, scenarios: Sequence[str] = ()) -> list[Finding]:
-    """The findings from golden runs of the scenarios (default: those of the target's campaigns, or else all).
+    """Return the findings from golden runs of the scenarios (default: those of the target's campaigns, or
+    else all).
 
     The findings cover differences between equal runs (and likely causes), obstacles to forking, statements of
     fault specs that never run, triggers that never hold, and harmless canaries. Raises MutatorError for an
@@ -173,7 +174,7 @@ class _Drive:
         )
 
     def _noted(self, golden: _Golden) -> dict[str, Any]:
-        """The notes of the watched run, with the target's own line numbers."""
+        """Return the notes of the watched run, with the target's own line numbers."""
         files = self.reach.counting.files
         noted = [
             one
@@ -237,7 +238,8 @@ class _Drive:
 
     def _reach_more(self) -> None:
         """Run with the changes that faults and campaigns make, until every statement and trigger is reached
-        or no changes are left."""
+        or no changes are left.
+        """
         own = list(dict.fromkeys(one.changes for one in self.reach.unexecuted if one.changes))
         for changes in own:
             for scenario in self.scenarios:

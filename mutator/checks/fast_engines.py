@@ -37,7 +37,7 @@ def finding(refusal: Refused | None) -> Finding:
 
 
 def variants(workspace: Workspace, manifest: TargetManifest) -> Finding:
-    """The finding about variants whose mutants cannot be put into a loaded program."""
+    """Return the finding about variants whose mutants cannot be put into a loaded program."""
     models = workspace.fault_models()
     faults = [f for spec in workspace.specs() for f in expand(spec, 0, models=models, manifest=manifest)]
     count = len({fault.spec for fault in faults})

@@ -113,7 +113,7 @@ class _Found:
         self.problems: list[MutatorError] = []
 
     def tried(self, make: Callable[[], T]) -> T | None:
-        """The result of `make`; None if that fails."""
+        """Return the result of `make`; None if that fails."""
         try:
             return make()
         except MutatorError as error:
@@ -154,7 +154,7 @@ def _unbuildable(
 
 
 def _where(error: MutatorError, manifest: TargetManifest) -> str:
-    """The place of an error in the target, with the file named as in specs: ` (pkg/sonar.py:28)`."""
+    """Return the place of an error in the target, with the file named as in specs: ` (pkg/sonar.py:28)`."""
     if not error.where:
         return ""
     path = manifest.tree.named(error.where)

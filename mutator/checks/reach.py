@@ -108,7 +108,7 @@ class Reach:
 
 
 def _statements(workspace: Workspace, manifest: TargetManifest) -> Iterator[Wanted]:
-    """The first injection of each statement, for each set of changes."""
+    """Yield the first injection of each statement, for each set of changes."""
     seen = set[object]()
     for spec in workspace.specs():
         for variant in spec:
@@ -125,7 +125,7 @@ def _statements(workspace: Workspace, manifest: TargetManifest) -> Iterator[Want
 def _counting(
     workspace: Workspace, manifest: TargetManifest, locations: Iterable[FaultLocation]
 ) -> tuple[Mutant, Mapping[str, FaultLocation]]:
-    """The mutant that counts at all these places, and the location of each injection id."""
+    """Return the mutant that counts at all these places, and the location of each injection id."""
     models, once = workspace.fault_models(), list(dict.fromkeys(locations))
     injections = tuple(Injection(location=location, model=_COUNT) for location in once)
     fault = Fault(_COUNT, _COUNT, _COUNT, _COUNT, None, "", "", injections)
@@ -152,8 +152,9 @@ def _with_count(models: FaultModels) -> FaultModels:
 def _triggers(
     workspace: Workspace, manifest: TargetManifest, campaigns: Sequence[Campaign]
 ) -> Iterator[Awaited]:
-    """The triggers that campaigns use, each armed as early as in any campaign, and the latest random times.
-    Without campaigns, the triggers of all context tables."""
+    """Yield the triggers that campaigns use, each armed as early as in any campaign, and the latest random
+    times. Without campaigns, the triggers of all context tables.
+    """
     armed: dict[tuple[str, str], float] = {}
     for campaign in campaigns:
         earliest = min(campaign.armed_after_s.values(), default=manifest.armed_after_s)

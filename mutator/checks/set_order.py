@@ -26,7 +26,8 @@ class SetOrder:
 
 def places(source: bytes) -> list[SetOrder]:
     """All places in a Python file that depend on the order of a set, by line; empty if the source is not
-    valid Python."""
+    valid Python.
+    """
     try:
         tree = ast.parse(source)
     except (SyntaxError, ValueError, RecursionError):
@@ -82,7 +83,7 @@ class _Scope:
         return isinstance(node, ast.Name | ast.Attribute) and ast.unparse(node) in self.sets
 
     def _in_order(self, node: ast.AST) -> Iterator[ast.expr]:
-        """The expressions that a node iterates over in order."""
+        """Yield the expressions that a node iterates over in order."""
         if isinstance(node, ast.For | ast.AsyncFor):
             yield node.iter
         elif isinstance(node, ast.ListComp | ast.DictComp | ast.GeneratorExp):
@@ -98,13 +99,13 @@ class _Scope:
                 yield from node.args
 
     def _to_be_ordered(self) -> list[ast.expr]:
-        """The arguments of functions whose result does not depend on the order."""
+        """Return the arguments of functions whose result does not depend on the order."""
         calls = (one for one in self._own if isinstance(one, ast.Call) and _called(one.func) in _UNORDERED)
         return [argument for one in calls for argument in one.args]
 
 
 def _own(node: ast.AST) -> Iterator[ast.AST]:
-    """The nodes of a scope. Of a nested function or class, only its own node is included."""
+    """Yield the nodes of a scope. Of a nested function or class, only its own node is included."""
     for child in ast.iter_child_nodes(node):
         yield child
         if not isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):

@@ -181,7 +181,7 @@ def _open_streams() -> None:
 
 @cache
 def _command() -> Any:
-    """The program with its subcommands, whose options take long to collect."""
+    """Return the program with its subcommands, whose options take long to collect."""
     return get_command(app)
 
 

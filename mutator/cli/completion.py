@@ -1,5 +1,6 @@
 """Shell completion of names in the library, run folders and experiment ids. Completion reads few files, so it
-is fast."""
+is fast.
+"""
 
 import csv
 from collections.abc import Callable, Iterable

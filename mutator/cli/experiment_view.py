@@ -79,7 +79,8 @@ def print_experiment(
 
 def print_verdict(terminal: Terminal, result: "ExperimentResult") -> None:
     """Print the verdict of an experiment that has run, its events, differences up to the end of the drive,
-    and metrics."""
+    and metrics.
+    """
     record = result.record
     assert record is not None
     manifest = _manifest(result)

@@ -63,7 +63,7 @@ def _print(terminal: Terminal, found: Sequence["ListedPlace"]) -> None:
 
 
 def _letter(number: int) -> str:
-    """A, B, ..., Z, AA, AB, ..."""
+    """Return A, B, ..., Z, AA, AB, ... for 0, 1, ..."""
     tens, ones = divmod(number, 26)
     return (_letter(tens - 1) if tens else "") + chr(ord("A") + ones)
 

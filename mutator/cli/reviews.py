@@ -163,7 +163,8 @@ def status(
     place: Place,
 ) -> None:
     """Show the review's progress: groups by state, changes since the decision, flags. With --campaign, also
-    the approvals that the campaign lacks."""
+    the approvals that the campaign lacks.
+    """
     from mutator.cli.review_status import print_status
 
     terminal = Terminal(as_json)

@@ -1,2 +1,3 @@
 """Compares two runs of the same faults, experiment by experiment. This package runs nothing and does not
-change run folders."""
+change run folders.
+"""

@@ -190,7 +190,7 @@ def findings(comparison: Comparison, gates: Sequence[Gate]) -> tuple[Finding, ..
 
 
 def _reaching(comparison: Comparison, least: str) -> tuple[Pair, ...]:
-    """The pairs that reach the severity class `least` in the second run but not in the first."""
+    """Return the pairs that reach the severity class `least` in the second run but not in the first."""
     for side in (comparison.a, comparison.b):
         if side.folder.scale is None:
             raise MutatorError(

@@ -64,7 +64,7 @@ def _facts(side: Side) -> dict[str, str]:
 
 
 def files(a: RunFolder, b: RunFolder) -> Files | None:
-    """The target's files that differ; None if a run is too old to list them."""
+    """Return the target's files that differ; None if a run is too old to list them."""
     of_a, of_b = (_files(folder.head) for folder in (a, b))
     if of_a is None or of_b is None:
         return None
@@ -102,7 +102,7 @@ def remarks(a: Side, b: Side, matching: Matching) -> tuple[str, ...]:
 
 
 def parts_remark(a: Side, b: Side) -> str:
-    """A remark that the runs are different parts of a campaign; empty if they are the same part."""
+    """Return a remark that the runs are different parts of a campaign; empty if they are the same part."""
     of_a, of_b = (
         {name: value for name in _PARTS if (value := side.folder.head["choices"].get(name)) is not None}
         for side in (a, b)

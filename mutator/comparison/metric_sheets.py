@@ -39,8 +39,9 @@ def metrics_sheets(pairs: Sequence[Pair], a: Side, b: Side, names: Names) -> tup
 
 
 def _values(pairs: Sequence[Pair], a: Side, b: Side, name: str) -> pd.DataFrame:
-    """The pairs in which both runs have a value of the metric. Columns: `kind`, `fault`, `first`,
-    `second`."""
+    """Return the pairs in which both runs have a value of the metric. Columns: `kind`, `fault`, `first`,
+    `second`.
+    """
     rows = [
         (by_fault_type(p.row_a), p.row_a.fault, a.metrics[p.a.id].get(name), b.metrics[p.b.id].get(name))
         for p in pairs

@@ -32,7 +32,8 @@ class Written:
 
 def write(comparison: Comparison, out: Path) -> Written:
     """Write all forms of the comparison into `out`, which is created if missing. Equal inputs give equal
-    bytes."""
+    bytes.
+    """
     make_folder(out / "tables")
     text, hypertext, pairs = out / "COMPARISON.md", out / "index.html", out / "pairs.csv"
     for sheet in comparison.sheets:
@@ -128,7 +129,7 @@ def _reasons(comparison: Comparison) -> Table:
 
 
 def page(comparison: Comparison) -> str:
-    """The comparison as one HTML page. All text from runs is escaped."""
+    """Return the comparison as one HTML page. All text from runs is escaped."""
     from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
@@ -201,7 +202,7 @@ def _hazard_time(row: Row) -> str:
 
 
 def pair_line(pair: Pair) -> dict[str, object]:
-    """A pair's line in pairs.csv. Times are in simulated seconds."""
+    """Return a pair's line in pairs.csv. Times are in simulated seconds."""
     row = pair.row_b
     line: dict[str, object] = {
         "experiment_a": pair.a.id,

@@ -16,7 +16,8 @@ _TIME_DIGITS = 6  # decimals of a time from activation; absorbs rounding errors
 
 class Change(StrEnum):
     """A change in the second run of a pair, relative to the first. `comparison.Gate` explains the changes for
-    the worse."""
+    the worse.
+    """
 
     NEW_HAZARD = "new-hazard"
     OTHER_HAZARD = "other-hazard"

@@ -21,7 +21,7 @@ TIMES = ("activation to manifest", "activation to alert", "activation to hazard"
 
 
 def frame_of(pairs: Sequence[Pair]) -> pd.DataFrame:
-    """A frame with a row for each pair that has valid results in both runs.
+    """Return a frame with a row for each pair that has valid results in both runs.
 
     Columns: `kind` (`sensor/bias`), `fault` (the resampling unit: variant and value), flags `activated_a`,
     `activated_b` etc., times `activation to hazard_a` etc. in s (NaN if either event is missing).
@@ -112,8 +112,9 @@ def _times(frame: pd.DataFrame, name: str) -> tuple[Cell, ...]:
 
 
 def adjusted(name: str, found: Mapping[str, tuple[Cell, ...]]) -> list[tuple[Cell, ...]]:
-    """The lines of one measure by fault type, with Holm's adjusted p added after the last cell, which is
-    p."""
+    """Return the lines of one measure by fault type, with Holm's adjusted p added after the last cell, which
+    is p.
+    """
     p_values = {kind: cells[-1] for kind, cells in found.items()}
     known = {kind: p for kind, p in p_values.items() if isinstance(p, P) and not math.isnan(p)}
     holm_values = dict(zip(known, map(P, holm(list(known.values()))), strict=True))
@@ -128,8 +129,9 @@ def whole_and_parts(
     whole: tuple[tuple[Cell, ...], ...],
     parts: Sequence[tuple[Cell, ...]],
 ) -> tuple[Sheet, Sheet]:
-    """The table of all pairs and the table by fault type. `heads` has the heading of the first column, then
-    those of the others."""
+    """Return the table of all pairs and the table by fault type. `heads` has the heading of the first column,
+    then those of the others.
+    """
     what, numbers = heads
     return (
         Sheet(name=name, title=title, note=f"{note}.", heads=(what, *numbers), lines=whole),

@@ -17,7 +17,8 @@ from mutator.targets.severity import Scale
 
 class Key(NamedTuple):
     """Identifies an experiment across runs, independently of target, reading, setting and seed. Ids can
-    differ across runs, because they depend on drawn times, reading, setting and the scenario's text."""
+    differ across runs, because they depend on drawn times, reading, setting and the scenario's text.
+    """
 
     spec: str  # with the variant: sensor/bias/distance
     value: Value
@@ -29,7 +30,8 @@ class Key(NamedTuple):
 @dataclass(frozen=True, kw_only=True)
 class Side:
     """One run: its folder, its planned experiments, and their rows and metrics by id. Metrics without a value
-    are left out."""
+    are left out.
+    """
 
     folder: RunFolder
     experiments: tuple[Experiment, ...]
@@ -41,7 +43,7 @@ class Side:
         return self.folder.path.name
 
     def classed(self, scale: Scale | None) -> "Side":
-        """This side with contacts classified by `scale`, or unclassified if it is None."""
+        """Return this side with contacts classified by `scale`, or unclassified if it is None."""
         rows = {}
         for name, row in self.rows.items():
             severity = ""

@@ -39,7 +39,7 @@ class Lost(Exception):
 
 
 class Refused(Exception):
-    """This target or run cannot be forked. The text says why; `remedy` says what to do, if known."""
+    """A target or run that cannot be forked. The text says why; `remedy` says what to do, if known."""
 
     def __init__(self, why: str, remedy: str = "") -> None:
         super().__init__(why, remedy)

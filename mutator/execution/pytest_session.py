@@ -100,7 +100,7 @@ def _defect(err: Exception, chunk: str) -> str:
 
 
 class LazyWorker:
-    """This process's Worker, made when the first chunk runs, because collection does not need it."""
+    """The worker of this process, made when the first chunk runs, because collection does not need it."""
 
     def __init__(self, workspace: Workspace, assignment: Assignment) -> None:
         self._workspace = workspace

@@ -207,7 +207,8 @@ class Runner:
 
     def _check_input(self, experiment: Experiment, execution: Execution) -> None:
         """Raise MutatorError if a run has written to what this experiment used, so its record would not
-        count."""
+        count.
+        """
         if execution.mode is RunMode.GOLDEN:
             self.goldens.check(execution.out)
         scenario = self.scenario_file(experiment.scenario)

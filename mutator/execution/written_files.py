@@ -21,7 +21,8 @@ class WrittenFiles:
 
     def begin(self, worker: str) -> None:
         """Note that a process began to work. Its files are believed until it reports, so that work is kept
-        when the process dies or the command is interrupted."""
+        when the process dies or the command is interrupted.
+        """
         self._unreported.add(worker)
 
     def report(self, sums: Sums, worker: str = "") -> None:

@@ -101,8 +101,8 @@ def _change(manifest: TargetManifest, models: FaultModels, fault: Fault) -> dict
 def _located(
     file: ParsedFile, start: tuple[int, int], end: tuple[int, int], replacement: str
 ) -> dict[str, Any]:
-    """A replacement of the text from `start` to `end` (line and byte, from 0), in the schema's positions:
-    lines and characters, from 1.
+    """Return a replacement of the text from `start` to `end` (line and byte, from 0), in the schema's
+    positions: lines and characters, from 1.
     """
     first, last = (
         {"line": line + 1, "column": len(file.lines[line][:column].decode(file.encoding)) + 1}

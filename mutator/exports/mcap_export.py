@@ -116,8 +116,8 @@ class Content:
         return written.finish()
 
     def _exact(self, experiment_id: str) -> tuple[Trace, Trace] | None:
-        """The kept traces, if both runs have one. MutatorError if a trace does not match its record: using
-        the coarser series instead would hide the mismatch.
+        """Return the kept traces, if both runs have one. MutatorError if a trace does not match its record:
+        using the coarser series instead would hide the mismatch.
         """
         kept = self._folder.traces_of(experiment_id)
         if self._traces is None or not kept.is_dir() or experiment_id not in self._records:

@@ -179,7 +179,7 @@ class _ParamModel(StrictModel, title="A parameter"):
 
 
 class _ExampleModel(StrictModel, title="An example"):
-    """This page shows each example, and `mutator check` runs it as a test."""
+    """Each example is shown on the page of its fault model, and `mutator check` runs it as a test."""
 
     about: str = Field(description="What the example shows. The page prints this after *For example,*.")
     injection: InjectionModel = Field(description="An injection, written as in a spec.")

@@ -115,7 +115,8 @@ _Number = Annotated[float, Field(ge=-_LARGEST, le=_LARGEST, allow_inf_nan=False)
 
 class SweepModel(StrictModel, title="A sweep"):
     """Ranges of equal width at equal distances. `{first: [15, 24], step: 10, last: [245, 254]}` gives the
-    24 ranges [15, 24], [25, 34] ... [245, 254]. One value is drawn from each range, both ends included."""
+    24 ranges [15, 24], [25, 34] ... [245, 254]. One value is drawn from each range, both ends included.
+    """
 
     first: list[_Number] = Field(description="The first range, [low, high].")
     step: float = Field(gt=0.0, allow_inf_nan=False, description="The distance from one range to the next.")

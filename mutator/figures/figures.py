@@ -46,7 +46,7 @@ def drawings(frame: pd.DataFrame) -> tuple[Drawing, ...]:
 
 
 def drawing_files(drawings: Sequence[Drawing]) -> dict[str, bytes]:
-    """The figures as files, by name: each as SVG and PNG."""
+    """Return the figures as files, by name: each as SVG and PNG."""
     files: dict[str, bytes] = {}
     for drawing in drawings:
         if drawing.figure is not None:

@@ -1,4 +1,4 @@
-"""Normalizes numbers and ids in source, so that one compilation covers many mutants.
+r"""Normalize numbers and ids in source, so that one compilation covers many mutants.
 
 Mutants of one kind differ only in the digits of their numbers and in their ids. If the normalized source
 compiles, so does every source that normalizes to it:
@@ -6,7 +6,7 @@ compiles, so does every source that normalizes to it:
 * A number becomes 0, or 0.0 if it has a point or an exponent. Only whole literals as `repr` writes them are
   replaced, up to a length that Python always accepts. So every token keeps its kind. Where the compiler
   compares values (a mapping pattern must not repeat a key), equal numbers are the worst case.
-* An id (hex digits) becomes one that is neither a valid token (`0f...`) nor a valid character (`\\U0f...`).
+* An id (hex digits) becomes one that is neither a valid token (`0f...`) nor a valid character (`\U0f...`).
   So normalized source compiles only if its ids are in strings, comments or names, where any id compiles.
   Equal ids stay equal, and different ids stay different.
 """

@@ -96,7 +96,8 @@ class Sampler:
 
     def _together(self, faulty: Trace, own: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the union of both runs' step times, and each run's values. After its end, a run has no value
-        (NaN) or, if the runs have different times, its last one."""
+        (NaN) or, if the runs have different times, its last one.
+        """
         if _is_prefix(own, self._time):
             time = max(own, self._time, key=len)
             return time, _filled(self._values, len(time)), _filled(self._on(faulty, own), len(time))

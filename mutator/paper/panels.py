@@ -52,7 +52,7 @@ _HTML = """\
 
 
 def observations_panel(run: ReportedRun) -> Panel | None:
-    """The panel of the observations that the library cites, with observations.md and tables.
+    """Return the panel of the observations that the library cites, with observations.md and tables.
 
     None if the library cites no observations, if the run has none of the published fault types, or if its
     experiments decide no observation. Decided observations come first.

@@ -1,5 +1,6 @@
 """The canary: a fault known to be harmful. The check fails only if every value of the canary's variant is
-harmless."""
+harmless.
+"""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
@@ -15,7 +16,7 @@ from mutator.workspace import Workspace
 
 
 def tries(workspace: Workspace, manifest: TargetManifest, canary: Experiment) -> Iterator[Experiment]:
-    """The canary, then the same fault with each other value of its variant, largest first."""
+    """Yield the canary, then the same fault with each other value of its variant, largest first."""
     yield canary
     models, known = workspace.fault_models(), canary.fault
     others: dict[str, Fault] = {}

@@ -39,7 +39,8 @@ class Sample:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Proof:
     """The state of a run's equivalence check: the number of experiments in the sample, the number with the
-    same result, and the harness errors of the check's own runs (experiment id, detail)."""
+    same result, and the harness errors of the check's own runs (experiment id, detail).
+    """
 
     sampled: int
     same: int
@@ -74,7 +75,8 @@ def sample(experiments: Sequence[Experiment], seed: int) -> tuple[Experiment, ..
 
 def _sample_of(folder: RunFolder) -> set[str]:
     """Ids of a plan's sample. For several seeds, each seed after the first adds one experiment in a
-    hundred."""
+    hundred.
+    """
     return set(_sampled_ids(folder.path, folder.head["plan"], len(folder.seeds)))
 
 
@@ -97,7 +99,7 @@ def _marks(experiment: Experiment) -> Iterator[tuple[str, ...]]:
 
 
 def needless(folder: RunFolder) -> str | None:
-    """The most frequent reason why no experiment was forked; None if one was forked or still can be.
+    """Return the most frequent reason why no experiment was forked; None if one was forked or still can be.
 
     Always None for a shard, because merged shards must all have a proof or none.
     """
@@ -124,7 +126,7 @@ def drop(folder: RunFolder) -> None:
 
 
 def left(folder: RunFolder) -> tuple[Sample, ...]:
-    """The part of the sample without a valid record in `proof/`; empty if no check is needed."""
+    """Return the part of the sample without a valid record in `proof/`; empty if no check is needed."""
     if not (folder.path / FOLDER).is_dir():
         return ()
     found = folder.records(FOLDER)
@@ -141,8 +143,9 @@ def sampled(folder: RunFolder) -> list[str]:
 
 
 def judge(folder: RunFolder, records: Mapping[str, Record]) -> Proof | None:
-    """The state of the check; None if none is needed. CheckFailed if a record differs on the reference
-    engine."""
+    """Return the state of the check; None if none is needed. CheckFailed if a record differs on the reference
+    engine.
+    """
     if not (folder.path / FOLDER).is_dir():
         return None
     found = folder.records(FOLDER)

@@ -71,7 +71,8 @@ def run_checks(
 
 def unreached_triggers(workspace: Workspace, folder: RunFolder) -> list[str]:
     """Remarks on triggers of the plan that no golden run reaches; none unless the golden runs just ran or
-    were cached."""
+    were cached.
+    """
     experiments = ((folder.golden_of(e).key, e) for e in plan_file.iterate(folder.path))
     observed = unreached.read_observed(_kept(folder))
     manifest = workspace.manifest(folder.head["target"])
@@ -85,7 +86,7 @@ def are_there(folder: RunFolder) -> bool:
 
 
 def _kept(folder: RunFolder) -> Path:
-    """The folder that keeps golden runs until they are accepted. Their observations stay there."""
+    """Return the folder that keeps golden runs until they are accepted. Their observations stay there."""
     return folder.work / "kept"
 
 
@@ -114,7 +115,8 @@ class _Checks:
 
     def known(self, workers: int, notify: Notify) -> tuple[CheckResult, ...] | None:
         """Earlier results, copied from another folder if necessary; None unless all checks passed and the
-        golden runs are unchanged."""
+        golden runs are unchanged.
+        """
         if (results := self._passed(self._before(), self.folder.path)) is not None:
             return results
         copy = self.kept
@@ -186,7 +188,8 @@ class _Checks:
 
     def _check_same_as_before(self, goldens: dict[str, str]) -> None:
         """Raise CheckFailed if a run that has records would continue with different golden runs, for example
-        on another processor."""
+        on another processor.
+        """
         run, before = self.folder.path, (self._before() or {}).get("goldens", {})
         known = {
             key: before.get(key) or digest_of(self.manifest, inside(run / "golden", key)) for key in goldens
@@ -201,7 +204,7 @@ class _Checks:
             )
 
     def _packages(self, runs: Runs) -> list[str]:
-        """The packages that the golden runs loaded, without the target and the standard library."""
+        """Return the packages that the golden runs loaded, without the target and the standard library."""
         loaded = {module for key in self.keys for module in runs[GOLDEN, key].modules}
         own = {path.split("/")[0].removesuffix(".py") for path in self.manifest.tree.files}
         return list(machine.packages_of(loaded - own))
@@ -228,7 +231,8 @@ class _Checks:
 
     def _anchors(self) -> CheckResult:
         """Check that each variant of the plan finds its statements. A mutant that does not compile
-        passes this check."""
+        passes this check.
+        """
         problems: dict[str, list[str]] = {}
         for fault in self.variants.values():
             try:

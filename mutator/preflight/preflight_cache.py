@@ -11,14 +11,16 @@ from mutator.preflight.unreached import FOLDER
 
 
 def entry(key: str) -> Path:
-    """The path for checks with this digest. Machines with a shared home folder have separate entries, because
-    the digest might not cover everything that changes last digits."""
+    """Return the path for checks with this digest. Machines with a shared home folder have separate entries,
+    because the digest might not cover everything that changes last digits.
+    """
     return inside(caches.of_checks(), digest([key, platform.node()]))
 
 
 def store(place: Path, run: Path, file: str, observed: Path) -> None:
     """Store a run folder's golden runs, check results (`file`) and observations at `place`, if the cache is
-    writable."""
+    writable.
+    """
 
     def fill(made: Path) -> None:
         shutil.copytree(run / "golden", made / "golden")

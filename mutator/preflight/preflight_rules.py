@@ -19,7 +19,8 @@ from mutator.targets.manifest import TargetManifest
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CheckRun:
     """What the checks need from a run. `digest` covers all outputs; `modules` are the third-party top-level
-    modules that it imported."""
+    modules that it imported.
+    """
 
     problem: str
     digest: str = ""
@@ -62,7 +63,7 @@ def digest_of(manifest: TargetManifest, out: Path) -> str:
 
 
 def judge_golden(first: CheckRun, again: CheckRun) -> str:
-    """The problem of a pair of golden runs; empty if there is none."""
+    """Return the problem of a pair of golden runs; empty if there is none."""
     if first.problem or again.problem:
         return first.problem or again.problem
     if first.digest != again.digest:
@@ -82,8 +83,9 @@ def judge_null(first: CheckRun, null: CheckRun) -> str:
 
 
 def judge_same(goldens: Mapping[str, CheckRun]) -> str:
-    """The problem of golden runs (by scenario) that are equal according to the manifest; empty if there is
-    none."""
+    """Return the problem of golden runs (by scenario) that are equal according to the manifest; empty if
+    there is none.
+    """
     (first, reference), *others = goldens.items()
     for name, run in others:
         if run.problem or reference.problem:

@@ -58,7 +58,8 @@ def holds(trigger: Arming, rows: Iterable[Sequence[float]]) -> bool:
 
 def _fits(trigger: Arming, observed: Observed) -> bool:
     """Whether the condition has one argument for each observed column; in older templates it also takes the
-    derived values."""
+    derived values.
+    """
     return len(signature(trigger[1]).parameters) == len(observed.T)
 
 

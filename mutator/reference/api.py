@@ -87,7 +87,8 @@ def undocumented() -> list[str]:
 
 def members(cls: type) -> list[Member]:
     """Return the public members of a class: its own, then those inherited from classes that are not
-    public."""
+    public.
+    """
     public = set(_classes().values()) - {cls}
     found: dict[str, Member] = {}
     for base in cls.__mro__:

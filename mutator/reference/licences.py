@@ -32,7 +32,8 @@ _ROW = re.compile(r"^\| ([\w.-]+) \| [^|]* \| ([^|]+) \|$", re.MULTILINE)
 
 def write_licences(clone: Path) -> None:
     """Write the page. A package that is not installed keeps its listed licence; MutatorError if none is
-    listed."""
+    listed.
+    """
     page = clone / PAGE
     known = table_of(page.read_text(encoding="utf-8")) if page.exists() else {}
     direct = _needed_by(clone)

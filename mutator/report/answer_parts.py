@@ -48,13 +48,13 @@ class Answer:
 
 
 def to_list(facets: Mapping[str, Sequence[str]], sort: str = "") -> str:
-    """The URL fragment that opens the list of experiments with these filters."""
+    """Return the URL fragment that opens the list of experiments with these filters."""
     parts = [f"{name}={','.join(quote(v, safe='') for v in values)}" for name, values in facets.items()]
     return "&".join((*parts, *([f"sort={sort}"] if sort else ())))
 
 
 def share(part: int, of: int, what: str) -> str:
-    """A share as text, for example `20 of 96 activated faults (21 %)`."""
+    """Return a share as text, for example `20 of 96 activated faults (21 %)`."""
     noun = what.removesuffix("s") if of == 1 else what
     return f"{part:,} of {of:,} {noun}" + (f" ({100 * part / of:.0f} %)" if of else "")
 

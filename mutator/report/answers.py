@@ -43,7 +43,9 @@ def answers_of(run: ReportedRun) -> tuple[Answer, ...]:
 
 
 def _told(run: ReportedRun) -> pd.DataFrame:
-    """The usable experiments with rank, course and warning. Those that answers can list also have texts."""
+    """Return the usable experiments with rank, course and warning. Those that answers can list also have
+    texts.
+    """
     frame = run.frame
     told = frame.assign(place=frame[PLACE], course=frame[COURSE], warning=warnings_of(frame))
     shown = worst_of(told)
@@ -57,7 +59,9 @@ def _told(run: ReportedRun) -> pd.DataFrame:
 
 
 def _warned(row: Row) -> str:
-    """The first alert and its time before the hazard; `only after` if it came later; `none` without one."""
+    """Return the first alert and its time before the hazard; `only after` if it came later; `none` without
+    one.
+    """
     if row.reaction_time is None:
         return "only after" if row.alerts else "none"
     return f"{row.alerts[0]}, {row.reaction_time:.1f} s"
@@ -104,7 +108,7 @@ def unwarned(frame: pd.DataFrame, note: str = "") -> Answer:
 
 
 def _more(count: int, what: str) -> str:
-    """A note that a list is truncated, or '' if it is complete."""
+    """Return a note that a list is truncated, or '' if it is complete."""
     return f" The table shows {TYPES} of the {count:,} {what}." if count > TYPES else ""
 
 

@@ -14,8 +14,9 @@ _APART = "compare-"  # folders of comparisons with other runs
 
 
 def pages(folder: RunFolder, workspace: Workspace | None) -> tuple[int, Iterator[MutatorError]]:
-    """The number of files in the report's folder, and their differences from the report that this version of
-    mutator makes of the run. Comparisons with other runs are not counted."""
+    """Return the number of files in the report's folder, and their differences from the report that this
+    version of mutator makes of the run. Comparisons with other runs are not counted.
+    """
     out = folder.path / FOLDER
     names = (path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file())
     stored = {name for name in names if not name.startswith(_APART)} - {FILE.removeprefix(f"{FOLDER}/")}

@@ -50,7 +50,8 @@ LISTED = 50_000  # maximum number of experiments that the page lists, so that it
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Browse:
     """Data for the page's scripts: `facts` as JSON, the rest as script elements. `listed` says which
-    experiments the page lists; '' if all."""
+    experiments the page lists; '' if all.
+    """
 
     facts: Markup
     scripts: tuple[Markup, ...]
@@ -58,7 +59,7 @@ class Browse:
 
 
 def browse_data(run: ReportedRun) -> Browse:
-    """The page data of a run. Paths in it are relative to the report's folder."""
+    """Return the page data of a run. Paths in it are relative to the report's folder."""
     folder, workspace = run.folder, run.workspace
     rows, lines = _listed(run)
     table_, details_ = _tables(run, rows, lines)
@@ -104,7 +105,7 @@ def _of_target(folder: RunFolder, workspace: "Workspace | None") -> dict[str, An
 
 
 def _listed(run: ReportedRun) -> tuple[list[Row], list[dict[str, str]]]:
-    """The rows that the page lists, in reading order, and their cells."""
+    """Return the rows that the page lists, in reading order, and their cells."""
     lines = lines_of(run.texts[run.seen.places < LISTED])
     rows = [row_from(line) for line in lines]
     order = sorted(range(len(rows)), key=lambda i: reading_order(rows[i]))
@@ -140,8 +141,9 @@ def table(
     alerts: bool = True,
     source: SourceLines | None = None,
 ) -> dict[str, Any]:
-    """The results by column, with derived columns such as `rank` (1: the worst). Alert columns need a
-    target with `alerts`; `line` (of the fault) and `lasting` need a `source`."""
+    """Return the results by column, with derived columns such as `rank` (1: the worst). Alert columns need a
+    target with `alerts`; `line` (of the fault) and `lasting` need a `source`.
+    """
     left_out = () if alerts else _OF_ALERTS
     columns: dict[str, list[str]] = {
         name: [line[name] for line in lines] for name in (lines[0] if lines else ()) if name not in left_out
@@ -166,7 +168,7 @@ def table(
 
 
 def _of_operators(source: SourceLines, lines: Sequence[Mapping[str, str]]) -> dict[str, list[str]]:
-    """The columns that differ for mutants of operators. Their `value` is the change in the source."""
+    """Return the columns that differ for mutants of operators. Their `value` is the change in the source."""
     changes = [source.changes.get(line["fault_id"], "") for line in lines]
     both = list(zip(lines, changes, strict=True))
     return {
@@ -178,8 +180,9 @@ def _of_operators(source: SourceLines, lines: Sequence[Mapping[str, str]]) -> di
 
 
 def column(name: str, values: Sequence[str]) -> dict[str, Any]:
-    """A column's data: numbers (None: empty), ids as texts, otherwise codes of the distinct values. Names are
-    never parsed as numbers, because a variant can be called `nan`."""
+    """Return a column's data: numbers (None: empty), ids as texts, otherwise codes of the distinct values.
+    Names are never parsed as numbers, because a variant can be called `nan`.
+    """
     if not is_text(name) and any(values):
         try:
             return {"numbers": [_number(text) for text in values]}
@@ -193,7 +196,7 @@ def column(name: str, values: Sequence[str]) -> dict[str, Any]:
 
 
 def _number(text: str) -> float | int | str | None:
-    """The value for JSON, which has no infinities or NaN."""
+    """Return the value for JSON, which has no infinities or NaN."""
     if not text:
         return None
     value = float(text)
@@ -209,7 +212,8 @@ def details(
 ) -> dict[str, Any]:
     """For each row, the codes of its spec and trigger setting (-1: not in the plan), the index of its diff's
     shape (-1: no diff), and the start of its trace's digest, which its series must name. A shape has a list
-    of values for each hole in its text, in row order."""
+    of values for each hole in its text, in row order.
+    """
     specs, settings = _Codes(), _Codes()
     faults = {e.fault.id: e.fault for e in experiments if e}
     spec = {name: _spec(fault) for name, fault in faults.items()}
@@ -241,7 +245,7 @@ class _Codes:
 
 
 def _spec(fault: Fault) -> str:
-    """The fault with its drawn value, as a spec in YAML."""
+    """Return the fault with its drawn value, as a spec in YAML."""
     told = {name: value for name, value in plain(fault).items() if value not in (None, [], "")}
     told["injections"] = [
         {
@@ -271,8 +275,9 @@ def _patches(run: ReportedRun, rows: Iterable[Row]) -> Iterator[tuple[str, str, 
 
 
 def media(folder: RunFolder, seen_from: Path, budget: int) -> dict[str, dict[str, Any]]:
-    """The stills, films and exact plots in plots/, by experiment. Stills are embedded up to `budget` bytes
-    in total; the rest become links relative to `seen_from`."""
+    """Return the stills, films and exact plots in plots/, by experiment. Stills are embedded up to `budget`
+    bytes in total; the rest become links relative to `seen_from`.
+    """
     found: dict[str, dict[str, Any]] = {}
     files = filter(Path.is_file, (folder.path / "plots").glob("*"))
     for path in sorted(files, key=lambda p: (len(p.name), p.name)):

@@ -30,7 +30,8 @@ MARKDOWN, PAGE = "REPORT.md", "index.html"
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Report:
     """The files of a report, and its number of experiments. Only a new report has `summaries`, tables for
-    the terminal."""
+    the terminal.
+    """
 
     markdown: Path
     page: Path
@@ -41,7 +42,8 @@ class Report:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Built:
     """A report in memory: its `files` by name in the report's folder, of which REPORT.md and index.html
-    always exist."""
+    always exist.
+    """
 
     files: Mapping[str, bytes]
     rows: int

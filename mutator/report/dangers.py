@@ -63,7 +63,7 @@ def _links(ranked: pd.DataFrame) -> tuple[Link, ...]:
 
 
 def contact_measure(frame: pd.DataFrame) -> str:
-    """The column that best measures a contact: delta-v or contact speed; '' if the target has neither."""
+    """Return the column that measures a contact: delta-v, contact speed; '' if the target has neither."""
     return next((name for name in ("delta_v", "contact_speed") if name in frame), "")
 
 
@@ -75,8 +75,9 @@ def _classes(hazards: pd.DataFrame) -> str:
 
 
 def _worst_lists(ranked: pd.DataFrame, units: Mapping[str, str], *, has_alerts: bool) -> tuple[Listing, ...]:
-    """The worst hazards in one list, or in two if only some have a severity class: the others, which rank
-    by margin, would rarely appear in a common list."""
+    """Return the worst hazards in one list, or in two if only some have a severity class: the others, which
+    rank by margin, would rarely appear in a common list.
+    """
     hit = ranked[ranked[SEVERITY] != ""] if SEVERITY in ranked else ranked
     missed = ranked.drop(hit.index)
     if hit.empty or missed.empty:
@@ -99,8 +100,9 @@ def _worst(
     *,
     has_alerts: bool,
 ) -> Listing:
-    """The experiments with their measures of danger. Each link opens one of them in the list filtered by
-    `shown`."""
+    """Return the experiments with their measures of danger. Each link opens one of them in the list filtered
+    by `shown`.
+    """
     contact = contact_measure(ranked)
     heads = [head, "scenario", "hazards"]
     columns = [ranked["scenario"], ranked["hazard_names"]]
@@ -126,7 +128,8 @@ def _worst(
 
 def _how_bad(row: Mapping[Any, Any], contact: str, units: Mapping[str, str]) -> str:
     """For a contact, its speed, for example `delta-v 6.70 m/s`; otherwise the smallest margin to hazards that
-    occurred, or `-`."""
+    occurred, or `-`.
+    """
     if contact and row[contact] not in ("", "0.0"):
         words = "delta-v" if contact == "delta_v" else "contact at"
         return f"{words} {float(row[contact]):.2f} {units.get(contact, '')}"

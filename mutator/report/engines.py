@@ -40,7 +40,8 @@ def engine_summary(
     folder: RunFolder, records: Mapping[str, Record], timings: "DataFrame"
 ) -> EngineSummary | None:
     """Summarize a run's `timings` (as in `Seen`) and `proof/`. None if no timing names an engine and there
-    is no `proof/`."""
+    is no `proof/`.
+    """
     ways = _ways(timings)
     if not ways and not (folder.path / equivalence.FOLDER).is_dir():
         return None

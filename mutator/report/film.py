@@ -1,5 +1,6 @@
 """Films an experiment: reruns its golden and faulty runs with recording, and renders the film with the
-target's command."""
+target's command.
+"""
 
 import json
 import shutil
@@ -46,7 +47,8 @@ class Filming:
     @classmethod
     def of(cls, workspace: Workspace, folder: RunFolder) -> "Filming":
         """Prepare to film. Raise MutatorError if the target cannot be filmed or has changed since the
-        run."""
+        run.
+        """
         manifest = manifest_of(workspace, folder)
         return cls(workspace, folder, manifest, manifest.filming())
 
@@ -64,7 +66,8 @@ class Filming:
     ) -> bool:
         """Rerun an experiment's faulty run, and the golden run unless it is given, and write `shots`.
         Return whether the new record equals `known`; true if `known` is None. Raise MutatorError if the
-        faulty run left no film or the target's command fails."""
+        faulty run left no film or the target's command fails.
+        """
         with ScratchFolder("mutator-film-") as scratch:
             single = run_single(
                 self.workspace,
@@ -94,7 +97,9 @@ class Filming:
 
 
 def hazards_in_words(workspace: Workspace, manifest: TargetManifest) -> dict[str, str]:
-    """A short text for each hazard, from the manifest or the hazard analysis (up to its first bracket)."""
+    """Return a short text for each hazard, from the manifest or the hazard analysis (up to its first
+    bracket).
+    """
     known = workspace.hazards()
     about = known.hazards if known else {}
     names = {name: words.partition(" (")[0].rstrip(".") for name, words in about.items()}

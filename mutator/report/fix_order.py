@@ -19,7 +19,8 @@ def first_to_fix(frame: pd.DataFrame, paths: FoundPaths | None, *, has_alerts: b
     """Say which fault types to fix first: those with the most silent hazards in the highest severity
     class; ties are broken by the next lower classes, then by hazards without contact, then by the shortest
     time from activation to hazard. If the target has no alerts, all hazards are counted. `frame` must have at
-    least one hazard."""
+    least one hazard.
+    """
     hazards = frame[frame["outcome"] == "hazard"]
     counted = hazards[hazards["warning"] != FIRST] if has_alerts else hazards
     if counted.empty:  # all hazards came after an alert, so count all
@@ -44,7 +45,7 @@ def first_to_fix(frame: pd.DataFrame, paths: FoundPaths | None, *, has_alerts: b
 
 
 def _classes(hazards: pd.DataFrame) -> list[str]:
-    """The severity classes that occur, highest first; no contact ('') is last."""
+    """Return the severity classes that occur, highest first; no contact ('') is last."""
     return sorted(hazards[SEVERITY].unique(), reverse=True) if SEVERITY in hazards else [""]
 
 
@@ -53,7 +54,7 @@ def _of_class(hazards: pd.DataFrame, name: str) -> pd.DataFrame:
 
 
 def _after(hazards: pd.DataFrame) -> pd.Series:
-    """Times from activation to hazard, s."""
+    """Return the times from activation to hazard, s."""
     return hazards["t_hazard"] - hazards["t_activation"]
 
 
@@ -118,7 +119,7 @@ def _line(
 def _let_through(
     kind: str, hazards: pd.DataFrame, only: Mapping[str, Sequence[str]], paths: FoundPaths
 ) -> Cell:
-    """The component that most often let this fault type through to the first changed actuator."""
+    """Return the component that most often let this fault type through to the first changed actuator."""
     passed: Counter[str] = Counter()
     links: dict[str, set[str]] = {}
     for course, count in _courses(hazards, paths):
@@ -139,7 +140,7 @@ def _courses(frame: pd.DataFrame, paths: FoundPaths) -> Iterator[tuple[Course, i
 
 
 def _stopped(kind: str, active: pd.DataFrame, paths: FoundPaths) -> Cell:
-    """The component that stopped most faults of this type, a candidate for stopping the rest."""
+    """Return the component that stopped most faults of this type, a candidate for stopping the rest."""
     stopped: Counter[str] = Counter()
     for course, count in _courses(active, paths):
         for name in course.stopped_at:

@@ -107,7 +107,7 @@ def _past_run(path: Path) -> PastRun:
 
 
 def _plans(runs: Sequence[PastRun]) -> dict[str, list[PastRun]]:
-    """The runs by campaign and plan, the plan of the latest run first."""
+    """Return the runs by campaign and plan, the plan of the latest run first."""
     found: dict[str, list[PastRun]] = {}
     for run in runs:
         found.setdefault(f"{run.folder.head['campaign']}, plan {run.folder.head['plan'][:8]}", []).append(run)
@@ -183,7 +183,7 @@ def _page(folder: Path, runs: Sequence[PastRun], left_out: Sequence[str]) -> str
 
 
 def _linked(group: Sequence[PastRun]) -> Table:
-    """The table of runs, newest first, with links to their reports."""
+    """Return the table of runs, newest first, with links to their reports."""
     from markupsafe import Markup
 
     link = Markup('<a href="{}">{}</a>').format
@@ -199,6 +199,6 @@ def _linked(group: Sequence[PastRun]) -> Table:
 
 
 def _comparison(folder: Path, before: PastRun, after: PastRun) -> str:
-    """The path of an existing comparison page, relative to the folder; '' if there is none."""
+    """Return the path of an existing comparison page, relative to the folder; '' if there is none."""
     page = Path(after.name, FOLDER, f"compare-{before.name}", "index.html")
     return quote(page.as_posix()) if inside(folder, page.as_posix()).exists() else ""

@@ -47,7 +47,8 @@ SCRIPTS = (  # in load order, because scripts use earlier ones
 class Content:
     """The content of both forms of a report. `alarm` is shown first. `outcomes` counts outcomes and
     statuses. `study` cites the study that has its own page. `answers` come before the list of experiments,
-    `panels` after it."""
+    `panels` after it.
+    """
 
     name: str
     alarm: str
@@ -79,7 +80,7 @@ def markdown(content: Content) -> str:
 
 
 def page_html(content: Content) -> str:
-    """The report as one self-contained HTML page. All text is escaped."""
+    """Return the report as one self-contained HTML page. All text is escaped."""
     from markupsafe import Markup
 
     html = rendered(

@@ -16,7 +16,8 @@ FOLDER = "report"  # the report's folder in a run folder
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Panel:
     """One part of a report. `link` is its name in the navigation bar, `summary` the table that the command
-    line shows, `style` a CSS file that it needs. `files` are written next to the report, by name."""
+    line shows, `style` a CSS file that it needs. `files` are written next to the report, by name.
+    """
 
     anchor: str  # its id on the page
     link: str

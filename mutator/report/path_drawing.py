@@ -1,5 +1,6 @@
 """Draws the control structure of a run, with the number of faults that passed each link or stopped in each
-box. ways.js updates the numbers."""
+box. ways.js updates the numbers.
+"""
 
 from collections.abc import Collection, Iterator
 from html import escape
@@ -15,7 +16,7 @@ _THIN = 1.8
 
 
 def draw_ways(structure: StructureModel, counts: PathCounts, links: Collection[str]) -> str:
-    """The control structure as SVG. `links` are those that a fault can take."""
+    """Return the control structure as SVG. `links` are those that a fault can take."""
     plain = {n: c.model_copy(update={"process_model": {}}) for n, c in structure.components.items()}
     layout = lay_out(structure.model_copy(update={"components": plain}), lines=2)
     size = f"{layout.width:.0f} {layout.height:.0f}"

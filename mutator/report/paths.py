@@ -66,7 +66,7 @@ class FoundPaths:
         return cls(ways=ways, channels=folder.head["channels"], by_id=by_id, records=records, courses=courses)
 
     def through(self, experiment_id: str) -> str:
-        """The links that a fault got through, joined by `;`. The page filters by them."""
+        """Return the links that a fault got through, joined by `;`. The page filters by them."""
         if experiment_id in self.course_of:
             crossings = self.courses[self.course_of[experiment_id]].crossings
         else:
@@ -75,9 +75,10 @@ class FoundPaths:
         return ";".join(link_text(c.tail, c.tip) for c in crossings if c.passage is Passage.THROUGH)
 
     def data(self, ids: Sequence[str]) -> dict[str, Any]:
-        """The page's data for the experiments `ids`: the shape of each path (-1: none), and for each
+        """Return the page's data for the experiments `ids`: the shape of each path (-1: none), and for each
         channel a column of first times and a column of largest deviations. `by` lists the components that
-        must have changed before their own channels did, with the latest possible time."""
+        must have changed before their own channels did, with the latest possible time.
+        """
         shapes: dict[str, int] = {}
         columns: dict[str, Any] = {}
         codes, by, names = [], {}, [name for name, *_ in self.channels]
@@ -113,7 +114,7 @@ class FoundPaths:
         return {s.component: round(s.t_by, 4) for s in (path.stages if path else ()) if s.t_by is not None}
 
     def label(self, component: str) -> str:
-        """The name of a component on pages."""
+        """Return the name of a component on pages."""
         return self.components[component]["label"]
 
     @cached_property
@@ -126,7 +127,7 @@ class FoundPaths:
 
 
 def link_text(tail: str, tip: str) -> str:
-    """The name of a link in lists and filters."""
+    """Return the name of a link in lists and filters."""
     return f"{tail}→{tip}"
 
 
@@ -147,7 +148,8 @@ def _placed(path: Path) -> Iterator[tuple[Any, int]]:
 class PathCounts:
     """Counts over the paths of some faults. By link: how many `came` to its start and got `through`, if its
     end is recorded. By component: how many were `injected`, `stopped`, and `masked` there. `ends` counts
-    masked faults by the set of components that stopped them."""
+    masked faults by the set of components that stopped them.
+    """
 
     active: int = 0
     came: Counter[str] = field(default_factory=Counter)
@@ -183,7 +185,7 @@ class PathCounts:
 def counts_by_fault_type(
     kinds: "pd.Series[str]", codes: "np.ndarray", paths: FoundPaths
 ) -> Mapping[str, PathCounts]:
-    """The counts of all faults, then those by fault type. `codes` has each row's course (-1: none)."""
+    """Return the counts of all faults, then those by fault type. `codes` has each row's course (-1: none)."""
     import pandas as pd
 
     found: dict[str, PathCounts] = defaultdict(PathCounts)

@@ -26,7 +26,8 @@ _Alerts = tuple[tuple[str, float], ...]  # the alerts of one experiment
 class Seen:
     """`places` (the rank, from 0) and `courses_of` (an index into `courses`, -1: none) have a number for
     each row of the results. `alerts` are those of experiments with a hazard. `timings` has a row for each
-    timed experiment; its engine is '' if not recorded."""
+    timed experiment; its engine is '' if not recorded.
+    """
 
     places: np.ndarray
     courses_of: np.ndarray

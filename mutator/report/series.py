@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 def series_facts(folder: RunFolder) -> dict[str, Any]:
     """Whether series are packed, which experiments have their own file, and the columns with the largest
     deviation of each channel, which its curves must have. The page must not request a missing file, because
-    the browser's console would show an error."""
+    the browser's console would show an error.
+    """
     series = SeriesFolder(folder.path)
     columns = dict(deviation_columns(folder.head["compared"]))
     return {"packed": series.is_packed, "kept": series.kept_ids(), "deviations": columns}

@@ -1,5 +1,6 @@
 """The source of a run's target, with the outcomes of the faults in each line. If the target has changed
-since the run, no source is shown."""
+since the run, no source is shown.
+"""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -56,7 +57,7 @@ class MarkedFile:
     marks: Marks
 
     def worst_lines(self) -> dict[str, int]:
-        """The number of lines by the worst outcome or status of their mutants, worst first."""
+        """Return the number of lines by the worst outcome or status of their mutants, worst first."""
         worst = [min((m.ending for m in here.values()), key=ENDINGS.index) for here in self.marks.values()]
         return {ending: worst.count(ending) for ending in ENDINGS if ending in worst}
 
@@ -65,7 +66,8 @@ class MarkedFile:
 class SourceLines:
     """The files of a run, worst first. `places` maps each fault to its line, such as `pkg/plan.py:42`;
     `changes` maps each fault of an operator to its change, such as `a + b -> a - b`. `why` is the reason if
-    there are no files."""
+    there are no files.
+    """
 
     files: tuple[MarkedFile, ...] = ()
     places: Mapping[str, str] = field(default_factory=dict)
@@ -74,7 +76,7 @@ class SourceLines:
 
     @classmethod
     def of(cls, folder: RunFolder, workspace: Workspace | None, texts: "DataFrame") -> "SourceLines | None":
-        """The source of a run with the results `texts`; None if the run has no operators."""
+        """Return the source of a run with the results `texts`; None if the run has no operators."""
         if not (texts["module"] == OPERATORS).any():
             return None
         faults = plan_file.read_faults(folder.path)
@@ -123,7 +125,8 @@ def _marks(
     at: Mapping[str, tuple[str, int]], texts: "DataFrame"
 ) -> Iterator[tuple[tuple[str, int], str, Mark]]:
     """Yield the marks of each line, for permanent and transient faults. Each fault is counted once, with its
-    worst experiment."""
+    worst experiment.
+    """
     found: dict[tuple[tuple[str, int], str], dict[str, int]] = {}
     for name, trigger, ending in zip(texts["fault_id"], texts["trigger"], endings(texts), strict=True):
         if name in at and ending in ENDINGS:
@@ -146,7 +149,7 @@ def _file(file: ParsedFile, marks: Marks) -> MarkedFile:
 
 
 def _around(file: ParsedFile, line: int) -> range:
-    """The outermost function around `line`; outside functions, a few lines."""
+    """Return the outermost function around `line`; outside functions, a few lines."""
     function = file.outer_function(line - 1)
     if function is not None:
         return range(function.start + 1, function.stop + 1)
@@ -154,7 +157,7 @@ def _around(file: ParsedFile, line: int) -> range:
 
 
 def _joined(parts: Iterable[range]) -> tuple[range, ...]:
-    """The ranges in order, joined if they almost touch."""
+    """Return the ranges in order, joined if they almost touch."""
     found: list[range] = []
     for part in sorted(parts, key=lambda part: (part.start, part.stop)):
         if found and part.start <= found[-1].stop + _JOINED:

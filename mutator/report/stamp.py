@@ -25,7 +25,7 @@ _LINKED = (".mp4", ".gif")  # the report contains only the names of such files
 
 
 def made_from(folder: RunFolder, workspace: Workspace | None) -> str:
-    """The digest of all inputs of a report, including the sources of mutator."""
+    """Return the digest of all inputs of a report, including the sources of mutator."""
     run = folder.path
     series = [series_facts(folder), digests.sha256(run / series_store.FOLDER / f"{series_store.INDEX}.js")]
     return digest([SCHEMA, _sources(), run.name, list(_files_of(run)), series, _library(folder, workspace)])
@@ -56,7 +56,7 @@ def write_files(run: Path, made_from: str, files: Mapping[str, bytes]) -> None:
 
 
 def _stamp(run: Path) -> dict[str, Any]:
-    """The stamp of the report before; without files if it cannot be read."""
+    """Return the stamp of the report before; without files if it cannot be read."""
     try:
         stamp = json_object(read_below(run, FILE), run / FILE, SCHEMA)
         if isinstance(files := stamp.get("files"), dict):
@@ -76,7 +76,8 @@ def _sources() -> object:
 
 def _files_of(run: Path) -> Iterator[tuple[str, str]]:
     """Yield the names and digests of the files that a report can read. What does not belong in a run folder
-    is not opened."""
+    is not opened.
+    """
     tops = [top for top in sorted(run.iterdir()) if top.name not in _NOT_READ and belongs(top.name)]
     for top in tops:
         inside = sorted(top.rglob("*")) if top.is_dir() else [top]
@@ -86,7 +87,7 @@ def _files_of(run: Path) -> Iterator[tuple[str, str]]:
 
 
 def _library(folder: RunFolder, workspace: Workspace | None) -> object:
-    """The digests of what a report reads of a library and of the run's target."""
+    """Return the digests of what a report reads of a library and of the run's target."""
     if workspace is None:
         return None
     files: list[tuple[str, str]] = []

@@ -77,7 +77,7 @@ def _due(
     experiments: Mapping[str, Experiment],
     records: Mapping[str, Record],
 ) -> dict[str, list[Shot]]:
-    """The missing stills of the worst experiments with one of the changes `pictures`, worst first."""
+    """Return the missing stills of the worst experiments with one of the changes `pictures`, worst first."""
     seeing = set(pictures)
     texts = Results.of_run(folder.path).texts()
     moved = ((texts["status"] == Status.OK.value) & (texts["t_manifest"] != "")).to_numpy()

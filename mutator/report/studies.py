@@ -32,7 +32,8 @@ if TYPE_CHECKING:
 class ReportedRun:
     """The data that a report is made from. `texts` are all experiments of results.csv, `frame` the usable
     ones. `experiments` (the plan) and `records` are read on access. Without a workspace, no experiment can
-    be rerun, and there is no study. `compared`: the study has its own page on these results."""
+    be rerun, and there is no study. `compared`: the study has its own page on these results.
+    """
 
     folder: RunFolder
     workspace: Workspace | None
@@ -78,7 +79,7 @@ class ReportedRun:
         return int((self.texts["status"] != Status.HARNESS_ERROR.value).sum())
 
     def fault_free(self) -> tuple[FaultFreeRun, ...]:
-        """The alerts, hazards and ranges of the golden runs; empty if these cannot be read."""
+        """Return the alerts, hazards and ranges of the golden runs; empty if these cannot be read."""
         if self.workspace is None:
             return ()
         try:
@@ -87,7 +88,9 @@ class ReportedRun:
             return ()
 
     def ends(self) -> dict[str, float] | None:
-        """The latest end of each scenario's golden runs, in simulated seconds; None if one cannot be read."""
+        """Return the latest end of each scenario's golden runs, in simulated seconds; None if one cannot be
+        read.
+        """
         if self.workspace is None:
             return None
         ends: dict[str, float] = {}
@@ -108,7 +111,8 @@ class Study:
     cites it. `check` finds problems in its data in a fault library. `published` returns the counts to show
     next to those of a run, or None if they do not apply. Each function in `panels` can return a panel of
     the study's page, with files next to it. If none returns a panel, there is no page. `drawings`
-    returns the figures of that page."""
+    returns the figures of that page.
+    """
 
     about: str
     check: Callable[[Workspace], Iterable[MutatorError]]

@@ -15,7 +15,7 @@ SILENT = (NO_ALERT, LATE)  # silent hazards: no alert before the hazard
 
 
 def warning(row: Row) -> str:
-    """The value of the page's filter `warning`; '' without a hazard."""
+    """Return the value of the page's filter `warning`; '' without a hazard."""
     if not row.hazards:
         return ""
     if not row.alerts:
@@ -24,7 +24,7 @@ def warning(row: Row) -> str:
 
 
 def warnings_of(frame: "pd.DataFrame") -> "np.ndarray":
-    """The value of `warning` for each row of a frame from `statistics.frame`."""
+    """Return the value of `warning` for each row of a frame from `statistics.frame`."""
     late = np.where(frame["reaction_time"] == "", LATE, FIRST)
     hazard = np.where(frame["alerts"] == "", NO_ALERT, late)
     return np.where(frame["is_hazard"], hazard, "")

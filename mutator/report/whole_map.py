@@ -1,5 +1,6 @@
 """The map of fault type and scenario over all experiments, for pages that list only the worst. The measures
-have the same names as in heat.js."""
+have the same names as in heat.js.
+"""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -15,7 +16,7 @@ Cells = list[list[Any]]  # by row; each cell has a count or value, and its base 
 
 
 def map_of(run: ReportedRun) -> dict[str, Any]:
-    """The fault types, scenarios, and cells by measure. The last row and column are totals."""
+    """Return the fault types, scenarios, and cells by measure. The last row and column are totals."""
     frame = run.frame
     kinds, scenarios = (sorted(map(str, frame[name].unique())) for name in ("kind", "scenario"))
     named = (("kind", kinds), ("scenario", scenarios))

@@ -40,7 +40,7 @@ _METHODS = {
 
 
 def words_of(run: ReportedRun) -> Words:
-    """The terms that the page explains. Terms that the run does not use are left out."""
+    """Return the terms that the page explains. Terms that the run does not use are left out."""
     head = run.folder.head
     found = {
         "How an experiment ends": _ENDINGS,
@@ -55,7 +55,7 @@ def words_of(run: ReportedRun) -> Words:
 
 
 def meanings_of(run: ReportedRun) -> Words:
-    """The meanings of the codes in the list of experiments: column -> code -> meaning."""
+    """Return the meanings of the codes in the list of experiments: column -> code -> meaning."""
     words = words_of(run)
     triggers = words.get("Triggers", {})
     drawn = run.texts[run.texts["method"] == Method.RANDOM.value]["trigger"].unique()
@@ -94,7 +94,7 @@ def _scenarios(run: ReportedRun) -> dict[str, str]:
 
 
 def _title(run: ReportedRun, name: str) -> str:
-    """The `title` or `about` in a scenario's file; empty if the file has a format of its own."""
+    """Return the `title` or `about` in a scenario's file; empty if the file has a format of its own."""
     if run.workspace is None:
         return ""
     try:
@@ -106,7 +106,7 @@ def _title(run: ReportedRun, name: str) -> str:
 
 
 def _triggers(run: ReportedRun) -> dict[str, str]:
-    """The trigger methods, then the condition of each guided trigger."""
+    """Return the trigger methods, then the condition of each guided trigger."""
     methods = set(run.texts["method"].unique())
     told = {name: about for name, about in _METHODS.items() if name in methods}
     abouts = _contexts(run)
@@ -121,7 +121,7 @@ def _triggers(run: ReportedRun) -> dict[str, str]:
 
 
 def _contexts(run: ReportedRun) -> dict[str, str]:
-    """The contexts in the campaign's context table; empty if the table is not found."""
+    """Return the contexts in the campaign's context table; empty if the table is not found."""
     try:
         table = load(run.folder.path / "campaign.yaml").data["triggers"]["table"]
         found = run.workspace.context_table(table) if run.workspace and table else None

@@ -1,2 +1,3 @@
 """Review of generated diffs: groups of mutants, decisions, the review page, `--require-reviewed`. This
-package runs no experiments."""
+package runs no experiments.
+"""

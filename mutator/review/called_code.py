@@ -24,7 +24,8 @@ _FURTHEST = 20  # maximum number of imports to follow for a name
 @dataclass(frozen=True, slots=True, order=True)
 class _Place:
     """A piece of the source tree: `name` in the file at `path`, or the whole file (no name). For a method,
-    `me` is the class of the object on which it is called."""
+    `me` is the class of the object on which it is called.
+    """
 
     path: str
     name: str
@@ -38,7 +39,8 @@ class CalledCode:
     def of_lines(self, path: str, data: bytes) -> dict[str, str]:
         """Return the code that the injected lines of a mutated file call: the source of each place, such as
         `car/weather.py Rain`. `data` is the content of the file at `path`. Files other than Python are
-        included whole."""
+        included whole.
+        """
         module = source_names.read_module(path, data, Path())
         return self._closure(path, uses_in(module.tree, wanted=_injected(data)))
 
@@ -62,7 +64,7 @@ class CalledCode:
         return {f"{one.path} {one.name}".strip(): found[one] for one in sorted(found)}
 
     def _beyond(self, place: _Place) -> Iterator[_Place]:
-        """The places that the source of this place calls. A class includes its methods."""
+        """Yield the places that the source of this place calls. A class includes its methods."""
         module = self._module(place.path)
         for node in module.nodes_of(place.name) if place.name else [module.tree]:
             uses = uses_in(node, place.name.rpartition(".")[0])
@@ -76,7 +78,7 @@ class CalledCode:
         return text.decode("utf-8", "surrogateescape")
 
     def _files(self, path: str, node: ast.AST) -> Iterator[_Place]:
-        """The files in the same folder that the source names and that are not Python: C code, a table."""
+        """Yield files in the same folder that the source names and that are not Python: C code, a table."""
         folder = PurePosixPath(path).parent
         for one in ast.walk(node):
             if isinstance(one, ast.Constant) and isinstance(one.value, str) and "." in one.value:
@@ -130,7 +132,7 @@ class CalledCode:
                 yield _Place(target, "")
 
     def _of_self(self, owner: _Class, name: str, me: _Class, depth: int) -> Iterator[_Place]:
-        """The method that `self.name` refers to in an object of `me`."""
+        """Yield the method that `self.name` refers to in an object of `me`."""
         path, inside = owner
         if self._module(path).nodes_of(f"{inside}.{name}"):
             yield _Place(path, f"{inside}.{name}", me)
@@ -138,7 +140,7 @@ class CalledCode:
             yield from self._of_bases(owner, name, me, depth)
 
     def _of_bases(self, owner: _Class, name: str, me: _Class, depth: int) -> Iterator[_Place]:
-        """The method that `super().name` refers to in an object of `me`."""
+        """Yield the method that `super().name` refers to in an object of `me`."""
         path, inside = owner
         for words in self._module(path).bases_of(inside) if depth < _FURTHEST else ():
             for base in self._named(path, words, 0):
@@ -155,8 +157,9 @@ class CalledCode:
 
 
 def _injected(data: bytes) -> Callable[[ast.expr], bool]:
-    """A predicate for the injected nodes of a mutated file: those in inserted lines, and those in the new
-    parts of changed lines."""
+    """Return a predicate for the injected nodes of a mutated file: those in inserted lines, and those in the
+    new parts of changed lines.
+    """
     tags = {number: tag for number, line in enumerate(data.splitlines(), 1) if (tag := tag_of(line))}
     changed = [(line, first, end) for _, line, first, end in changed_parts(data)]
 

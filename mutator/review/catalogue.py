@@ -77,7 +77,7 @@ _Member = tuple[Fault, Trigger]
 
 
 def of_plan(workspace: Workspace, plan: Plan) -> tuple[Group, ...]:
-    """The groups of all mutants that the plan runs, canary included; the probe's group is last."""
+    """Return the groups of all mutants that the plan runs, canary included; the probe's group is last."""
     manifest = workspace.manifest(plan.campaign.target)
     members = [(e.fault, e.trigger) for e in (*plan.experiments, plan.canary)]
     runs = Counter(groups.group_label(e.fault) for e in plan.experiments)
@@ -97,7 +97,7 @@ def of_library(
     reading: str | None = None,
     seed: int = 0,
 ) -> tuple[Group, ...]:
-    """The groups of the library's faults; the probe's group is last.
+    """Return the groups of the library's faults; the probe's group is last.
 
     Each fault is built with a trigger for every context of the tables and one for a random time, as in
     campaigns that do not set `hold`. Without `reading`, all readings are included. `specs` are spec files, or
@@ -137,7 +137,7 @@ class _Catalogue:
         self._called = CalledCode(manifest.tree)
 
     def groups(self, members: Sequence[_Member], runs: Mapping[str, int] | None) -> tuple[Group, ...]:
-        """The groups of `members`, sorted by label; `runs` counts experiments by label."""
+        """Return the groups of `members`, sorted by label; `runs` counts experiments by label."""
         found: dict[str, list[_Member]] = {}
         for fault, trigger in members:
             found.setdefault(groups.group_label(fault), []).append((fault, trigger))
@@ -197,7 +197,7 @@ class _Catalogue:
         return (*specs, *(path for one in found for path in (one.template_path, one.source.path)))
 
     def _material(self, faults: Sequence[Fault], patches: Sequence[str]) -> Material:
-        """The texts that a decision about mutants is bound to; `faults` has one fault for each shape."""
+        """Return the texts that a decision about mutants is bound to; `faults` has one for each shape."""
         calls: dict[str, str] = {}
         for fault in faults:
             mutant = build(self.manifest, self.models, fault, always())
@@ -212,7 +212,7 @@ class _Catalogue:
         )
 
     def _material_of_operator(self, fault: Fault, operator: Operator) -> Material:
-        """The texts that determine all mutants of an operator in a function, selected or not."""
+        """Return the texts that determine all mutants of an operator in a function, selected or not."""
         at, tree = fault.injections[0].location, self.manifest.tree
         file, facts = parsed(tree, at.path), facts_of(tree, at.path)
         found = list(mutations_of(file, facts, at.function, self.models, [operator]))
@@ -224,7 +224,9 @@ class _Catalogue:
         )
 
     def _probe(self, runs: Mapping[str, int] | None) -> Group:
-        """The group of the code that every mutant has: the probe, its import, and the observing statement."""
+        """Return the group of the code that every mutant has: the probe, its import, and the observing
+        statement.
+        """
         location = self.manifest.observation.location
         what = f"the probe, observing at {groups.location_label(location)}"
         patch = build(self.manifest, self.models, None, always()).patch

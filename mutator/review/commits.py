@@ -34,7 +34,7 @@ def _names(person: str) -> set[str]:
 
 
 def library_commit(workspace: Workspace) -> str | None:
-    """The library's commit, with `-dirty` if anything but its reviews changed since; None outside git."""
+    """Return the library's commit, with `-dirty` if more than its reviews changed since; None outside git."""
     clone = Clone.of(workspace.library)
     if clone is None:
         return None
@@ -43,7 +43,8 @@ def library_commit(workspace: Workspace) -> str | None:
 
 def check_four_eyes(approvals: Sequence[tuple[Group, str]]) -> None:
     """Raise MutatorError if a reviewer approves a group that they changed last, or if a group's last author
-    is unknown."""
+    is unknown.
+    """
     known: dict[tuple[Path, ...], dict[Path, _Commit]] = {}
     for group, by in approvals:
         if group.made_from not in known:
@@ -59,7 +60,7 @@ def check_four_eyes(approvals: Sequence[tuple[Group, str]]) -> None:
 
 
 def _last_changes(group: Group) -> dict[Path, _Commit]:
-    """The last commit that changed the group's sources, for each clone."""
+    """Return the last commit that changed the group's sources, for each clone."""
     clones: dict[Clone, list[Path]] = {}
     for path in group.made_from:
         clone = Clone.of(path.resolve().parent)

@@ -91,7 +91,7 @@ class Review:
         return entry.decision if entry else None
 
     def remarks(self, group: str) -> tuple[Remark, ...]:
-        """The group's remarks, oldest first."""
+        """Return the group's remarks, oldest first."""
         entry = self.entries.get(group)
         return entry.remarks if entry else ()
 
@@ -105,7 +105,7 @@ class Review:
         return entry.revision if entry else ""
 
     def changed(self, group: Group) -> list[str]:
-        """The parts of a group that changed since the decision, as text."""
+        """Return the parts of a group that changed since the decision, as text."""
         decision = self.decision(group.id)
         return decision.changed(group.bound, group.values) if decision else []
 
@@ -116,24 +116,25 @@ class Review:
         return State.CHANGED if self.changed(group) else State(decision.verdict.value)
 
     def changes(self, group: Group) -> str:
-        """A unified diff from what the reviewer saw to the current state; empty if the decision is valid, or
-        if what the reviewer saw was not stored."""
+        """Return a unified diff from what the reviewer saw to the current state; empty if the decision is
+        valid, or if what the reviewer saw was not stored.
+        """
         decision = self.decision(group.id)
         if decision is None or not self.changed(group):
             return ""
         return seen_texts.changes(self.library, self.seen_name(group.id), decision.bound, group.seen)
 
     def seen_name(self, group: str) -> str:
-        """The file in the library with the text of a group that the reviewer saw."""
+        """Return the file in the library with the text of a group that the reviewer saw."""
         return f"{_FOLDER}/seen/{self.target}/{group}.txt"
 
     def in_turn(self, groups: Iterable[Group]) -> list[Group]:
-        """The groups in list order: new and changed ones first."""
+        """Return the groups in list order: new and changed ones first."""
         order = list(State)
         return sorted(groups, key=lambda group: order.index(self.state(group)))
 
     def describe(self, group: Group) -> str:
-        """The decision about the group and what changed since, as text; empty without a decision."""
+        """Return the decision about the group and what changed since, as text; empty without a decision."""
         decision = self.decision(group.id)
         if decision is None:
             return ""
@@ -145,7 +146,8 @@ class Review:
 
 def load_review(workspace: Workspace, target: str) -> Review:
     """Load the reviews of a target's groups; empty if there is no file. MutatorError, with the line, for a
-    mistake. Links are refused: errors would reveal the linked file, and a change would replace the link."""
+    mistake. Links are refused: errors would reveal the linked file, and a change would replace the link.
+    """
     library, name = workspace.library, _name_of(target)
     try:
         open_below(library, name).close()
@@ -156,7 +158,7 @@ def load_review(workspace: Workspace, target: str) -> Review:
 
 
 def _name_of(target: str) -> str:
-    """The file of a target's reviews in the library."""
+    """Return the file of a target's reviews in the library."""
     return f"{_FOLDER}/{target}.yaml"
 
 
@@ -183,7 +185,7 @@ def record(workspace: Workspace, target: str, changes: Sequence[Change], seen: M
 
 
 def _text_of(kind: Kind) -> str:
-    """The API argument that holds the text of a change."""
+    """Return the API argument that holds the text of a change."""
     return "text" if kind is Kind.REMARK else "remark"
 
 
@@ -268,7 +270,7 @@ def _applied(entry: Entry, change: Change, at: str, commit: str | None) -> Entry
 
 
 def _line(text: str, argument: str) -> str:
-    """The text as one line; MutatorError for characters that YAML cannot store."""
+    """Return the text as one line; MutatorError for characters that YAML cannot store."""
     line = " ".join(text.split())
     if not line.isprintable():
         raise MutatorError(

@@ -56,7 +56,7 @@ class Decision:
     values: Values | None = None
 
     def changed(self, bound: Bound, values: Values) -> list[str]:
-        """The parts of the group that changed since the decision, as text; empty if it is still valid."""
+        """Return the parts of the group that changed since the decision, as text; empty if none did."""
         beyond = _beyond(self.values, values) if self.values is not None else ""
         return self.bound.changed(bound) + ([f"values ({beyond})"] if beyond else [])
 
@@ -103,12 +103,12 @@ class Entry:
 
 
 def values_in_words(values: Values) -> str:
-    """The ranges as text: `by: -40 to 40; seed: 3`."""
+    """Return the ranges as text: `by: -40 to 40; seed: 3`."""
     return "; ".join(f"{name}: {_range(value)}" for name, value in values.items())
 
 
 def _beyond(approved: Values, now: Values) -> str:
-    """The values outside the approved ranges, as text."""
+    """Return the values outside the approved ranges, as text."""
     wider = [name for name in now if not _within(now[name], approved.get(name, ()))]
     told = (f"{name}: {_range(now[name])}; approved {_range(approved.get(name, ()))}" for name in wider)
     return "; ".join(told)

@@ -17,7 +17,8 @@ _MOST_IDS = 10  # maximum number of ids in one printed command
 
 
 def approvals(workspace: Workspace, plan: Plan) -> dict[str, Any]:
-    """The decisions that allow the plan to run (canary and probe included), for `mutator.store.approvals`.
+    """Return the decisions that allow the plan to run (canary and probe included), for
+    `mutator.store.approvals`.
 
     CheckFailed unless every group has a valid approval.
     """
@@ -69,12 +70,12 @@ def reason(review: Review, group: Group) -> str:
 
 
 def share(group: Group) -> str:
-    """The group's share of a campaign as text: a number of experiments, or only the canary."""
+    """Return the group's share of a campaign as text: a number of experiments, or only the canary."""
     return counted(group.runs, "experiment") if group.runs else "the canary"
 
 
 def _campaign(workspace: Workspace, plan: Plan) -> str:
-    """The campaign's name if the library's file of that name has the same text, else its file."""
+    """Return the campaign's name if the library's file of that name has the same text, else its file."""
     name = plan.campaign.name
     known = name in workspace.campaigns
     same = known and read_bounded(workspace.campaign(name)) == plan.campaign.source

@@ -59,8 +59,9 @@ class Shape:
         return "".join(a + b for a, b in zip(self.parts, [*between, ""], strict=True))
 
     def with_named_holes(self, parameters: Iterable[Mapping[str, Value]]) -> "Shape":
-        """The shape with each numbered hole named after the parameter that fills it in every member;
-        `parameters` are in member order."""
+        """Return the shape with each numbered hole named after the parameter that fills it in every member;
+        `parameters` are in member order.
+        """
         each = list(parameters)
         names: list[str] = []
         for hole, name in enumerate(self.holes):
@@ -73,7 +74,7 @@ class Shape:
 
 
 def shapes(patches: Iterable[tuple[str, str, str]]) -> list[Shape]:
-    """The shapes of patches given as (key, name, patch), in the order of their first members.
+    """Return the shapes of patches given as (key, name, patch), in the order of their first members.
 
     Keys are the members' names. Patches with different `name`s never share a shape (see `group_label`).
     """
@@ -90,7 +91,7 @@ def shapes(patches: Iterable[tuple[str, str, str]]) -> list[Shape]:
 
 
 def without_values(patch: str) -> str:
-    """The patch without values, which is equal for all patches of a shape."""
+    """Return the patch without values, which is equal for all patches of a shape."""
     return _rest(patch, list(_spans(patch)))
 
 
@@ -116,7 +117,8 @@ def location_label(location: FaultLocation) -> str:
 
 def injection_label(injection: Injection) -> str:
     """Location, model and parameters without numbers. Names and truth values stay, because they can change
-    the injected code."""
+    the injected code.
+    """
     given = (
         f"{name}={value}" if value is None or isinstance(value, str | bool) else name
         for name, value in injection.params
@@ -132,7 +134,7 @@ def _instance(injection: Injection) -> str:
 
 
 def trigger_kind(trigger: Trigger) -> str:
-    """`always`, `time` (the condition uses only the time) or `state` (any other condition)."""
+    """Return `always`, `time` (the condition uses only the time) or `state` (any other condition)."""
     if trigger.condition == "True":
         return "always"
     return "time" if names_in(trigger.condition) == (TIME,) else "state"
@@ -143,7 +145,9 @@ def hold_of(fault: Fault, trigger: Trigger) -> Hold:
 
 
 def parameter_values(fault: Fault) -> dict[str, Value]:
-    """The parameters of a fault's injections by name: `by`; with several injections also `1.by`, `2.by`."""
+    """Return the parameters of a fault's injections by name: `by`; with several injections also `1.by`,
+    `2.by`.
+    """
     given = [dict(injection.params) for injection in fault.injections]
     common = {
         name: value
@@ -164,7 +168,8 @@ class _ShapeBuilder:
 
     def shape(self, name: str, rest: str) -> Shape:
         """Build the shape: values equal in all members become text, and values equal to each other share a
-        hole."""
+        hole.
+        """
         pieces = rest.split(HOLE) if self.labels else [rest]
         parts, places = [pieces[0]], []
         columns: dict[tuple[str, ...], int] = {}

@@ -21,7 +21,8 @@ _SHOWN_HOLE = "⟨⟩"
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Material:
     """The texts that a decision is bound to. `diff` has one text for each shape, or a pair of texts for each
-    change that an operator makes."""
+    change that an operator makes.
+    """
 
     diff: Sequence[str] | Sequence[Sequence[str]]
     functions: Mapping[str, str]
@@ -64,7 +65,7 @@ def functions_of(tree: SourceTree, locations: Iterable[FaultLocation]) -> dict[s
 
 
 def fault_hunks(patch: str) -> str:
-    """The hunks of a patch that contain lines of a fault."""
+    """Return the hunks of a patch that contain lines of a fault."""
     kept = []
     for section in file_patches(patch):
         if not adds_file(section):
@@ -81,7 +82,7 @@ def _named(texts: Mapping[str, str | Sequence[str]]) -> str:
 
 @lru_cache(maxsize=256)
 def _function(data: bytes, name: str) -> bytes:
-    """The source of the functions with this qualified name, decorators included."""
+    """Return the source of the functions with this qualified name, decorators included."""
     lines = data.splitlines(keepends=True)
     spans = [
         (min(n.lineno for n in (node, *node.decorator_list)), node.end_lineno)

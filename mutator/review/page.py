@@ -51,8 +51,9 @@ def page_html(
     options: Sequence[str],
     served: Mapping[str, Any] | None = None,
 ) -> str:
-    """The page of `groups`. `served` has what a served page needs: target, reviewer, address and token for
-    decisions, runs."""
+    """Return the page of `groups`. `served` has what a served page needs: target, reviewer, address and token
+    for decisions, runs.
+    """
     data = {
         "target": review.target,
         "states": [state.value for state in State],
@@ -79,8 +80,9 @@ def render_page(data: dict[str, Any]) -> str:
 
 
 def state_of(review: Review, group: Group) -> dict[str, Any]:
-    """The review of a group, as the page shows it. `digest` identifies the mutants, so that decisions from a
-    page that shows other mutants are refused."""
+    """Return the review of a group, as the page shows it. `digest` identifies the mutants, so that decisions
+    from a page that shows other mutants are refused.
+    """
     decision, flag = review.decision(group.id), review.flag(group.id)
     return {
         "state": review.state(group).value,
@@ -102,8 +104,9 @@ def state_of(review: Review, group: Group) -> dict[str, Any]:
 
 
 def _in_stacks(review: Review, groups: Sequence[Group]) -> list[tuple[Group, int]]:
-    """The groups with stack numbers, in stack order. The groups of a stack share state, template, function
-    and called code."""
+    """Return the groups with stack numbers, in stack order. The groups of a stack share state, template,
+    function and called code.
+    """
     kinds: dict[tuple[object, ...], int] = {}
     numbered = []
     for group in groups:

@@ -61,7 +61,8 @@ class Level:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pictures:
     """A group's images as JPEG files. One distinct value gives only the level `most`; two give `least` and
-    `most`."""
+    `most`.
+    """
 
     before: bytes
     levels: tuple[Level, ...]
@@ -78,14 +79,14 @@ def has_pictures(group: Group) -> bool:
 def of_group(
     workspace: Workspace, manifest: TargetManifest, group: Group, level: str
 ) -> tuple[bytes, bytes] | None:
-    """The image before and after the effect at one of LEVELS, as JPEG files."""
+    """Return the image before and after the effect at one of LEVELS, as JPEG files."""
     found = of_groups(workspace, manifest, [group]).get(group.id)
     wanted = found.level(level) if found else None
     return (found.before, wanted.after) if found and wanted else None
 
 
 def of_groups(workspace: Workspace, manifest: TargetManifest, groups: Iterable[Group]) -> dict[str, Pictures]:
-    """The images of all groups that have any, by group; drawn unless cached.
+    """Return the images of all groups that have any, by group; drawn unless cached.
 
     Groups of one place are drawn in one process. MutatorError if the target does not reach the place, or if
     an effect fails there.
@@ -129,7 +130,7 @@ class _Wanted:
 
 
 def _scenario(workspace: Workspace) -> Path:
-    """The library's first scenario: any road will do."""
+    """Return the library's first scenario: any road will do."""
     found = next(iter(workspace.scenarios.values()), None)
     if found is None:
         raise MutatorError(
@@ -145,7 +146,7 @@ def _effects(fault: Fault) -> tuple[Injection, ...]:
 
 
 def _place(fault: Fault) -> tuple[FaultLocation, str] | None:
-    """The place of a fault's image effects, and the variable with the image; None for several places."""
+    """Return the place of a fault's image effects, and the image variable; None for several places."""
     places = {(one.location, str(dict(one.params)["target"])) for one in _effects(fault)}
     return places.pop() if len(places) == 1 else None
 
@@ -205,7 +206,7 @@ def _drawn_anew(
 def _run(
     engine: ReferenceEngine, models: FaultModels, scenario: Path, groups: Sequence[_Wanted], folder: Path
 ) -> list[np.ndarray]:
-    """The image before the effect, then the images after each fault of each group."""
+    """Return the image before the effect, then the images after each fault of each group."""
     manifest, (location, picture) = engine.manifest, groups[0].place
     first = groups[0].faults[0]
     mutant = build(manifest, models, replace(first, injections=_effects(first)[:1]), always())
@@ -245,9 +246,10 @@ def _shown(before: np.ndarray, faults: Sequence[Fault], after: Sequence[np.ndarr
 
 
 def _by_severity(changes: Sequence[float]) -> list[int]:
-    """Indices into `changes`, least severe first. The order follows the amounts, in the direction in which
-    the image changes more, so that random differences between neighbouring amounts do not matter. Amounts on
-    both sides of "no effect" are ordered by change."""
+    """Return the indices into `changes`, least severe first. The order follows the amounts, in the direction
+    in which the image changes more, so that random differences between neighbouring amounts do not matter.
+    Amounts on both sides of "no effect" are ordered by change.
+    """
     order = list(range(len(changes)))
     trend = correlation(order, changes) if len(set(changes)) > 1 else 1.0
     if abs(trend) < CLEAR:

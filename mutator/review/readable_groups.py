@@ -13,7 +13,7 @@ _ID_HOLE = re.compile(r"id(_\d+)?\Z")  # readers do not need ids
 
 
 def value_table(group: Group) -> tuple[list[str], list[list[str]]]:
-    """The headings, and a row for each fault with the values of its holes, except ids."""
+    """Return the headings, and a row for each fault with the values of its holes, except ids."""
     faults = {fault.id: fault for fault in group.faults}
     names = list(dict.fromkeys(name for shape in group.shapes for name in _shown_holes(shape)))
     rows = []
@@ -31,7 +31,7 @@ def _shown_holes(shape: Shape) -> list[str]:
 
 
 def ranges(group: Group) -> str:
-    """The ranges of values that an approval covers: `by: -40 to 40`."""
+    """Return the ranges of values that an approval covers: `by: -40 to 40`."""
     return values_in_words(group.values)
 
 

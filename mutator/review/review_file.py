@@ -92,7 +92,7 @@ def load(path: Path, target: str) -> Content:
 
 
 def text(target: str, content: Content) -> str:
-    """The text of a file, sorted so that git can merge parallel work."""
+    """Return the text of a file, sorted so that git can merge parallel work."""
     blocks = [_block(content.entries[name]) for name in sorted(content.entries)]
     head = f"schema: {SCHEMA}\ntarget: {json.dumps(target)}\n" + "four_eyes: true\n" * content.four_eyes
     return f"{_HEAD}{head}decisions:" + ("\n" + "".join(blocks) if blocks else " []\n")
@@ -169,7 +169,7 @@ def _given(remark: Remark) -> dict[str, str]:
 
 
 def _json(value: Any) -> str:
-    """The value as one line of JSON, which is also YAML."""
+    """Return the value as one line of JSON, which is also YAML."""
     return json.dumps(value, ensure_ascii=False)
 
 
@@ -206,7 +206,8 @@ def _merged(target: str, entries: Iterable[Entry]) -> dict[str, Entry]:
 
 def _one(group: str, what: str, parts: Sequence[Entry]) -> Entry:
     """Merge decisions: rejected if any part was rejected, else approved. `by` names all reviewers with that
-    verdict."""
+    verdict.
+    """
     decisions = [entry.decision for entry in parts if entry.decision]
     remarks = tuple(dict.fromkeys(remark for entry in parts for remark in entry.remarks))
     counting = [one for one in decisions if one.verdict is Verdict.REJECTED] or decisions

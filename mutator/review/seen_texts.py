@@ -17,7 +17,7 @@ _HUNK = re.compile(r"@@ -\S+ \+(\d+)\S* @@")
 
 
 def text_of(bound: Bound, values: Values, sections: Mapping[str, str]) -> str:
-    """The stored text of a group: its digests, its values, then each section under its name."""
+    """Return the stored text of a group: its digests, its values, then each section under its name."""
     parts = {"values": values_in_words(values), **sections}
     named = (f"== {name} ==\n{text}" + "\n" * (not text.endswith("\n")) for name, text in parts.items())
     return f"{_head(bound)}\n" + "\n".join(named)
@@ -29,8 +29,9 @@ def keep(library: Path, name: str, text: str) -> None:
 
 
 def changes(library: Path, name: str, bound: Bound, text: str) -> str:
-    """A unified diff from the stored text to the current `text`; empty if no text was stored for the decision
-    with the digests `bound`."""
+    """Return a unified diff from the stored text to the current `text`; empty if no text was stored for the
+    decision with the digests `bound`.
+    """
     try:
         before = read_below(library, name).decode("utf-8", "surrogateescape")
     except (OSError, MutatorError):
@@ -42,14 +43,14 @@ def changes(library: Path, name: str, bound: Bound, text: str) -> str:
 
 
 def _headed(diff: Iterable[str], new: Sequence[str]) -> Iterator[str]:
-    """The diff, with the hunk's section after each `@@` line, such as `calls: car/lens.py Light`."""
+    """Yield the diff, with the hunk's section after each `@@` line, such as `calls: car/lens.py Light`."""
     for line in diff:
         hunk = _HUNK.match(line)
         yield f"{hunk[0]} {_section(new[: int(hunk[1]) - 1 + _AROUND])}\n" if hunk else line
 
 
 def _section(lines: Iterable[str]) -> str:
-    """The names of the last section in these lines and of its last part."""
+    """Return the names of the last section in these lines and of its last part."""
     section = part = ""
     for line in lines:
         if line.startswith("== "):

@@ -15,14 +15,15 @@ _COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
 @dataclass(frozen=True, slots=True)
 class Import:
     """`from module import name`, or `import module` if `name` is None. `level` is the number of dots before
-    the module."""
+    the module.
+    """
 
     module: str
     name: str | None = None
     level: int = 0
 
     def absolute(self, path: str) -> str:
-        """The module's full name, for an import in the file at `path`."""
+        """Return the module's full name, for an import in the file at `path`."""
         if not self.level:
             return self.module
         parts = path.split("/")[: -self.level]
@@ -51,14 +52,14 @@ class Module:
     imports: Mapping[str, Sequence[Import]]
 
     def nodes_of(self, name: str) -> Sequence[ast.stmt]:
-        """The statements that define a name: several if it is assigned more than once."""
+        """Return the statements that define a name: several if it is assigned more than once."""
         return self.defined.get(name, ())
 
     def knows(self, name: str) -> bool:
         return name in self.defined or name in self.imports
 
     def function(self, name: str) -> ast.stmt | None:
-        """The function with that qualified name; the last if there are several."""
+        """Return the function with that qualified name; the last if there are several."""
         found = self.nodes_of(name)
         return found[-1] if found else None
 
@@ -70,7 +71,7 @@ class Module:
         return [words for base in bases if (words := _dotted(base))]
 
     def source_of(self, name: str, data: bytes) -> bytes:
-        """The lines of all statements that define a name, decorators included."""
+        """Return the lines of all statements that define a name, decorators included."""
         lines = data.splitlines(keepends=True)
         parts = []
         for node in self.nodes_of(name):
@@ -81,7 +82,7 @@ class Module:
 
 
 def read_module(path: str, data: bytes, root: Path) -> Module:
-    """The names in a file; empty if it is not Python."""
+    """Return the names in a file; empty if it is not Python."""
     try:
         tree = ast.parse(data)
     except (SyntaxError, ValueError, RecursionError):
@@ -96,13 +97,14 @@ def read_module(path: str, data: bytes, root: Path) -> Module:
 
 
 def uses_in(node: ast.AST, owner: str = "", wanted: _Wanted | None = None) -> Iterator[Use]:
-    """The external names used in `node`, within the parts that `wanted` accepts. `owner` is the class of a
-    method."""
+    """Yield the external names used in `node`, within the parts that `wanted` accepts. `owner` is the class
+    of a method.
+    """
     yield from _uses(node, _Scope(owner=owner), wanted or (lambda _: True))
 
 
 def uses_beside(function: ast.stmt | None, owner: str, node: ast.AST) -> Iterator[Use]:
-    """The external names that `node` uses inside a function (a method, if `owner` is a class)."""
+    """Yield the external names that `node` uses inside a function (a method, if `owner` is a class)."""
     scope = _Scope(owner=owner)
     yield from _uses(node, scope.inside(function) if isinstance(function, _SCOPES) else scope, lambda _: True)
 
@@ -128,7 +130,7 @@ class _Scope:
         )
 
     def use(self, words: tuple[str, ...]) -> Use | None:
-        """The external use of a name with attributes; None for a local variable."""
+        """Return the external use of a name with attributes; None for a local variable."""
         for name, one in reversed(self.imports):
             if name == words[0]:
                 return Use(words, imported=one)
@@ -149,7 +151,7 @@ def _uses(node: ast.AST, scope: _Scope, wanted: _Wanted) -> Iterator[Use]:
 
 
 def _parts(node: ast.AST, scope: _Scope) -> Iterator[tuple[ast.AST, _Scope]]:
-    """The parts of a node with their scopes, without annotations."""
+    """Yield the parts of a node with their scopes, without annotations."""
     if isinstance(node, ast.ClassDef):
         inner = replace(scope, owner=f"{scope.owner}.{node.name}".strip("."), me="")
         yield from ((one, scope) for one in (*node.bases, *node.keywords, *node.decorator_list))

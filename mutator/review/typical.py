@@ -38,7 +38,8 @@ class Case:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Typical:
     """A group's results in a run. The typical experiment is the median, by rank, of those with the most
-    frequent outcome; the worst has the first rank."""
+    frequent outcome; the worst has the first rank.
+    """
 
     experiments: int
     outcomes: Mapping[str, int]
@@ -47,8 +48,9 @@ class Typical:
 
 
 def of_group(run: RunFolder, group: Group) -> Typical | None:
-    """The group's results in a run; None if the results table has no experiment of the group. MutatorError if
-    the run has no table."""
+    """Return the group's results in a run; None if the results table has no experiment of the group.
+    MutatorError if the run has no table.
+    """
     table = Results.of_run(run.path)
     try:
         written = table.path.stat().st_mtime_ns
@@ -60,7 +62,7 @@ def of_group(run: RunFolder, group: Group) -> Typical | None:
 
 @lru_cache(maxsize=8)
 def _of_run(path: Path, written: int) -> dict[str, Typical]:
-    """The results of each group by label; `written`, the time of the table, is only a cache key."""
+    """Return the results of each group by label; `written`, the time of the table, is only a cache key."""
     import numpy as np
 
     texts = Results.of_run(path).texts()
@@ -77,8 +79,9 @@ def _of_run(path: Path, written: int) -> dict[str, Typical]:
 def _typical(
     texts: "pd.DataFrame", ended: Sequence[str], rows: Sequence[int], about: Mapping[str, str]
 ) -> Typical:
-    """The result for `rows`, sorted from worst to best. Of two equally frequent outcomes, the worse one is
-    typical."""
+    """Return the result for `rows`, sorted from worst to best. Of two equally frequent outcomes, the worse
+    one is typical.
+    """
     by_ending: dict[str, list[int]] = {}
     for row in rows:
         by_ending.setdefault(ended[row], []).append(row)
@@ -101,7 +104,7 @@ def _case(texts: "pd.DataFrame", number: int, about: Mapping[str, str]) -> Case:
 
 
 def verdict_of(row: Row, about: Mapping[str, str]) -> str:
-    """An experiment's result as text; `about` explains the hazards."""
+    """Return an experiment's result as text; `about` explains the hazards."""
     if row.ending in _PLAIN:
         return _PLAIN[row.ending]
     if row.ending == Outcome.SDC.value:

@@ -15,7 +15,7 @@ _Value = float | str
 
 
 def ranges_of(faults: Iterable[Fault], specs: Mapping[str, FaultSpec], models: FaultModels) -> Values:
-    """The range of each parameter of `faults`: all drawn values and all that their specs can draw.
+    """Return the range of each parameter of `faults`: all drawn values and all that their specs can draw.
 
     `specs` maps names to specs; a fault without a spec contributes only its own values. With several
     injections, names are numbered: `1.by`, `2.by`. Texts and truth values define the group, so they are not
@@ -35,7 +35,7 @@ def ranges_of(faults: Iterable[Fault], specs: Mapping[str, FaultSpec], models: F
 
 
 def _ends(fault: Fault, spec: FaultSpec | None, models: FaultModels) -> Iterator[tuple[Injection, ...]]:
-    """The injections with the least and the greatest value that the fault's spec can draw."""
+    """Yield the injections with the least and the greatest value that the fault's spec can draw."""
     name = fault.spec.rpartition("/")[2]
     for variant in spec or ():
         if variant.name == name and variant.draw and spec:

@@ -60,7 +60,8 @@ class ReviewApi:
 
 class JobApi:
     """Jobs for the first page, which can start and cancel all, and for a report, which can start and cancel
-    those of its run."""
+    those of its run.
+    """
 
     def __init__(self, desk: Desk, jobs: Jobs, tokens: PageTokens) -> None:
         self._desk, self._jobs, self._tokens = desk, jobs, tokens

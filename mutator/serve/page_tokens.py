@@ -40,7 +40,7 @@ class PageTokens:
 
 
 def run_page(folder: Path) -> str:
-    """The name of a run's report for `PageTokens`."""
+    """Return the name of a run's report for `PageTokens`."""
     return f"run {folder}"
 
 

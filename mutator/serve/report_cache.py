@@ -26,7 +26,8 @@ class ReportCache:
 
     def file(self, key: str, name: str, build: Callable[[], Mapping[str, bytes]]) -> bytes | None:
         """Return a file of a report, or None if it has no such file. `build` builds a report that is not
-        cached."""
+        cached.
+        """
         files = self._memory.pop(key, None) or _stored(key)
         if files is None:
             files = build()

@@ -86,7 +86,8 @@ class Shown:
 
     def _built(self, folder: RunFolder) -> Mapping[str, bytes]:
         """Build a report. Raise MutatorError if the tables of a finished run do not follow from its records:
-        the report shows them beside the run's seal."""
+        the report shows them beside the run's seal.
+        """
         if folder.finished:
             for problem in tables(folder)[1]:
                 raise problem

@@ -60,7 +60,8 @@ class Pooled:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Difference:
     """The hazard rate of guided runs minus that of random runs, with its bootstrap interval over `clusters`
-    faults."""
+    faults.
+    """
 
     difference: float
     low: float
@@ -118,7 +119,8 @@ def fisher(stratum: Stratum) -> float:
 
 def holm(p_values: Sequence[float]) -> tuple[float, ...]:
     """Adjust p-values by Holm's method (Scandinavian Journal of Statistics 6, 1979): the k-th smallest of n
-    is multiplied by n - k + 1; results are monotone and at most 1. NaN stays NaN."""
+    is multiplied by n - k + 1; results are monotone and at most 1. NaN stays NaN.
+    """
     known = sorted((p, place) for place, p in enumerate(p_values) if not math.isnan(p))
     adjusted, largest = [math.nan] * len(p_values), 0.0
     for k, (p, place) in enumerate(known):

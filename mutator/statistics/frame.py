@@ -64,12 +64,13 @@ _SHARED = (
 
 def slim(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
     """Keep only the columns that most statistics need, and those in `more`. Selecting from a million rows
-    with all columns takes seconds."""
+    with all columns takes seconds.
+    """
     flags = [hazard.lower() for hazard in hazard_names(frame)]
     wanted = {*_SHARED, *flags, *more}
     return frame[[name for name in frame.columns if name in wanted or name.startswith(("t_", "is_"))]]
 
 
 def hazard_names(frame: pd.DataFrame) -> tuple[str, ...]:
-    """The hazards in the table, sorted. A hazard NEAR has a flag `near` and a time `t_near`."""
+    """Return the hazards in the table, sorted. A hazard NEAR has a flag `near` and a time `t_near`."""
     return tuple(sorted(hazards_in(frame.columns)))

@@ -20,8 +20,8 @@ _BLOCK = 256  # minimum number of values in a block
 
 
 def median_interval(values: pd.Series, cluster: pd.Series) -> tuple[float, float]:
-    """The interval of the median of `values`, which must not contain NaN. `cluster` has the cluster of each
-    value.
+    """Return the interval of the median of `values`, which must not contain NaN. `cluster` has the cluster of
+    each value.
 
     NaN if there are fewer than two clusters or if all values are equal, because unobserved values can differ.
     """
@@ -29,8 +29,9 @@ def median_interval(values: pd.Series, cluster: pd.Series) -> tuple[float, float
 
 
 def median_difference(first: pd.Series, second: pd.Series, cluster: pd.Series) -> Difference:
-    """The median of the second values minus that of the first, with its interval; draws keep pairs together.
-    NaN without pairs. The interval is NaN in the same cases as in `median_interval`."""
+    """Return the median of the second values minus that of the first, with its interval; draws keep pairs
+    together. NaN without pairs. The interval is NaN in the same cases as in `median_interval`.
+    """
     before, after = first.to_numpy(dtype=float), second.to_numpy(dtype=float)
     if not before.size:
         return Difference(difference=math.nan, low=math.nan, high=math.nan)
@@ -39,7 +40,7 @@ def median_difference(first: pd.Series, second: pd.Series, cluster: pd.Series) -
 
 
 def _interval(samples: list[np.ndarray], cluster: pd.Series) -> tuple[float, float]:
-    """The interval of the median of the first sample, minus the median of the second if there is one."""
+    """Return the interval of the median of the first sample, minus that of the second if there is one."""
     codes, names = pd.factorize(cluster)
     alike = np.ptp(samples[0] if len(samples) == 1 else samples[0] - samples[1]) == 0 if codes.size else True
     if len(names) < 2 or alike:
@@ -56,14 +57,16 @@ def _interval(samples: list[np.ndarray], cluster: pd.Series) -> tuple[float, flo
 
 
 def _block_of(clusters: int, runs: int) -> int:
-    """The number of values per block. It balances two costs: a product for each block and cluster, and work
-    on each value in the median's block, which is about 50 times as slow."""
+    """Return the number of values per block. It balances two costs: a product for each block and cluster, and
+    work on each value in the median's block, which is about 50 times as slow.
+    """
     return max(_BLOCK, math.isqrt(clusters * runs // 50))
 
 
 def _draws(clusters: int, others: int) -> Iterator[np.ndarray]:
     """Yield batches of shape (draws, clusters): how often each cluster is drawn. Each draw also needs memory
-    for `others` cells."""
+    for `others` cells.
+    """
     rng = np.random.default_rng(_SEED)
     batch = max(1, _CELLS // max(clusters, others))
     for begin in range(0, RESAMPLES, batch):
@@ -73,7 +76,8 @@ def _draws(clusters: int, others: int) -> Iterator[np.ndarray]:
 
 class _Sorted:
     """Sorted values in blocks, with the number of each cluster's values in each block. The median of a draw
-    is located first by block, then within the block."""
+    is located first by block, then within the block.
+    """
 
     def __init__(self, values: np.ndarray, codes: np.ndarray, clusters: int, block: int) -> None:
         self._block = block
@@ -84,8 +88,9 @@ class _Sorted:
         self._of = np.bincount(cells, minlength=blocks * clusters).reshape(blocks, clusters).astype(float)
 
     def medians(self, counts: np.ndarray) -> np.ndarray:
-        """The median of each draw. `counts`, of shape (draws, clusters), says how often each cluster is
-        drawn."""
+        """Return the median of each draw. `counts`, of shape (draws, clusters), says how often each cluster
+        is drawn.
+        """
         until = np.cumsum(counts @ self._of.T, axis=1)  # integers, which floats represent exactly
         whole = until[:, -1:].astype(np.int64)
         lower, upper = (self._at(place, until, counts) for place in ((whole - 1) // 2, whole // 2))

@@ -21,7 +21,8 @@ _INTERVAL = (
 
 def metrics_sheet(frame: pd.DataFrame, metrics: Sequence[Sequence[str]]) -> Sheet:
     """Tabulate the spread of each metric, given as (name, unit, meaning, worse direction). Without values,
-    the table has no lines."""
+    the table has no lines.
+    """
     lines: list[tuple[Cell, ...]] = []
     activated = frame.loc[frame["is_activated"], ["kind", "fault_id", *(name for name, *_ in metrics)]]
     for name, unit, _, worse in metrics:
@@ -45,7 +46,7 @@ def metrics_sheet(frame: pd.DataFrame, metrics: Sequence[Sequence[str]]) -> Shee
 
 
 def severity_sheet(frame: pd.DataFrame) -> Sheet:
-    """The table of activated faults by severity class. Without classes, it has no lines."""
+    """Return the table of activated faults by severity class. Without classes, it has no lines."""
     lines: list[tuple[Cell, ...]] = []
     known = [name for name in ("kind", "severity") if name in frame]
     activated = frame.loc[frame["is_activated"], known]
@@ -90,7 +91,8 @@ def tolerant_times_sheet(frame: pd.DataFrame, *, alerts: bool = True) -> Sheet:
 
 def _groups(frame: pd.DataFrame, values: pd.Series) -> Iterator[tuple[str, pd.Series, pd.Series]]:
     """Yield each fault type with the values of its runs and the faults that they belong to. Runs without a
-    value are left out."""
+    value are left out.
+    """
     known = values.dropna()
     for kind, group in _by_kind(frame.loc[known.index, ["kind", "fault_id"]]):
         yield kind, known[group.index], group["fault_id"]

@@ -41,7 +41,7 @@ _UNKNOWN_ALERTS = " The fault-free runs cannot be read, so alerts are not compar
 def drives_of(
     frame: pd.DataFrame, faults: Mapping[str, Fault], golden_alerts: GoldenAlerts | None
 ) -> pd.DataFrame:
-    """A frame with a row for each usable experiment of an operator mutant.
+    """Return a frame with a row for each usable experiment of an operator mutant.
 
     Columns: `mutant` (the fault's id), `operator`, `function` (`path::name`), `fault` (permanent or
     transient), a flag `active`, and a flag for each effect. A crashed or timed-out drive is active. Without
@@ -90,9 +90,10 @@ def score_sheet(
     golden_alerts: GoldenAlerts | None,
     told: Sequence[str] = (),
 ) -> Sheet:
-    """The score in total, by operator and by function, for permanent and transient faults. Without results of
-    operator mutants, it has no lines. `faults` are those of the plan. `golden_alerts` are the alerts that
-    golden runs raise (None: not known). `told` describes the available mutants and exclusions."""
+    """Return the score in total, by operator and by function, for permanent and transient faults. Without
+    results of operator mutants, it has no lines. `faults` are those of the plan. `golden_alerts` are the
+    alerts that golden runs raise (None: not known). `told` describes the available mutants and exclusions.
+    """
     drives = drives_of(frame, faults, golden_alerts)
     planned = {name for name, fault in faults.items() if fault.module == OPERATORS}
     missing = len(planned - set(drives["mutant"]))
@@ -109,7 +110,7 @@ def score_sheet(
 
 
 def totals(sheet: Sheet) -> Table:
-    """The lines for all mutants, with fewer columns."""
+    """Return the lines for all mutants, with fewer columns."""
     rows = [
         (f"{'all' if lasting == EITHER else lasting} {counted}", *map(_short, cells))
         for name, counted, lasting, *cells in sheet.lines
@@ -149,7 +150,7 @@ def _any_drive(drives: pd.DataFrame) -> pd.DataFrame:
 
 
 def _line(name: str, counted: str, lasting: str, flags: pd.DataFrame) -> tuple[Cell, ...]:
-    """A line of the sheet. `flags` has a row for each counted item and is indexed by mutant."""
+    """Return a line of the sheet. `flags` has a row for each counted item and is indexed by mutant."""
     active = flags[flags[_ACTIVE]]
     known = [effect for effect in _EFFECTS if effect in active]
     cells = [_share(active[effect]) if effect in active else None for effect in _EFFECTS]
@@ -158,7 +159,7 @@ def _line(name: str, counted: str, lasting: str, flags: pd.DataFrame) -> tuple[C
 
 
 def _share(flag: "pd.Series[bool]") -> Share:
-    """The share of a flag. If a mutant has several rows, the interval resamples whole mutants."""
+    """Return the share of a flag. If a mutant has several rows, the interval resamples whole mutants."""
     count, of = int(flag.sum()), len(flag)
     if flag.index.is_unique:
         return share(count, of)

@@ -23,7 +23,8 @@ _DIGITS = 9  # decimals of a time difference; absorbs rounding errors
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Matched:
     """Numbers of pairs with the event under both conditions, only the first, only the second, or neither. `p`
-    is from McNemar's exact test that the event is equally likely under both."""
+    is from McNemar's exact test that the event is equally likely under both.
+    """
 
     both: int
     first_only: int
@@ -48,7 +49,8 @@ class Difference:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Times:
     """The times of `n` complete pairs in s: both medians, and the median difference (second minus first) with
-    its exact interval. `p` is from Wilcoxon's test that the differences are symmetric about 0."""
+    its exact interval. `p` is from Wilcoxon's test that the differences are symmetric about 0.
+    """
 
     n: int
     first: float
@@ -76,7 +78,9 @@ def mcnemar(first: pd.Series, second: pd.Series) -> Matched:
 
 
 def rate_difference(first: pd.Series, second: pd.Series, cluster: pd.Series) -> Difference:
-    """The difference of a flag's rates, second minus first, with its `resampled_interval` over clusters."""
+    """Return the difference of a flag's rates, second minus first, with its `resampled_interval` over
+    clusters.
+    """
     change = second.astype(int) - first.astype(int)
     sums = change.groupby(cluster.to_numpy()).agg(["sum", "count"])
     low, high = resampled_interval((sums["sum"].to_numpy(), sums["count"].to_numpy()), _mean)
@@ -85,7 +89,7 @@ def rate_difference(first: pd.Series, second: pd.Series, cluster: pd.Series) -> 
 
 
 def resampled_interval(clusters: Sequence[np.ndarray], statistic: Callable[..., Any]) -> tuple[float, float]:
-    """The interval of a statistic from a percentile bootstrap over whole clusters (scipy).
+    """Return the interval of a statistic from a percentile bootstrap over whole clusters (scipy).
 
     Each array has a number for each cluster. NaN if there are fewer than two clusters, if the statistic is
     undefined for some draws, or if it is equal for all draws, because unobserved clusters can differ.
@@ -117,7 +121,8 @@ def _mean(changes: Any, pairs: Any, axis: int = -1) -> Any:
 
 def times(first: pd.Series, second: pd.Series) -> Times:
     """Compare the times of complete pairs (scipy): medians, the median difference with an exact interval from
-    order statistics, and p of Wilcoxon's signed-rank test (NaN if no time differs)."""
+    order statistics, and p of Wilcoxon's signed-rank test (NaN if no time differs).
+    """
     from scipy.stats import quantile_test
 
     known = first.notna() & second.notna()
@@ -139,7 +144,7 @@ def times(first: pd.Series, second: pd.Series) -> Times:
 
 
 def wilcoxon(first: pd.Series, second: pd.Series) -> float:
-    """The p-value of Wilcoxon's signed-rank test (scipy) on pairs without NaN; NaN if no pair differs."""
+    """Return the p-value of Wilcoxon's signed-rank test on pairs without NaN; NaN if no pair differs."""
     from scipy.stats import wilcoxon as signed_rank
 
     change = (second - first).round(_DIGITS)

@@ -30,7 +30,7 @@ _BY_KIND = ((_ACTIVATED, _INJECTED), (_HAZARDS, _ACTIVATED), (_HAZARDS, _INJECTE
 
 
 def seeds_of(frame: pd.DataFrame) -> list[str]:
-    """The seeds of a frame in numeric order. Rows without a seed ('') are ignored."""
+    """Return the seeds of a frame in numeric order. Rows without a seed ('') are ignored."""
     return sorted(filter(None, map(str, frame["seed"].unique())), key=int)
 
 
@@ -62,7 +62,7 @@ def kinds_sheet(frame: pd.DataFrame) -> Sheet:
 
 
 def _shares(frame: pd.DataFrame, *, alerts: bool) -> list[tuple[str, str]]:
-    """The shares to compute, each as (what is counted, the base)."""
+    """Return the shares to compute, each as (what is counted, the base)."""
     made = [(_ACTIVATED, _INJECTED), ("manifested", _ACTIVATED), *_BY_KIND[1:]]
     made += [(name, whole) for name in hazard_names(frame) for whole in (_ACTIVATED, _INJECTED)]
     if alerts:

@@ -31,7 +31,7 @@ class Share:
 
 
 def share(count: int, of: int) -> Share:
-    """The share `count`/`of`, with its 95 % Wilson interval (statsmodels)."""
+    """Return the share `count`/`of`, with its 95 % Wilson interval (statsmodels)."""
     from statsmodels.stats.proportion import proportion_confint  # type: ignore[import-untyped]
 
     if not of:

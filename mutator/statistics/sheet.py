@@ -36,7 +36,8 @@ Cell = Share | float | int | str | None
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sheet:
     """One table. `name` is the file name, and `note` says what is counted. Each line has a cell for each
-    heading."""
+    heading.
+    """
 
     name: str
     title: str
@@ -51,8 +52,9 @@ class Sheet:
         return f"## {self.title}\n\n{self.note}\n\n{self.table().as_markdown()}\n"
 
     def csv(self) -> str:
-        """The table as CSV. A share becomes five columns: count, of, rate, and both ends of its interval
-        (fractions)."""
+        """Return the table as CSV. A share becomes five columns: count, of, rate, and both ends of its
+        interval (fractions).
+        """
         columns, lines = self._unfolded(_number)
         out = io.StringIO()
         writer = csv.writer(out, lineterminator="\n")
@@ -61,7 +63,7 @@ class Sheet:
         return out.getvalue()
 
     def frame(self) -> "pd.DataFrame":
-        """The columns of the CSV as a pandas frame, with full precision."""
+        """Return the columns of the CSV as a pandas frame, with full precision."""
         import pandas as pd
 
         columns, lines = self._unfolded(float)

@@ -72,7 +72,7 @@ def _title(title: str, published: str) -> str:
 def _sources(
     method: str, ours: Counts, published: Published | None, theirs: Counts, names: Iterable[str]
 ) -> dict[str, dict[str, Tally | None]]:
-    """The published counts, if any, and those of the run, by group. None: not published."""
+    """Return the published counts, if any, and those of the run, by group. None: not published."""
     groups = list(names)
     known = {name: theirs.get((method, name)) for name in groups}
     sources: dict[str, dict[str, Tally | None]] = {}

@@ -38,7 +38,7 @@ def tally(frame: pd.DataFrame) -> Tally:
 
 
 def total(tallies: Iterable[Tally]) -> Tally:
-    """The sum over groups. A count is None if it is None in any group."""
+    """Return the sum over groups. A count is None if it is None in any group."""
     all_of_them = list(tallies)
     sums: dict[str, Any] = {}
     for field in fields(Tally):

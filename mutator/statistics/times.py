@@ -65,8 +65,9 @@ def spread(times: pd.Series) -> Spread:
 
 
 def propagation(frame: pd.DataFrame) -> dict[str, Spread]:
-    """The times from activation to the first actuator difference, alert and hazard, and from the first alert
-    to the first hazard if the alert came first."""
+    """Return the times from activation to the first actuator difference, alert and hazard, and from the first
+    alert to the first hazard if the alert came first.
+    """
     start = frame["t_activation"]
     reaction = frame["t_hazard"] - frame["t_alert"]
     return {
@@ -78,7 +79,7 @@ def propagation(frame: pd.DataFrame) -> dict[str, Spread]:
 
 
 def reaction(frame: pd.DataFrame, ends: Mapping[str, float], driver_s: float) -> Reaction:
-    """The Kaplan-Meier estimate (statsmodels) over the runs with an alert before any hazard.
+    """Return the Kaplan-Meier estimate (statsmodels) over the runs with an alert before any hazard.
 
     `ends` maps each scenario to the end of its runs, in simulated seconds. Crashed and timed-out runs are
     left out, because their ends are unknown.
@@ -118,8 +119,9 @@ def reaction(frame: pd.DataFrame, ends: Mapping[str, float], driver_s: float) ->
 
 
 def _median(curve: Any) -> float:
-    """The time at which a Kaplan-Meier curve crosses one half, as defined in `Reaction`; NaN if it does
-    not."""
+    """Return the time at which a Kaplan-Meier curve crosses one half, as defined in `Reaction`; NaN if it
+    does not.
+    """
     (reached,) = np.nonzero(curve.surv_prob < 0.5 + _EQUAL)
     if not reached.size:
         return math.nan
@@ -129,7 +131,7 @@ def _median(curve: Any) -> float:
 
 
 def _median_interval(curve: Any) -> tuple[float, float]:
-    """The interval of the median time. Infinite or NaN: not reached."""
+    """Return the interval of the median time. Infinite or NaN: not reached."""
     with np.errstate(all="ignore"):  # the last point of the curve can be 0, which has no log
         low, high = curve.quantile_ci(0.5, alpha=1 - CONFIDENCE)
     # a curve that ends at 0 has no interval there, so the median's interval cannot end there
@@ -157,7 +159,7 @@ def alerts_before(frame: pd.DataFrame, alerts: Alerts) -> dict[tuple[str, str], 
 
 
 def hazard_orders(frame: pd.DataFrame) -> dict[str, int]:
-    """The number of runs with each order of hazards: `A`, `A then B`, `A with B`."""
+    """Return the number of runs with each order of hazards: `A`, `A then B`, `A with B`."""
     names = hazard_names(frame)
     rows = frame[frame["is_hazard"]]
     times = zip(*(rows[f"t_{name.lower()}"].tolist() for name in names), strict=True)

@@ -108,7 +108,8 @@ def _is_known(name: str) -> bool:
 
 def _sorted_out(path: Path) -> tuple[list[Path], list[Path]]:
     """Separate the files and scratch folders below `path` that a run wrote from other entries. Links are
-    not followed."""
+    not followed.
+    """
     ours: list[Path] = []
     strangers: list[Path] = []
     for folder, folders, files in os.walk(path):

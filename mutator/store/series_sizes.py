@@ -36,7 +36,8 @@ def check_values(golden: Series, faulty: Series, record: Record, where: Path | N
 
 def _compared(golden: Series, faulty: Series, record: Record) -> Iterator[tuple[str, float, float, float]]:
     """Yield channels with the bounds of their largest deviation, and the recorded one: those of compared
-    channels in the whole run, and those of channels that left their tolerance in the drive."""
+    channels in the whole run, and those of channels that left their tolerance in the drive.
+    """
     channels = {one["name"]: (number, one) for number, one in enumerate(golden.about["channels"])}
     end = np.inf if record.t_end is None else record.t_end + _TINY
     compared = [(name, np.inf, largest) for name, largest in record.max_dev]

@@ -160,8 +160,9 @@ def _row(analysis: Analysis, context: str) -> ContextRow:
 
 
 def _judged(row: ContextRow, action: UnsafeActionModel) -> set[str]:
-    """The hazards that a row names for the category of `action`; for wrong timing or duration, those of both
-    columns."""
+    """Return the hazards that a row names for the category of `action`; for wrong timing or duration, those
+    of both columns.
+    """
     verdicts = row.actions.get(action.action)
     if verdicts is None:
         return set()
@@ -258,7 +259,7 @@ def _misdirected(analysis: Analysis, keys: Keys, factor: FactorModel, specs: Spe
 
 
 def injected(spec: FaultSpec) -> set[str]:
-    """The places at which a spec injects in any reading, as `file::function`."""
+    """Return the places at which a spec injects in any reading, as `file::function`."""
     return {
         f"{injection.location.path}::{injection.location.function}"
         for variant in spec

@@ -27,7 +27,8 @@ class Verdicts:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ContextRow:
     """A context: its id (`C1`), its condition with constants inserted, and the verdict on each control
-    action."""
+    action.
+    """
 
     id: str
     condition: str
@@ -38,7 +39,8 @@ class ContextRow:
 @dataclass(frozen=True, kw_only=True)
 class ContextTable:
     """A context table of the hazard analysis. Its rows cover every situation exactly once; `coverage` has the
-    proof."""
+    proof.
+    """
 
     name: str
     about: str

@@ -49,7 +49,7 @@ def draw(analysis: Analysis) -> str:
 
 
 def faulty_places(analysis: Analysis) -> dict[str, list[str]]:
-    """The links and components at which faults enter, with the causal factors of these faults."""
+    """Return the links and components at which faults enter, with the causal factors of these faults."""
     places: dict[str, list[str]] = {}
     for name, factor in analysis.factors.items():
         for place in factor.where if factor.faults else ():

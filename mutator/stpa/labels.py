@@ -31,7 +31,8 @@ def place_labels(
     words: Mapping[str, str], arrows: Mapping[str, Sequence[Point]], boxes: Iterable[Area]
 ) -> dict[str, Label]:
     """Find a place for the label of each arrow in `arrows` (lists of corners); the preferred place if none is
-    clear."""
+    clear.
+    """
     taken = list(boxes)
     lines = {name: [_around(a, b) for a, b in pairwise(points)] for name, points in arrows.items()}
     found: dict[str, Label] = {}
@@ -47,7 +48,7 @@ def place_labels(
 
 
 def _bearer(points: Sequence[Point]) -> tuple[Point, Point]:
-    """The segment of an arrow that carries the label, a horizontal one if possible."""
+    """Return the segment of an arrow that carries the label, a horizontal one if possible."""
     return next((pair for pair in pairwise(points) if pair[0][1] == pair[1][1]), (points[0], points[-1]))
 
 
@@ -57,7 +58,8 @@ def _length(start: Point, end: Point) -> float:
 
 def _places(points: Sequence[Point], width: float) -> Iterator[Label]:
     """Yield places for a label, the best first: at a horizontal segment, from its middle outwards, or
-    next to a vertical one, from its tip, where the fewest other arrows cross."""
+    next to a vertical one, from its tip, where the fewest other arrows cross.
+    """
     (x1, y1), (x2, y2) = _bearer(points)
     if y1 == y2:
         middle, free = (x1 + x2) / 2, max(abs(x1 - x2) - width, 0) / 2

@@ -115,7 +115,7 @@ def _boxes(structure: StructureModel, lines: int) -> dict[str, Box]:
 
 
 def _tracks(structure: StructureModel, row: int) -> int:
-    """The number of arrows that need a track below `row`, because their ends have no common column."""
+    """Return the number of arrows that need a track below `row`, because their ends have no common column."""
     count = 0
     for link in structure.links.values():
         (row1, first1, width1), (row2, first2, width2) = (
@@ -133,7 +133,7 @@ def _lines(component: ComponentModel) -> tuple[str, ...]:
 
 
 def _ports(links: dict[str, LinkModel], boxes: dict[str, Box]) -> dict[str, tuple[float, float]]:
-    """The x of each link's tail and tip: the same x if possible, otherwise apart from all others."""
+    """Return the x of each link's tail and tip: the same x if possible, otherwise apart from all others."""
     ports = dict.fromkeys(links, (0.0, 0.0))
     edges: dict[tuple[str, bool], list[str]] = defaultdict(list)  # (box, at its lower edge) -> its links
     for name, link in links.items():
@@ -169,8 +169,9 @@ def _spread(
     links: dict[str, LinkModel],
     boxes: dict[str, Box],
 ) -> float:
-    """The x of a link at the box `own`. The links of an edge are spread evenly, in the order of their other
-    ends."""
+    """Return the x of a link at the box `own`. The links of an edge are spread evenly, in the order of their
+    other ends.
+    """
     other = links[name].to if links[name].from_ == own else links[name].from_
     mates = edges[own, boxes[own].row < boxes[other].row]
     mates = sorted(mates, key=lambda mate: _middle(boxes, links[mate], own))
@@ -178,8 +179,8 @@ def _spread(
 
 
 def _apart(x: float, toward: float, box: Box, others: list[float]) -> float:
-    """The place on the box's edge that is nearest to `x` and at least `APART` from `others`. It is added to
-    `others`.
+    """Return the place on the box's edge that is nearest to `x` and at least `APART` from `others`. It is
+    added to `others`.
 
     The side towards the other end, `toward`, is tried first, because this saves a crossing.
     """

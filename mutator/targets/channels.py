@@ -15,7 +15,8 @@ SUFFIXES = (".npz", ".csv", ".parquet", ".mcap")
 
 class Role(StrEnum):
     """A channel's role in a verdict: a fault has manifested if an `actuator` channel differs from the golden
-    run."""
+    run.
+    """
 
     ACTUATOR = "actuator"
     TRUTH = "truth"

@@ -23,7 +23,8 @@ class EntryModel(StrictModel, title="The entry"):
     """Arguments can contain placeholders: `{scenario}` is the scenario's file, `{seed}` the seed, `{out}` the
     folder for trace and record. `{cache}` is a folder that all runs of the target share. It can be missing,
     unwritable or damaged, and `mutator cache` deletes from it, so results must not depend on it. `{root}` is
-    the target's root, to which a run must never write."""
+    the target's root, to which a run must never write.
+    """
 
     module: str = Field(description="The module, which is run as `python -m` from the root.")
     args: list[str] = Field(

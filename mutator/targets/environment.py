@@ -22,7 +22,8 @@ _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
 
 def check_environment(env: Mapping[str, str], source: Source) -> None:
     """Raise MutatorError for a variable in a manifest's `env` that cannot be set, or that the harness sets
-    differently."""
+    differently.
+    """
     for name, value in env.items():
         if FIXED.get(name) == value:
             continue

@@ -7,8 +7,9 @@ from mutator.triggers.conditions import check_condition, check_formula
 
 
 def condition(text: str | None, known: Collection[str], source: Source, keys: Keys) -> str:
-    """The condition in canonical text ('' for none). It may use the names `known`; MutatorError at `keys` of
-    the manifest."""
+    """Return the condition in canonical text ('' for none). It may use the names `known`; MutatorError at
+    `keys` of the manifest.
+    """
     if text is None:
         return ""
     with source.placing(keys):
@@ -16,7 +17,7 @@ def condition(text: str | None, known: Collection[str], source: Source, keys: Ke
 
 
 def formula(text: str | None, known: Collection[str], source: Source, keys: Keys) -> str:
-    """The formula in canonical text; otherwise like `condition`."""
+    """Return the formula in canonical text; otherwise like `condition`."""
     if text is None:
         return ""
     with source.placing(keys):

@@ -20,7 +20,8 @@ _WORSE = Literal["higher", "lower"]
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Metric:
     """A number for each run: an aggregate of `formula` over the steps in which `where` holds, up to the first
-    terminal hazard."""
+    terminal hazard.
+    """
 
     name: str
     aggregate: Aggregate
@@ -188,7 +189,9 @@ def _hazard(name: str, model: HazardModel, known: Collection[str], source: Sourc
 
 
 def _margin_of(when: str) -> str:
-    """The margin of a single comparison: the difference of its two sides, positive while it does not hold."""
+    """Return the margin of a single comparison: the difference of its two sides, positive while it does not
+    hold.
+    """
     node = parse(when) if when else None
     if not isinstance(node, ast.Compare) or len(node.ops) != 1:
         return ""

@@ -159,7 +159,7 @@ class TargetManifest:
         changes: tuple[str, ...] = (),
         independent: bool = False,
     ) -> tuple[str, ...]:
-        """The entry module's arguments for one run; MutatorError for an unknown change."""
+        """Return the entry module's arguments for one run; MutatorError for an unknown change."""
         values = {"scenario": str(scenario), "seed": str(seed), "out": str(out)}
         values |= {"film": str(out / FILM), "cache": str(self.cache), "root": str(self.root)}
         extra = [*self.independent] if independent else []
@@ -187,8 +187,9 @@ class TargetManifest:
         return caches.of_target(self.cache_name)
 
     def read_by_runs(self) -> tuple[Path, ...]:
-        """What runs read besides their tree, scenario and cache: the target's root, if an argument names
-        it."""
+        """Return what runs read besides their tree, scenario and cache: the target's root, if an argument
+        names it.
+        """
         words = (
             *self.entry_args,
             *self.independent,
@@ -197,7 +198,7 @@ class TargetManifest:
         return (self.root,) if any("{root}" in word for word in words) else ()
 
     def filming(self) -> "TargetManifest":
-        """The same target, with runs that write a film; MutatorError if it cannot be filmed."""
+        """Return the same target, with runs that write a film; MutatorError if it cannot be filmed."""
         if self.film is None:
             raise MutatorError(
                 f"target {self.name} cannot be filmed",

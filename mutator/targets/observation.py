@@ -28,7 +28,8 @@ _ARGUMENTS = {"abs": (1, 1), "float": (1, 1), "len": (1, 1), "hypot": (2, 2)}  #
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Value:
     """An observed value. `text` is an expression at the place; for a derived value it is a formula over
-    earlier values."""
+    earlier values.
+    """
 
     name: str
     text: str
@@ -39,7 +40,8 @@ class Value:
 @dataclass(frozen=True, kw_only=True)
 class Observation:
     """Where a target is observed. `time` is an expression for the time (s); if it is None, the probe counts
-    steps."""
+    steps.
+    """
 
     location: FaultLocation
     time: str | None
@@ -57,7 +59,7 @@ class Observation:
         return (TIME, *(value.name for value in (*self.values, *self.derived)))
 
     def inputs(self, names: Iterable[str]) -> frozenset[str]:
-        """These names, and the inputs of those that are derived values."""
+        """Return these names, and the inputs of those that are derived values."""
         found = set(names)
         for value in reversed(self.derived):
             if value.name in found:
@@ -65,8 +67,9 @@ class Observation:
         return frozenset(found)
 
     def judgeable(self, channels: Iterable[str]) -> tuple[str, ...]:
-        """The names that formulas over a trace with these channels can use: time, channels, and values
-        derived from them."""
+        """Return the names that formulas over a trace with these channels can use: time, channels, and values
+        derived from them.
+        """
         known = dict.fromkeys((TIME, *(name for name in channels if name.isidentifier())))
         for value in self.derived:
             if all(name in known for name in names_in(value.text)):
@@ -219,6 +222,6 @@ class _Hypot(ast.NodeTransformer):
 
 
 def variable_units(observation: Observation) -> Mapping[str, tuple[str, str]]:
-    """The unit and meaning of every name in conditions."""
+    """Return the unit and meaning of every name in conditions."""
     values = (*observation.values, *observation.derived)
     return {TIME: ("s", "time"), **{value.name: (value.unit, value.about) for value in values}}

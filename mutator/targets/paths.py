@@ -7,7 +7,8 @@ from mutator.errors import MutatorError
 
 def inside(path: str) -> str:
     """Return `path` as a clean relative path in a target's root; MutatorError, without a file position, if it
-    is outside the root."""
+    is outside the root.
+    """
     pure = PurePosixPath(path)
     if not path or pure.is_absolute() or ".." in pure.parts or "\\" in path or "\0" in path:
         raise MutatorError(

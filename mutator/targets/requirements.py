@@ -31,8 +31,9 @@ def read_requirements(texts: Sequence[str], source: Source) -> tuple[Requirement
 
 
 def shortcoming(wanted: Requirement) -> str:
-    """What is wrong with a package: `not installed`, or the installed version. Empty if the package is
-    installed as required, or is not needed on this platform."""
+    """Return what is wrong with a package: `not installed`, or the installed version. Empty if the package is
+    installed as required, or is not needed on this platform.
+    """
     if wanted.marker and not wanted.marker.evaluate({"extra": ""}):
         return ""
     try:

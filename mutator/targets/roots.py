@@ -17,7 +17,8 @@ INSTALLED = "installed:"  # prefix of an import package's name, as `root` of a m
 
 def find_root(root: str, source: Source, requires: Sequence[Requirement]) -> Path:
     """Find the folder that a manifest's `root` names; it might not exist. An installed package is not
-    imported."""
+    imported.
+    """
     if root == SHIPPED_TARGET:
         return shipped_folder() / "target"
     if not root.startswith(INSTALLED):
@@ -112,7 +113,7 @@ def check_installed(root: str, packages: Sequence[str], files: Sequence[str], so
 
 
 def installed_at(name: str) -> Path | None:
-    """The folder or file of an import package or module; None if it has no single place on disk."""
+    """Return the folder or file of an import package or module; None if it has no single place on disk."""
     try:
         found = find_spec(name)
     except (ImportError, ValueError):

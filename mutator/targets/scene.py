@@ -46,7 +46,8 @@ class Line:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
     """The actors and lines of a drawing of the drive. `follow` is the actor that the view follows ('': none).
-    `speed` is a formula for the speed (m/s) at which the origin moves along x."""
+    `speed` is a formula for the speed (m/s) at which the origin moves along x.
+    """
 
     actors: tuple[Actor, ...]
     lines: tuple[Line, ...]

@@ -20,7 +20,8 @@ _KPH = UNITS["kph"].factor
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Contact:
     """How severe a contact is. `hazard` is the terminal hazard, and `speed` the metric of the closing speed
-    (m/s). Masses are in kg; `scale` names the scale of the classes."""
+    (m/s). Masses are in kg; `scale` names the scale of the classes.
+    """
 
     hazard: str
     speed: str
@@ -29,15 +30,17 @@ class Contact:
     scale: str
 
     def delta_v(self, closing: float) -> float:
-        """The change of the ego car's speed in m/s, in an inelastic collision along the line of travel; 0 if
-        the closing speed is not positive."""
+        """Return the change of the ego car's speed in m/s, in an inelastic collision along the line of
+        travel; 0 if the closing speed is not positive.
+        """
         return max(closing, 0.0) * self.other_mass / (self.mass + self.other_mass)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scale:
     """The classes of delta-v: (name, least delta-v in m/s, meaning), the mildest first, beginning at 0.
-    `source` cites the bounds."""
+    `source` cites the bounds.
+    """
 
     name: str
     about: str
@@ -54,7 +57,7 @@ class Scale:
         return told | {"classes": [list(one) for one in self.classes]}
 
     def class_of(self, delta_v: float) -> str:
-        """The class of a delta-v in m/s, 0 or more; a value on a bound is in the upper class."""
+        """Return the class of a delta-v in m/s, 0 or more; a value on a bound is in the upper class."""
         return [name for name, least, _ in self.classes if delta_v >= least][-1]
 
 

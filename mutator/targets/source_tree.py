@@ -60,7 +60,7 @@ class SourceTree:
         return cast("T", self._derived[key])
 
     def named(self, where: str) -> str:
-        """The path of a file as a spec names it, relative to the root or the overlay."""
+        """Return the path of a file as a spec names it, relative to the root or the overlay."""
         for folder in (self.root, self.overlay or self.root):
             where = where.removeprefix(f"{folder}{os.sep}")
         return where
@@ -74,7 +74,7 @@ class SourceTree:
 
 
 def _entries(files: Mapping[str, bytes]) -> dict[str, str]:
-    """What each file adds to the digest: its path and digest, as canonical text."""
+    """Return what each file adds to the digest: its path and digest, as canonical text."""
     return {path: canonical([path, digest(data)]) for path, data in files.items()}
 
 
@@ -120,7 +120,6 @@ def read_tree(
 
 def _read(root: Path, globs: tuple[str, ...], bounds: Path | None) -> dict[str, bytes]:
     """Read the files of `root` that match; Outside for a link that leads out of the folder `bounds`."""
-
     seen = 0
 
     def count(path: Path) -> None:

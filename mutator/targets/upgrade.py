@@ -37,8 +37,9 @@ _DERIVED = {
 
 
 def upgraded(source: Source) -> Source:
-    """The manifest as target/2, with the old line numbers. MutatorError if a key that target/1 requires is
-    missing."""
+    """Return the manifest as target/2, with the old line numbers. MutatorError if a key that target/1
+    requires is missing.
+    """
     data, lines = dict(source.data), dict(source.lines)
     _check_complete(data, _REQUIRED, source, ())
     if isinstance(observation := data["observation"], dict):
@@ -79,7 +80,8 @@ def _observation(old: dict[str, Any], lines: dict[Keys, int]) -> dict[str, Any]:
 
 def _channels(data: dict[str, Any], lines: dict[Keys, int]) -> dict[str, Any]:
     """Convert `compare` and `plot` to actuators and internal channels, and remove them from `data`. A channel
-    in both becomes an actuator."""
+    in both becomes an actuator.
+    """
     channels = dict[str, Any]()
     for key, role in (("compare", "actuator"), ("plot", "internal")):
         for name, channel in data.pop(key, {}).items():
@@ -154,7 +156,7 @@ def _line_by_line(text: str, source: Source, new: dict[str, Any]) -> Upgrade:
 
 
 def _comments(text: str) -> list[tuple[int, str]]:
-    """The line (from 0) and text of each comment."""
+    """Return the line (from 0) and text of each comment."""
     masked = list(text)
     for token in yaml.scan(text, Loader=yaml.SafeLoader):
         if isinstance(token, yaml.ScalarToken):
@@ -165,7 +167,7 @@ def _comments(text: str) -> list[tuple[int, str]]:
 
 
 def _end_of(lines: list[str], begin: int) -> int:
-    """The end of the part before line `begin`. Comments directly above a key belong to that key."""
+    """Return the end of the part before line `begin`. Comments directly above a key belong to that key."""
     while begin and lines[begin - 1].startswith("#"):
         begin -= 1
     return begin

@@ -14,7 +14,7 @@ from typing import Any
 
 @cache
 def asset(name: str) -> str:
-    """The text of a file in this folder. CSS and JavaScript are safe inside `<style>` and `<script>`."""
+    """Return the text of a file in this folder, which is safe inside `<style>` and `<script>`."""
     text = files(__package__).joinpath(name).read_text(encoding="utf-8")
     if not name.endswith(".html") and ("</script" in text or "</style" in text):
         raise ValueError(f"{name} would end the element it is put into")
@@ -28,12 +28,13 @@ def packed(value: Any) -> str:
 
 
 def plainly_embedded(value: Any, name: str) -> str:
-    """A script element with id `name` that contains `value` as plain JSON, for scripts that need it
-    immediately."""
+    """Return a script element with id `name` that contains `value` as plain JSON, for scripts that need it
+    immediately.
+    """
     text = json.dumps(value, ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
     return f'<script type="application/json" id="{name}">{text}</script>'
 
 
 def embedded(value: Any, name: str) -> str:
-    """A script element with id `name` that contains `value`, compressed. `Packed.read(name)` reads it."""
+    """Return a script element with id `name` with `value`, compressed. `Packed.read(name)` reads it."""
     return f'<script type="application/octet-stream+gzip" id="{name}">{packed(value)}</script>'

@@ -287,7 +287,8 @@ def places(tree: str) -> list[str]:
 
 def stamp(places: list[str]) -> list[tuple[int, int]]:
     """Return a value that changes when a file or folder is written to, added or removed, even if its size
-    and times are put back, because only the kernel sets ctime."""
+    and times are put back, because only the kernel sets ctime.
+    """
     states = map(os.stat, places)
     return [(state.st_ctime_ns, state.st_ino) for state in states]
 

@@ -205,7 +205,6 @@ def load_cluster(path: Path) -> ClusterFile:
 
 def _noting(job_class: Any, problems: list[Exception]) -> type:
     """Make a job class that adds errors of failed submissions to `problems`; Dask only logs them."""
-
     from distributed import Status
 
     class Noting(job_class):  # type: ignore[misc]

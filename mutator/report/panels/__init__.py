@@ -1,5 +1,6 @@
 """The panels of every report. To add a panel, write a module and list its function in `PANELS`. The function
-returns None if there is nothing to show."""
+returns None if there is nothing to show.
+"""
 
 from collections.abc import Callable
 
@@ -20,8 +21,9 @@ PANELS: tuple[Callable[[ReportedRun], Panel | None], ...] = (
 
 
 def study_panels(run: ReportedRun) -> tuple[Panel, ...]:
-    """The panels of the study's page: those of the study, then the run's tables and figures next to the
-    published ones. Empty if the run has too few experiments or none of the study's faults."""
+    """Return the panels of the study's page: those of the study, then the run's tables and figures next to
+    the published ones. Empty if the run has too few experiments or none of the study's faults.
+    """
     said = [panel for panel_of in run.study.panels if (panel := panel_of(run))] if run.study else []
     if not said:
         return ()

@@ -53,7 +53,7 @@ def _table(listing: Listing) -> Table:
 
 
 def _html(listing: Listing, meanings: Words) -> Markup:
-    """The table as HTML. On narrow screens, each cell shows the heading of its column."""
+    """Return the table as HTML. On narrow screens, each cell shows the heading of its column."""
     rows = [
         [
             _labelled(head, cell, meanings.get(head, {})) if i else _cell(cell)
@@ -72,7 +72,7 @@ def _labelled(head: str, cell: Cell, meanings: Mapping[str, str]) -> str:
 
 
 def _explained(codes: str, meanings: Mapping[str, str]) -> str:
-    """The codes of hazards or of a severity class, with their meanings as a tooltip."""
+    """Return the codes of hazards or of a severity class, with their meanings as a tooltip."""
     names = codes.removeprefix("severity ").split(", ")
     about = "; ".join(meanings[name] for name in names if name in meanings)
     return Markup('<abbr title="{}">{}</abbr>').format(about, codes) if about else codes

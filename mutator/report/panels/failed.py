@@ -23,7 +23,7 @@ _HTML = """\
 
 
 def failed_panel(run: ReportedRun) -> Panel | None:
-    """The panel of failed runs with their messages; None if no run failed."""
+    """Return the panel of failed runs with their messages; None if no run failed."""
     texts = run.texts[run.texts["status"] != Status.OK.value]
     if texts.empty:
         return None

@@ -23,12 +23,12 @@ _HTML = """\
 
 
 def figures_panel(run: ReportedRun) -> Panel | None:
-    """The panel of figures over all results; None if there are none."""
+    """Return the panel of figures over all results; None if there are none."""
     return _panel(drawings(run.frame))
 
 
 def study_figures(run: ReportedRun) -> Panel | None:
-    """The panel of figures that the run's study adds; None if there are none."""
+    """Return the panel of figures that the run's study adds; None if there are none."""
     return _panel(run.study.drawings(run)) if run.study else None
 
 

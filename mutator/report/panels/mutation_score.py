@@ -1,5 +1,6 @@
 """The panel of the mutation score: the share of operator mutants that change the closed loop. Runs without
-operators have no such panel."""
+operators have no such panel.
+"""
 
 from dataclasses import replace
 
@@ -24,7 +25,7 @@ _HTML = """\
 
 
 def score_panel(run: ReportedRun) -> Panel | None:
-    """The panel with the shares in total and by operator."""
+    """Return the panel with the shares in total and by operator."""
     if not (run.texts["module"] == OPERATORS).any():
         return None
     runs = run.fault_free()
@@ -46,5 +47,5 @@ def score_panel(run: ReportedRun) -> Panel | None:
 
 
 def _part(score: Sheet, of_functions: bool) -> Sheet:
-    """The lines of functions if `of_functions`; otherwise all other lines."""
+    """Return the lines of functions if `of_functions`; otherwise all other lines."""
     return replace(score, lines=tuple(line for line in score.lines if ("::" in str(line[0])) == of_functions))

@@ -26,7 +26,7 @@ _HTML = """\
 
 
 def origin_panel(run: ReportedRun) -> Panel:
-    """The panel with engines, equivalence check, plan, choices, sources and versions."""
+    """Return the panel with engines, equivalence check, plan, choices, sources and versions."""
     engines, facts = run.engines, _facts(run)
     unsealed = list(unsealed_facts(run.folder).items())
     parts = []
@@ -71,7 +71,7 @@ def _facts(run: ReportedRun) -> list[tuple[str, str]]:
 
 
 def _study(run: ReportedRun) -> dict[str, str]:
-    """The study that the campaign names, and the reason if this report is not compared with it."""
+    """Return the study that the campaign names, and the reason if this report is not compared with it."""
     name = run.folder.head.get("study")
     if not name:
         return {}

@@ -56,7 +56,7 @@ names all components that stopped it.</p>
 
 
 def paths_panel(run: ReportedRun) -> Panel | None:
-    """The panel with the counts of links and components; None if no path is known."""
+    """Return the panel with the counts of links and components; None if no path is known."""
     paths = run.paths
     counts = counts_by_fault_type(kinds(run.texts), run.seen.courses_of, paths) if paths else {}
     if paths is None or not counts:
@@ -87,7 +87,7 @@ Links = Mapping[str, tuple[str, str, str]]  # tail, tip, and what the link carri
 
 
 def _links(paths: FoundPaths) -> Links:
-    """The links that occur in any path, in the order of the control structure."""
+    """Return the links that occur in any path, in the order of the control structure."""
     crossings = {c.link: c for course in paths.courses for c in course.crossings}
     structure = paths.ways.structure
     known = structure.links if structure else {}
@@ -111,8 +111,9 @@ def _table(links: Links, counts: PathCounts, paths: FoundPaths) -> Table:
 
 
 def _stops(counts: Mapping[str, PathCounts], paths: FoundPaths) -> Table | None:
-    """The table of masked faults by fault type, with a column for each set of components that stopped them.
-    None if no fault was masked."""
+    """Return the table of masked faults by fault type, with a column for each set of components that stopped
+    them. None if no fault was masked.
+    """
     ends = sorted(counts[ALL].ends, key=lambda names: (len(names), list(map(paths.label, names))))
     if not ends:
         return None

@@ -21,7 +21,7 @@ _HTML = """\
 
 
 def seeds_panel(run: ReportedRun) -> Panel | None:
-    """The panel with the spread of each share between seeds."""
+    """Return the panel with the spread of each share between seeds."""
     seeds = seeds_of(run.frame)
     if len(seeds) < 2:
         return None
@@ -40,7 +40,7 @@ def seeds_panel(run: ReportedRun) -> Panel | None:
 
 
 def _summary(sheet: Sheet) -> Table:
-    """The lines over all faults, with fewer columns."""
+    """Return the lines over all faults, with fewer columns."""
     rows = []
     for faults, part, whole, share, *cells, _ in sheet.lines:
         if faults == ALL:

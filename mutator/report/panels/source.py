@@ -1,5 +1,6 @@
 """The panel of the source, for runs with operators: each line coloured by the worst outcome of its
-mutants."""
+mutants.
+"""
 
 import io
 import keyword
@@ -62,7 +63,7 @@ _CLASSES = {tokenize.COMMENT: "comment", tokenize.NUMBER: "number", tokenize.STR
 
 
 def source_panel(run: ReportedRun) -> Panel | None:
-    """The panel with each file that has faults. Only the worst file is unfolded."""
+    """Return the panel with each file that has faults. Only the worst file is unfolded."""
     source = run.source
     if source is None:
         return None
@@ -137,12 +138,12 @@ def _mark(mark: Mark, line: int, place: str, lasting: str) -> Markup:
 
 
 def _query(place: str, *more: str) -> str:
-    """The URL fragment that searches the list of experiments (web/state.js)."""
+    """Return the URL fragment that searches the list of experiments (web/state.js)."""
     return f"q={quote(' '.join((f'line={place}', *more)), safe='')}"
 
 
 def _coloured(file: MarkedFile) -> list[Markup]:
-    """The lines of a file as HTML, coloured as in diffs."""
+    """Return the lines of a file as HTML, coloured as in diffs."""
     made, done = [Markup("")] * len(file.lines), [0] * len(file.lines)
     for line, start, end, name in _parts(file):
         text, begin = file.lines[line], max(start, done[line])

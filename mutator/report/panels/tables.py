@@ -63,7 +63,9 @@ def notes(folder: RunFolder) -> str:
 
 
 def tables_panel(run: ReportedRun) -> Panel:
-    """The panel of counts, then statistics. Tables with published counterparts are on the study's page."""
+    """Return the panel of counts, then statistics. Tables with published counterparts are on the study's
+    page.
+    """
     runs = run.fault_free()
     note = own_alerts(runs)
     own = () if run.compared else _statistics(run, None)
@@ -94,7 +96,9 @@ def tables_panel(run: ReportedRun) -> Panel:
 
 
 def published_panel(run: ReportedRun) -> Panel | None:
-    """The panel of the run's statistics next to the published ones of its study; None if there are none."""
+    """Return the panel of the run's statistics next to the published ones of its study; None if there are
+    none.
+    """
     note = own_alerts(run.fault_free())
     published = run.study.published(run) if run.study else None
     sheets = [_noted(sheet, note) for sheet in _statistics(run, published)]
