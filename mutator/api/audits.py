@@ -12,8 +12,8 @@ from mutator._common.locks import owned
 from mutator._common.tables import Table
 from mutator._common.text import counted
 from mutator.api.selection import WorkspaceLike, open_workspace
-from mutator.audit.repair import repair as put_aside
 from mutator.audit.run_audit import Check, audit_checks
+from mutator.audit.run_repair import repair as put_aside
 from mutator.audit.seal import Seals, seals_of, unsealed_facts
 from mutator.audit.signatures import sign as write_signature
 from mutator.audit.signatures import signer

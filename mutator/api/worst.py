@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from mutator.campaigns.filters import compile_filter
+from mutator.results.column_facts import is_text
 from mutator.results.ranking import places
-from mutator.results.result_columns import is_text
 from mutator.results.rows import Row, lines_of, row_from
 from mutator.results.table_reader import Results
 

@@ -26,7 +26,7 @@ from mutator.campaigns.provenance import check_sources, check_version, sources
 from mutator.errors import MutatorError
 from mutator.model import Experiment
 from mutator.outcomes.channel_departures import channel_facts
-from mutator.results.result_columns import PLAN_COLUMNS, metric_columns, plan_row
+from mutator.results.column_facts import PLAN_COLUMNS, metric_columns, plan_row
 from mutator.store import digests, plan_file
 from mutator.store.digests import Digest, DigestingFile, Ledger
 from mutator.store.opening import check_contents

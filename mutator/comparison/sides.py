@@ -7,7 +7,7 @@ from typing import NamedTuple
 from mutator.campaigns.filters import compile_filter
 from mutator.model import Experiment, Record, Value
 from mutator.preflight import equivalence
-from mutator.results.result_columns import PLAN_COLUMNS, T_END, plan_row
+from mutator.results.column_facts import PLAN_COLUMNS, T_END, plan_row
 from mutator.results.rows import Row
 from mutator.results.table_reader import row_of
 from mutator.store import plan_file

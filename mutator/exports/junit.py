@@ -10,7 +10,7 @@ from collections.abc import Collection, Sequence
 
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Outcome, Status
-from mutator.results.result_columns import plan_row
+from mutator.results.column_facts import plan_row
 from mutator.results.rows import Row
 from mutator.results.table_reader import Results
 from mutator.store.plan_file import read_all

@@ -4,8 +4,7 @@ from collections.abc import Iterable, Iterator
 
 from mutator._common.tables import Table
 from mutator.reference.tables import generated
-from mutator.results.propagation import COLUMNS as PROPAGATION
-from mutator.results.result_columns import (
+from mutator.results.column_facts import (
     PLAN_COLUMNS,
     TIMINGS,
     Column,
@@ -13,6 +12,7 @@ from mutator.results.result_columns import (
     result_columns,
     severity_columns,
 )
+from mutator.results.propagation import COLUMNS as PROPAGATION
 from mutator.targets.channels import Channel
 from mutator.targets.judging import Hazard, Metric
 from mutator.targets.manifest import TargetManifest

@@ -27,8 +27,8 @@ from mutator.report.studies import ReportedRun
 from mutator.report.warnings import warning
 from mutator.report.whole_map import map_of
 from mutator.report.words import meanings_of
+from mutator.results.column_facts import is_text
 from mutator.results.ranking import worst
-from mutator.results.result_columns import is_text
 from mutator.results.rows import Row, lines_of, row_from
 from mutator.review.groups import Shape, shapes
 from mutator.statistics.mutation_score import PERMANENT, TRANSIENT

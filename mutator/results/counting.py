@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from mutator.model import Outcome, Status
-from mutator.results.result_columns import hazards_in
+from mutator.results.column_facts import hazards_in
 from mutator.results.rows import UNUSABLE, Count
 
 if TYPE_CHECKING:

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from mutator.model import Record
-from mutator.results.result_columns import Column
+from mutator.results.column_facts import Column
 
 COLUMNS = (
     Column("experiment_id", "text", "", "the experiment"),

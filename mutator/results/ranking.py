@@ -5,8 +5,8 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from mutator.model import Outcome, Status
+from mutator.results.column_facts import hazards_in
 from mutator.results.counting import came, endings
-from mutator.results.result_columns import hazards_in
 from mutator.results.rows import Row
 from mutator.targets.severity import CLASSES, DELTA_V
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from mutator.model import Outcome, Status, fault_label
-from mutator.results.result_columns import hazards_in
+from mutator.results.column_facts import hazards_in
 from mutator.targets.severity import DELTA_V
 
 if TYPE_CHECKING:

@@ -14,8 +14,8 @@ from mutator._common.processes import beside, processes_for, shared
 from mutator._common.version import VERSION
 from mutator.errors import MutatorError, MutatorWarning
 from mutator.results import propagation
+from mutator.results.column_facts import TIMINGS
 from mutator.results.propagation import columns_of
-from mutator.results.result_columns import TIMINGS
 from mutator.results.table_cells import ResultRows
 from mutator.results.table_files import CsvTable, ParquetTable, csv_lines, record_batch
 from mutator.store import digests, plan_file

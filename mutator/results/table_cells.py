@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from mutator.model import Experiment, Record, Status
 from mutator.outcomes.fault_paths import ways_of
 from mutator.outcomes.verdicts import reaction_time, severity_of, since_activation, since_manifestation
-from mutator.results.result_columns import (
+from mutator.results.column_facts import (
     T_END,
     deviation_columns,
     hazard_columns,

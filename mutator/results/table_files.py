@@ -7,7 +7,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from mutator.results.result_columns import Column
+from mutator.results.column_facts import Column
 
 _ROWS = 1 << 20  # maximum number of rows in a row group (pyarrow's default)
 _CELLS = 1 << 23  # maximum number of cells in a row group, because a whole group is in memory

@@ -15,7 +15,7 @@ from mutator._common.bounded import MOST_DATA, check_open, open_regular, read_bo
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Outcome, Record, Status
 from mutator.results import table_building, table_cells
-from mutator.results.result_columns import SINCE, hazards_in
+from mutator.results.column_facts import SINCE, hazards_in
 from mutator.results.rows import Row, row_from
 from mutator.store.run_folder import RunFolder
 from mutator.targets.severity import Scale

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from mutator.results.result_columns import hazards_in
+from mutator.results.column_facts import hazards_in
 from mutator.results.rows import UNUSABLE
 from mutator.results.table_reader import Results
 

@@ -27,7 +27,7 @@ from mutator.errors import MutatorError
 from mutator.execution.cluster.parcel import pack, unpack
 from mutator.faults.fault_models import FILES, FaultModels, load_fault_models
 from mutator.model import Limits
-from mutator.results.result_columns import check_names
+from mutator.results.column_facts import check_names
 from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.run_folder import GoldenRun, RunFolder

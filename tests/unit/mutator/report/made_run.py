@@ -5,7 +5,7 @@ import json
 from html.parser import HTMLParser
 from pathlib import Path
 
-from mutator.results.result_columns import result_columns
+from mutator.results.column_facts import result_columns
 from mutator.store import plan_file
 
 COLUMNS = [c.name for c in result_columns(("H1", "H2", "H3"), ("gas", "brake", "steer_torque"))]

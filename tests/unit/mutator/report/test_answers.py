@@ -19,7 +19,7 @@ from mutator.report.panels.answers import answers_panel
 from mutator.report.paths import FoundPaths
 from mutator.report.studies import ReportedRun
 from mutator.report.warnings import NO_ALERT
-from mutator.results.result_columns import result_columns
+from mutator.results.column_facts import result_columns
 from mutator.results.rows import lines_of
 from mutator.store.run_folder import RunFolder
 

@@ -4,8 +4,8 @@ import csv
 import random
 from pathlib import Path
 
+from mutator.results.column_facts import SEVERITY, result_columns
 from mutator.results.ranking import places, worst, worth, worth_of
-from mutator.results.result_columns import SEVERITY, result_columns
 from mutator.results.table_reader import Results
 
 METRICS = [[name, "-", "", "lower"] for name in ("margin_h1", "margin_h2", "margin_h3", "delta_v")]

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from mutator.model import Outcome, Status
+from mutator.results.column_facts import result_columns
 from mutator.results.counting import counts_by, hazard_names, kinds, outcome_counts
-from mutator.results.result_columns import result_columns
 from mutator.results.rows import count_table
 from mutator.results.table_reader import Results
 

@@ -20,7 +20,7 @@ from mutator.campaigns.plans import make_plan
 from mutator.errors import MutatorWarning
 from mutator.model import Experiment, Method, Outcome, Record, Status
 from mutator.results import propagation, table_building, table_cells, table_files
-from mutator.results.result_columns import TIMINGS, Column, result_columns, severity_columns
+from mutator.results.column_facts import TIMINGS, Column, result_columns, severity_columns
 from mutator.store import plan_file
 from mutator.store.lines import LineWriter
 from mutator.store.records import SCHEMA, TIMINGS_SCHEMA

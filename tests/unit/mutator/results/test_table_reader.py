@@ -23,7 +23,7 @@ from mutator.exports.write import export
 from mutator.model import Experiment, Outcome, Status
 from mutator.report import building
 from mutator.results import table_building, table_cells
-from mutator.results.result_columns import SEVERITY, SINCE, metric_columns, result_columns
+from mutator.results.column_facts import SEVERITY, SINCE, metric_columns, result_columns
 from mutator.results.table_reader import Results, _table, same_parquet
 from mutator.statistics.frame import load
 from mutator.store import plan_file

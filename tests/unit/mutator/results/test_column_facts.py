@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.results.result_columns import deviation_columns, hazards_in, is_text, result_columns
+from mutator.results.column_facts import deviation_columns, hazards_in, is_text, result_columns
 from mutator.workspace import Workspace
 
 OF_OPENPILOT = (

@@ -9,7 +9,7 @@ import pytest
 
 from mutator._common.below import Outside
 from mutator._common.locks import owned
-from mutator.audit.repair import _put_aside, repair
+from mutator.audit.run_repair import _put_aside, repair
 from mutator.errors import MutatorError
 from mutator.store import digests, plan_file
 from mutator.store.digests import Digest, Ledger
