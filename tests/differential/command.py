@@ -24,7 +24,7 @@ def results(out: Path) -> Bytes:
 
 def pytest_words(out: Path, campaign: str | Path = "small", workers: int = 2) -> list[str]:
     plain = ["-m", "pytest", "-p", "no:cacheprovider", "-p", "no:hypothesispytest", "--assert=plain"]
-    return [*plain, "--campaign", str(campaign), f"--campaign-out={out}", "-n", str(workers)]
+    return [*plain, f"--campaign={campaign}", f"--campaign-out={out}", "-n", str(workers)]
 
 
 class Command:
