@@ -15,10 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from mutator.report.page import SCRIPTS, STYLES
 from mutator.report.scenes import scene_facts
 from mutator.targets.manifest import TargetManifest
-from mutator.web import asset
+from mutator.web import asset, load_order
 from mutator.workspace import Workspace
 
 GOAL = 30  # frames a second
@@ -88,9 +87,9 @@ def main() -> int:
         parser.error("no browser here")
     manifest = Workspace.find().manifest("openpilot")
     data = {"series": made_series(manifest), "facts": {"scene": scene_facts(manifest), "hazards": []}}
-    replay = [name for name in SCRIPTS if name == "dom.js" or name.startswith("replay")]
+    replay = [name for name in load_order("report", ".js") if name.startswith(("shared/dom", "replay/"))]
     text = PAGE.format(
-        styles="".join(f"<style>{asset(name)}</style>" for name in STYLES),
+        styles="".join(f"<style>{asset(name)}</style>" for name in load_order("report", ".css")),
         scripts="".join(f"<script>{asset(name)}</script>" for name in replay),
         data=json.dumps(data).replace("<", "\\u003c"),
     )

@@ -5,7 +5,6 @@ import io
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from importlib.resources import files as package_files
 from pathlib import Path
 
 from mutator._common.below import inside
@@ -16,7 +15,7 @@ from mutator.comparison.comparison import Comparison, Gate, ending_change
 from mutator.comparison.differences import Fact
 from mutator.comparison.pairs import Change, Pair, time_to_hazard
 from mutator.results.rows import Row
-from mutator.web import asset
+from mutator.web import asset, load_order
 
 LISTED = 50  # number of experiments that the Markdown lists for each change; the page and the CSV list all
 SHOWN = 500  # table rows that the page shows at once; browsers need seconds to lay out thousands
@@ -137,7 +136,7 @@ def page(comparison: Comparison) -> str:
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
     counts = Counter(change for pair in comparison.pairs for change in pair.changes)
-    return environment.from_string(_own("page.html")).render(
+    return environment.from_string(asset("comparison/comparison.html")).render(
         c=comparison,
         summary=summary(comparison),
         differing=_facts(comparison, [fact for fact in comparison.facts if fact.differs]),
@@ -148,20 +147,12 @@ def page(comparison: Comparison) -> str:
         changed=_changed(comparison),
         limit=SHOWN,
         style=Markup(style()),
-        script=Markup(script()),
+        script=Markup(asset("comparison/comparison.js")),
     )
 
 
 def style() -> str:
-    return asset("base.css") + _own("page.css").replace("LIMIT", str(SHOWN + 1))
-
-
-def script() -> str:
-    return _own("page.js")
-
-
-def _own(name: str) -> str:
-    return package_files(__package__).joinpath(name).read_text(encoding="utf-8")
+    return "".join(map(asset, load_order("comparison", ".css"))).replace("LIMIT", str(SHOWN + 1))
 
 
 def _changed(comparison: Comparison) -> Table:

@@ -21,7 +21,7 @@ from mutator.results.table_reader import Results
 from mutator.store.run_folder import RunFolder
 from mutator.web import asset
 
-FILES = ("HISTORY.md", "history.html")
+FILES = ("HISTORY.md", "report/history.html")
 _HEADS = (
     "run",
     "date (UTC)",
@@ -169,9 +169,9 @@ def _page(folder: Path, runs: Sequence[PastRun], left_out: Sequence[str]) -> str
         (title, _linked(group), [(a, b, _changes(a, b), _comparison(folder, a, b)) for a, b in _steps(group)])
         for title, group in _plans(runs).items()
     ]
-    styles = [Markup(asset(name)) for name in ("base.css", "report.css")]
+    styles = [Markup(asset(name)) for name in ("shared/base.css", "report/report.css")]
     page = rendered(
-        asset("history.html"),
+        asset("report/history.html"),
         name=folder.resolve().name,
         count=counted(len(runs), "run"),
         plans=plans,

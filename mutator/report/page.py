@@ -9,38 +9,7 @@ from mutator.mutants.injected_lines import tag_words
 from mutator.report.browse import Browse
 from mutator.report.panel import Panel, rendered
 from mutator.report.words import Words
-from mutator.web import asset, plainly_embedded
-
-STYLES = ("base.css", "report.css", "replay.css", "path.css")
-SCRIPTS = (  # in load order, because scripts use earlier ones
-    "packed.js",
-    "dom.js",
-    "diff.js",
-    "rows.js",
-    "state.js",
-    "filters.js",
-    "heat.js",
-    "grid.js",
-    "columns.js",
-    "details.js",
-    "series_file.js",
-    "replay_formula.js",
-    "replay_data.js",
-    "replay_clock.js",
-    "replay_colours.js",
-    "replay_tracks.js",
-    "replay_scene.js",
-    "replay_bar.js",
-    "replay_gauges.js",
-    "replay_plot.js",
-    "replay_plots.js",
-    "replay.js",
-    "path.js",
-    "happened.js",
-    "experiment.js",
-    "report.js",
-    "ways.js",
-)
+from mutator.web import asset, load_order, plainly_embedded
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,15 +53,18 @@ def page_html(content: Content) -> str:
     from markupsafe import Markup
 
     html = rendered(
-        asset("report.html"),
+        asset("report/report.html"),
         content=content,
         tags=Markup(plainly_embedded(tag_words(), "tags")),
         outcome_names=[outcome.value for outcome in Outcome],
         styles=[
             Markup(asset(name))
-            for name in (*STYLES, *dict.fromkeys(p.style for p in content.panels if p.style))
+            for name in (
+                *load_order("report", ".css"),
+                *dict.fromkeys(p.style for p in content.panels if p.style),
+            )
         ],
-        scripts=[Markup(asset(name)) for name in SCRIPTS],
+        scripts=[Markup(asset(name)) for name in load_order("report", ".js")],
     )
     return str(html)
 
@@ -109,5 +81,5 @@ def study_markdown(content: Content, panels: Sequence[Panel]) -> str:
 def study_html(content: Content, panels: Sequence[Panel]) -> str:
     from markupsafe import Markup
 
-    styles = [Markup(asset(name)) for name in STYLES]
-    return str(rendered(asset("study.html"), content=content, panels=panels, styles=styles))
+    styles = [Markup(asset(name)) for name in load_order("report", ".css")]
+    return str(rendered(asset("report/study.html"), content=content, panels=panels, styles=styles))

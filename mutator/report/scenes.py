@@ -8,7 +8,7 @@ from mutator.triggers.trees import Tree, tree
 
 
 def scene_facts(manifest: TargetManifest) -> dict[str, Any] | None:
-    """Return the data that replay_scene.js draws; None if the target's manifest has no scene."""
+    """Return the data that web/replay/scene.js draws; None if the target's manifest has no scene."""
     scene = manifest.scene
     if scene is None:
         return None

@@ -21,6 +21,7 @@ from mutator.workspace import Workspace
 SCHEMA = "report/1"
 FILE = f"{FOLDER}/made_from.json"
 _NOT_READ = {FOLDER, "exports", series_store.FOLDER, TRACES, ASIDE, SCRATCH, "workers", *SIGNATURE}
+_ASSETS = (".css", ".html", ".js", ".txt")
 _LINKED = (".mp4", ".gif")  # the report contains only the names of such files
 
 
@@ -71,7 +72,11 @@ def _stamp(run: Path) -> dict[str, Any]:
 @cache
 def _sources() -> object:
     root = Path(__file__).parents[1]
-    return [VERSION, _digests(root, "**/*.py"), _digests(root / "web", "*.*")]
+    return [
+        VERSION,
+        _digests(root, "**/*.py"),
+        *(_digests(root / "web", f"*/*{suffix}") for suffix in _ASSETS),
+    ]
 
 
 def _files_of(run: Path) -> Iterator[tuple[str, str]]:

@@ -1,5 +1,5 @@
 """The map of fault type and scenario over all experiments, for pages that list only the worst. The measures
-have the same names as in heat.js.
+have the same names as in web/report/heat.js.
 """
 
 from collections.abc import Iterator, Mapping

@@ -16,23 +16,7 @@ from mutator.review.catalogue import Group
 from mutator.review.decisions import Review, State
 from mutator.review.pictures import has_pictures
 from mutator.review.readable_groups import condition_lines, value_table
-from mutator.web import asset, embedded, plainly_embedded
-
-STYLES = ("base.css", "review.css")
-SCRIPTS = (  # in load order: each uses earlier ones
-    "dom.js",
-    "packed.js",
-    "diff.js",
-    "review_changes.js",
-    "review_beside.js",
-    "review_card.js",
-    "review_stacks.js",
-    "review_commands.js",
-    "review_outbox.js",
-    "review_question.js",
-    "review_guard.js",
-    "review.js",
-)
+from mutator.web import asset, embedded, load_order, plainly_embedded
 
 
 def write_page(out: Path, review: Review, groups: Sequence[Group], options: Sequence[str]) -> None:
@@ -68,14 +52,14 @@ def render_page(data: dict[str, Any]) -> str:
     environment = Environment(
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    return environment.from_string(asset("review.html")).render(
+    return environment.from_string(asset("review/review.html")).render(
         target=data["target"],
         count=len(data["groups"]),
         served=data.get("served") is not None,
-        styles=[Markup(asset(name)) for name in STYLES],
+        styles=[Markup(asset(name)) for name in load_order("review", ".css")],
         tags=Markup(plainly_embedded(tag_words(), "tags")),
         data=Markup(embedded(data, "review")),
-        scripts=[Markup(asset(name)) for name in SCRIPTS],
+        scripts=[Markup(asset(name)) for name in load_order("review", ".js")],
     )
 
 

@@ -24,8 +24,7 @@ from mutator.serve.page_tokens import HOME, PageTokens, review_page
 from mutator.serve.report_pages import Shown
 from mutator.serve.reviews import Reviews
 from mutator.serve.runs import Absent, Runs, open_file, report_of, told
-from mutator.serve.security import assets
-from mutator.web import asset
+from mutator.web import asset, assets
 from mutator.workspace import Workspace
 
 _PLOT = "plot.svg"
@@ -135,7 +134,7 @@ def _pages(site: Site) -> list[Route]:
 
     return [
         Route("/", _quick(home)),
-        Route("/assets/{name}", _quick(_own)),
+        Route("/assets/{name:path}", _quick(_own)),
         Route("/runs/{run}/", _quick(run)),
         Route("/runs/{run}/{path:path}", _quick(in_run)),
         Route("/compare/{a}/{b}/", _quick(compared)),

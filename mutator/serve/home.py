@@ -1,13 +1,13 @@
 """The first page, the choices in its forms, and the error page."""
 
 from collections.abc import Mapping, Sequence
-from importlib.resources import files
 from typing import Any
 from urllib.parse import quote
 
 from jinja2 import Environment, StrictUndefined
 
 from mutator.errors import MutatorError
+from mutator.web import asset
 from mutator.workspace import Workspace
 
 _MOST_PAIRS = 20  # pairs of runs offered for comparison
@@ -60,5 +60,5 @@ def _rendered(name: str, **content: Any) -> str:
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
     environment.filters["quoted"] = lambda text: quote(text, safe="")
-    text = files(__package__).joinpath(name).read_text(encoding="utf-8")
+    text = asset(f"serve/{name}")
     return environment.from_string(text).render(content)

@@ -24,14 +24,14 @@ from mutator.serve.report_cache import ReportCache
 from mutator.serve.runs import Absent, Runs, open_in_run
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_script import read_script, script_of
+from mutator.web import load_order
 from mutator.workspace import Workspace
 
-_HEAD = """<meta name="mutator-page" content="{}">
-<link rel="stylesheet" href="/assets/served.css">
-</head>"""
-_SCRIPTS = b"""<script src="/assets/jobs.js" defer></script>
-<script src="/assets/served.js" defer></script>
-</body>"""
+_STYLES = [f'<link rel="stylesheet" href="/assets/{name}">' for name in load_order("serve", ".css")]
+_HEAD = "\n".join(['<meta name="mutator-page" content="{}">', *_STYLES, "</head>"])
+_SCRIPTS = "\n".join(
+    [*(f'<script src="/assets/{name}" defer></script>' for name in load_order("serve", ".js")), "</body>"]
+).encode()
 _MOST_COMPARED = 4  # cached comparisons
 
 

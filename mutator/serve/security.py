@@ -10,7 +10,6 @@ import hashlib
 import hmac
 from collections.abc import Iterable
 from functools import cache
-from importlib.resources import files
 from urllib.parse import parse_qs
 
 from starlette.datastructures import Headers, MutableHeaders
@@ -18,7 +17,7 @@ from starlette.responses import PlainTextResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from mutator.comparison import pages
-from mutator.web import asset
+from mutator.web import asset, assets
 
 HOST = "127.0.0.1"
 MOST_BYTES = 1_000_000  # the longest body of a request
@@ -154,7 +153,7 @@ def _with_policy(send: Send) -> Send:
 @cache
 def policy() -> str:
     """Return the policy for pages: they can run only code from `mutator.web`, as files or inline by hash."""
-    scripts = [_hash(f"\n{asset(name)}") for name in assets(".js")] + [_hash(f"\n{pages.script()}\n")]
+    scripts = [_hash(f"\n{asset(name)}") for name in assets(".js")]
     styles = [_hash(f"\n{asset(name)}") for name in assets(".css")] + [_hash(f"\n{pages.style()}")]
     return "; ".join(
         (
@@ -170,11 +169,6 @@ def policy() -> str:
             "form-action 'none'",
         )
     )
-
-
-@cache
-def assets(suffix: str) -> tuple[str, ...]:
-    return tuple(sorted(one.name for one in files("mutator.web").iterdir() if one.name.endswith(suffix)))
 
 
 def _hash(text: str) -> str:

@@ -1,7 +1,8 @@
-"""Assets of the HTML pages (the CSS and JavaScript files of this package), and data embedded in pages.
+"""Assets of the HTML pages (the CSS and JavaScript files below this package), and data embedded in pages.
 
-The scripts are not modules. A page names them in the order in which they must be loaded. Each script declares
-one constant.
+Each page has a folder. `shared` and `replay` have what pages share. Scripts are not modules, because pages
+are opened from disk. Each script declares one constant, which later scripts use. A page's `order.txt` lists
+its files in load order.
 """
 
 import base64
@@ -14,11 +15,25 @@ from typing import Any
 
 @cache
 def asset(name: str) -> str:
-    """Return the text of a file in this folder, which is safe inside `<style>` and `<script>`."""
+    """Return the text of a file such as `shared/dom.js`, which is safe inside `<style>` and `<script>`."""
     text = files(__package__).joinpath(name).read_text(encoding="utf-8")
     if not name.endswith(".html") and ("</script" in text or "</style" in text):
         raise ValueError(f"{name} would end the element it is put into")
     return text
+
+
+@cache
+def load_order(page: str, suffix: str) -> tuple[str, ...]:
+    """Return the names of the scripts (suffix `.js`) or style sheets (`.css`) of a page in load order."""
+    return tuple(name for name in asset(f"{page}/order.txt").split() if name.endswith(suffix))
+
+
+@cache
+def assets(suffix: str) -> tuple[str, ...]:
+    """Return the names of all files with a suffix, sorted."""
+    folders = [folder for folder in files(__package__).iterdir() if folder.is_dir()]
+    names = [f"{folder.name}/{file.name}" for folder in folders for file in folder.iterdir()]
+    return tuple(sorted(name for name in names if name.endswith(suffix)))
 
 
 def packed(value: Any) -> str:

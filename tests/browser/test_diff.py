@@ -18,7 +18,9 @@ def test_a_tag_extends_to_the_end_of_its_line(browser: Any, end: str) -> None:
     patch = "diff --git a/m.py b/m.py\n--- a/m.py\n+++ b/m.py\n@@ -1,1 +1,3 @@\n" + end.join([*lines, ""])
     page = browser.new_page()
     page.set_content(f'<script type="application/json" id="tags">{json.dumps(tag_words())}</script><p></p>')
-    page.add_script_tag(content=f"{asset('dom.js')}\n{asset('diff.js')}\nglobalThis.Diff = Diff;")
+    page.add_script_tag(
+        content=f"{asset('shared/dom.js')}\n{asset('shared/diff.js')}\nglobalThis.Diff = Diff;"
+    )
     (file,) = page.evaluate("(patch) => Diff.injected(patch)", patch)
     assert file["lines"] == [CHANGED.rstrip(), "y = 1"]
     page.evaluate("(patch) => Diff.render(document.querySelector('p'), patch)", patch)

@@ -51,7 +51,7 @@ def test_python_and_the_page_agree_on_formulas(browser: Any, values: dict[str, n
     formulas = [check_formula(formula(rng), NAMES, over_time=True) for _ in range(COUNT)]
     conditions = [check_condition(condition(rng), variables=NAMES, over_time=True) for _ in range(COUNT)]
     page = browser.new_page()
-    page.add_script_tag(content=asset("replay_formula.js") + "\nglobalThis.Formula = Formula;")
+    page.add_script_tag(content=asset("replay/formula.js") + "\nglobalThis.Formula = Formula;")
     given = {name: array.tolist() for name, array in values.items()}
     script = "([trees, values]) => trees.map((tree) => Formula.evaluate(tree, values))"
     found = page.evaluate(script, [[tree(text, {}) for text in (*formulas, *conditions)], given])

@@ -35,7 +35,7 @@ def run(tmp_path: Path) -> Path:
     facts = {"series": {"packed": True, "kept": SeriesFolder(tmp_path).kept_ids()}}
     (tmp_path / "report").mkdir()
     told = f'<script type="application/json" id="facts">{json.dumps(facts)}</script>'
-    page = f"<!doctype html><meta charset='utf-8'>{told}<script>{asset('series_file.js')}</script>"
+    page = f"<!doctype html><meta charset='utf-8'>{told}<script>{asset('replay/series_file.js')}</script>"
     (tmp_path / "report" / "index.html").write_text(page)
     return tmp_path
 

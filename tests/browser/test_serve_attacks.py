@@ -64,7 +64,7 @@ ATTACK = """async (made) => {
         made.onerror = () => resolve("refused");
         document.body.append(made);
     });
-    said.push(await element("script", { src: `${made}/assets/dom.js` }));
+    said.push(await element("script", { src: `${made}/assets/shared/dom.js` }));
     said.push(await element("img", { src: `${made}/runs/night/plots/picture.png` }));
     return said;
 }"""

@@ -11,13 +11,11 @@ ALLOWED = {
     "_common/shipped.py: read_bytes": "installed with the harness, or unpacked from that",
     "_common/shipped.py: read_text": "installed with the harness",
     "campaigns/machine.py: read_text": "the kernel's file",
-    "comparison/pages.py: read_text": "installed with the harness",
     "execution/stopped_workers.py: read_text": "the kernel's file",
     "glue.py: read_text": "runs in the target's process",
     "results/table_reader.py: read": "checks the number of cells before",
     "review/pictures.py: read_bytes": "installed with the harness",
     "review/pictures.py: read_text": "installed with the harness",
-    "serve/home.py: read_text": "installed with the harness",
     "store/series_packing.py: read": "calls a function of its own",
     "web/__init__.py: read_text": "installed with the harness",
 }

@@ -41,7 +41,7 @@ def score_panel(run: ReportedRun) -> Panel | None:
         link="Score",
         markdown=score.markdown().rstrip(),
         html=html,
-        style="source.css",
+        style="report/source.css",
         files=sheet_files([score]),
     )
 

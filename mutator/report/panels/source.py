@@ -80,7 +80,9 @@ def source_panel(run: ReportedRun) -> Panel | None:
         told=_told,
         rows=_rows,
     )
-    return Panel(anchor="source", link="Source", markdown="\n\n".join(parts), html=html, style="source.css")
+    return Panel(
+        anchor="source", link="Source", markdown="\n\n".join(parts), html=html, style="report/source.css"
+    )
 
 
 def _told(file: MarkedFile) -> str:
@@ -138,7 +140,7 @@ def _mark(mark: Mark, line: int, place: str, lasting: str) -> Markup:
 
 
 def _query(place: str, *more: str) -> str:
-    """Return the URL fragment that searches the list of experiments (web/state.js)."""
+    """Return the URL fragment that searches the list of experiments (web/report/state.js)."""
     return f"q={quote(' '.join((f'line={place}', *more)), safe='')}"
 
 

@@ -50,5 +50,5 @@ def test_pages_use_the_tags_defined_in_python() -> None:
     for tag in words["probe"]:
         assert injected_lines.tagged("x", tag) == f"x  {words['mark']}{tag}"
     assert words["probe"] == [injected_lines.IMPORT_TAG, injected_lines.OBSERVE_TAG]
-    assert "fi:" not in asset("diff.js")
-    assert not re.search("|".join(rf"{tag}\W*\|" for tag in words["probe"]), asset("diff.js"))
+    assert "fi:" not in asset("shared/diff.js")
+    assert not re.search("|".join(rf"{tag}\W*\|" for tag in words["probe"]), asset("shared/diff.js"))

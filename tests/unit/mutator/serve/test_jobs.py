@@ -52,7 +52,7 @@ def test_the_run_of_a_job_is_complete_and_can_be_compared(busy: Client) -> None:
     [run] = busy.get("/api/runs").json["runs"]
     assert (run["key"], run["state"], run["done"]) == ("first", "finished", 2)
     report = busy.get(run["report"])
-    assert '<script src="/assets/served.js" defer></script>\n</body>' in report.text
+    assert '<script src="/assets/serve/served.js" defer></script>\n</body>' in report.text
     compared = busy.get("/compare/first/first/")
     check_policy(compared)
     assert "Nothing: the same sources" in compared.text

@@ -14,7 +14,7 @@ from mutator.serve.security import MOST_BYTES
 
 from .conftest import TOKEN, Answer, Client
 
-ASKED = ("/", "/api/jobs", "/runs/night/report/index.html", "/assets/base.css", "/nowhere")
+ASKED = ("/", "/api/jobs", "/runs/night/report/index.html", "/assets/shared/base.css", "/nowhere")
 
 
 @pytest.mark.parametrize(

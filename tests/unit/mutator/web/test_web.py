@@ -7,10 +7,8 @@ import json
 import pytest
 
 from mutator import web
-from mutator.report import page as report
-from mutator.review import page as review
 
-SERVED = ("jobs.js", "served.js", "start.js", "served.css")  # a server's page loads it by its address
+PAGES = ("comparison", "report", "review", "serve")
 
 
 def test_embedded_data_round_trip_and_are_reproducible() -> None:
@@ -37,9 +35,15 @@ def test_nan_is_refused() -> None:
         web.packed([float("nan")])
 
 
-@pytest.mark.parametrize(
-    "name",
-    sorted({*report.STYLES, *report.SCRIPTS, *review.STYLES, *review.SCRIPTS, *SERVED}),
-)
+@pytest.mark.parametrize("name", [*web.assets(".css"), *web.assets(".js")])
 def test_assets_stay_small_and_cannot_end_their_element(name: str) -> None:
     assert len(web.asset(name).splitlines()) <= 300
+
+
+def test_load_orders_name_every_script_once() -> None:
+    """`home.html` loads start.js by its address. A report panel adds source.css."""
+    orders = [web.load_order(page, ".js") for page in PAGES]
+    assert all(len({*order}) == len(order) for order in orders)
+    assert {name for order in orders for name in order} == {*web.assets(".js")} - {"serve/start.js"}
+    styles = {name for page in PAGES for name in web.load_order(page, ".css")}
+    assert styles == {*web.assets(".css")} - {"report/source.css"}
