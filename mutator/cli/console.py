@@ -17,6 +17,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TextIO
 
+from mutator._common import events
 from mutator._common.hashing import plain
 from mutator._common.tables import Table
 from mutator._common.text import folded
@@ -62,6 +63,16 @@ class Terminal:
         if not self.as_json:
             _print(self.out, text, style, whole=whole)
 
+    def result(self, text: str, style: str | None = None) -> None:
+        """Print the sentence that says what came out of the command."""
+        events.result(text)
+        self.say(text, style)
+
+    def link(self, kind: str, path: Path, text: str | None = None) -> None:
+        """Print where a file was written: `kind: path`, or `text`."""
+        events.link(kind, path)
+        self.say(text or f"{kind}: {short_path(path)}")
+
     def note(self, text: str) -> None:
         """Print a remark to standard error, so that a pipe gets only the result."""
         with remarking():
@@ -69,6 +80,7 @@ class Terminal:
 
     def complain(self, text: str) -> None:
         """Print an error to standard error."""
+        events.error(text)
         with remarking():
             _print(self.err, f"error: {text}", "bold red")
 
@@ -113,6 +125,7 @@ class Terminal:
 
     @contextmanager
     def wait(self, text: str) -> Iterator[None]:
+        events.phase(text)
         if self.as_json or not self.err.is_terminal:
             yield
             return

@@ -85,7 +85,7 @@ def print_verdict(terminal: Terminal, result: "ExperimentResult") -> None:
     assert record is not None
     manifest = _manifest(result)
     ending = record.outcome.value if record.outcome else record.status.value
-    terminal.say(f"verdict: {ending}", style=STYLES.get(ending))
+    terminal.result(f"verdict: {ending}", style=STYLES.get(ending))
     if record.detail:
         terminal.say(record.detail)
     start = record.activation.first if record.activation else None
@@ -196,4 +196,7 @@ def show_trial(terminal: Terminal, trial: "Trial") -> None:
     if trial.log.strip() and trial.record.detail:
         terminal.say("last lines of the run:")
         terminal.say(trial.log.strip(), whole=True)
-    terminal.say(f"plot: {drawn}" if drawn else "no plot: the run left no trace")
+    if drawn:
+        terminal.link("plot", drawn, f"plot: {drawn}")
+    else:
+        terminal.say("no plot: the run left no trace")

@@ -197,7 +197,7 @@ def rerun(
         facts = {**describe(found.experiment), **trial.verdict, "same_as_record": same}
         terminal.emit(facts | {"traces": str(traces) if trace else None, "plot": str(plot) if plot else None})
     experiment_view.print_verdict(terminal, trial)
-    terminal.say(_comparison(same), style="bold red" if same is False else None)
+    terminal.result(_comparison(same), style="bold red" if same is False else None)
     if trace:
         terminal.say(f"trace: {short_path(traces)}")
         terminal.say(f"plot: {short_path(plot)}" if plot else "no plot: the run left no trace")

@@ -1,9 +1,10 @@
 """The progress of a campaign: a live bar in a terminal, occasional lines elsewhere."""
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from typing import TYPE_CHECKING
 
+from mutator._common import events
 from mutator.cli.console import Terminal
 from mutator.execution.phases import Lines, count, endings, rate, remaining, title
 
@@ -14,11 +15,13 @@ if TYPE_CHECKING:
 @contextmanager
 def campaign_progress(terminal: Terminal) -> Iterator[Callable[["Progress"], None]]:
     """Show progress; yield the function that the campaign calls, from any thread."""
-    if terminal.err.is_terminal:
-        with _live(terminal) as notify:
-            yield notify
-    else:
-        yield Lines(terminal.note)
+    with _live(terminal) if terminal.err.is_terminal else nullcontext(Lines(terminal.note)) as show:
+
+        def notify(progress: "Progress") -> None:
+            events.phase(title(progress), progress.done, progress.total, progress.outcomes)
+            show(progress)
+
+        yield notify
 
 
 @contextmanager

@@ -38,7 +38,7 @@ def show_counts(terminal: Terminal, run: "Run") -> None:
             terminal.say(note)
     if run.folder.stop_note:
         terminal.say(run.folder.stop_note)
-    terminal.say(f"outcomes: {', '.join(f'{name} {n}' for name, n in run.endings.items())}")
+    terminal.result(f"outcomes: {', '.join(f'{name} {n}' for name, n in run.endings.items())}")
 
 
 MERGE_EXAMPLES = """\b

@@ -3,31 +3,34 @@
 import os
 import queue
 import re
+import selectors
 import subprocess
 import sys
 import threading
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from enum import StrEnum
-from typing import Any
+from pathlib import Path
+from typing import IO, Any
 
+from mutator._common.events import EVENTS_FD
 from mutator.errors import MutatorError
-from mutator.execution.phases import count, endings
+from mutator.execution.phases import endings
 from mutator.serve.answers import without_places
+from mutator.serve.job_events import Event, EventReader, Link, Phase
 from mutator.serve.orders import TRIES, Work
 from mutator.serve.runs import Absent
-from mutator.store.progress import Tail
 
 _KEEPER = "mutator.serve.keeper"
 _COLUMNS = "200"  # line width of a job's output; pages wrap the lines
 _LOG_BYTES = 100_000  # only the last bytes of a job's output are kept
+_READ_BYTES = 65_536
+_LONGEST_MESSAGE = 500
 _MOST_JOBS = 200  # ended jobs to keep, the newest
 _MOST_WAITING = 50
-_NEWS = ("the same as", "no record to compare", "film: ", "verdict: ", "outcomes: ")
 _STYLES = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")  # terminal escape codes
-_COUNT = re.compile(r"^([a-z ]+) (\d+)/(\d+)(?:,|$)")
-_TRIED = re.compile(r"^experiment +([0-9a-f]{16})$", re.MULTILINE)
 _END_S = 30.0  # time for jobs to end when the server ends
 
 
@@ -56,15 +59,14 @@ class Job:
     started: datetime | None = None
     ended: datetime | None = None
     log: bytearray = field(default_factory=bytearray)
-    tail: Tail | None = None  # follows the records of a campaign while its experiments run
+    outcome: str = ""  # what came out of the command, in one sentence
+    error: str = ""
+    links: dict[str, str] = field(default_factory=dict)  # kind of file -> path
+    events: EventReader = field(default_factory=EventReader)
     hold: int | None = None  # the writing end of the pipe to the job's keeper
 
     def told(self) -> dict[str, Any]:
         order = self.work.order
-        if self.tail is not None and self.state is State.RUNNING:
-            now = self.tail.poll()
-            self.progress = min(1.0, now.done / max(1, now.total))
-            self.message = ", ".join(filter(None, (f"experiments {count(now)}", endings(now.outcomes))))
         facts: dict[str, Any] = {"id": self.id, "kind": order.kind, "title": self.work.title}
         facts |= {name: getattr(order, name, None) for name in ("run", "experiment")}
         facts |= {"state": self.state.value, "progress": self.progress, "message": self.message}
@@ -76,17 +78,29 @@ class Job:
         """The output, without control characters and absolute paths."""
         return _plain(self.log)
 
-    def hear(self, line: bytes) -> None:
-        self.log += line
+    def add_output(self, data: bytes) -> None:
+        self.log += data
         del self.log[:-_LOG_BYTES]
-        text = _plain(line).strip()
-        if not text:
-            return
-        found = _COUNT.match(text)
-        self.message, self.tail = text[:500], None
-        self.progress = min(1.0, int(found[2]) / max(1, int(found[3]))) if found else None
-        if found and found[1] == "experiments" and self.work.folder:
-            self.tail = Tail("experiments", self.work.folder / "records", int(found[3]))
+
+    def add_events(self, data: bytes) -> None:
+        """Take in what the command sent through the pipe for events."""
+        for event in self.events.read(data):
+            self._add(event)
+
+    def _add(self, event: Event) -> None:
+        if isinstance(event, Link):
+            self.links[event.kind] = event.path
+        elif isinstance(event, Phase):
+            count = f" {event.done}/{event.total}" if event.total else ""
+            parts = (_line(f"{event.phase}{count}"), endings(Counter(event.outcomes)))
+            self.message = ", ".join(filter(None, parts))
+            self.progress = min(1.0, event.done / event.total) if event.total else None
+        elif event.event == "result":
+            self.outcome = _line(event.text)
+        elif event.event == "error":
+            self.error = _line(event.text)
+        else:
+            self.message = f"warning: {_line(event.text)}"
 
 
 class Jobs:
@@ -158,11 +172,22 @@ class Jobs:
 
     def _work(self) -> None:
         while (job := self._waiting.get()) is not None:
-            process = self._started(job)
-            if process is not None:
-                self._follow(job, process)
+            try:
+                events, sent = os.pipe()
+            except OSError as err:
+                with self._lock:
+                    self._fail(job, err)
+                continue
+            with os.fdopen(events, "rb", buffering=0) as pipe:
+                try:
+                    process = self._started(job, sent)
+                finally:
+                    os.close(sent)
+                if process is not None:
+                    self._follow(job, process, pipe)
 
-    def _started(self, job: Job) -> subprocess.Popen[bytes] | None:
+    def _started(self, job: Job, events: int) -> subprocess.Popen[bytes] | None:
+        """Start the job's command, which sends its events to the pipe `events`; None if it must not start."""
         with self._lock:
             if job.state is not State.QUEUED or self._closed:
                 return None
@@ -174,8 +199,8 @@ class Jobs:
             try:
                 process = subprocess.Popen(
                     [sys.executable, "-P", "-m", _KEEPER, str(watched), *job.work.words],
-                    pass_fds=[watched],
-                    env={**os.environ, "COLUMNS": _COLUMNS},
+                    pass_fds=[watched, events],
+                    env={**os.environ, "COLUMNS": _COLUMNS, EVENTS_FD: str(events)},
                     stdin=subprocess.DEVNULL,
                     stdout=subprocess.PIPE,
                     stderr=subprocess.STDOUT,
@@ -194,13 +219,10 @@ class Jobs:
         job.hold, job.state, job.message = None, State.FAILED, f"cannot be started: {err.strerror}"
         job.ended = datetime.now(UTC)
 
-    def _follow(self, job: Job, process: subprocess.Popen[bytes]) -> None:
+    def _follow(self, job: Job, process: subprocess.Popen[bytes], events: IO[bytes]) -> None:
         assert process.stdout is not None
-        with process.stdout as said:
-            for line in iter(lambda: said.readline(_LOG_BYTES), b""):
-                with self._lock:
-                    if job.state is State.RUNNING:
-                        job.hear(line)
+        with process.stdout as output:
+            self._read(job, {output.fileno(): job.add_output, events.fileno(): job.add_events})
         code = process.wait()
         result = self._result(job) if code == 0 else None
         with self._lock:
@@ -213,29 +235,47 @@ class Jobs:
                 os.close(job.hold)
                 job.hold = None
 
+    def _read(self, job: Job, readers: dict[int, Callable[[bytes], None]]) -> None:
+        """Give what the job's command writes to its readers, until it has closed all pipes."""
+        with selectors.DefaultSelector() as pipes:
+            for pipe, reader in readers.items():
+                pipes.register(pipe, selectors.EVENT_READ, reader)
+            while pipes.get_map():
+                for ready, _ in pipes.select():
+                    data = os.read(ready.fd, _READ_BYTES)
+                    if not data:
+                        pipes.unregister(ready.fd)
+                    with self._lock:
+                        if job.state is State.RUNNING:
+                            ready.data(data)
+
     def _result(self, job: Job) -> str | None:
         if job.work.order.kind == "try":
-            tried = _TRIED.search(job.text)
-            return f"/{TRIES}/{tried[1]}/plot.svg" if tried and "\nplot: " in job.text else None
+            plot = job.links.get("plot")
+            return f"/{TRIES}/{Path(plot).parent.name}/plot.svg" if plot else None
         return job.work.result or self._report_at(job.work)
 
 
 def _plain(data: bytes | bytearray) -> str:
-    text = without_places(_STYLES.sub("", data.decode("utf-8", "replace")))
+    return _printable(data.decode("utf-8", "replace"))
+
+
+def _printable(text: str) -> str:
+    text = without_places(_STYLES.sub("", text))
     return "".join(c for c in text if c.isprintable() or c in "\n\t")
 
 
+def _line(text: str) -> str:
+    return _printable(text)[:_LONGEST_MESSAGE]
+
+
 def _news(job: Job) -> str:
-    lines = job.text.splitlines()
-    told = [line for line in lines if line.startswith(_NEWS)]
-    return (told or [job.message])[-1]
+    film = job.links.get("film")
+    return f"film: {_line(film)}" if film else job.outcome or job.message
 
 
 def _complaint(job: Job) -> str:
-    lines = job.text.splitlines()
-    errors = [line.removeprefix("error: ") for line in lines if line.startswith("error: ")]
-    differs = [line for line in lines if line.startswith("DIFFERS")]
-    return (errors or differs or [job.message or "no output"])[-1]
+    return job.error or job.outcome or job.message or "no output"
 
 
 def _time(moment: datetime | None) -> str | None:

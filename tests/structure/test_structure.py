@@ -183,7 +183,7 @@ SHOWN_BY_THE_COMMAND_LINE = {
 
 
 def test_the_command_line_calls_the_api() -> None:
-    own = ("mutator.api.", "mutator.cli", "mutator._common.", "mutator.errors")
+    own = ("mutator.api.", "mutator.cli", "mutator._common", "mutator.errors")
     for path in (CLONE / "mutator" / "cli").glob("*.py"):
         tree = ast.parse(path.read_text(encoding="utf-8"))
         types = {

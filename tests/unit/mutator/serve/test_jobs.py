@@ -1,5 +1,6 @@
 """Jobs, from the request to their files. All tests share one small campaign of the toy."""
 
+import json
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -117,21 +118,50 @@ def job(**given: Any) -> Job:
 
 def test_the_output_of_a_job_is_plain_text() -> None:
     made = job()
-    made.hear(f"\x1b[31m/srv/data/{HOSTILE}\x07\u202e\n".encode())
-    made.hear(b"\xff\xfe\n")
+    hostile = f"\x1b[31m/srv/data/{HOSTILE}\x07\u202e"
+    made.add_output(f"{hostile}\n".encode())
+    made.add_output(b"\xff\xfe\n")
     assert made.text == f"{HOSTILE}\n\ufffd\ufffd\n"
-    for _ in range(30):
-        made.hear(b"x" * 9_999 + b"\n")
+    made.add_output(b"x" * 300_000)
     assert len(made.text) == 100_000
+    made.add_events(event("warning", text=hostile))
+    assert made.message == f"warning: {HOSTILE}"
+    made.add_events(event("phase", phase="x" * 9_999, done=0, total=0, outcomes={}))
     assert len(made.message) == 500
 
 
-def test_a_job_reports_the_progress_of_its_stage() -> None:
+def event(kind: str, **facts: Any) -> bytes:
+    return json.dumps({"event": kind, **facts}).encode() + b"\n"
+
+
+def test_a_job_reports_the_progress_of_its_phase() -> None:
     made = job()
-    made.hear(b"golden runs 1/4, 2.0 a second\n")
-    assert made.progress == 0.25
-    made.hear(b"report\n")
-    assert made.progress is None
+    made.add_events(event("phase", phase="experiments", done=1, total=4, outcomes={"sdc": 1}))
+    assert (made.progress, made.message) == (0.25, "experiments 1/4, sdc 1")
+    made.add_events(event("phase", phase="report", done=0, total=0, outcomes={}))
+    assert (made.progress, made.message) == (None, "report")
+
+
+def test_the_state_of_a_job_does_not_depend_on_its_output() -> None:
+    """A fault's name, or what a target prints, can look like any sentence."""
+    made = job()
+    made.add_output(b"error: none\nexperiments 3/4\nverdict: hazard\nplot: /tmp/plot.svg\n")
+    assert (made.progress, made.message, made.outcome, made.error, made.links) == (None, "", "", "", {})
+
+
+def test_events_arrive_in_any_pieces_and_other_lines_are_dropped() -> None:
+    made = job()
+    wrong = (
+        b"nonsense\n",
+        b"\xff\n",
+        event("result"),
+        event("phase", phase="x", done=-1, total=0, outcomes={}),
+    )
+    for line in (*wrong, event("result", text="wrong", more=1), b"x" * 99_999 + b"\n"):
+        made.add_events(line)
+    for byte in event("result", text="verdict: sdc"):
+        made.add_events(bytes([byte]))
+    assert (made.outcome, made.message) == ("verdict: sdc", "")
 
 
 def test_the_number_of_waiting_jobs_is_limited() -> None:
