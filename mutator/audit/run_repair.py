@@ -36,11 +36,10 @@ from mutator.store.digests import Digest, Ledger
 from mutator.store.lines import Segment, read_segment, written
 from mutator.store.opening import ASIDE
 from mutator.store.patches import rewrite
-from mutator.store.records import SCHEMA, TIMINGS_SCHEMA
+from mutator.store.records import LINE_SCHEMAS
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
-SCHEMAS = {"records": SCHEMA, "proof": SCHEMA, "timings": TIMINGS_SCHEMA}
 _Change = tuple[str, bytes | None, str]  # file, new content (None: removed), sentence about the change
 
 
@@ -148,7 +147,7 @@ def _segments(folder: RunFolder, ledger: Ledger, lost: Collection[str]) -> Itera
     """Segments with invalid lines, and their remaining content."""
     run, planned = folder.path, folder.share()
     strangers = set(integrity.strangers(run, ledger)) if ledger.finished else set()
-    for kind, schema in SCHEMAS.items():
+    for kind, schema in LINE_SCHEMAS.items():
         done: set[str] = set()
         for path in sorted({*(run / kind).glob("*.jsonl")} - strangers):
             name = path.relative_to(run).as_posix()

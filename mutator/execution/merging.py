@@ -28,18 +28,17 @@ from mutator.store.approvals import FILE as REVIEWED
 from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.digests import Digest, Ledger
-from mutator.store.lines import verified_lines, write_copy
 from mutator.store.opening import check_contents
 from mutator.store.patches import PatchWriter
-from mutator.store.records import SCHEMA, TIMINGS_SCHEMA, endings
+from mutator.store.records import endings
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import HEAD
 from mutator.store.run_head import SCHEMA as HEAD_SCHEMA
+from mutator.store.run_writer import copy_lines
 from mutator.store.series import FOLDER as SERIES
 from mutator.store.series_packing import pack
 from mutator.store.stretches import Stretch, differences
 
-_SEGMENTS = {"records": SCHEMA, "timings": TIMINGS_SCHEMA, equivalence.FOLDER: SCHEMA}
 _MARK = f".{HEAD}."  # followed by a process id: marks an unfinished merge
 _REMEDY = "give the folder of each shard of one plan exactly once"
 
@@ -222,7 +221,8 @@ def _copy(folders: Sequence[RunFolder], out: Path, stretches: Sequence[dict[str,
             shutil.copyfileobj(source, copy)
     for folder in folders:
         _copy_patches(folder, out)
-        _copy_segments(folder, out)
+        assert folder.shard is not None
+        copy_lines(folder, out, f"-shard{folder.shard.number}")
     _pack_series(folders, out)
     whole = {
         "schema": HEAD_SCHEMA,
@@ -260,15 +260,3 @@ def _rows(folder: RunFolder) -> Iterator[Row]:
     for experiment in plan_file.iterate(folder.path):
         if (record := records.get(experiment.id)) is not None:
             yield row_of(experiment, record, hazards, scale)
-
-
-def _copy_segments(folder: RunFolder, out: Path) -> None:
-    assert folder.shard is not None
-    for kind, schema in _SEGMENTS.items():
-        if (folder.path / kind).is_dir():
-            (out / kind).mkdir(exist_ok=True)
-        for path in sorted((folder.path / kind).glob("*.jsonl")):
-            place = inside(out / kind, f"{path.stem}-shard{folder.shard.number}.jsonl")
-            head = {"schema": schema, "plan": folder.head["plan"]}
-            lines = verified_lines(path, schema, checksums=True)
-            write_copy(place, head, (line for _, _, line in lines))

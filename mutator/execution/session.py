@@ -41,7 +41,7 @@ from mutator.results.table_reader import Results
 from mutator.store import digests
 from mutator.store.check_results import golden_digests
 from mutator.store.progress import Progress, label
-from mutator.store.records import endings
+from mutator.store.records import LINE_SCHEMAS, endings
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_packing import pack, segments
 from mutator.targets.requirements import check_requirements
@@ -169,8 +169,7 @@ class Session:
 
     def worker_name(self, name: str) -> str:
         """Return a name for a worker's files that no session used before."""
-        kinds = ("records", "timings", equivalence.FOLDER)
-        files = chain.from_iterable((self.folder.path / kind).glob("*.jsonl") for kind in kinds)
+        files = chain.from_iterable((self.folder.path / kind).glob("*.jsonl") for kind in LINE_SCHEMAS)
         taken = [int(number[0]) for path in files if (number := re.match(r"\d+", path.name))]
         return f"{max(taken, default=0) + 1:04d}-{name}"
 

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from mutator._common import caches
-from mutator._common.below import inside
 from mutator._common.files import raising_disk_full
 from mutator.campaigns.chunks import Pending
 from mutator.campaigns.provenance import check_sources, sources
@@ -23,12 +22,9 @@ from mutator.model import Experiment, Status
 from mutator.preflight import equivalence
 from mutator.preflight.equivalence import Sample
 from mutator.store import plan_file
-from mutator.store.lines import LineWriter
-from mutator.store.patches import PatchWriter
 from mutator.store.planned import Planned
-from mutator.store.records import SCHEMA, TIMINGS_SCHEMA, line_of
 from mutator.store.run_folder import RunFolder
-from mutator.store.series_packing import SeriesWriter
+from mutator.store.run_writer import RunWriter
 from mutator.workspace import Workspace
 
 
@@ -62,21 +58,15 @@ class Worker:
         with raising_disk_full(self.folder.work):
             self.folder.work.mkdir(exist_ok=True)
         self._workspace, self._manifest, self._assignment = workspace, manifest, assignment
-        self._patches = PatchWriter(self.folder.path, assignment.name)
-        self._series = SeriesWriter(self.folder.path, assignment.name) if self.folder.series_mb else None
         self._runner = self._make_runner(
-            self._engine(assignment.engine), with_series=self._series is not None
+            self._engine(assignment.engine), with_series=bool(self.folder.series_mb)
         )
         self._seed: int | None = None  # the seed being run
         self._prover: Runner | None = None
-        self._proofs: LineWriter | None = None
         self._needs_proof: bool | None = None  # None: not known yet
         self._planned: Mapping[str, Experiment] = {}
         self._faults = plan_file.read_faults(self.folder.path)
-        plan = head["plan"]
-        self._head = {"schema": SCHEMA, "plan": plan}
-        self._records = LineWriter(self._file("records"), self._head, self._sync_blocks)
-        self._timings = LineWriter(self._file("timings"), {"schema": TIMINGS_SCHEMA, "plan": plan})
+        self._writer = RunWriter(self.folder, assignment.name)  # last: nothing is written if the rest fails
 
     def run(self, pending: Pending) -> list[tuple[str, str]]:
         """Run the rest of a chunk; return (experiment id, detail) of each harness error."""
@@ -111,14 +101,13 @@ class Worker:
             self._needs_proof = equivalence.needless(self.folder) is None
         if not self._needs_proof:
             return []
-        if self._prover is None or self._proofs is None:
+        if self._prover is None:
             self._prover = self._make_runner(self._independent_engine())
-            self._proofs = LineWriter(self._file(equivalence.FOLDER), self._head)
             self._planned = Planned(self.folder.path)
         errors = []
         for ended in self._prover.run([self._planned[sample.id]]):
             finished = self._blamed(ended)
-            self._proofs.append(line_of(finished.record))
+            self._writer.append_proof(finished.record)
             if finished.record.status is Status.HARNESS_ERROR:
                 errors.append((finished.experiment.id, finished.record.detail))
         return errors
@@ -126,14 +115,11 @@ class Worker:
     @property
     def written(self) -> Sums:
         """The digests of the files whose lines count."""
-        writers = [self._records, *([self._proofs] if self._proofs else [])]
-        return {one.path.relative_to(self.folder.path).as_posix(): one.sha256 for one in writers}
+        return self._writer.digests
 
     def close(self) -> None:
         self._runner.engine.close()
-        for writer in (self._patches, self._series, self._records, self._timings, self._proofs):
-            if writer is not None:
-                writer.close()
+        self._writer.close()
 
     def _make_runner(self, engine: Engine, *, with_series: bool = False) -> Runner:
         folder = self.folder
@@ -177,22 +163,9 @@ class Worker:
         return replace(finished, record=replace(bare, tree=made.tree, patch=made.patch), series=None)
 
     def _keep(self, finished: Finished) -> None:
-        """Append the patch first and the record last, so that each record's other data exist."""
-        if finished.mutant is not None:
-            self._patches.append(finished.experiment.id, finished.mutant.patch_bytes)
-        if self._series is not None and finished.series is not None:
-            self._series.append(finished.experiment.id, finished.series)
-        self._timings.append(timing_of(finished, self._assignment.name))
-        self._records.append(line_of(finished.record))
-
-    def _sync_blocks(self) -> None:
-        """Sync blocks before records, because a stored record names patches that must survive a power cut."""
-        self._patches.sync()
-        if self._series is not None:
-            self._series.sync()
-
-    def _file(self, kind: str) -> Path:
-        return inside(self.folder.path, f"{kind}/{self._assignment.name}.jsonl")
+        patch = None if finished.mutant is None else finished.mutant.patch_bytes
+        timing = timing_of(finished, self._assignment.name)
+        self._writer.append(finished.record, timing, patch, finished.series)
 
 
 def timing_of(finished: Finished, worker: str) -> dict[str, Any]:

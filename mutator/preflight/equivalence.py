@@ -20,10 +20,10 @@ from mutator.engines.jobs import RunMode
 from mutator.errors import CheckFailed
 from mutator.model import Experiment, Record, Status
 from mutator.store import digests, plan_file
-from mutator.store.records import endings
+from mutator.store.records import PROOF, endings
 from mutator.store.run_folder import RunFolder
 
-FOLDER = "proof"
+FOLDER = PROOF
 _LEAST = 20
 _SHARE = 100  # one experiment in this many
 

@@ -14,6 +14,8 @@ from mutator.store.indexed_lines import IndexedLines, Line
 
 SCHEMA = "records/2"
 TIMINGS_SCHEMA = "timings/2"
+RECORDS, TIMINGS, PROOF = "records", "timings", "proof"  # folders of files of lines
+LINE_SCHEMAS = {RECORDS: SCHEMA, TIMINGS: TIMINGS_SCHEMA, PROOF: SCHEMA}
 _LONGEST_S = 1e9  # of a run; sums of such times are finite
 _NAMES = tuple(field.name for field in fields(Record))
 _RECORDS = ("activation", "error")  # fields that contain dataclasses
