@@ -20,9 +20,9 @@ from mutator.audit.seal import Seals, not_verifiable, seals_of
 from mutator.errors import MutatorError
 from mutator.execution.merging import merge
 from mutator.execution.session import Notify, Summary
-from mutator.exports import Format
+from mutator.exports import Format, Parts, find_export
 from mutator.exports import Table as ExportedTable
-from mutator.exports.write import Parts, export
+from mutator.exports.write import export
 from mutator.model import OPERATORS
 from mutator.outcomes.fault_free import FaultFreeRun, alerts_by_drive, fault_free_runs, own_alerts
 from mutator.outcomes.golden import load_trace
@@ -203,19 +203,19 @@ class Run(RunContents):
     ) -> Path:
         """Export the run for other tools, and return the path; default: in exports/ of the run folder.
 
+        `format` is a `Format`, or the name of one that another package adds.
         `failures` are the endings that JUnit shows as failures. `only`, for MCAP, is a filter over the
         columns of the results. `table` is the table for CSV and Parquet. An MCAP export is a folder of files.
         """
-        for name, value, kind in (("format", format, Format), ("table", table, ExportedTable)):
-            if value not in (known := [one.value for one in kind]):
-                raise MutatorError(f"'{value}'", argument=name, expected=f"one of {', '.join(known)}")
-        wanted = Format(format)
-        workspace = self.workspace if wanted is Format.MUTATION_ELEMENTS else None
-        if wanted is Format.MCAP:
+        if table not in (known := [one.value for one in ExportedTable]):
+            raise MutatorError(f"'{table}'", argument="table", expected=f"one of {', '.join(known)}")
+        wanted = find_export(str(format))
+        workspace = self.workspace if wanted.needs_library else None
+        if wanted.uses_library:
             workspace = self._workspace_if_any()
         place = None if out is None else Path(out)
         parts = Parts(failures=failures, only=only, table=ExportedTable(table))
-        return export(self.path, wanted, place, workspace=workspace, parts=parts)
+        return export(self.path, str(format), place, workspace=workspace, parts=parts)
 
     def check_equivalence(self) -> None:
         """Raise CheckFailed if the equivalence check of the run failed."""

@@ -9,6 +9,7 @@ from typing import Any
 
 import typer
 
+from mutator._common.doors import EXPORTS
 from mutator._common.places import library_files, library_folder, run_folders
 from mutator.errors import MutatorError
 
@@ -35,6 +36,10 @@ targets = names_in("targets")
 
 def runs(ctx: typer.Context, incomplete: str) -> list[str]:
     return _starting(map(_from_here, run_folders(_library(ctx).parent)), incomplete)
+
+
+def formats(ctx: typer.Context, incomplete: str) -> list[str]:
+    return _starting(EXPORTS.names(), incomplete)
 
 
 def experiments(ctx: typer.Context, incomplete: str) -> list[str]:

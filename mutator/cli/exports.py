@@ -10,7 +10,7 @@ from mutator.cli import completion
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json, Place, with_place
 from mutator.cli.run_folders import library_if_any
-from mutator.exports import Format, Table
+from mutator.exports import Format, Table, find_export
 
 
 def register(app: typer.Typer) -> None:
@@ -31,7 +31,14 @@ Examples:
 @with_place
 def export(
     run: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.", autocompletion=completion.runs)],
-    format: Annotated[Format, typer.Option(help="What to write.")],
+    format: Annotated[
+        str,
+        typer.Option(
+            metavar=f"[{'|'.join(Format)}]",
+            help="What to write. Other packages can add formats.",
+            autocompletion=completion.formats,
+        ),
+    ],
     out: Annotated[
         Path | None,
         typer.Option(
@@ -64,8 +71,9 @@ def export(
     faulty run.
     """
     terminal = Terminal(as_json)
-    workspace = place.workspace() if format is Format.MUTATION_ELEMENTS else None
-    if format is Format.MCAP:
+    wanted = find_export(format)
+    workspace = place.workspace() if wanted.needs_library else None
+    if wanted.uses_library:
         workspace = library_if_any(place)
     endings = [name.strip() for name in failures.split(",")] if failures else []
     with terminal.wait("writing"):
@@ -73,5 +81,5 @@ def export(
             format, out, failures=endings, only=only, table=table
         )
     if as_json:
-        terminal.emit({"format": format.value, "file": str(written)})
-    terminal.say(f"{format.value}: {short_path(written)}")
+        terminal.emit({"format": format, "file": str(written)})
+    terminal.say(f"{format}: {short_path(written)}")

@@ -1,16 +1,40 @@
-"""Write runs for other tools: mutation testing viewers, CI servers, spreadsheets, data frames."""
+"""Write runs for other tools: mutation testing viewers, CI servers, spreadsheets, data frames.
 
-from enum import StrEnum
+A format is an `Export`: in a module of `formats/`, or from another package (entry points of the group
+`mutator.exports`).
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import EnumType, StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mutator._common.doors import EXPORTS
+from mutator.errors import MutatorError
+
+if TYPE_CHECKING:
+    from mutator.store.run_folder import RunFolder
+    from mutator.workspace import Workspace
 
 
-class Format(StrEnum):
-    """The formats that a run can be written in."""
+class _Members(EnumType):
+    if TYPE_CHECKING:  # members come from the folder of formats
 
-    MUTATION_ELEMENTS = "mutation-elements"  #: JSON for viewers of mutation reports
-    JUNIT = "junit"  #: JUnit XML for CI servers
-    CSV = "csv"  #: a table as CSV
-    PARQUET = "parquet"  #: a table as Parquet
-    MCAP = "mcap"  #: a folder of traces, one MCAP file per experiment
+        def __getattr__(cls, name: str) -> "Format": ...
+
+
+class Format(StrEnum, metaclass=_Members):
+    """The formats that a run can be written in. Other packages can add more, which have names only."""
+
+    _ignore_ = "name"
+    for name in EXPORTS.shipped():
+        vars()[name.replace("-", "_").upper()] = name
+
+    @property
+    def about(self) -> str:
+        """What the format is."""
+        return find_export(self).about
 
 
 class Table(StrEnum):
@@ -19,3 +43,61 @@ class Table(StrEnum):
     RESULTS = "results"
     PROPAGATION = "propagation"
     TIMINGS = "timings"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parts:
+    """The part of a run to write: the outcomes that are reported as failures, a filter over the columns of
+    the results, the table.
+    """
+
+    failures: Sequence[str] = ()
+    only: str | None = None
+    table: Table = Table.RESULTS
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExportRequest:
+    """What to write: a run folder, the file or folder for it, the library with the target if the format needs
+    it and there is one, and the part of the run.
+    """
+
+    folder: "RunFolder"
+    out: Path
+    workspace: "Workspace | None"
+    parts: Parts
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Export:
+    """A format.
+
+    `write` returns the content of the file, or None if it has written the folder `out` itself. `file` is the
+    default name in the run's `exports/`; `{table}` in it is the name of the table.
+    """
+
+    about: str
+    file: str
+    write: Callable[[ExportRequest], bytes | None]
+    options: frozenset[str] = frozenset()  # the fields of `Parts` that it reads
+    needs_library: bool = False  # fails without the library and the target
+    uses_library: bool = False  # writes more if they are there
+
+
+def find_export(name: str) -> Export:
+    """Return the format of that name; MutatorError if there is none, or if its package is broken."""
+    found = EXPORTS.find(name)
+    assert isinstance(found, Export)
+    return found
+
+
+def check_options(name: str, export: Export, parts: Parts) -> None:
+    """Raise MutatorError for a part of a run that this format cannot write."""
+    chosen = {
+        "failures": bool(parts.failures),
+        "only": parts.only is not None,
+        "table": parts.table is not Table.RESULTS,
+    }
+    for option, is_chosen in chosen.items():
+        if is_chosen and option not in export.options:
+            raise MutatorError(f"not valid for {name}", argument=option, remedy=f"leave `{option}` out")

@@ -155,6 +155,11 @@ def _parsed(thing: Any) -> tuple[Any, str]:
 
 
 def _own_members(cls: type) -> Iterator[Member]:
+    if issubclass(cls, Enum) and hasattr(cls, "about"):  # its members are not in its source
+        for one in cls:
+            meaning = f"{one.about[0].upper()}{one.about[1:]}."
+            yield Member(name=one.name, written=one.name, type=_type_of(one), meaning=meaning)
+        return
     lines = dedent(inspect.getsource(cls)).splitlines()
     for node in _parsed(cls)[0].body:
         if isinstance(node, Function):

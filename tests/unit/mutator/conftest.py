@@ -1,7 +1,8 @@
 """Fixtures for unit tests: workspaces and a fork engine."""
 
 import shutil
-from collections.abc import Iterator
+import tomllib
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,32 @@ from .fork_on_toy import Edit, Fork
 
 HERE = Path(__file__).parent
 CLONE = HERE.parents[2]
+
+
+@pytest.fixture
+def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[Path], None]:
+    """Install a project as pip would: its folder and a dist-info with its entry points on the path."""
+
+    def installed(project: Path) -> None:
+        facts = tomllib.loads((project / "pyproject.toml").read_text())["project"]
+        info = tmp_path / "site" / f"{facts['name'].replace('-', '_')}-{facts['version']}.dist-info"
+        info.mkdir(parents=True)
+        (info / "METADATA").write_text(f"Name: {facts['name']}\nVersion: {facts['version']}\n")
+        lines = []
+        for group, points in facts["entry-points"].items():
+            lines += [f"[{group}]", *(f"{name} = {value}" for name, value in points.items())]
+        (info / "entry_points.txt").write_text("\n".join(lines))
+        monkeypatch.syspath_prepend(info.parent)
+        monkeypatch.syspath_prepend(project)
+
+    return installed
+
+
+@pytest.fixture
+def door_examples(install: Callable[[Path], None]) -> Path:
+    project = CLONE / "tests" / "fixtures" / "doors"
+    install(project)
+    return project
 
 
 @pytest.fixture

@@ -6,22 +6,23 @@ mutants are errors; experiments that have not run or were never active are skipp
 
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 
 from mutator.errors import MutatorError
+from mutator.exports import Export, ExportRequest
 from mutator.model import Experiment, Outcome, Status
 from mutator.results.column_facts import plan_row
 from mutator.results.rows import Row
 from mutator.results.table_reader import Results
 from mutator.store.plan_file import read_all
-from mutator.store.run_folder import RunFolder
 
 ENDINGS = (Outcome.HAZARD, Outcome.SDC, Outcome.MASKED, Status.CRASHED, Status.TIMEOUT)
 _NO_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
-def content(folder: RunFolder, failures: Sequence[str] = ()) -> bytes:
+def _content(request: ExportRequest) -> bytes:
     """Return the XML. MutatorError for an outcome that cannot be a failure."""
+    folder, failures = request.folder, request.parts.failures
     known = [ending.value for ending in ENDINGS]
     if strangers := [name for name in failures if name not in known]:
         raise MutatorError(f"'{strangers[0]}'", argument="failures", expected=f"one of {', '.join(known)}")
@@ -71,3 +72,8 @@ def _count(element: ET.Element) -> None:
 
 def _clean(text: str) -> str:
     return _NO_XML.sub("?", text)
+
+
+EXPORT = Export(
+    about="JUnit XML for CI servers", file="junit.xml", write=_content, options=frozenset({"failures"})
+)

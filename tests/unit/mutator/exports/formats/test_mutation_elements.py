@@ -12,7 +12,7 @@ import pytest
 from mutator.campaigns.plans import Plan
 from mutator.errors import MutatorError
 from mutator.exports import Format
-from mutator.exports.elements import verdict
+from mutator.exports.formats.mutation_elements import verdict
 from mutator.exports.write import export
 from mutator.model import Anchor, AnchorKind, Experiment, Injection, Outcome, Record, Status
 from mutator.workspace import Workspace

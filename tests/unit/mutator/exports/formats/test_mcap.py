@@ -15,8 +15,8 @@ import pytest
 from mcap.reader import make_reader
 
 from mutator.errors import MutatorError, MutatorWarning
-from mutator.exports import Format, Table
-from mutator.exports.write import Parts, export
+from mutator.exports import Format, Parts, Table
+from mutator.exports.write import export
 from mutator.model import Activation, Experiment, Outcome
 from mutator.store.cleaning import check
 from mutator.store.run_folder import RunFolder

@@ -12,7 +12,6 @@ import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,6 +22,7 @@ from mutator._common.text import counted
 from mutator.campaigns.filters import compile_filter
 from mutator.errors import MutatorError, MutatorWarning
 from mutator.execution.traces import Traces
+from mutator.exports import Export, ExportRequest
 from mutator.model import Experiment, Record
 from mutator.outcomes.golden import Trace
 from mutator.outcomes.trace_files import own_times
@@ -47,16 +47,15 @@ class Topic:
     values: Values
 
 
-def write_experiments(
-    folder: RunFolder, out: Path, workspace: Workspace | None, only: str | None = None
-) -> Path:
-    """Write `<id>.mcap` into `out` for each experiment with a series or a kept trace that matches the filter
-    `only`.
+def _write_experiments(request: ExportRequest) -> None:
+    """Write `<id>.mcap` into the folder `out` for each experiment that has a series or a kept trace and
+    matches the filter `only`.
 
     MutatorError if the package mcap is missing or no experiment has data; MutatorWarning if some have none.
     """
-    content = Content(folder, workspace)
-    wanted = _chosen(folder, only)
+    folder, out = request.folder, request.out
+    content = Content(folder, request.workspace)
+    wanted = _chosen(folder, request.parts.only)
     found = [name for name in wanted if content.has(name)]
     remedy = f"rerun one: `mutator rerun {(wanted or ['ID'])[0]} --run {folder.path} --trace`"
     if not found:
@@ -79,7 +78,6 @@ def write_experiments(
     make_folder(out)
     for name in found:
         write_atomic(inside(out, f"{name}.mcap"), content.of(name))
-    return out
 
 
 class Content:
@@ -266,3 +264,12 @@ def _events(record: Record) -> Iterator[tuple[float, str, str]]:
     yield from ((t, "hazard", name) for name, t in record.hazards)
     if record.t_end is not None:
         yield record.t_end, "end_of_drive", ""
+
+
+EXPORT = Export(
+    about="a folder of traces, one MCAP file per experiment",
+    file="mcap",
+    write=_write_experiments,
+    options=frozenset({"only"}),
+    uses_library=True,
+)

@@ -12,6 +12,7 @@ from typing import Any
 from mutator._common.text import counted
 from mutator._common.version import VERSION
 from mutator.execution import single_run
+from mutator.exports import Export, ExportRequest
 from mutator.faults.fault_models import FaultModels, SnippetKind
 from mutator.model import OPERATORS, VALUE_ANCHORS, Experiment, Fault, Injection, Outcome, Record, Status
 from mutator.mutants.anchors import ParsedFile, parsed
@@ -22,16 +23,16 @@ from mutator.mutants.splicing import Edit, Rank, in_lines, in_order
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
-from mutator.workspace import Workspace
 
 SCHEMA_VERSION = "2.0"
 
 
-def content(folder: RunFolder, workspace: Workspace) -> bytes:
-    manifest = single_run.manifest_of(workspace, folder)
-    return (
-        json.dumps(report(folder, manifest, workspace.fault_models()), ensure_ascii=False) + "\n"
-    ).encode()
+def _content(request: ExportRequest) -> bytes:
+    workspace = request.workspace
+    assert workspace is not None
+    manifest = single_run.manifest_of(workspace, request.folder)
+    content = report(request.folder, manifest, workspace.fault_models())
+    return (json.dumps(content, ensure_ascii=False) + "\n").encode()
 
 
 def report(folder: RunFolder, manifest: TargetManifest, models: FaultModels) -> dict[str, Any]:
@@ -165,3 +166,11 @@ def _tests(experiments: Sequence[Experiment]) -> dict[str, Any]:
     for scenario, name in sorted({(e.scenario, e.drive_label) for e in experiments}):
         files.setdefault(scenario, {"tests": []})["tests"].append({"id": name, "name": name})
     return files
+
+
+EXPORT = Export(
+    about="JSON for viewers of mutation reports",
+    file="mutation-elements.json",
+    write=_content,
+    needs_library=True,
+)

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.exports import Format
-from mutator.exports.write import Parts, export
+from mutator.exports import Format, Parts
+from mutator.exports.write import export
 from mutator.model import Experiment, Outcome, Status
 from mutator.workspace import Workspace
 

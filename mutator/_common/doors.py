@@ -1,0 +1,120 @@
+"""Doors: where a module, or another package by an entry point, adds to the harness.
+
+A door has a folder of modules, each with one object, and a group of entry points with objects of the same
+kind. Whatever is not asked for by name is not imported.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from pkgutil import iter_modules, resolve_name
+from typing import Any
+
+from mutator._common.text import suggestion
+from mutator.errors import MutatorError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Door:
+    """One kind of addition. `thing` is its name, `kind` (`module:class`) is what every object must be.
+
+    The modules of the package `folder` hold the shipped ones, each as an attribute named like `thing`, in
+    capitals. A module's name is the name of the object, with `-` for `_`.
+    """
+
+    thing: str
+    folder: str
+    kind: str
+    argument: str  # the API's argument that names one
+
+    @property
+    def group(self) -> str:
+        """The group of entry points."""
+        return f"mutator.{self.thing.replace(' ', '_')}s"
+
+    def shipped(self) -> tuple[str, ...]:
+        """Return the names of the shipped objects."""
+        return _shipped(self.folder)
+
+    def installed(self) -> tuple[str, ...]:
+        """Return the names that other packages add."""
+        return tuple(sorted({point.name for point in entry_points(group=self.group)}))
+
+    def names(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys((*self.shipped(), *self.installed())))
+
+    def find(self, name: str) -> Any:
+        """Return the object of that name.
+
+        MutatorError for an unknown name, a name that two packages use, an entry point that cannot be loaded,
+        or an object of another kind.
+        """
+        points = list(entry_points(group=self.group, name=name))
+        is_shipped = name in self.shipped()
+        if len(points) + is_shipped > 1:
+            owners = ["mutator"] * is_shipped + [_package(point) for point in points]
+            raise self._refused(
+                name, f"{self.thing} '{name}' comes from {' and '.join(owners)}", "uninstall all but one"
+            )
+        if is_shipped:
+            return _load_shipped(self.folder, self.thing, name)
+        if not points:
+            remedy = "correct the name, or install the package that adds it"
+            raise self._refused(
+                name, f"no {self.thing} '{name}'", remedy + suggestion(name, list(self.names()))
+            )
+        return self._load(points[0])
+
+    def _load(self, point: EntryPoint) -> Any:
+        what = f"{self.thing} '{point.name}' of package {_package(point)} ({point.value})"
+        remedy = "correct, update or uninstall this package"
+        try:
+            loaded = point.load()
+        except Exception as err:  # importing it runs the code of somebody else
+            why = f"{type(err).__name__}: {err}"
+            raise MutatorError(f"{what} cannot be loaded: {why}", remedy=remedy) from err
+        if not isinstance(loaded, resolve_name(self.kind)):
+            kind = self.kind.replace(":", ".")
+            raise MutatorError(
+                f"{what} is of type {type(loaded).__name__}", expected=f"a {kind}", remedy=remedy
+            )
+        return loaded
+
+    def _refused(self, name: str, got: str, remedy: str) -> MutatorError:
+        others = ", ".join(other for other in self.names() if other != name)
+        return MutatorError(got, argument=self.argument, expected=f"one of {others}", remedy=remedy)
+
+
+@cache
+def _shipped(folder: str) -> tuple[str, ...]:
+    path = Path(__file__).parent.parent.joinpath(*folder.split(".")[1:])  # without importing the package
+    return tuple(sorted(module.name.replace("_", "-") for module in iter_modules([str(path)])))
+
+
+@cache
+def _load_shipped(folder: str, thing: str, name: str) -> Any:
+    module = import_module(f"{folder}.{name.replace('-', '_')}")
+    return getattr(module, thing.upper().replace(" ", "_"))
+
+
+def _package(point: EntryPoint) -> str:
+    return f"{point.dist.name} {point.dist.version}" if point.dist else "unknown"
+
+
+EXPORTS = Door(
+    thing="export", folder="mutator.exports.formats", kind="mutator.exports:Export", argument="format"
+)
+DISTRIBUTORS = Door(
+    thing="distributor",
+    folder="mutator.execution.distributors",
+    kind="mutator.execution.distribution:DistributorKind",
+    argument="cluster",
+)
+IMPORTERS = Door(
+    thing="importer",
+    folder="mutator.outcomes.importers",
+    kind="mutator.outcomes.trace_files:Importer",
+    argument="trace",
+)

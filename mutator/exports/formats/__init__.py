@@ -1,0 +1,1 @@
+"""The formats of `mutator export`: one module for each, with an `EXPORT`."""

@@ -1,0 +1,55 @@
+"""Doors: what is found by name, and what is refused."""
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from mutator._common.doors import EXPORTS
+from mutator.errors import MutatorError
+
+BROKEN = {
+    "shape": ("THING = 3", "is of type int; expected a mutator.exports.Export"),
+    "import": ("import no_such_module", "cannot be loaded: ModuleNotFoundError"),
+    "missing": ("", "cannot be loaded: AttributeError"),
+}
+
+
+def project(folder: Path, name: str, source: str) -> Path:
+    (folder / "strange_door.py").write_text(source)
+    text = '[project]\nname = "strange"\nversion = "2.5"\n[project.entry-points."mutator.exports"]\n'
+    (folder / "pyproject.toml").write_text(f'{text}{name} = "strange_door:THING"\n')
+    return folder
+
+
+@pytest.mark.parametrize("kind", BROKEN)
+def test_a_broken_addition_is_an_error_that_names_its_package(
+    kind: str, tmp_path: Path, install: Callable[[Path], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source, words = BROKEN[kind]
+    monkeypatch.delitem(sys.modules, "strange_door", raising=False)
+    install(project(tmp_path, "strange", source))
+    with pytest.raises(MutatorError, match=r"export 'strange' of package strange 2\.5") as error:
+        EXPORTS.find("strange")
+    monkeypatch.delitem(sys.modules, "strange_door", raising=False)
+    assert words in str(error.value) and "uninstall this package" in str(error.value)
+
+
+def test_a_name_that_two_packages_use_is_refused(tmp_path: Path, install: Callable[[Path], None]) -> None:
+    install(project(tmp_path, "csv", "THING = 3"))
+    with pytest.raises(MutatorError, match=r"comes from mutator and strange 2\.5"):
+        EXPORTS.find("csv")
+
+
+def test_an_unknown_name_lists_those_that_exist(door_examples: Path) -> None:
+    with pytest.raises(MutatorError, match=r"no export 'cvs'.*csv.*counts"):
+        EXPORTS.find("cvs")
+
+
+def test_the_command_line_starts_without_any_addition() -> None:
+    code = "import sys, mutator.cli.app; print([m for m in sys.modules if '.formats.' in m])"
+    code = f"import importlib.metadata as m; m.entry_points = None; {code}"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
