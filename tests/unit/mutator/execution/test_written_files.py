@@ -1,9 +1,12 @@
 """Lines that count are those that a worker says it wrote."""
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
+from mutator.execution.pytest_session import Controller
 from mutator.execution.written_files import WrittenFiles
 from mutator.store import digests
 from mutator.store.lines import LineWriter
@@ -53,3 +56,13 @@ def test_lines_of_a_worker_count_until_it_reports_others(run: Path) -> None:
     assert written.set_others_aside(run) == []
     written.report({}, "0001-gw0")
     assert written.set_others_aside(run) == [NAME]
+
+
+def test_lines_of_workers_count_if_the_command_is_interrupted(run: Path) -> None:
+    """pytest then does not wait for the workers' reports."""
+    write(run)
+    written = WrittenFiles()
+    begun = SimpleNamespace(written=written, worker_input=lambda: {"session": "0001-"})
+    node = SimpleNamespace(workerinput={}, gateway=SimpleNamespace(id="gw0"))
+    Controller(cast("Any", begun)).pytest_configure_node(node)
+    assert written.set_others_aside(run) == []
