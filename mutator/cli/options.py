@@ -1,10 +1,9 @@
 """Options that several subcommands share, and the place (library, templates, target) that they name."""
 
-import dataclasses
 import functools
 import inspect
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -107,28 +106,6 @@ InsecureNetwork = Annotated[
 OutRun = Annotated[Path, typer.Option("--out", metavar="DIR", help="The run folder.")]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Place:
-    """The library, templates and target that options name; the environment supplies the rest.
-
-    `sandbox` is whether the target's code runs in a sandbox.
-    """
-
-    root: Path | None = None
-    library: Path | None = None
-    templates: Path | None = None
-    target: Path | None = None
-    sandbox: bool | None = None
-
-    def workspace(self) -> "Workspace":
-        sandbox = bool(self.sandbox)
-        return mutator.Workspace.find(self.root, self.library, self.templates, self.target, sandbox=sandbox)
-
-    def over(self, other: "Place") -> "Place":
-        mine = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
-        return dataclasses.replace(other, **{k: v for k, v in mine.items() if v is not None})
-
-
 Root = Annotated[
     Path | None,
     typer.Option(metavar="DIR", help="Folder with fault_library/ and templates/ [env: MUTATOR_ROOT]."),
@@ -152,32 +129,53 @@ Sandbox = Annotated[
         help="Run the target's code in a sandbox, without your files and the network (needs bubblewrap).",
     ),
 ]
-PLACE_OPTIONS = {
-    "root": Root,
-    "library": Library,
-    "templates": Templates,
-    "target": Target,
-    "sandbox": Sandbox,
-}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """The library, templates and target that options name; the environment supplies the rest.
+
+    `sandbox` is whether the target's code runs in a sandbox.
+    """
+
+    root: Root = None
+    library: Library = None
+    templates: Templates = None
+    target: Target = None
+    sandbox: Sandbox = None
+
+    def workspace(self) -> "Workspace":
+        sandbox = bool(self.sandbox)
+        return mutator.Workspace.find(self.root, self.library, self.templates, self.target, sandbox=sandbox)
+
+    def over(self, other: "Place") -> "Place":
+        mine = {f.name: getattr(self, f.name) for f in fields(self)}
+        return replace(other, **{k: v for k, v in mine.items() if v is not None})
 
 
 def with_place(verb: Callable[..., None]) -> Callable[..., None]:
-    """Add the options of a place to a subcommand, so that users can also write them after it."""
+    """Replace each parameter that is a dataclass of options by these options, as Typer needs them.
+
+    Options of a place can also stand before the subcommand; those after it win.
+    """
     signature = inspect.signature(verb, eval_str=True)
-    own = [p for p in signature.parameters.values() if p.name != "place"]
+    sets: dict[str, Any] = {
+        p.name: p.annotation for p in signature.parameters.values() if is_dataclass(p.annotation)
+    }
     context = inspect.Parameter("ctx", inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context)
-    extra = [
-        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=annotation)
-        for name, annotation in PLACE_OPTIONS.items()
-    ]
+    parameters = [context]
+    for parameter in signature.parameters.values():
+        options = inspect.signature(sets[parameter.name]) if parameter.name in sets else None
+        each = options.parameters.values() if options else [parameter]
+        parameters += [one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in each]
 
     @functools.wraps(verb)
-    def run(*, ctx: typer.Context, **given: Any) -> None:
-        place = Place(**{name: given.pop(name) for name in PLACE_OPTIONS})
-        verb(place=place.over(ctx.obj or Place()), **given)
+    def run(*, ctx: typer.Context, **values: Any) -> None:
+        for name, options in sets.items():
+            values[name] = options(**{field.name: values.pop(field.name) for field in fields(options)})
+        place = values.pop("place").over(ctx.obj or Place())
+        verb(place=place, **values)
 
-    own = [p.replace(kind=inspect.Parameter.KEYWORD_ONLY) for p in own]
-    parameters = [context, *own, *extra]
     run.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
     run.__annotations__ = {p.name: p.annotation for p in parameters}
     return run

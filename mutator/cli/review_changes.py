@@ -10,8 +10,8 @@ import mutator
 from mutator._common.text import counted
 from mutator.cli import review_view
 from mutator.cli.console import Terminal, short_path
-from mutator.cli.options import Json, Manifest, Place, Reading, Seed, with_place
-from mutator.cli.review_options import By, Campaign, Groups, OnlyGroups, Specs, load, reviewer
+from mutator.cli.options import Json, Place, with_place
+from mutator.cli.review_options import By, Groups, MutantOptions, OnlyGroups, reviewer
 from mutator.errors import MutatorError
 
 if TYPE_CHECKING:
@@ -35,17 +35,13 @@ def _deciding(kind: str, about: str) -> Callable[..., None]:
         remark: Remark = "",
         only: OnlyGroups = None,
         yes: Yes = False,
-        campaign: Campaign = None,
-        specs: Specs = None,
-        reading: Reading = None,
-        seed: Seed = None,
-        manifest: Manifest = None,
-        as_json: Json = False,
         *,
+        mutants: MutantOptions,
+        as_json: Json = False,
         place: Place,
     ) -> None:
         terminal, name = Terminal(as_json), reviewer(place, by)
-        found = load(terminal, place, campaign, specs, reading, seed, manifest)
+        found = mutants.load(terminal, place)
         if chosen := _chosen(found, kind, groups, only, yes=yes):
             decide = found.approve if kind == "approve" else found.reject
             _tell(terminal, decide(chosen, name, remark), chosen)
@@ -63,18 +59,14 @@ def clear(
     groups: Groups,
     by: By = None,
     remark: Remark = "",
-    campaign: Campaign = None,
-    specs: Specs = None,
-    reading: Reading = None,
-    seed: Seed = None,
-    manifest: Manifest = None,
-    as_json: Json = False,
     *,
+    mutants: MutantOptions,
+    as_json: Json = False,
     place: Place,
 ) -> None:
     """Withdraw decisions; remarks and flags stay."""
     terminal, name = Terminal(as_json), reviewer(place, by)
-    found = load(terminal, place, campaign, specs, reading, seed, manifest)
+    found = mutants.load(terminal, place)
     _tell(terminal, found.clear(chosen := found.find(groups), name, remark), chosen)
 
 
@@ -83,18 +75,14 @@ def remark(
     groups: Groups,
     text: Annotated[str, typer.Option("--text", metavar="TEXT", help="The remark, one line.")],
     by: By = None,
-    campaign: Campaign = None,
-    specs: Specs = None,
-    reading: Reading = None,
-    seed: Seed = None,
-    manifest: Manifest = None,
-    as_json: Json = False,
     *,
+    mutants: MutantOptions,
+    as_json: Json = False,
     place: Place,
 ) -> None:
     """Add a remark to groups."""
     terminal, name = Terminal(as_json), reviewer(place, by)
-    found = load(terminal, place, campaign, specs, reading, seed, manifest)
+    found = mutants.load(terminal, place)
     _tell(terminal, found.remark(chosen := found.find(groups), name, text), chosen)
 
 
@@ -103,17 +91,13 @@ def _flagging(flag: bool, about: str) -> Callable[..., None]:
     def verb(
         groups: Groups,
         by: By = None,
-        campaign: Campaign = None,
-        specs: Specs = None,
-        reading: Reading = None,
-        seed: Seed = None,
-        manifest: Manifest = None,
-        as_json: Json = False,
         *,
+        mutants: MutantOptions,
+        as_json: Json = False,
         place: Place,
     ) -> None:
         terminal, name = Terminal(as_json), reviewer(place, by)
-        found = load(terminal, place, campaign, specs, reading, seed, manifest)
+        found = mutants.load(terminal, place)
         chosen = found.find(groups)
         _tell(terminal, (found.flag if flag else found.unflag)(chosen, name), chosen)
 

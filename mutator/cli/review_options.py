@@ -1,13 +1,13 @@
 """Options that the subcommands of `review` share: which groups, and who reviews."""
 
-from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Annotated
 
 import typer
 
 import mutator
 from mutator.cli.console import Terminal
-from mutator.cli.options import Place
+from mutator.cli.options import Manifest, Place, Reading, Seed
 from mutator.errors import MutatorError
 from mutator.review.columns import COLUMNS
 
@@ -35,27 +35,29 @@ By = Annotated[
 ]
 
 
-def load(
-    terminal: Terminal,
-    place: Place,
-    campaign: str | None,
-    specs: Sequence[str] | None,
-    reading: str | None,
-    seed: int | None,
-    manifest: str | None,
-) -> "mutator.ReviewedGroups":
-    if campaign and specs:
-        raise MutatorError("--campaign together with --spec", expected="one or the other")
-    workspace = place.workspace()
-    with terminal.wait("making the mutants"):
-        return mutator.load_review(
-            campaign=campaign,
-            specs=tuple(specs or ()),
-            reading=reading,
-            seed=seed,
-            target=manifest,
-            workspace=workspace,
-        )
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MutantOptions:
+    """The options of every subcommand that say which mutants are reviewed."""
+
+    campaign: Campaign = None
+    specs: Specs = None
+    reading: Reading = None
+    seed: Seed = None
+    manifest: Manifest = None
+
+    def load(self, terminal: Terminal, place: Place) -> "mutator.ReviewedGroups":
+        if self.campaign and self.specs:
+            raise MutatorError("--campaign together with --spec", expected="one or the other")
+        workspace = place.workspace()
+        with terminal.wait("making the mutants"):
+            return mutator.load_review(
+                campaign=self.campaign,
+                specs=tuple(self.specs or ()),
+                reading=self.reading,
+                seed=self.seed,
+                target=self.manifest,
+                workspace=workspace,
+            )
 
 
 def reviewer(place: Place, by: str | None) -> str:

@@ -11,15 +11,13 @@ import mutator
 from mutator._common.text import counted
 from mutator.cli import review_changes, review_view
 from mutator.cli.console import Terminal, short_path
-from mutator.cli.options import Json, Manifest, Place, Reading, Seed, with_place
+from mutator.cli.options import Json, Place, with_place
 from mutator.cli.review_options import (
     By,
-    Campaign,
     ExcludeGroups,
     Groups,
+    MutantOptions,
     OnlyGroups,
-    Specs,
-    load,
     reviewer,
 )
 
@@ -86,20 +84,16 @@ def review() -> None:
 
 @with_place
 def list_groups(
-    campaign: Campaign = None,
-    specs: Specs = None,
     only: OnlyGroups = None,
     exclude: ExcludeGroups = None,
-    reading: Reading = None,
-    seed: Seed = None,
-    manifest: Manifest = None,
-    as_json: Json = False,
     *,
+    mutants: MutantOptions,
+    as_json: Json = False,
     place: Place,
 ) -> None:
     """List groups, new and changed ones first (the default)."""
     terminal = Terminal(as_json)
-    found = load(terminal, place, campaign, specs, reading, seed, manifest).matching(only, exclude)
+    found = mutants.load(terminal, place).matching(only, exclude)
     review_view.print_list(terminal, found.review, found.groups)
 
 
@@ -113,18 +107,14 @@ def show(
         Path | None,
         typer.Option(metavar="DIR", help="Also write frames before and after an image effect."),
     ] = None,
-    campaign: Campaign = None,
-    specs: Specs = None,
-    reading: Reading = None,
-    seed: Seed = None,
-    manifest: Manifest = None,
-    as_json: Json = False,
     *,
+    mutants: MutantOptions,
+    as_json: Json = False,
     place: Place,
 ) -> None:
     """Show a group: its diff with holes, and the values that fill them."""
     terminal = Terminal(as_json)
-    found = load(terminal, place, campaign, specs, reading, seed, manifest)
+    found = mutants.load(terminal, place)
     shown = found.find(groups)
     for group in () if as_json else shown:
         (review_view.print_changes if changes else review_view.print_group)(terminal, found.review, group)
@@ -153,13 +143,9 @@ def _write_pictures(
 
 @with_place
 def status(
-    campaign: Campaign = None,
-    specs: Specs = None,
-    reading: Reading = None,
-    seed: Seed = None,
-    manifest: Manifest = None,
-    as_json: Json = False,
     *,
+    mutants: MutantOptions,
+    as_json: Json = False,
     place: Place,
 ) -> None:
     """Show the review's progress: groups by state, changes since the decision, flags. With --campaign, also
@@ -168,21 +154,17 @@ def status(
     from mutator.cli.review_status import print_status
 
     terminal = Terminal(as_json)
-    found = load(terminal, place, campaign, specs, reading, seed, manifest)
-    print_status(terminal, found, campaign)
+    found = mutants.load(terminal, place)
+    print_status(terminal, found, mutants.campaign)
 
 
 @with_place
 def walk(
     by: By = None,
-    campaign: Campaign = None,
-    specs: Specs = None,
     only: OnlyGroups = None,
     exclude: ExcludeGroups = None,
-    reading: Reading = None,
-    seed: Seed = None,
-    manifest: Manifest = None,
     *,
+    mutants: MutantOptions,
     place: Place,
 ) -> None:
     """Show new and changed groups one by one, and ask for a decision on each."""
@@ -191,7 +173,7 @@ def walk(
     terminal = Terminal()
 
     def groups() -> "mutator.ReviewedGroups":
-        found = load(terminal, place, campaign, specs, reading, seed, manifest)
+        found = mutants.load(terminal, place)
         return found.matching(only, exclude)
 
     walk_through(terminal, groups, lambda: reviewer(place, by))
@@ -200,20 +182,16 @@ def walk(
 @with_place
 def page(
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The page, an .html file.")],
-    campaign: Campaign = None,
-    specs: Specs = None,
     only: OnlyGroups = None,
     exclude: ExcludeGroups = None,
-    reading: Reading = None,
-    seed: Seed = None,
-    manifest: Manifest = None,
-    as_json: Json = False,
     *,
+    mutants: MutantOptions,
+    as_json: Json = False,
     place: Place,
 ) -> None:
     """Write all groups to one self-contained page, with commands to copy."""
     terminal = Terminal(as_json)
-    found = load(terminal, place, campaign, specs, reading, seed, manifest).matching(only, exclude)
+    found = mutants.load(terminal, place).matching(only, exclude)
     found.write_page(out)
     if as_json:
         terminal.emit({"page": str(out), "groups": len(found.groups)})

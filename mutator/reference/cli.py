@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterable, Iterator
+from dataclasses import fields
 from typing import Any
 
 import pytest
@@ -9,11 +10,12 @@ from typer.main import get_command
 
 from mutator._common.tables import Table
 from mutator.cli.app import EXIT_CODES, GROUPS, app
-from mutator.cli.options import PLACE_OPTIONS
+from mutator.cli.options import Place
 from mutator.execution import pytest_plugin
 from mutator.reference.tables import generated
 from mutator.workspace import Workspace
 
+_PLACE = {field.name for field in fields(Place)}
 _PLACES = (
     "These options say where the library, templates and target are. Write them before or after the "
     "subcommand.\n"
@@ -38,7 +40,7 @@ def command_line(workspace: Workspace) -> str:
         "`--run` names or of the newest\nrun. `mutator --show-completion` prints its script.\n",
         "## Library, templates and target\n",
         _PLACES,
-        *_options(command, [p for p in command.params if p.name in PLACE_OPTIONS]),
+        *_options(command, [p for p in command.params if p.name in _PLACE]),
     ]
     for _, names in GROUPS:
         for name in names:
@@ -55,7 +57,7 @@ def _verb(group: Any, name: str) -> Iterator[str]:
         usage = " ".join(command.get_usage(ctx).removeprefix("Usage: ").split())
     yield f"```text\n{usage}\n```\n"
     yield f"{_paragraphs(command.help)}\n"
-    own = [param for param in command.params if param.name not in (*PLACE_OPTIONS, "help")]
+    own = [param for param in command.params if param.name not in (*_PLACE, "help")]
     yield from _options(command, own)
     if command.epilog:
         title, _, lines = command.epilog.replace("\b", "").strip().partition("\n")

@@ -6,9 +6,16 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from graphlib import CycleError, TopologicalSorter
+from inspect import signature
 from pathlib import Path
+from typing import Any
 
 import pytest
+from typer.main import get_command
+
+from mutator.cli.app import app
+from mutator.cli.options import Place
+from mutator.cli.review_options import MutantOptions
 
 CLONE = Path(__file__).parents[2]
 TOP_MODULES = 12
@@ -196,3 +203,24 @@ def test_the_command_line_calls_the_api() -> None:
             if isinstance(node, ast.ImportFrom) and node.module and node not in types:
                 inside = node.module.startswith("mutator.") and not node.module.startswith(own)
                 assert not inside or node.module in SHOWN_BY_THE_COMMAND_LINE, f"{path}: {node.module}"
+
+
+def test_options_of_every_review_verb_are_declared_once() -> None:
+    """A set of options that several subcommands share is one dataclass, not parameters of each."""
+    shared = {*signature(MutantOptions).parameters, *signature(Place).parameters}
+    functions = [
+        node
+        for name in ("reviews", "review_changes")
+        for node in ast.walk(ast.parse((CLONE / f"mutator/cli/{name}.py").read_bytes()))
+        if isinstance(node, ast.FunctionDef)
+    ]
+    repeated = [
+        f"{function.name}: {one.arg}"
+        for function in functions
+        for one in (*function.args.args, *function.args.kwonlyargs)
+        if function.args.kwonlyargs and one.arg in shared  # a verb, whose place is a keyword
+    ]
+    assert repeated == []
+    command: Any = get_command(app)
+    verbs = command.commands["review"].commands.values()
+    assert [verb.name for verb in verbs if not shared <= {one.name for one in verb.params}] == []
