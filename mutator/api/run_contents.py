@@ -11,7 +11,7 @@ from mutator.campaigns.plans import Plan, load_plan
 from mutator.errors import MutatorError
 from mutator.execution.traces import Traces
 from mutator.model import Experiment, Fault, Record, Status
-from mutator.outcomes.fault_paths import Ways, ways_of
+from mutator.outcomes.fault_paths import FaultPaths, fault_paths_of
 from mutator.results import counting
 from mutator.results.table_reader import Results
 from mutator.store import plan_file
@@ -113,9 +113,9 @@ class RunContents:
         return Results.up_to_date(self.path).texts()
 
     @cached_property
-    def ways(self) -> Ways | None:
+    def fault_paths(self) -> FaultPaths | None:
         """The paths of faults through the target; None if unknown."""
-        return ways_of(self.folder.head)
+        return fault_paths_of(self.folder.head)
 
     @cached_property
     def traces(self) -> Traces:

@@ -13,7 +13,7 @@ from mutator.api.run_contents import RunContents, from_here
 from mutator.api.trials import Trial, trial_of
 from mutator.errors import MutatorError
 from mutator.execution.single_run import rerun
-from mutator.outcomes.fault_paths import Path as FaultPath
+from mutator.outcomes.fault_paths import FaultPath
 from mutator.outcomes.golden import Trace, load_trace
 from mutator.outcomes.sampling import keep_series
 from mutator.report.film import Filming, Shot
@@ -128,8 +128,8 @@ class RunExperiment(ExperimentResult):
         """How far the fault propagated along the control structure; None if that is unknown, if the fault was
         never active, or if the run has no outcome.
         """
-        ways = self.run.ways
-        return ways.path(self.experiment, self.record) if ways and self.record else None
+        fault_paths = self.run.fault_paths
+        return fault_paths.path(self.experiment, self.record) if fault_paths and self.record else None
 
     def _channels(self) -> Sequence[Sequence[str]]:
         channels: Sequence[Sequence[str]] = self.run.folder.head.get("channels", ())

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from mutator.api.run_experiments import RunExperiment
     from mutator.api.trials import Trial
     from mutator.model import Experiment, Record
-    from mutator.outcomes.fault_paths import Stage
+    from mutator.outcomes.fault_paths import PathComponent
     from mutator.results.rows import Row
     from mutator.targets.manifest import TargetManifest
     from mutator.workspace import Workspace
@@ -143,20 +143,20 @@ def print_path(terminal: Terminal, found: "RunExperiment") -> None:
     if (path := found.fault_path) is None:
         return
     terminal.say("path of the fault:")
-    for stage in path.stages:
-        terminal.say(f"  {_stage(stage)}")
+    for component in path.components:
+        terminal.say(f"  {_component(component)}")
     stopped = f", stopped at {' and '.join(path.stopped_at)}" if path.stopped_at else ""
     terminal.say(f"reached: {path.reached or 'no recorded component'}{stopped}")
 
 
-def _stage(stage: "Stage") -> str:
+def _component(component: "PathComponent") -> str:
     """Return a line such as `brakes: reached at 3.50 s`; for an injected component, without a time."""
-    what = f"{stage.component}: {stage.state.value}"
-    if stage.state.value == "injected":
+    what = f"{component.name}: {component.state.value}"
+    if component.state.value == "injected":
         return what
-    if stage.t_by is not None:
-        return f"{what} by {stage.t_by:.2f} s"
-    return what if stage.t_first is None else f"{what} at {stage.t_first:.2f} s"
+    if component.t_by is not None:
+        return f"{what} by {component.t_by:.2f} s"
+    return what if component.t_first is None else f"{what} at {component.t_first:.2f} s"
 
 
 def _events(record: "Record", manifest: "TargetManifest | None") -> list[tuple[float, str]]:

@@ -1,4 +1,4 @@
-"""Finds the path of a fault along the control structure, from the injected components to the process.
+"""Find the path of a fault along the control structure, from the injected components to the process.
 
 The path excludes links out of the process (feedback), links from or to people, and links that are not
 studied. A change of a component is attributed to feedback if the component left golden only after the
@@ -15,13 +15,13 @@ from typing import NamedTuple
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Fault, Outcome, Record
 from mutator.outcomes.channel_departures import Departure
-from mutator.outcomes.topology import Way, chained, links_of, steps_from, structured
+from mutator.outcomes.topology import PossibleRoute, chained, links_of, steps_from, structured
 from mutator.store.run_head import REMEDY, Head
 from mutator.stpa.analysis import Kind, StructureModel
 from mutator.targets.channels import Role
 
 
-class State(StrEnum):
+class ComponentState(StrEnum):
     """The effect of the fault at a component."""
 
     INJECTED = "injected"
@@ -32,7 +32,7 @@ class State(StrEnum):
     UNSEEN = "unseen"  # it has no recorded channels
 
 
-class Passage(StrEnum):
+class LinkState(StrEnum):
     """Whether the fault got through a link of its path."""
 
     THROUGH = "through"
@@ -42,15 +42,15 @@ class Passage(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Stage:
+class PathComponent:
     """A component on a path, and its channels that left golden.
 
     If a component that only this one feeds left golden before this one's own channels did, `t_by` is the time
     (s) when that happened: this component must have changed by then.
     """
 
-    component: str
-    state: State
+    name: str
+    state: ComponentState
     channels: tuple[Departure, ...]
     t_by: float | None = None
 
@@ -60,59 +60,59 @@ class Stage:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Crossing:
+class PathLink:
     """A link of a path with its ends, and whether the fault got through."""
 
-    link: str
+    name: str
     tail: str
     tip: str
-    passage: Passage
+    state: LinkState
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Path:
-    """The stages of a path in causal order, and whether the fault got through each link."""
+class FaultPath:
+    """The components of a path in causal order, and whether the fault got through each link."""
 
-    stages: tuple[Stage, ...]
-    crossings: tuple[Crossing, ...]
+    components: tuple[PathComponent, ...]
+    links: tuple[PathLink, ...]
     reached: str  # of the components that left golden, the nearest to the process; '' if none
     stopped_at: tuple[str, ...]  # the components that held the fault, if it changed no actuator
 
     @property
     def injected(self) -> tuple[str, ...]:
-        return tuple(stage.component for stage in self.stages if stage.state is State.INJECTED)
+        return tuple(one.name for one in self.components if one.state is ComponentState.INJECTED)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Course:
-    """A path without times. Paths have the same course if they have the same injected components, and
+class UntimedPath:
+    """A path without times. Paths have the same untimed path if they have the same injected components, and
     components left golden in the same order.
 
     `late` has the components that must have changed before their own channels did, each with the rank of
-    `Stage.t_by` among all times. `entered` is the link by which the fault reached the first actuator.
+    `PathComponent.t_by` among all times. `entered` is the link by which the fault reached the first actuator.
     """
 
-    states: Mapping[str, State]  # in causal order
+    states: Mapping[str, ComponentState]  # in causal order
     late: Mapping[str, int]
-    crossings: tuple[Crossing, ...]
+    links: tuple[PathLink, ...]
     reached: str
     stopped_at: tuple[str, ...]
-    entered: Crossing | None
+    entered: PathLink | None
 
     @property
     def injected(self) -> tuple[str, ...]:
-        return tuple(name for name, state in self.states.items() if state is State.INJECTED)
+        return tuple(name for name, state in self.states.items() if state is ComponentState.INJECTED)
 
 
-class Sight(NamedTuple):
-    """The facts about an experiment that determine its course."""
+class PathInputs(NamedTuple):
+    """The facts about an experiment that determine its untimed path."""
 
     injected: frozenset[str]
     order: tuple[tuple[str, int], ...]  # the rank of the time at which each component left golden
     masked: bool
 
 
-class Ways:
+class FaultPaths:
     """The paths of faults through a target.
 
     `channels` have name, unit, role, component and meaning, as in run.json. Without a `structure`, the
@@ -128,7 +128,7 @@ class Ways:
         self._links = links_of(structure) if structure else {}
         # links from unrecorded components back to the components that feed them
         self._back = [(tip, tail) for tail, tip in self._links.values() if tip not in self._roles]
-        self._course = lru_cache(maxsize=None)(self._course_of)
+        self._untimed_path = lru_cache(maxsize=None)(self._untimed_path_of)
         self._where: dict[str, frozenset[str]] = {}  # the components of each fault, by fault id
 
     @property
@@ -145,44 +145,44 @@ class Ways:
             self._where[fault.id] = found
         return self._where[fault.id]
 
-    def path(self, experiment: Experiment, record: Record) -> Path | None:
+    def path(self, experiment: Experiment, record: Record) -> FaultPath | None:
         """Return the path of an experiment.
 
         None if the fault was not active, if the run has no outcome, or if the fault is in no known component.
         """
-        course = self.course(experiment.fault, record)
-        if course is None:
+        untimed_path = self.untimed_path(experiment.fault, record)
+        if untimed_path is None:
             return None
         left: dict[str, list[Departure]] = {}
         for departure in record.left:
             left.setdefault(self.component_of.get(departure[0], ""), []).append(departure)
         times = sorted({min(t for _, t, _ in found) for found in left.values()})
-        stages = [
-            Stage(
-                component=name,
+        components = [
+            PathComponent(
+                name=name,
                 state=state,
                 channels=tuple(left.get(name, ())),
-                t_by=times[course.late[name]] if name in course.late else None,
+                t_by=times[untimed_path.late[name]] if name in untimed_path.late else None,
             )
-            for name, state in course.states.items()
+            for name, state in untimed_path.states.items()
         ]
-        return Path(
-            stages=tuple(stages),
-            crossings=course.crossings,
-            reached=course.reached,
-            stopped_at=course.stopped_at,
+        return FaultPath(
+            components=tuple(components),
+            links=untimed_path.links,
+            reached=untimed_path.reached,
+            stopped_at=untimed_path.stopped_at,
         )
 
-    def course(self, fault: Fault, record: Record) -> Course | None:
-        """Return the course of an experiment; None in the same cases as `path`."""
-        sight = self.sight(fault, record)
-        return sight and self.course_of(sight)
+    def untimed_path(self, fault: Fault, record: Record) -> UntimedPath | None:
+        """Return the untimed path of an experiment; None in the same cases as `path`."""
+        inputs = self.inputs_of(fault, record)
+        return inputs and self.untimed_path_of(inputs)
 
-    def course_of(self, sight: Sight) -> Course | None:
-        return self._course(*sight)
+    def untimed_path_of(self, inputs: PathInputs) -> UntimedPath | None:
+        return self._untimed_path(*inputs)
 
-    def sight(self, fault: Fault, record: Record) -> Sight | None:
-        """Return the inputs of a course; None if the fault was not active or the run has no outcome."""
+    def inputs_of(self, fault: Fault, record: Record) -> PathInputs | None:
+        """Return the inputs of an untimed path; None if the fault was not active or without an outcome."""
         if record.outcome in (None, Outcome.NOT_ACTIVATED):
             return None
         firsts: dict[str, float] = {}
@@ -192,62 +192,64 @@ class Ways:
                 firsts[component] = first
         place = {time: i for i, time in enumerate(sorted(set(firsts.values())))}
         order = tuple(sorted((name, place[time]) for name, time in firsts.items()))
-        return Sight(self._injected(fault), order, record.outcome is Outcome.MASKED)
+        return PathInputs(self._injected(fault), order, record.outcome is Outcome.MASKED)
 
-    def _course_of(
+    def _untimed_path_of(
         self, injected: frozenset[str], order: tuple[tuple[str, int], ...], masked: bool
-    ) -> Course | None:
-        way = self._way_of(injected)
-        if not way.components:
+    ) -> UntimedPath | None:
+        route = self._route_of(injected)
+        if not route.components:
             return None
         times = dict(order)
-        latest = self._latest(way, times)
-        states, arrived = self._states(way, times.keys(), latest)
+        latest = self._latest(route, times)
+        states, arrived = self._states(route, times.keys(), latest)
         late = {name: _sooner(latest, times, name) for name, state in states.items() if state in _CHANGED}
         changed = [
-            n for n, state in states.items() if n in times and state in (State.INJECTED, State.REACHED)
+            n
+            for n, state in states.items()
+            if n in times and state in (ComponentState.INJECTED, ComponentState.REACHED)
         ]
-        crossings = tuple(
-            Crossing(link=name, tail=tail, tip=tip, passage=_passage(tail, tip, states, arrived))
-            for name, (tail, tip) in way.links.items()
+        links = tuple(
+            PathLink(name=name, tail=tail, tip=tip, state=_link_state(tail, tip, states, arrived))
+            for name, (tail, tip) in route.links.items()
         )
-        through = [c for c in crossings if c.tip in self._actuators and c.passage is Passage.THROUGH]
-        return Course(
+        through = [c for c in links if c.tip in self._actuators and c.state is LinkState.THROUGH]
+        return UntimedPath(
             states=states,
             late={name: int(place) for name, place in late.items() if place is not None},
-            crossings=crossings,
-            reached=min(reversed(changed), key=way.steps.__getitem__, default=""),
-            stopped_at=_holding(way, states, arrived) if masked else (),
+            links=links,
+            reached=min(reversed(changed), key=route.steps.__getitem__, default=""),
+            stopped_at=_holding(route, states, arrived) if masked else (),
             entered=min(through, key=lambda c: times.get(c.tip, inf), default=None),
         )
 
     def _states(
-        self, way: Way, shown: Collection[str], left: Mapping[str, float]
-    ) -> tuple[dict[str, State], set[str]]:
-        """Return the state of each component of a way, and the components that the fault reached.
+        self, route: PossibleRoute, shown: Collection[str], left: Mapping[str, float]
+    ) -> tuple[dict[str, ComponentState], set[str]]:
+        """Return the state of each component of a route, and the components that the fault reached.
 
         `left` has the rank of the time by which each component left golden. Components in `shown` have
         channels that left golden. The fault reaches an unrecorded component if it reached one that feeds it.
         """
         moved = self._moved(left)
-        states: dict[str, State] = {}
+        states: dict[str, ComponentState] = {}
         arrived: set[str] = set()
-        for name in way.components:
-            came = name in way.sources or bool(way.feeders(name) & arrived)
-            if way.injected and name in way.sources:
-                states[name] = State.INJECTED
+        for name in route.components:
+            came = name in route.sources or bool(route.feeders(name) & arrived)
+            if route.injected and name in route.sources:
+                states[name] = ComponentState.INJECTED
             elif name not in self._roles:
-                states[name] = State.UNSEEN
+                states[name] = ComponentState.UNSEEN
             elif name not in left:
-                states[name] = State.HELD
+                states[name] = ComponentState.HELD
             elif left[name] <= moved:
-                states[name] = State.REACHED if name in shown else State.PASSED
+                states[name] = ComponentState.REACHED if name in shown else ComponentState.PASSED
             else:
-                back = self._fed_back(way.fed.get(name, ()), left)
-                along = min((left[f] for f in way.feeders(name) & arrived if f in left), default=inf)
+                back = self._fed_back(route.fed.get(name, ()), left)
+                along = min((left[f] for f in route.feeders(name) & arrived if f in left), default=inf)
                 by_loop = not came or (back <= left[name] and back <= along)
-                states[name] = State.FEEDBACK if by_loop else State.REACHED
-            if states[name] in _CAME or (states[name] is State.UNSEEN and came):
+                states[name] = ComponentState.FEEDBACK if by_loop else ComponentState.REACHED
+            if states[name] in _CAME or (states[name] is ComponentState.UNSEEN and came):
                 arrived.add(name)
         return states, arrived
 
@@ -255,22 +257,22 @@ class Ways:
         """Return the rank of the time at which the process left golden; infinite if it did not."""
         return min((left[name] for name in self.processes if name in left), default=inf)
 
-    def _latest(self, way: Way, left: Mapping[str, float]) -> dict[str, float]:
+    def _latest(self, route: PossibleRoute, left: Mapping[str, float]) -> dict[str, float]:
         """Return the rank of the time by which each component left golden.
 
         If a component is the only one that feeds another, it left golden no later than the other did, unless
         feedback could have reached the other. If the place of injection is unknown, nothing is inferred.
         """
         moved, times = self._moved(left), dict(left)
-        for name in reversed(way.components if way.injected else ()):
-            only = way.feeders(name) | way.fed.get(name, frozenset())
-            if name in times and len(only) == 1 and name not in way.sources:
+        for name in reversed(route.components if route.injected else ()):
+            only = route.feeders(name) | route.fed.get(name, frozenset())
+            if name in times and len(only) == 1 and name not in route.sources:
                 (feeder,) = only
                 if feeder in left or times[name] <= moved:
                     times[feeder] = min(times.get(feeder, inf), times[name])
         return times
 
-    def _way_of(self, injected: frozenset[str]) -> Way:
+    def _route_of(self, injected: frozenset[str]) -> PossibleRoute:
         if self.structure is None:
             return chained(self._roles, self.processes)
         return structured(self.structure.components, self._links, self.processes, injected)
@@ -285,38 +287,42 @@ class Ways:
         return min((left[name] for name in {*names, *unseen} if name in left), default=inf)
 
 
-def ways_of(head: Head) -> Ways | None:
-    """Return the ways of a run's target, from run.json. None if no channel names a component."""
+def fault_paths_of(head: Head) -> FaultPaths | None:
+    """Return the fault paths of a run's target, from run.json. None if no channel names a component."""
     if not any(component for *_, component, _ in head.get("channels", ())):
         return None
     try:
         structure = StructureModel.model_validate(head["structure"]) if head.get("structure") else None
     except ValueError:
         raise MutatorError("damaged at 'structure'", where=head.path, remedy=REMEDY) from None
-    return Ways(head["channels"], structure)
+    return FaultPaths(head["channels"], structure)
 
 
-_CHANGED = (State.REACHED, State.PASSED, State.FEEDBACK)
-_CAME = (State.INJECTED, State.REACHED, State.PASSED)
+_CHANGED = (ComponentState.REACHED, ComponentState.PASSED, ComponentState.FEEDBACK)
+_CAME = (ComponentState.INJECTED, ComponentState.REACHED, ComponentState.PASSED)
 
 
 def _sooner(some: Mapping[str, float], others: Mapping[str, float], name: str) -> float | None:
     return some[name] if some.get(name, inf) < others.get(name, inf) else None
 
 
-def _passage(tail: str, tip: str, states: Mapping[str, State], arrived: Collection[str]) -> Passage:
-    if tail not in arrived or states[tip] is State.INJECTED:
-        return Passage.NONE
-    if states[tip] is State.UNSEEN:
-        return Passage.UNKNOWN
-    return Passage.THROUGH if states[tip] in _CAME else Passage.STOPPED
+def _link_state(
+    tail: str, tip: str, states: Mapping[str, ComponentState], arrived: Collection[str]
+) -> LinkState:
+    if tail not in arrived or states[tip] is ComponentState.INJECTED:
+        return LinkState.NONE
+    if states[tip] is ComponentState.UNSEEN:
+        return LinkState.UNKNOWN
+    return LinkState.THROUGH if states[tip] in _CAME else LinkState.STOPPED
 
 
-def _holding(way: Way, states: Mapping[str, State], arrived: Collection[str]) -> tuple[str, ...]:
+def _holding(
+    route: PossibleRoute, states: Mapping[str, ComponentState], arrived: Collection[str]
+) -> tuple[str, ...]:
     """Return the components that held a fault: those fed by a component that the fault reached or, if there
     are none, the first ones on its path.
     """
-    held = [name for name in way.components if states[name] is State.HELD]
-    reached = {name for name in way.components if states[name] is State.REACHED}
-    after_reached = [name for name in held if way.feeders(name) & reached]
-    return tuple(after_reached or (n for n in held if n in way.sources or way.feeders(n) & {*arrived}))
+    held = [name for name in route.components if states[name] is ComponentState.HELD]
+    reached = {name for name in route.components if states[name] is ComponentState.REACHED}
+    after_reached = [name for name in held if route.feeders(name) & reached]
+    return tuple(after_reached or (n for n in held if n in route.sources or route.feeders(n) & {*arrived}))

@@ -1,4 +1,4 @@
-"""Finds the components on a fault's way to the controlled process, in causal order."""
+"""Find the components on a fault's route to the controlled process, in causal order."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -9,27 +9,27 @@ from mutator.targets.channels import Role
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Way:
-    """The way that faults in some components can take: the components in causal order, and their links."""
+class PossibleRoute:
+    """The route that faults in some components can take: the components in causal order, and their links."""
 
     components: tuple[str, ...]
     links: Mapping[str, tuple[str, str]]
     sources: frozenset[str]  # components at which the fault enters
     injected: bool  # whether the sources are known to be the place of injection
-    fed: Mapping[str, frozenset[str]]  # by component: the components not on the way that lead to it
+    fed: Mapping[str, frozenset[str]]  # by component: the components not on the route that lead to it
     steps: Mapping[str, int]  # by component: number of links to the process
 
     def feeders(self, component: str) -> set[str]:
         return {tail for tail, tip in self.links.values() if tip == component}
 
 
-def chained(roles: Mapping[str, str], processes: frozenset[str]) -> Way:
+def chained(roles: Mapping[str, str], processes: frozenset[str]) -> PossibleRoute:
     """Return the chain of components, ordered by their channels' roles. The place of injection is unknown."""
     order = [role.value for role in (Role.INTERNAL, Role.ACTUATOR, Role.TRUTH)]
     chain = sorted(roles, key=lambda name: order.index(roles[name]))
     links = {f"{tail}-{tip}": (tail, tip) for tail, tip in pairwise(chain)}
     # the process can also feed back into the first component
-    return Way(
+    return PossibleRoute(
         components=tuple(chain),
         links=links,
         sources=frozenset(chain[:1]),
@@ -44,23 +44,23 @@ def structured(
     links: Mapping[str, tuple[str, str]],
     processes: frozenset[str],
     injected: frozenset[str],
-) -> Way:
-    """Return the way from the injected components along `links`, without links out of a process."""
+) -> PossibleRoute:
+    """Return the route from the injected components along `links`, without links out of a process."""
     forward = {name: ends for name, ends in links.items() if ends[0] not in processes}
     steps = steps_from(processes, [(tip, tail) for tail, tip in forward.values()])
-    on_way = (steps_from(injected, forward.values()).keys() & steps.keys()) | injected
-    own = {name: pair for name, pair in forward.items() if on_way.issuperset(pair)}
+    on_route = (steps_from(injected, forward.values()).keys() & steps.keys()) | injected
+    own = {name: pair for name, pair in forward.items() if on_route.issuperset(pair)}
     fed = {
-        name: frozenset(tail for tail, tip in links.values() if tip == name and tail not in on_way)
-        for name in on_way
+        name: frozenset(tail for tail, tip in links.values() if tip == name and tail not in on_route)
+        for name in on_route
     }
-    return Way(
-        components=_in_causal_order([name for name in components if name in on_way], own, steps),
+    return PossibleRoute(
+        components=_in_causal_order([name for name in components if name in on_route], own, steps),
         links=own,
         sources=injected,
         injected=True,
         fed=fed,
-        steps={name: steps.get(name, len(on_way)) for name in on_way},
+        steps={name: steps.get(name, len(on_route)) for name in on_route},
     )
 
 

@@ -19,7 +19,7 @@ from mutator.report.answer_parts import (
 )
 from mutator.report.dangers import dangerous, worst_of
 from mutator.report.fix_order import first_to_fix
-from mutator.report.seen import COURSE, PLACE
+from mutator.report.seen import PLACE, UNTIMED_PATH
 from mutator.report.studies import ReportedRun
 from mutator.report.warnings import FIRST, LATE, NO_ALERT, SILENT, warnings_of
 from mutator.results.rows import Row, lines_of, row_from
@@ -43,11 +43,11 @@ def answers_of(run: ReportedRun) -> tuple[Answer, ...]:
 
 
 def _told(run: ReportedRun) -> pd.DataFrame:
-    """Return the usable experiments with rank, course and warning. Those that answers can list also have
+    """Return the usable experiments with rank, path and warning. Those that answers can list also have
     texts.
     """
     frame = run.frame
-    told = frame.assign(place=frame[PLACE], course=frame[COURSE], warning=warnings_of(frame))
+    told = frame.assign(place=frame[PLACE], untimed_path=frame[UNTIMED_PATH], warning=warnings_of(frame))
     shown = worst_of(told)
     rows = [row_from(line) for line in lines_of(run.texts[run.texts["experiment_id"].isin(shown)])]
     words = {

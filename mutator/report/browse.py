@@ -19,7 +19,7 @@ from mutator.errors import MutatorError
 from mutator.model import Experiment, Fault
 from mutator.mutants.readable_diffs import readable
 from mutator.report.panel import FOLDER
-from mutator.report.paths import FoundPaths
+from mutator.report.paths import RunPaths
 from mutator.report.scenes import scene_facts
 from mutator.report.series import series_facts
 from mutator.report.source_lines import SourceLines
@@ -118,9 +118,9 @@ def _tables(
     planned = [run.experiments.get(row.experiment_id) for row in rows]
     paths = run.paths
     if paths:
-        ids, places = run.texts["experiment_id"], run.seen.courses_of
+        ids, places = run.texts["experiment_id"], run.seen.path_numbers
         some = (run.seen.places < LISTED) & (places >= 0)
-        paths = replace(paths, course_of=dict(zip(ids[some], places[some].tolist(), strict=True)))
+        paths = replace(paths, untimed_path_of=dict(zip(ids[some], places[some].tolist(), strict=True)))
     made = table(rows, lines, paths, alerts=run.folder.has_alerts, source=run.source)
     if len(rows) < len(run.texts):
         made |= {"of": len(run.texts), "map": map_of(run)}
@@ -136,7 +136,7 @@ def reading_order(row: Row) -> tuple[str, ...]:
 def table(
     rows: Sequence[Row],
     lines: Sequence[Mapping[str, str]],
-    paths: FoundPaths | None = None,
+    paths: RunPaths | None = None,
     *,
     alerts: bool = True,
     source: SourceLines | None = None,

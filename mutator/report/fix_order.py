@@ -6,16 +6,16 @@ from math import inf
 
 import pandas as pd
 
-from mutator.outcomes.fault_paths import Course
+from mutator.outcomes.fault_paths import UntimedPath
 from mutator.report.answer_parts import Answer, Cell, Link, Listing, kind_link, share, to_list
 from mutator.report.dangers import NO_CONTACT, SEVERITY
-from mutator.report.paths import FoundPaths, link_text
+from mutator.report.paths import RunPaths, link_text
 from mutator.report.warnings import FIRST, SILENT
 
 LISTED = 5  # maximum number of fault types listed
 
 
-def first_to_fix(frame: pd.DataFrame, paths: FoundPaths | None, *, has_alerts: bool) -> Answer:
+def first_to_fix(frame: pd.DataFrame, paths: RunPaths | None, *, has_alerts: bool) -> Answer:
     """Say which fault types to fix first: those with the most silent hazards in the highest severity
     class; ties are broken by the next lower classes, then by hazards without contact, then by the shortest
     time from activation to hazard. If the target has no alerts, all hazards are counted. `frame` must have at
@@ -92,7 +92,7 @@ def _line(
     counted: pd.DataFrame,
     classes: Sequence[str],
     only: Mapping[str, Sequence[str]],
-    paths: FoundPaths | None,
+    paths: RunPaths | None,
 ) -> tuple[Cell, ...]:
     told = [(name, len(_of_class(counted, name))) for name in classes]
     if SEVERITY in counted:
@@ -117,15 +117,15 @@ def _line(
 
 
 def _let_through(
-    kind: str, hazards: pd.DataFrame, only: Mapping[str, Sequence[str]], paths: FoundPaths
+    kind: str, hazards: pd.DataFrame, only: Mapping[str, Sequence[str]], paths: RunPaths
 ) -> Cell:
     """Return the component that most often let this fault type through to the first changed actuator."""
     passed: Counter[str] = Counter()
     links: dict[str, set[str]] = {}
-    for course, count in _courses(hazards, paths):
-        if crossing := course.entered:
-            passed[crossing.tail] += count
-            links.setdefault(crossing.tail, set()).add(link_text(crossing.tail, crossing.tip))
+    for untimed_path, count in _untimed_paths(hazards, paths):
+        if link := untimed_path.entered:
+            passed[link.tail] += count
+            links.setdefault(link.tail, set()).add(link_text(link.tail, link.tip))
     if not passed:
         return "-"
     component = min(passed, key=lambda name: (-passed[name], name))
@@ -133,17 +133,17 @@ def _let_through(
     return Link(f"{paths.label(component)}: {passed[component]} of {len(hazards)}", to)
 
 
-def _courses(frame: pd.DataFrame, paths: FoundPaths) -> Iterator[tuple[Course, int]]:
-    for code, count in frame["course"].value_counts(sort=False).items():
+def _untimed_paths(frame: pd.DataFrame, paths: RunPaths) -> Iterator[tuple[UntimedPath, int]]:
+    for code, count in frame["untimed_path"].value_counts(sort=False).items():
         if (place := int(str(code))) >= 0:
-            yield paths.courses[place], int(count)
+            yield paths.untimed_paths[place], int(count)
 
 
-def _stopped(kind: str, active: pd.DataFrame, paths: FoundPaths) -> Cell:
+def _stopped(kind: str, active: pd.DataFrame, paths: RunPaths) -> Cell:
     """Return the component that stopped most faults of this type, a candidate for stopping the rest."""
     stopped: Counter[str] = Counter()
-    for course, count in _courses(active, paths):
-        for name in course.stopped_at:
+    for untimed_path, count in _untimed_paths(active, paths):
+        for name in untimed_path.stopped_at:
             stopped[name] += count
     if not stopped:
         return f"none of {len(active):,}"

@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from mutator.model import Experiment, Record
-from mutator.outcomes.fault_paths import Course, Passage, Path, Ways
+from mutator.outcomes.fault_paths import FaultPath, FaultPaths, LinkState, UntimedPath
 from mutator.store.run_folder import RunFolder
 
 if TYPE_CHECKING:
@@ -19,17 +19,19 @@ SCHEMA = "report-paths/1"
 ALL = "all fault types"
 
 
-class _PathsById(Mapping[str, Path]):
+class _PathsById(Mapping[str, FaultPath]):
     """The paths of experiments, computed on access."""
 
-    def __init__(self, ways: Ways, planned: Mapping[str, Experiment], records: Mapping[str, Record]) -> None:
-        self._ways, self._planned, self._records = ways, planned, records
-        self._last: tuple[str, Path | None] | None = None
+    def __init__(
+        self, fault_paths: FaultPaths, planned: Mapping[str, Experiment], records: Mapping[str, Record]
+    ) -> None:
+        self._fault_paths, self._planned, self._records = fault_paths, planned, records
+        self._last: tuple[str, FaultPath | None] | None = None
 
-    def __getitem__(self, name: str) -> Path:
+    def __getitem__(self, name: str) -> FaultPath:
         last = self._last
         if last is None or last[0] != name:
-            self._last = last = name, self._ways.path(self._planned[name], self._records[name])
+            self._last = last = name, self._fault_paths.path(self._planned[name], self._records[name])
         path = last[1]
         if path is None:
             raise KeyError(name)
@@ -43,36 +45,42 @@ class _PathsById(Mapping[str, Path]):
 
 
 @dataclass(frozen=True, kw_only=True)
-class FoundPaths:
-    """The known paths of a run, and the distinct courses of its experiments."""
+class RunPaths:
+    """The known paths of a run, and the distinct untimed paths of its experiments."""
 
-    ways: Ways
+    fault_paths: FaultPaths
     channels: Sequence[Sequence[str]]  # as in run.json
-    by_id: Mapping[str, Path]
+    by_id: Mapping[str, FaultPath]
     records: Mapping[str, Record]
-    courses: Sequence[Course] = ()
-    course_of: Mapping[str, int] = field(default_factory=dict)  # by experiment id, for some experiments
+    untimed_paths: Sequence[UntimedPath] = ()
+    untimed_path_of: Mapping[str, int] = field(default_factory=dict)  # by experiment id, for some experiments
 
     @classmethod
     def of(
         cls,
         folder: RunFolder,
-        ways: Ways,
+        fault_paths: FaultPaths,
         planned: Mapping[str, Experiment],
         records: Mapping[str, Record],
-        courses: Sequence[Course],
-    ) -> "FoundPaths":
-        by_id = _PathsById(ways, planned, records)
-        return cls(ways=ways, channels=folder.head["channels"], by_id=by_id, records=records, courses=courses)
+        untimed_paths: Sequence[UntimedPath],
+    ) -> "RunPaths":
+        by_id = _PathsById(fault_paths, planned, records)
+        return cls(
+            fault_paths=fault_paths,
+            channels=folder.head["channels"],
+            by_id=by_id,
+            records=records,
+            untimed_paths=untimed_paths,
+        )
 
     def through(self, experiment_id: str) -> str:
         """Return the links that a fault got through, joined by `;`. The page filters by them."""
-        if experiment_id in self.course_of:
-            crossings = self.courses[self.course_of[experiment_id]].crossings
+        if experiment_id in self.untimed_path_of:
+            links = self.untimed_paths[self.untimed_path_of[experiment_id]].links
         else:
             path = self.by_id.get(experiment_id)
-            crossings = path.crossings if path else ()
-        return ";".join(link_text(c.tail, c.tip) for c in crossings if c.passage is Passage.THROUGH)
+            links = path.links if path else ()
+        return ";".join(link_text(c.tail, c.tip) for c in links if c.state is LinkState.THROUGH)
 
     def data(self, ids: Sequence[str]) -> dict[str, Any]:
         """Return the page's data for the experiments `ids`: the shape of each path (-1: none), and for each
@@ -86,10 +94,10 @@ class FoundPaths:
         largest: list[list[float | str | None]] = [[] for _ in names]
         for row, name in enumerate(ids):
             path = self.by_id.get(name)
-            stages = [[s.component, s.state.value, column] for s, column in _placed(path)] if path else []
-            key = repr(stages)
-            codes.append(shapes.setdefault(key, len(shapes)) if stages else -1)
-            columns.setdefault(key, stages)
+            components = [[s.name, s.state.value, column] for s, column in _placed(path)] if path else []
+            key = repr(components)
+            codes.append(shapes.setdefault(key, len(shapes)) if components else -1)
+            columns.setdefault(key, components)
             if late := self._late(path):
                 by[row] = late
             departures = self.records[name].left if name in self.records else ()
@@ -110,8 +118,8 @@ class FoundPaths:
         }
 
     @staticmethod
-    def _late(path: Path | None) -> dict[str, float]:
-        return {s.component: round(s.t_by, 4) for s in (path.stages if path else ()) if s.t_by is not None}
+    def _late(path: FaultPath | None) -> dict[str, float]:
+        return {s.name: round(s.t_by, 4) for s in (path.components if path else ()) if s.t_by is not None}
 
     def label(self, component: str) -> str:
         """Return the name of a component on pages."""
@@ -120,7 +128,7 @@ class FoundPaths:
     @cached_property
     def components(self) -> dict[str, dict[str, str]]:
         """Label and meaning of each component."""
-        structure = self.ways.structure
+        structure = self.fault_paths.structure
         if structure is None:
             return {name: {"label": name, "about": ""} for _, _, _, name, _ in self.channels if name}
         return {name: {"label": c.label, "about": c.about} for name, c in structure.components.items()}
@@ -135,13 +143,13 @@ def _short(value: float) -> float | str:
     return float(f"{value:.3g}") if math.isfinite(value) else "Infinity"
 
 
-def _placed(path: Path) -> Iterator[tuple[Any, int]]:
-    """Yield each stage and its column on the page, to the right of all components that feed the stage."""
+def _placed(path: FaultPath) -> Iterator[tuple[Any, int]]:
+    """Yield each component and its column on the page, to the right of all that feed it."""
     columns: dict[str, int] = {}
-    for stage in path.stages:
-        feeders = (c.tail for c in path.crossings if c.tip == stage.component)
-        columns[stage.component] = 1 + max((columns.get(name, -1) for name in feeders), default=-1)
-        yield stage, columns[stage.component]
+    for component in path.components:
+        feeders = (c.tail for c in path.links if c.tip == component.name)
+        columns[component.name] = 1 + max((columns.get(name, -1) for name in feeders), default=-1)
+        yield component, columns[component.name]
 
 
 @dataclass(slots=True, kw_only=True)
@@ -159,13 +167,16 @@ class PathCounts:
     masked: Counter[str] = field(default_factory=Counter)
     ends: Counter[tuple[str, ...]] = field(default_factory=Counter)
 
-    def add(self, path: Path | Course, count: int = 1) -> None:
+    def add(self, path: FaultPath | UntimedPath, count: int = 1) -> None:
         self.active += count
-        passages = [(c.link, c.tip, c.passage) for c in path.crossings]
-        stopped = {tip for _, tip, passage in passages if passage is Passage.STOPPED}
+        link_states = [(c.name, c.tip, c.state) for c in path.links]
+        stopped = {tip for _, tip, passage in link_states if passage is LinkState.STOPPED}
         for counter, names in (
-            (self.came, [n for n, _, passage in passages if passage in (Passage.THROUGH, Passage.STOPPED)]),
-            (self.through, [name for name, _, passage in passages if passage is Passage.THROUGH]),
+            (
+                self.came,
+                [n for n, _, passage in link_states if passage in (LinkState.THROUGH, LinkState.STOPPED)],
+            ),
+            (self.through, [name for name, _, passage in link_states if passage is LinkState.THROUGH]),
             (self.injected, path.injected),
             (self.stopped, stopped.union(path.stopped_at)),
             (self.masked, path.stopped_at),
@@ -183,15 +194,15 @@ class PathCounts:
 
 
 def counts_by_fault_type(
-    kinds: "pd.Series[str]", codes: "np.ndarray", paths: FoundPaths
+    kinds: "pd.Series[str]", codes: "np.ndarray", paths: RunPaths
 ) -> Mapping[str, PathCounts]:
-    """Return the counts of all faults, then those by fault type. `codes` has each row's course (-1: none)."""
+    """Return the counts of all faults, then those by fault type. `codes` has each row's path (-1: none)."""
     import pandas as pd
 
     found: dict[str, PathCounts] = defaultdict(PathCounts)
-    rows = pd.DataFrame({"kind": kinds.to_numpy(), "course": codes})
-    for kind, group in rows[rows["course"] >= 0].groupby("kind"):
-        for code, count in group["course"].value_counts(sort=False).items():
+    rows = pd.DataFrame({"kind": kinds.to_numpy(), "untimed_path": codes})
+    for kind, group in rows[rows["untimed_path"] >= 0].groupby("kind"):
+        for code, count in group["untimed_path"].value_counts(sort=False).items():
             for name in (ALL, str(kind)):
-                found[name].add(paths.courses[int(str(code))], int(count))
+                found[name].add(paths.untimed_paths[int(str(code))], int(count))
     return dict(found)

@@ -8,7 +8,7 @@ import numpy as np
 
 from mutator._common.processes import processes_for, shared
 from mutator.model import Record
-from mutator.outcomes.fault_paths import Course, Sight, Ways
+from mutator.outcomes.fault_paths import FaultPaths, PathInputs, UntimedPath
 from mutator.results.ranking import places
 from mutator.statistics.times import Alerts
 from mutator.store import plan_file
@@ -18,66 +18,70 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 _PIECE = 5_000  # number of experiments in a batch
-PLACE, COURSE = "#place", "#course"  # extra columns of a frame of results; no metric has such a name
+PLACE, UNTIMED_PATH = "#place", "#course"  # extra columns of a frame of results; no metric has such a name
 _Alerts = tuple[tuple[str, float], ...]  # the alerts of one experiment
 
 
 @dataclass(frozen=True, kw_only=True)
 class Seen:
-    """`places` (the rank, from 0) and `courses_of` (an index into `courses`, -1: none) have a number for
-    each row of the results. `alerts` are those of experiments with a hazard. `timings` has a row for each
+    """`places` (the rank, from 0) and `path_numbers` (an index into `untimed_paths`, -1: none) have a number
+    for each row of the results. `alerts` are those of experiments with a hazard. `timings` has a row for each
     timed experiment; its engine is '' if not recorded.
     """
 
     places: np.ndarray
-    courses_of: np.ndarray
-    courses: tuple[Course, ...]
+    path_numbers: np.ndarray
+    untimed_paths: tuple[UntimedPath, ...]
     alerts: Alerts
     timings: "DataFrame"
 
     @classmethod
     def of(
-        cls, folder: RunFolder, texts: "DataFrame", records: Mapping[str, Record], ways: Ways | None
+        cls,
+        folder: RunFolder,
+        texts: "DataFrame",
+        records: Mapping[str, Record],
+        fault_paths: FaultPaths | None,
     ) -> "Seen":
-        codes: dict[int, int] = {}  # compared by identity, because equal courses are one object
-        courses: list[Course] = []
-        courses_of = np.full(len(texts), -1, dtype=np.int32)
+        codes: dict[int, int] = {}  # compared by identity, because equal untimed paths are one object
+        untimed_paths: list[UntimedPath] = []
+        path_numbers = np.full(len(texts), -1, dtype=np.int32)
         alerts: dict[str, _Alerts] = {}
-        for number, (sights, told) in enumerate(_looks(folder, texts, records, ways)):
+        for number, (all_inputs, told) in enumerate(_looks(folder, texts, records, fault_paths)):
             alerts |= told
-            for row, sight in enumerate(sights, start=number * _PIECE):
-                course = ways.course_of(sight) if ways and sight else None
-                if course is not None:
-                    courses_of[row] = code = codes.setdefault(id(course), len(codes))
-                    if code == len(courses):
-                        courses.append(course)
+            for row, inputs in enumerate(all_inputs, start=number * _PIECE):
+                untimed_path = fault_paths.untimed_path_of(inputs) if fault_paths and inputs else None
+                if untimed_path is not None:
+                    path_numbers[row] = code = codes.setdefault(id(untimed_path), len(codes))
+                    if code == len(untimed_paths):
+                        untimed_paths.append(untimed_path)
         return cls(
             places=places(texts),
-            courses_of=courses_of,
-            courses=tuple(courses),
+            path_numbers=path_numbers,
+            untimed_paths=tuple(untimed_paths),
             alerts=alerts,
             timings=timings_of(folder),
         )
 
 
 def _looks(
-    folder: RunFolder, texts: "DataFrame", records: Mapping[str, Record], ways: Ways | None
-) -> Iterator[tuple[list[Sight | None], dict[str, _Alerts]]]:
-    """Yield, for each batch of experiments, their `Sight`, and the alerts of those with a hazard."""
+    folder: RunFolder, texts: "DataFrame", records: Mapping[str, Record], fault_paths: FaultPaths | None
+) -> Iterator[tuple[list[PathInputs | None], dict[str, _Alerts]]]:
+    """Yield, for each batch of experiments, their `PathInputs`, and the alerts of those with a hazard."""
     faults, pairs = plan_file.read_faults(folder.path), texts[["experiment_id", "fault_id"]]
 
-    def looked_at(piece: "DataFrame") -> tuple[list[Sight | None], dict[str, _Alerts]]:
-        sights: list[Sight | None] = []
+    def looked_at(piece: "DataFrame") -> tuple[list[PathInputs | None], dict[str, _Alerts]]:
+        all_inputs: list[PathInputs | None] = []
         alerts = {}
         for name, fault in zip(piece["experiment_id"], piece["fault_id"], strict=True):
-            record, sight = records.get(name), None
+            record, inputs = records.get(name), None
             if record is not None:
                 if record.hazards:
                     alerts[name] = record.alerts
-                if ways and fault in faults:
-                    sight = ways.sight(faults[fault], record)
-            sights.append(sight)
-        return sights, alerts
+                if fault_paths and fault in faults:
+                    inputs = fault_paths.inputs_of(faults[fault], record)
+            all_inputs.append(inputs)
+        return all_inputs, alerts
 
     pieces = [pairs[begin : begin + _PIECE] for begin in range(0, len(pairs), _PIECE)]
     return shared(looked_at, pieces, processes_for(len(pairs)))

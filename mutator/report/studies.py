@@ -9,12 +9,12 @@ from mutator.errors import MutatorError
 from mutator.figures.figures import Drawing
 from mutator.model import Experiment, Record, Status
 from mutator.outcomes.fault_free import FaultFreeRun, fault_free_runs
-from mutator.outcomes.fault_paths import ways_of
+from mutator.outcomes.fault_paths import fault_paths_of
 from mutator.outcomes.golden import load_trace
 from mutator.report.engines import EngineSummary, engine_summary
 from mutator.report.panel import Panel
-from mutator.report.paths import FoundPaths
-from mutator.report.seen import COURSE, PLACE, Seen
+from mutator.report.paths import RunPaths
+from mutator.report.seen import PLACE, UNTIMED_PATH, Seen
 from mutator.report.source_lines import SourceLines
 from mutator.results.rows import Row
 from mutator.results.table_reader import Results
@@ -43,7 +43,7 @@ class ReportedRun:
     seen: Seen
     engines: EngineSummary | None = None
     compared: bool = False
-    paths: FoundPaths | None = None
+    paths: RunPaths | None = None
     source: SourceLines | None = None
     experiments: Mapping[str, Experiment] = field(default_factory=dict)
     records: Mapping[str, Record] = field(default_factory=dict)
@@ -52,17 +52,19 @@ class ReportedRun:
     def open(cls, folder: RunFolder, workspace: Workspace | None) -> "ReportedRun":
         """Open a run folder whose results.csv is up to date."""
         experiments, records = Planned(folder.path), folder.records()
-        texts, ways = Results.of_run(folder.path).texts(), ways_of(folder.head)
-        seen = Seen.of(folder, texts, records, ways)
+        texts, fault_paths = Results.of_run(folder.path).texts(), fault_paths_of(folder.head)
+        seen = Seen.of(folder, texts, records, fault_paths)
         return cls(
             folder=folder,
             workspace=workspace,
             texts=texts,
-            frame=prepare(texts.assign(**{PLACE: seen.places, COURSE: seen.courses_of})),
+            frame=prepare(texts.assign(**{PLACE: seen.places, UNTIMED_PATH: seen.path_numbers})),
             engines=engine_summary(folder, records, seen.timings),
             study=_study(folder) if workspace else None,
             seen=seen,
-            paths=FoundPaths.of(folder, ways, experiments, records, seen.courses) if ways else None,
+            paths=RunPaths.of(folder, fault_paths, experiments, records, seen.untimed_paths)
+            if fault_paths
+            else None,
             source=SourceLines.of(folder, workspace, texts),
             experiments=experiments,
             records=records,

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from mutator.model import Experiment, Record, Status
-from mutator.outcomes.fault_paths import ways_of
+from mutator.outcomes.fault_paths import fault_paths_of
 from mutator.outcomes.verdicts import reaction_time, severity_of, since_activation, since_manifestation
 from mutator.results.column_facts import (
     T_END,
@@ -78,17 +78,20 @@ class ResultRows:
     def __init__(self, folder: RunFolder) -> None:
         head = folder.head
         metrics = head.get("metrics", ())
-        self._hazards, self._scale, self._ways = head["hazards"], folder.scale, ways_of(head)
+        self._hazards, self._scale, self._fault_paths = head["hazards"], folder.scale, fault_paths_of(head)
         self._ends = T_END in (name for name, *_ in metrics)
         self.columns = result_columns(
             *(head["hazards"], head["compared"], metrics, severity_columns(head)),
-            paths=self._ways is not None,
+            paths=self._fault_paths is not None,
         )
         self._names = [column.name for column in self.columns]
 
     def cells(self, experiment: Experiment, record: Record) -> list[object]:
         made = row(experiment, record, self._hazards, ends=self._ends, scale=self._scale)
-        course = self._ways.course(experiment.fault, record) if self._ways else None
-        if course:
-            made |= {"reached": course.reached or None, "stopped_at": ";".join(course.stopped_at) or None}
+        untimed_path = self._fault_paths.untimed_path(experiment.fault, record) if self._fault_paths else None
+        if untimed_path:
+            made |= {
+                "reached": untimed_path.reached or None,
+                "stopped_at": ";".join(untimed_path.stopped_at) or None,
+            }
         return list(map(made.get, self._names))

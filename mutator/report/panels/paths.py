@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from mutator._common.tables import Table
 from mutator.report.panel import Panel, rendered
 from mutator.report.path_drawing import draw_ways, share_text
-from mutator.report.paths import ALL, FoundPaths, PathCounts, counts_by_fault_type
+from mutator.report.paths import ALL, PathCounts, RunPaths, counts_by_fault_type
 from mutator.report.studies import ReportedRun
 from mutator.results.counting import kinds
 from mutator.web import plainly_embedded
@@ -58,11 +58,11 @@ names all components that stopped it.</p>
 def paths_panel(run: ReportedRun) -> Panel | None:
     """Return the panel with the counts of links and components; None if no path is known."""
     paths = run.paths
-    counts = counts_by_fault_type(kinds(run.texts), run.seen.courses_of, paths) if paths else {}
+    counts = counts_by_fault_type(kinds(run.texts), run.seen.path_numbers, paths) if paths else {}
     if paths is None or not counts:
         return None
     links = _links(paths)
-    structure = paths.ways.structure
+    structure = paths.fault_paths.structure
     stops = _stops(counts, paths)
     parts = ["## Fault paths", _ABOUT, _table(links, counts[ALL], paths).as_markdown()]
     parts += ["### Where masked faults were stopped", stops.as_markdown() if stops else _NONE_STOPPED]
@@ -86,22 +86,22 @@ def paths_panel(run: ReportedRun) -> Panel | None:
 Links = Mapping[str, tuple[str, str, str]]  # tail, tip, and what the link carries
 
 
-def _links(paths: FoundPaths) -> Links:
+def _links(paths: RunPaths) -> Links:
     """Return the links that occur in any path, in the order of the control structure."""
-    crossings = {c.link: c for course in paths.courses for c in course.crossings}
-    structure = paths.ways.structure
+    links = {c.name: c for untimed_path in paths.untimed_paths for c in untimed_path.links}
+    structure = paths.fault_paths.structure
     known = structure.links if structure else {}
     order = [
-        *(name for name in known if name in crossings),
-        *(name for name in crossings if name not in known),
+        *(name for name in known if name in links),
+        *(name for name in links if name not in known),
     ]
     return {
-        name: (crossings[name].tail, crossings[name].tip, known[name].label if name in known else "")
+        name: (links[name].tail, links[name].tip, known[name].label if name in known else "")
         for name in order
     }
 
 
-def _table(links: Links, counts: PathCounts, paths: FoundPaths) -> Table:
+def _table(links: Links, counts: PathCounts, paths: RunPaths) -> Table:
     rows = [
         (paths.label(tail), paths.label(tip), carries, share_text(counts.through[name], came))
         for name, (tail, tip, carries) in links.items()
@@ -110,7 +110,7 @@ def _table(links: Links, counts: PathCounts, paths: FoundPaths) -> Table:
     return Table(heads=("from", "to", "what it carries", "got through, of those that reached it"), rows=rows)
 
 
-def _stops(counts: Mapping[str, PathCounts], paths: FoundPaths) -> Table | None:
+def _stops(counts: Mapping[str, PathCounts], paths: RunPaths) -> Table | None:
     """Return the table of masked faults by fault type, with a column for each set of components that stopped
     them. None if no fault was masked.
     """

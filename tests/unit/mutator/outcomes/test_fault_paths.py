@@ -21,7 +21,7 @@ from mutator.model import (
     Status,
     Trigger,
 )
-from mutator.outcomes.fault_paths import Passage, Path, State, Ways, ways_of
+from mutator.outcomes.fault_paths import ComponentState, FaultPath, FaultPaths, LinkState, fault_paths_of
 from mutator.store.run_head import Head
 from mutator.stpa.analysis import StructureModel
 
@@ -70,7 +70,7 @@ CHANNELS = [
     ["torque", "-", "actuator", "rack", ""],
     ["place", "m", "truth", "car", ""],
 ]
-WAYS = Ways(CHANNELS, STRUCTURE)
+WAYS = FaultPaths(CHANNELS, STRUCTURE)
 
 
 def experiment(*modules: str) -> Experiment:
@@ -110,61 +110,67 @@ def record(outcome: Outcome | None, **left: float) -> Record:
     )
 
 
-def path(*modules: str, outcome: Outcome = Outcome.SDC, ways: Ways = WAYS, **left: float) -> Path:
-    found = ways.path(experiment(*modules), record(outcome, **left))
+def path(
+    *modules: str, outcome: Outcome = Outcome.SDC, fault_paths: FaultPaths = WAYS, **left: float
+) -> FaultPath:
+    found = fault_paths.path(experiment(*modules), record(outcome, **left))
     assert found is not None
     return found
 
 
-def states(found: Path) -> dict[str, State]:
-    return {stage.component: stage.state for stage in found.stages}
+def states(found: FaultPath) -> dict[str, ComponentState]:
+    return {one.name: one.state for one in found.components}
 
 
-def passages(found: Path) -> dict[str, Passage]:
-    return {crossing.link: crossing.passage for crossing in found.crossings}
+def link_states(found: FaultPath) -> dict[str, LinkState]:
+    return {link.name: link.state for link in found.links}
 
 
 def test_an_estimator_that_did_not_change_stopped_the_fault() -> None:
     found = path("eyes", outcome=Outcome.MASKED)
     assert [*states(found).items()] == [
-        ("eyes", State.INJECTED),
-        ("finder", State.HELD),
-        ("speed", State.HELD),
-        ("pedals", State.HELD),
-        ("car", State.HELD),
+        ("eyes", ComponentState.INJECTED),
+        ("finder", ComponentState.HELD),
+        ("speed", ComponentState.HELD),
+        ("pedals", ComponentState.HELD),
+        ("car", ComponentState.HELD),
     ]
     assert (found.reached, found.stopped_at) == ("", ("finder",))
-    assert passages(found) == {
-        "picture": Passage.STOPPED,
-        "lead": Passage.NONE,
-        "gas": Passage.NONE,
-        "force": Passage.NONE,
+    assert link_states(found) == {
+        "picture": LinkState.STOPPED,
+        "lead": LinkState.NONE,
+        "gas": LinkState.NONE,
+        "force": LinkState.NONE,
     }
 
 
 def test_a_controller_that_did_not_change_stopped_the_fault() -> None:
     found = path("eyes", outcome=Outcome.MASKED, seen=1.2)
     assert (found.reached, found.stopped_at) == ("finder", ("speed",))
-    assert passages(found)["picture"] is Passage.THROUGH
-    assert passages(found)["lead"] is Passage.STOPPED
+    assert link_states(found)["picture"] is LinkState.THROUGH
+    assert link_states(found)["lead"] is LinkState.STOPPED
 
 
 def test_a_fault_that_changed_the_car_reached_it() -> None:
     found = path("eyes", seen=1.2, wanted=1.3, gas=1.3, place=1.4)
-    assert [(s.component, s.t_first) for s in found.stages[1:]] == [
+    assert [(s.name, s.t_first) for s in found.components[1:]] == [
         ("finder", 1.2),
         ("speed", 1.3),
         ("pedals", 1.3),
         ("car", 1.4),
     ]
-    assert {*passages(found).values()} == {Passage.THROUGH}
+    assert {*link_states(found).values()} == {LinkState.THROUGH}
     assert (found.reached, found.stopped_at) == ("car", ())
 
 
 def test_feedback_is_not_part_of_the_path() -> None:
     """A car that moves differently is also observed differently."""
     found = path("wheel", angle=1.0, torque=1.0, place=1.1, seen=1.2, wanted=1.3, gas=1.4)
-    assert states(found) == {"wheel": State.INJECTED, "rack": State.REACHED, "car": State.REACHED}
+    assert states(found) == {
+        "wheel": ComponentState.INJECTED,
+        "rack": ComponentState.REACHED,
+        "car": ComponentState.REACHED,
+    }
 
 
 def test_links_that_the_study_ignores_are_not_part_of_the_path() -> None:
@@ -172,7 +178,7 @@ def test_links_that_the_study_ignores_are_not_part_of_the_path() -> None:
     links = {name: {"from": tail, "to": tip, "label": ""} for name, (tail, tip) in LINKS.items()}
     for studied, names in ((True, {"wheel", "rack"}), (False, set())):
         structure = replace_links({**links, "engaged": {**ends, "studied": studied}})
-        found = states(path("speed", ways=Ways(CHANNELS, structure), wanted=1.1, gas=1.1))
+        found = states(path("speed", fault_paths=FaultPaths(CHANNELS, structure), wanted=1.1, gas=1.1))
         assert found.keys() - {"speed", "pedals", "car"} == names
 
 
@@ -180,65 +186,65 @@ def test_a_component_that_changed_after_the_car_only_received_feedback() -> None
     """The speed control changed after the car and has an input that is not on the path."""
     found = path("finder", "wheel", angle=1.0, torque=1.0, place=1.1, wanted=1.5, gas=1.6)
     assert states(found) == {
-        "finder": State.INJECTED,
-        "wheel": State.INJECTED,
-        "rack": State.REACHED,
-        "speed": State.FEEDBACK,
-        "pedals": State.FEEDBACK,
-        "car": State.REACHED,
+        "finder": ComponentState.INJECTED,
+        "wheel": ComponentState.INJECTED,
+        "rack": ComponentState.REACHED,
+        "speed": ComponentState.FEEDBACK,
+        "pedals": ComponentState.FEEDBACK,
+        "car": ComponentState.REACHED,
     }
-    assert passages(found)["lead"] is Passage.STOPPED
-    assert passages(found)["gas"] is Passage.NONE
+    assert link_states(found)["lead"] is LinkState.STOPPED
+    assert link_states(found)["gas"] is LinkState.NONE
 
 
 def test_the_only_input_of_a_reached_component_passed_the_fault_on() -> None:
     """The rack changed before the car, and the wheel control is the rack's only input."""
     found = path("gauge", torque=1.0, place=1.1)
-    assert states(found)["wheel"] is State.PASSED
-    assert passages(found)["angle"] is passages(found)["torque"] is Passage.THROUGH
-    assert states(path("gauge", torque=1.0, place=1.1, angle=1.2))["wheel"] is State.REACHED
+    assert states(found)["wheel"] is ComponentState.PASSED
+    assert link_states(found)["angle"] is link_states(found)["torque"] is LinkState.THROUGH
+    assert states(path("gauge", torque=1.0, place=1.1, angle=1.2))["wheel"] is ComponentState.REACHED
 
 
 def test_a_component_changed_no_later_than_those_that_it_alone_feeds() -> None:
     """Only the speed control feeds the pedals."""
     found = path("finder", gas=1.2, place=1.3, wanted=1.25)
-    assert {s.component: s.t_by for s in found.stages if s.t_by is not None} == {"speed": 1.2}
-    assert [s.t_first for s in found.stages if s.component == "speed"] == [1.25]
+    assert {s.name: s.t_by for s in found.components if s.t_by is not None} == {"speed": 1.2}
+    assert [s.t_first for s in found.components if s.name == "speed"] == [1.25]
     late = path("eyes", "wheel", torque=1.0, place=1.1, gas=1.2, wanted=1.5)
-    assert {s.component: s.t_by for s in late.stages if s.t_by is not None} == {"speed": 1.2}
+    assert {s.name: s.t_by for s in late.components if s.t_by is not None} == {"speed": 1.2}
 
 
 @pytest.mark.parametrize(
     ("left", "state"),
     [
-        ({"pace": 1.6}, State.REACHED),  # the gauge had not yet observed the car's different motion
-        ({"pace": 1.5}, State.FEEDBACK),
-        ({"pace": 1.5, "seen": 1.2}, State.REACHED),  # the fault reached it earlier
-        ({"pace": 1.2, "seen": 1.4}, State.FEEDBACK),
+        ({"pace": 1.6}, ComponentState.REACHED),  # the gauge had not yet observed the car's different motion
+        ({"pace": 1.5}, ComponentState.FEEDBACK),
+        ({"pace": 1.5, "seen": 1.2}, ComponentState.REACHED),  # the fault reached it earlier
+        ({"pace": 1.2, "seen": 1.4}, ComponentState.FEEDBACK),
     ],
 )
 def test_the_first_changed_input_decides_between_fault_and_feedback(
-    left: dict[str, float], state: State
+    left: dict[str, float], state: ComponentState
 ) -> None:
     """The car moved differently before the speed control changed."""
-    ways = Ways([*CHANNELS, ["pace", "m/s", "internal", "gauge", ""]], STRUCTURE)
-    found = path("finder", "wheel", ways=ways, torque=1.0, place=1.1, wanted=1.5, **left)
+    fault_paths = FaultPaths([*CHANNELS, ["pace", "m/s", "internal", "gauge", ""]], STRUCTURE)
+    found = path("finder", "wheel", fault_paths=fault_paths, torque=1.0, place=1.1, wanted=1.5, **left)
     assert states(found)["speed"] is state
 
 
 def test_a_component_with_a_single_input_is_reached_even_after_the_car() -> None:
     """Only the speed control feeds the pedals."""
     found = path("eyes", "wheel", seen=1.0, wanted=1.0, torque=1.0, place=1.1, gas=3.0)
-    assert states(found)["pedals"] is State.REACHED
+    assert states(found)["pedals"] is ComponentState.REACHED
 
 
 def test_components_without_channels_are_unobserved() -> None:
-    ways = Ways([channel for channel in CHANNELS if channel[0] != "seen"], STRUCTURE)
-    found = path("eyes", ways=ways, wanted=1.2, gas=1.2, place=1.3)
-    assert states(found)["finder"] is State.UNSEEN
-    assert passages(found)["picture"] is Passage.UNKNOWN
-    assert passages(found)["lead"] is Passage.THROUGH
-    held = path("eyes", ways=ways, outcome=Outcome.MASKED)
+    fault_paths = FaultPaths([channel for channel in CHANNELS if channel[0] != "seen"], STRUCTURE)
+    found = path("eyes", fault_paths=fault_paths, wanted=1.2, gas=1.2, place=1.3)
+    assert states(found)["finder"] is ComponentState.UNSEEN
+    assert link_states(found)["picture"] is LinkState.UNKNOWN
+    assert link_states(found)["lead"] is LinkState.THROUGH
+    held = path("eyes", fault_paths=fault_paths, outcome=Outcome.MASKED)
     assert held.stopped_at == ("speed",)
 
 
@@ -258,17 +264,17 @@ def test_a_fault_outside_all_components_has_no_path() -> None:
 
 
 def test_without_a_structure_components_are_ordered_by_role() -> None:
-    ways = Ways(CHANNELS[::-1], None)
-    found = path("eyes", ways=ways, outcome=Outcome.MASKED, angle=1.0)
+    fault_paths = FaultPaths(CHANNELS[::-1], None)
+    found = path("eyes", fault_paths=fault_paths, outcome=Outcome.MASKED, angle=1.0)
     assert [*states(found)] == ["wheel", "speed", "finder", "rack", "pedals", "car"]
     assert (found.reached, found.stopped_at) == ("wheel", ("speed",))
-    none = path("eyes", ways=ways, outcome=Outcome.MASKED)
+    none = path("eyes", fault_paths=fault_paths, outcome=Outcome.MASKED)
     assert (none.reached, none.stopped_at) == ("", ("wheel",))
 
 
 def test_a_chain_has_feedback_too() -> None:
     """The fault is injected after the interface, whose channels change only after the car."""
-    ways = Ways(
+    fault_paths = FaultPaths(
         [
             ["seen", "", "internal", "interface", ""],
             ["ask", "", "actuator", "control", ""],
@@ -276,11 +282,11 @@ def test_a_chain_has_feedback_too() -> None:
         ],
         None,
     )
-    found = path("x", ways=ways, ask=1.0, gap=1.1, seen=1.2)
+    found = path("x", fault_paths=fault_paths, ask=1.0, gap=1.1, seen=1.2)
     assert states(found) == {
-        "interface": State.FEEDBACK,
-        "control": State.REACHED,
-        "car": State.REACHED,
+        "interface": ComponentState.FEEDBACK,
+        "control": ComponentState.REACHED,
+        "car": ComponentState.REACHED,
     }
 
 
@@ -288,8 +294,8 @@ def test_a_path_through_a_loop_has_each_component_once() -> None:
     links: dict[str, Any] = {name: one.model_dump(by_alias=True) for name, one in STRUCTURE.links.items()}
     links["back"] = {"from": "speed", "to": "finder", "label": ""}
     circle = replace_links(links)
-    found = path("eyes", ways=Ways(CHANNELS, circle), seen=1.0, wanted=1.0, gas=1.0, place=1.1)
-    assert [stage.component for stage in found.stages] == ["eyes", "finder", "speed", "pedals", "car"]
+    found = path("eyes", fault_paths=FaultPaths(CHANNELS, circle), seen=1.0, wanted=1.0, gas=1.0, place=1.1)
+    assert [one.name for one in found.components] == ["eyes", "finder", "speed", "pedals", "car"]
     assert found.reached == "car"
 
 
@@ -301,11 +307,11 @@ def test_the_structure_is_read_from_run_json() -> None:
     """Older runs have no components, so they have no paths."""
     structure = STRUCTURE.model_dump(mode="json", by_alias=True)
     head = Head(Folder("run.json"), {"channels": CHANNELS, "structure": structure})
-    found = ways_of(head)
+    found = fault_paths_of(head)
     assert found is not None and found.structure == STRUCTURE
-    assert ways_of(Head(Folder("run.json"), {})) is None
+    assert fault_paths_of(Head(Folder("run.json"), {})) is None
     nothing = [[name, unit, role, "", about] for name, unit, role, _, about in CHANNELS]
-    assert ways_of(Head(Folder("run.json"), {"channels": nothing, "structure": None})) is None
+    assert fault_paths_of(Head(Folder("run.json"), {"channels": nothing, "structure": None})) is None
     structure["links"]["lead"]["to"] = 3
     with pytest.raises(MutatorError, match="structure"):
-        ways_of(head)
+        fault_paths_of(head)

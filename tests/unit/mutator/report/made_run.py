@@ -13,6 +13,7 @@ HEAD = {
     "schema": "run/1",
     "campaign": "night_<b>drive</b>",
     "plan": "ab" * 32,
+    "compared": [],
     "seed": 7,
     "reading": "as_described",
     "choices": {"seed": None, "limit": 3},

@@ -10,13 +10,13 @@ from typing import cast
 import pandas as pd
 import pytest
 
-from mutator.outcomes.fault_paths import Course, Crossing, Passage
+from mutator.outcomes.fault_paths import LinkState, PathLink, UntimedPath
 from mutator.report.answer_parts import Answer, Link, Part, to_list
 from mutator.report.answers import answers_of
 from mutator.report.dangers import dangerous
 from mutator.report.fix_order import first_to_fix
 from mutator.report.panels.answers import answers_panel
-from mutator.report.paths import FoundPaths
+from mutator.report.paths import RunPaths
 from mutator.report.studies import ReportedRun
 from mutator.report.warnings import NO_ALERT
 from mutator.results.column_facts import result_columns
@@ -58,7 +58,10 @@ def run(tmp_path: Path) -> ReportedRun:
             line |= {"t_manifest": 2.5 if outcome in ("hazard", "sdc") else "", "variant": "x"}
             line |= {"reaction_time": hazard - alert if alerts and alert < hazard else ""}
             table.writerow(line)
-    costs = [{"experiment_id": f"{i}" * 16, "cpu_s": 2.0**i, "worker": f"w{i % 2}"} for i in range(7)]
+    costs = [
+        {"experiment_id": f"{i}" * 16, "cpu_s": 2.0**i, "wall_s": 1.0, "worker": f"w{i % 2}"}
+        for i in range(7)
+    ]
     lines = [
         {"schema": "timings/1", "plan": HEAD["plan"]},
         *costs,
@@ -155,20 +158,20 @@ def test_severity_and_then_time_decide_what_to_fix_first() -> None:
     assert "and 1 of 3 of severity S3, the highest among the silent hazards." in answer.says
 
 
-def course(by: str = "", stopped_at: tuple[str, ...] = ()) -> Course:
+def untimed_path(by: str = "", stopped_at: tuple[str, ...] = ()) -> UntimedPath:
     """Return the path of a fault that reached its first actuator through the link `by`, or was stopped at
     these components."""
-    entered = Crossing(link=by, tail=by, tip="pedals", passage=Passage.THROUGH) if by else None
-    return Course(states={}, late={}, crossings=(), reached="", stopped_at=stopped_at, entered=entered)
+    entered = PathLink(name=by, tail=by, tip="pedals", state=LinkState.THROUGH) if by else None
+    return UntimedPath(states={}, late={}, links=(), reached="", stopped_at=stopped_at, entered=entered)
 
 
 def test_the_component_that_let_most_faults_through_is_named() -> None:
-    courses = (course("feet"), course("hands"), course(stopped_at=("eyes",)))
-    structure = {"label": {"feet": "Feet", "eyes": "Eyes"}.__getitem__, "courses": courses}
-    frame = hazards(*[("a/b", "S1", 1.0)] * 4).assign(course=[0, 0, 1, -1])
-    masked = frame[:1].assign(experiment_id="masked", outcome="masked", course=2)
+    untimed_paths = (untimed_path("feet"), untimed_path("hands"), untimed_path(stopped_at=("eyes",)))
+    structure = {"label": {"feet": "Feet", "eyes": "Eyes"}.__getitem__, "untimed_paths": untimed_paths}
+    frame = hazards(*[("a/b", "S1", 1.0)] * 4).assign(untimed_path=[0, 0, 1, -1])
+    masked = frame[:1].assign(experiment_id="masked", outcome="masked", untimed_path=2)
     answer = first_to_fix(
-        pd.concat([frame, masked]), cast(FoundPaths, SimpleNamespace(**structure)), has_alerts=True
+        pd.concat([frame, masked]), cast(RunPaths, SimpleNamespace(**structure)), has_alerts=True
     )
     [line] = answer.listings[0].lines
     silent = "warning=no%20alert%20at%20all,alert%20only%20after%20the%20hazard"

@@ -4,8 +4,15 @@ from collections.abc import Callable
 from math import inf
 
 from mutator.model import Record
-from mutator.outcomes.fault_paths import Crossing, Passage, Path, Stage, State, Ways
-from mutator.report.paths import FoundPaths, PathCounts
+from mutator.outcomes.fault_paths import (
+    ComponentState,
+    FaultPath,
+    FaultPaths,
+    LinkState,
+    PathComponent,
+    PathLink,
+)
+from mutator.report.paths import PathCounts, RunPaths
 
 CHANNELS = [
     ["seen", "m", "internal", "eyes", "what is seen"],
@@ -14,26 +21,35 @@ CHANNELS = [
 ]
 
 
-def path(*states: State, stopped_at: tuple[str, ...] = ()) -> Path:
+def path(*states: ComponentState, stopped_at: tuple[str, ...] = ()) -> FaultPath:
     names = ("eyes", "pedals", "car")
-    stages = tuple(Stage(component=n, state=s, channels=()) for n, s in zip(names, states, strict=True))
-    through = {State.REACHED: Passage.THROUGH, State.HELD: Passage.STOPPED, State.UNSEEN: Passage.UNKNOWN}
-    crossings = tuple(
-        Crossing(link=f"{tail}-{tip}", tail=tail, tip=tip, passage=through[state])
+    components = tuple(
+        PathComponent(name=n, state=s, channels=()) for n, s in zip(names, states, strict=True)
+    )
+    through = {
+        ComponentState.REACHED: LinkState.THROUGH,
+        ComponentState.HELD: LinkState.STOPPED,
+        ComponentState.UNSEEN: LinkState.UNKNOWN,
+    }
+    links = tuple(
+        PathLink(name=f"{tail}-{tip}", tail=tail, tip=tip, state=through[state])
         for tail, tip, state in zip(names, names[1:], states[1:], strict=False)
     )
-    return Path(stages=stages, crossings=crossings, reached="", stopped_at=stopped_at)
+    return FaultPath(components=components, links=links, reached="", stopped_at=stopped_at)
 
 
 def test_paths_become_shapes_and_columns_of_the_page(record: Callable[..., Record]) -> None:
-    far, held = path(*[State.REACHED] * 3), path(State.REACHED, State.HELD, State.HELD)
+    far, held = (
+        path(*[ComponentState.REACHED] * 3),
+        path(ComponentState.REACHED, ComponentState.HELD, ComponentState.HELD),
+    )
     records = {
         "a": record("a", left=(("seen", 1.23456, 0.123456), ("gap", 2.0, inf))),
         "b": record("b"),
         "c": record("c", left=(("seen", 1.0, 2.0),)),
     }
     by_id = {"a": far, "c": held, "d": far}
-    found = FoundPaths(ways=Ways(CHANNELS, None), channels=CHANNELS, by_id=by_id, records=records)
+    found = RunPaths(fault_paths=FaultPaths(CHANNELS, None), channels=CHANNELS, by_id=by_id, records=records)
     data = found.data(["a", "b", "c", "d"])
     assert data["shape"] == [0, -1, 1, 0]
     assert data["shapes"][0] == [["eyes", "reached", 0], ["pedals", "reached", 1], ["car", "reached", 2]]
@@ -46,10 +62,12 @@ def test_paths_become_shapes_and_columns_of_the_page(record: Callable[..., Recor
 def test_faults_are_counted_by_link_and_component() -> None:
     """A fault is not counted for a link if the component after the link is not recorded."""
     counts = PathCounts()
-    counts.add(path(State.INJECTED, State.REACHED, State.REACHED))
-    counts.add(path(State.INJECTED, State.HELD, State.HELD, stopped_at=("pedals",)))
-    counts.add(path(State.INJECTED, State.UNSEEN, State.REACHED))
-    counts.add(path(State.INJECTED, State.REACHED, State.HELD))
+    counts.add(path(ComponentState.INJECTED, ComponentState.REACHED, ComponentState.REACHED))
+    counts.add(
+        path(ComponentState.INJECTED, ComponentState.HELD, ComponentState.HELD, stopped_at=("pedals",))
+    )
+    counts.add(path(ComponentState.INJECTED, ComponentState.UNSEEN, ComponentState.REACHED))
+    counts.add(path(ComponentState.INJECTED, ComponentState.REACHED, ComponentState.HELD))
     plain = counts.plain()
     assert plain["active"] == 4
     assert plain["links"] == {"eyes-pedals": [2, 3], "pedals-car": [2, 4]}
