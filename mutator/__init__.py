@@ -11,7 +11,7 @@ from mutator._common.version import VERSION
 if TYPE_CHECKING:
     from mutator.api.audits import Audit, seal, verify
     from mutator.api.caches import cache_entries, cache_folder, clear_caches, prune_caches
-    from mutator.api.campaigns import IncompleteRun, run
+    from mutator.api.campaigns import run
     from mutator.api.comparisons import RunComparison, compare
     from mutator.api.experiment_results import TraceFrames
     from mutator.api.histories import write_history
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from mutator.audit.seal import Seals
     from mutator.campaigns.plans import Choices, Plan
     from mutator.comparison.comparison import Gate
-    from mutator.errors import CheckFailed, MutatorError, MutatorWarning
+    from mutator.errors import CheckFailed, IncompleteRun, MutatorError, MutatorWarning
     from mutator.execution.session import Summary
     from mutator.exports import Format
     from mutator.model import Experiment, Fault, Outcome, Record, Status, Trigger
@@ -51,7 +51,7 @@ __version__ = VERSION
 _HOMES = {
     "mutator.api.audits": ("Audit", "seal", "verify"),
     "mutator.api.caches": ("cache_entries", "cache_folder", "clear_caches", "prune_caches"),
-    "mutator.api.campaigns": ("IncompleteRun", "run"),
+    "mutator.api.campaigns": ("run",),
     "mutator.api.comparisons": ("RunComparison", "compare"),
     "mutator.api.experiment_results": ("TraceFrames",),
     "mutator.api.histories": ("write_history",),
@@ -75,7 +75,7 @@ _HOMES = {
     "mutator.api.trials": ("Trial", "try_fault"),
     "mutator.campaigns.plans": ("Choices", "Plan"),
     "mutator.comparison.comparison": ("Gate",),
-    "mutator.errors": ("CheckFailed", "MutatorError", "MutatorWarning"),
+    "mutator.errors": ("CheckFailed", "IncompleteRun", "MutatorError", "MutatorWarning"),
     "mutator.execution.session": ("Summary",),
     "mutator.exports": ("Format",),
     "mutator.model": ("Experiment", "Fault", "Outcome", "Record", "Status", "Trigger"),

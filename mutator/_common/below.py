@@ -21,17 +21,13 @@ from typing import BinaryIO
 
 from mutator._common.bounded import MOST_WHOLE, read_open
 from mutator._common.files import clear_place, let_in, raising_disk_full
-from mutator.errors import MutatorError
+from mutator.errors import MutatorError, Outside
 
 _FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
 _CAREFULLY = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
 _NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
 _DEEPEST, _DEEPEST_OUTPUT = 30, 20  # folders in each other; an output lies in a few others
 _LONGEST_NAME = 220  # bytes; Linux allows 255, and a half-written file has a longer name
-
-
-class Outside(MutatorError):
-    """A name points out of its folder, or something in a folder is not a plain file or folder."""
 
 
 def check_name(name: object, where: str | Path, *, folders: bool = True) -> str:

@@ -14,7 +14,7 @@ from io import BufferedReader
 from pathlib import Path
 from typing import BinaryIO
 
-from mutator.errors import MutatorError
+from mutator.errors import TooLarge
 
 MOST_WHOLE = 128_000_000  # bytes of a file that is read as a whole; a reader can have another limit
 MOST_JSON = 6_000_000  # bytes of a JSON object; as Python objects they can take 30 times as much memory
@@ -23,13 +23,6 @@ MOST_LINE = 4_000_000  # bytes of a line
 _DENSE = 64_000_000  # from this size, a file must not have holes
 _PIECE = 1_000_000
 _GZIP = zlib.MAX_WBITS | 16
-
-
-class TooLarge(MutatorError, ValueError):
-    """A file is larger than anything that belongs there.
-
-    Also a ValueError, so that readers that skip a damaged file (of a cache) skip it as well.
-    """
 
 
 def read_bounded(path: Path, most: int = MOST_WHOLE) -> bytes:

@@ -15,17 +15,11 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from mutator._common.bounded import MOST_JSON, read_bounded
-from mutator.errors import EXIT_HARNESS_ERRORS, MutatorError
+from mutator.errors import DiskFull, MutatorError
 
 _NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
 _FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW
 _NO_FILE = (errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP, errno.ENXIO)
-
-
-class DiskFull(MutatorError):
-    """No space left on the disk. Finished work is kept; rerun the command after freeing space."""
-
-    exit_code = EXIT_HARNESS_ERRORS
 
 
 def is_disk_full(err: BaseException | None) -> bool:

@@ -5,9 +5,10 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-from mutator._common.below import Outside, check_plain
+from mutator._common.below import check_plain
 from mutator._common.bounded import MOST_DATA, read_bounded
 from mutator._common.hashing import digest
+from mutator.errors import Outside
 
 _SUM = "sum"  # the file with the digest of all others
 

@@ -10,9 +10,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from mutator._common.below import Outside, open_descriptor, unlink_below
+from mutator._common.below import open_descriptor, unlink_below
 from mutator._common.files import raising_disk_full
-from mutator.errors import MutatorError
+from mutator.errors import MutatorError, Outside
 
 OWNER = "owner.lock"
 WORKERS = "workers"

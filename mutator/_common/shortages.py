@@ -3,7 +3,7 @@
 import errno
 import os
 
-from mutator.errors import EXIT_HARNESS_ERRORS, MutatorError
+from mutator.errors import Shortage
 
 _FILES = (errno.EMFILE, errno.ENFILE)
 _PROCESSES = "can't start new thread"
@@ -12,12 +12,6 @@ _LOADING = (
     "cannot allocate memory",
 )  # errors when there is too little memory to load a library
 _AGAIN = "run the same command again; finished experiments are kept and not repeated"
-
-
-class Shortage(MutatorError):
-    """The machine is out of a resource, or this process has reached a limit. Finished work is kept."""
-
-    exit_code = EXIT_HARNESS_ERRORS
 
 
 def shortage(err: BaseException | None) -> Shortage | None:

@@ -10,10 +10,10 @@ from mutator._common.below import inside
 from mutator._common.hashing import digest
 from mutator._common.text import counted
 from mutator.engines.jobs import FAST
-from mutator.errors import MutatorError
+from mutator.errors import InvalidMutant, MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Activation, Fault, Record, Status, Trigger
-from mutator.mutants.building import InvalidMutant, build
+from mutator.mutants.building import build
 from mutator.outcomes.verdicts import Events, judge
 from mutator.preflight import equivalence
 from mutator.store import plan_file

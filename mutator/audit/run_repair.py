@@ -11,16 +11,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from mutator._common.below import (
-    Outside,
-    inside,
-    move_below,
-    open_below,
-    unlink_below,
-    write_below,
-    writing_below,
-)
-from mutator._common.bounded import MOST_DATA, TooLarge, check_open, read_bounded
+from mutator._common.below import inside, move_below, open_below, unlink_below, write_below, writing_below
+from mutator._common.bounded import MOST_DATA, check_open, read_bounded
 from mutator._common.files import raising_disk_full
 from mutator._common.locks import owned
 from mutator._common.text import counted
@@ -28,7 +20,7 @@ from mutator.audit.record_audit import recorded
 from mutator.audit.series_repair import repair_series
 from mutator.campaigns.freezing import CSV, plan_csv
 from mutator.campaigns.plans import load_plan
-from mutator.errors import MutatorError
+from mutator.errors import MutatorError, Outside, TooLarge
 from mutator.model import Status
 from mutator.store import digests, integrity
 from mutator.store.blocks import read_blocks

@@ -7,8 +7,8 @@ from tempfile import TemporaryDirectory
 from typing import BinaryIO
 
 from mutator._common.below import inside
-from mutator._common.bounded import TooLarge, bounded_lines
-from mutator.errors import MutatorError
+from mutator._common.bounded import bounded_lines
+from mutator.errors import MutatorError, TooLarge
 from mutator.results import table_building
 from mutator.results.table_reader import same_parquet
 from mutator.store.run_folder import RunFolder

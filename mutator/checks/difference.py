@@ -8,8 +8,8 @@ import numpy as np
 from mutator._common.below import inside
 from mutator._common.bounded import read_bounded
 from mutator._common.text import shown
+from mutator.errors import BadOutput
 from mutator.outcomes import golden
-from mutator.outcomes.golden import BadOutput
 from mutator.targets.manifest import TargetManifest
 
 

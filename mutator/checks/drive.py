@@ -22,11 +22,11 @@ from mutator.checks.findings import Finding, Level
 from mutator.checks.reach import Reach
 from mutator.engines import forkable
 from mutator.engines.fork import ForkEngine
-from mutator.engines.fork_pool import Refused
 from mutator.engines.in_target.watch import CLOCK, THREAD
 from mutator.engines.jobs import Execution, Job
 from mutator.engines.reference import ReferenceEngine
 from mutator.engines.threads import too_many, turned_off
+from mutator.errors import NotForkable
 from mutator.model import Experiment, Limits
 from mutator.mutants.building import build
 from mutator.mutants.injected_lines import tag_of
@@ -221,7 +221,7 @@ class _Drive:
         places = dict.fromkeys(place for one in noted for place in causes.of_kind(one, THREAD))
         return replace(told, places=tuple(places))
 
-    def _refusal(self, scenario: str, golden: _Golden) -> Refused | None:
+    def _refusal(self, scenario: str, golden: _Golden) -> NotForkable | None:
         null = build(self.manifest, self.workspace.fault_models(), None, always()).files
         work = self._scratch / "fork"
         work.mkdir()
@@ -284,9 +284,9 @@ class _Drive:
         )
 
 
-def _threads(watched: Execution) -> Refused | None:
+def _threads(watched: Execution) -> NotForkable | None:
     others = watched.watched.get("threads", [])
-    return Refused(too_many(others), turned_off(others)) if others else None
+    return NotForkable(too_many(others), turned_off(others)) if others else None
 
 
 def _reading(workspace: Workspace, campaign: Campaign) -> str:

@@ -5,9 +5,8 @@ from dataclasses import replace
 from mutator._common.files import ScratchFolder
 from mutator._common.text import counted
 from mutator.checks.findings import Finding, Level
-from mutator.engines.fork_pool import Refused
 from mutator.engines.forkable import not_forked, not_loadable
-from mutator.errors import MutatorError
+from mutator.errors import MutatorError, NotForkable
 from mutator.faults.expansion import expand
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
@@ -25,7 +24,7 @@ def loading(manifest: TargetManifest) -> Finding:
     return replace(told, remedy=f"{told.remedy}; {_DRIVE}") if "thread" in told.found else told
 
 
-def finding(refusal: Refused | None) -> Finding:
+def finding(refusal: NotForkable | None) -> Finding:
     if refusal is None:
         return Finding(name=NAME, level=Level.OK, found="runs can be forked")
     return Finding(

@@ -12,6 +12,7 @@ from functools import lru_cache
 from inspect import CO_ASYNC_GENERATOR, CO_COROUTINE, CO_GENERATOR, CO_OPTIMIZED
 from types import CodeType
 
+from mutator.errors import NotSwappable
 from mutator.mutants.imported_names import module_name
 from mutator.mutants.injected_lines import sets_values, tag_of
 from mutator.mutants.probe import parts_of, probe_path
@@ -21,10 +22,6 @@ from mutator.targets.source_tree import matches
 
 _SUSPENDED = CO_GENERATOR | CO_COROUTINE | CO_ASYNC_GENERATOR
 _IMPORT = re.compile(rb"\s*(?:from ([\w.]+) import|import ([\w.]+))")
-
-
-class NotSwappable(Exception):
-    """The mutant cannot be put into a running program; the text says why."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

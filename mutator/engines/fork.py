@@ -20,8 +20,8 @@ from mutator._common.bounded import read_bounded
 from mutator._common.files import clear_place, disk_full, raising_disk_full, remove_folder, write_atomic
 from mutator._common.hashing import content_id
 from mutator.engines.activation import Observed, Start, first_active
-from mutator.engines.code_swap import CodeSwap, NotSwappable, plan_swap
-from mutator.engines.fork_pool import Golden, Lost, Pool, Refused, Waiting, used_unchanged
+from mutator.engines.code_swap import CodeSwap, plan_swap
+from mutator.engines.fork_pool import Golden, Pool, Waiting, used_unchanged
 from mutator.engines.jobs import Execution, Job, RunMode, Setting, failed
 from mutator.engines.processes import (
     PATIENCE_S,
@@ -33,6 +33,7 @@ from mutator.engines.processes import (
 from mutator.engines.reference import ReferenceEngine
 from mutator.engines.run_home import OUTPUT, RunHome, is_disturbance, make_work
 from mutator.engines.threads import too_many, turned_off
+from mutator.errors import ForkServerLost, NotForkable, NotSwappable
 from mutator.model import Limits, Status
 from mutator.mutants.building import build
 from mutator.mutants.probe import probe_module, silent_report, state_after
@@ -73,8 +74,8 @@ class ForkEngine:
         self._patience_s = limits.wall_s + PATIENCE_S
         self._pool: Pool | None = None
         self._pools = 0
-        self._unfit = None if manifest.stepwise else Refused(f"target {manifest.name} is not stepwise")
-        self._seen: dict[_Key, Observed | Refused] = {}  # observations, or why there are none
+        self._unfit = None if manifest.stepwise else NotForkable(f"target {manifest.name} is not stepwise")
+        self._seen: dict[_Key, Observed | NotForkable] = {}  # observations, or why there are none
 
     def run(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Execution]]:
         for job in jobs:
@@ -94,9 +95,9 @@ class ForkEngine:
         try:
             with raising_disk_full(self._work):
                 return self._execute(job, folder)
-        except (NotSwappable, Refused) as why:
+        except (NotSwappable, NotForkable) as why:
             return self._by_reference(job, steady(str(why), folder))
-        except Lost as why:
+        except ForkServerLost as why:
             self.close()
             return failed(str(why), folder / OUTPUT, RunMode.FORK)
         except OSError as err:
@@ -110,22 +111,22 @@ class ForkEngine:
         clear_place(another)
         return replace(self.reference.execute(job, another), why=why)
 
-    def refusal(self, job: Job) -> Refused | None:
+    def refusal(self, job: Job) -> NotForkable | None:
         """Return why a job's golden run cannot be forked up to its last step; None if it can."""
         assert job.golden is not None
         try:
             if self._unfit:
-                raise Refused(*self._unfit.args)
+                raise NotForkable(*self._unfit.args)
             steps = len(self._observed(job, job.golden).before)
             swap = plan_swap(self._manifest, self._null, str(self._running(job).tree))
             waiting = self._at(job, steps - 1, swap)
             said, _ = waiting.ask({"do": "load", "modules": []}, self._patience_s)
             if said["threads"]:
-                raise Refused(too_many(said["threads"]), turned_off(said["threads"]))
-        except Refused as why:
+                raise NotForkable(too_many(said["threads"]), turned_off(said["threads"]))
+        except NotForkable as why:
             return why
-        except Lost as why:
-            return Refused(str(why))
+        except ForkServerLost as why:
+            return NotForkable(str(why))
         return None
 
     def close(self) -> None:
@@ -136,9 +137,9 @@ class ForkEngine:
 
     def _execute(self, job: Job, folder: Path) -> Execution:
         if self._unfit:
-            raise Refused(*self._unfit.args)
+            raise NotForkable(*self._unfit.args)
         if job.mutant is None or job.golden is None or job.hash_seed:
-            raise Refused("not an experiment")
+            raise NotForkable("not an experiment")
         swap = plan_swap(self._manifest, job.files, str(self._running(job).tree))
         if self._warm:
             return self._from_the_start(job, folder, swap)
@@ -162,11 +163,11 @@ class ForkEngine:
             home = self._runs / f"server-{self._pools}"
             try:
                 self._pool = Pool(self._manifest, home, self._parent, scenarios)
-            except Refused as why:
+            except NotForkable as why:
                 self._unfit = why
                 raise
         if self._manifest.sandbox and self._pool.scenarios != scenarios:
-            raise Refused("the sandbox of the fork server has the scenarios of another folder")
+            raise NotForkable("the sandbox of the fork server has the scenarios of another folder")
         return self._pool
 
     def _at(self, job: Job, step: int, swap: CodeSwap) -> Waiting:
@@ -226,10 +227,10 @@ class ForkEngine:
             said, _ = waiting.ask(asked, self._patience_s)
         self._running(job).clean()
         if said["threads"]:
-            raise Refused(too_many(said["threads"]), turned_off(said["threads"]))
+            raise NotForkable(too_many(said["threads"]), turned_off(said["threads"]))
         if said["touched"]:
             self.close()
-            raise Refused("it writes into its own tree")
+            raise NotForkable("it writes into its own tree")
         return Ended(**{name: said[name] for name in Ended.__slots__})
 
     def _judged(self, job: Job, home: RunHome, ended: Ended, place: Path, watch: bool) -> Execution:
@@ -241,7 +242,7 @@ class ForkEngine:
         if status is not Status.OK and is_full(self._work, report):
             raise disk_full(self._work)
         if status is Status.CRASHED:
-            raise Refused(f"ended as crashed: {detail}")
+            raise NotForkable(f"ended as crashed: {detail}")
         return Execution(
             status=status,
             detail=detail,
@@ -257,16 +258,16 @@ class ForkEngine:
         )
 
     def _check(self, job: Job, report: dict[str, Any]) -> None:
-        """Raise Refused if the child did not run the mutant's code, or if threads are left."""
+        """Raise NotForkable if the child did not run the mutant's code, or if threads are left."""
         if report["ended"] == "swap refused":
-            raise Refused(str(report.get("why")))
+            raise NotForkable(str(report.get("why")))
         if report["outside"]:
-            raise Refused(f"the target was also imported from {', '.join(report['outside'])}")
+            raise NotForkable(f"the target was also imported from {', '.join(report['outside'])}")
         if report["threads"]:
             others = report["threads"]
-            raise Refused(f"at its end {too_many(others)}", turned_off(others))
+            raise NotForkable(f"at its end {too_many(others)}", turned_off(others))
         if report["ended"] == "ok" and (problem := job.problem_of(report["probe"])):
-            raise Refused(problem)
+            raise NotForkable(problem)
 
     def _observed(self, job: Job, golden: Path) -> Observed:
         """Return what a probe observes in a job's golden run. The first call runs it."""
@@ -274,11 +275,11 @@ class ForkEngine:
         if key not in self._seen:
             try:
                 self._seen[key] = self._watch(job, golden)
-            except Refused as why:
+            except NotForkable as why:
                 self._seen[key] = why
         seen = self._seen[key]
-        if isinstance(seen, Refused):
-            raise Refused(*seen.args)
+        if isinstance(seen, NotForkable):
+            raise NotForkable(*seen.args)
         return seen
 
     def _watch(self, job: Job, golden: Path) -> Observed:
@@ -290,26 +291,26 @@ class ForkEngine:
         try:
             swap = plan_swap(self._manifest, self._null, str(self._running(job).tree))
             null = replace(job, mutant=None, stop=False)
-            self._at(job, 0, swap)  # Refused, with the reason, if the run cannot begin
+            self._at(job, 0, swap)  # NotForkable, with the reason, if the run cannot begin
             # Fork before the first step, because a later fork misses earlier observations.
             first = self._running(job).first
             execution = self._become(first, null, folder, swap, _FROM_THE_START, watch=True)
             if execution.status is Status.HARNESS_ERROR:
-                raise Lost(execution.detail)
+                raise ForkServerLost(execution.detail)
             if execution.status is not Status.OK:
-                raise Refused(f"its golden run ended as {execution.status.value}: {execution.detail}")
+                raise NotForkable(f"its golden run ended as {execution.status.value}: {execution.detail}")
             for name in self._manifest.outputs:
                 if read_bounded(execution.out / name) != read_bounded(golden / name):
-                    raise Refused(f"its {name} differs when it is driven step by step")
+                    raise NotForkable(f"its {name} differs when it is driven step by step")
             seen, *others = (execution.watched[name] for name in _WATCHED)
             found = (tuple(map(tuple, seen)), *map(tuple, others))
             if found[0] and found[1][:1] != (0,):
-                raise Refused("it observes before its first step")
+                raise NotForkable("it observes before its first step")
             data = marshal.dumps(found)
             write_atomic(known, self._code(known, data) + data)
             return Observed(values=found[0], before=found[1], libraries=found[2])
         except NotSwappable as why:
-            raise Refused(f"its observing statement cannot be inserted: {why}") from None
+            raise NotForkable(f"its observing statement cannot be inserted: {why}") from None
         finally:
             remove_folder(folder)
 

@@ -25,6 +25,7 @@ from mutator.engines.base_tree import RunTree
 from mutator.engines.processes import end, environment, raised_in
 from mutator.engines.sandbox import Sandbox
 from mutator.engines.threads import too_many, turned_off
+from mutator.errors import ForkServerLost, NotForkable
 from mutator.targets.manifest import TargetManifest
 
 _SERVER = Path(__file__).parent / "in_target" / "fork_server.py"
@@ -32,21 +33,6 @@ _MOST = 8  # maximum number of waiting processes, because each takes about 20 MB
 _NEAR = 100  # steps; a process at most this far behind is advanced, not copied: it is quickly remade
 _LOOK_UP_S = 0.5  # interval between two checks that the parent is alive
 _START_S = 120.0
-
-
-class Lost(Exception):
-    """A process of the fork server is gone or does not answer."""
-
-
-class Refused(Exception):
-    """A target or run that cannot be forked. The text says why; `remedy` says what to do, if known."""
-
-    def __init__(self, why: str, remedy: str = "") -> None:
-        super().__init__(why, remedy)
-        self.remedy = remedy
-
-    def __str__(self) -> str:
-        return str(self.args[0])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,7 +70,7 @@ class Waiting:
         try:
             self._connection.sendall(struct.pack("<I", len(data)) + data)
         except OSError as err:
-            raise Lost(f"a process of the fork server is gone ({err})") from None
+            raise ForkServerLost(f"a process of the fork server is gone ({err})") from None
         return self.reply(patience_s)
 
     def reply(self, patience_s: float) -> tuple[dict[str, Any], list[int]]:
@@ -114,24 +100,24 @@ class Waiting:
                 if self._parent is not None and os.getppid() != self._parent:
                     raise SystemExit("the process that started this one is gone") from None
                 if time.monotonic() > deadline:
-                    raise Lost("the fork server does not answer") from None
+                    raise ForkServerLost("the fork server does not answer") from None
                 continue
             except OSError as err:
-                raise Lost(f"a process of the fork server is gone ({err})") from None
+                raise ForkServerLost(f"a process of the fork server is gone ({err})") from None
             handles += found
             if not part:
-                raise Lost("a process of the fork server is gone")
+                raise ForkServerLost("a process of the fork server is gone")
             data += part
         return data
 
 
 @contextmanager
 def used_unchanged(path: Path) -> Iterator[None]:
-    """Raise Lost if a file is written to while the server uses it."""
+    """Raise ForkServerLost if a file is written to while the server uses it."""
     used = UnchangedFiles({str(path.resolve()): read_bounded(path)})
     yield
     if used.first_changed():
-        raise Lost(f"{path.name} was changed while it was in use")
+        raise ForkServerLost(f"{path.name} was changed while it was in use")
 
 
 class Pool:
@@ -140,8 +126,8 @@ class Pool:
     In a sandbox, they can read the folder `scenarios`, and write to the folder in which `home` is.
 
     Its tree has no bytecode, which a mutant could exchange before the server loads one more module. Raises
-    Refused if the target cannot be loaded or has more than one thread, and Lost if the server ends without an
-    answer, or if its tree is not the pristine one.
+    NotForkable if the target cannot be loaded or has more than one thread, and ForkServerLost if the server
+    ends without an answer, or if its tree is not the pristine one.
     """
 
     def __init__(self, manifest: TargetManifest, home: Path, parent: int | None, scenarios: Path) -> None:
@@ -190,13 +176,13 @@ class Pool:
     def _welcome(self) -> None:
         said, _ = self.first.reply(_START_S)
         if "failed" in said:
-            raise Refused(f"it cannot be loaded: {_why(said['failed'])}")
+            raise NotForkable(f"it cannot be loaded: {_why(said['failed'])}")
         if said["threads"]:
             others = said["threads"]
-            raise Refused(f"once it is loaded, {too_many(others)}", turned_off(others))
+            raise NotForkable(f"once it is loaded, {too_many(others)}", turned_off(others))
         self._group = said["group"]
         if self._files.first_changed() or self._told.first_changed():
-            raise Lost("the tree of the fork server is not the pristine one")
+            raise ForkServerLost("the tree of the fork server is not the pristine one")
         if self._sandbox:
             self._sandbox.begin()
 
@@ -208,7 +194,7 @@ class Pool:
     def before(self, step: int, golden: Golden, modules: Sequence[str], patience_s: float) -> Waiting:
         """Return a process that waits before `step` of the golden run, with these modules loaded."""
         if self._process.poll() is not None:
-            raise Lost("the fork server is gone")
+            raise ForkServerLost("the fork server is gone")
         mine = [w for w in self._waiting if w.key == golden.key and w.step <= step]
         if not mine:
             self.first.load(modules, patience_s)
@@ -234,13 +220,13 @@ class Pool:
             oldest.close()
         said, handles = source.ask({"do": "branch", "step": step, "args": arguments}, patience_s)
         if said["threads"] or len(handles) != 1:
-            raise Refused(too_many(said["threads"]), turned_off(said["threads"]))
+            raise NotForkable(too_many(said["threads"]), turned_off(said["threads"]))
         made = Waiting(socket.socket(fileno=handles[0]), self._parent, self._wake, key)
         made.loaded |= source.loaded
         reply, _ = made.reply(patience_s)
         if "failed" in reply:
             made.close()
-            raise Refused(f"its golden run cannot be driven step by step: {_why(reply['failed'])}")
+            raise NotForkable(f"its golden run cannot be driven step by step: {_why(reply['failed'])}")
         made.step = reply["step"]
         self._waiting.append(made)
         return made

@@ -3,10 +3,10 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-from mutator.engines.code_swap import NotSwappable, plan_swap
-from mutator.engines.fork_pool import Lost, Pool, Refused
+from mutator.engines.code_swap import plan_swap
+from mutator.engines.fork_pool import Pool
 from mutator.engines.registry import not_forkable
-from mutator.errors import MutatorError
+from mutator.errors import ForkServerLost, MutatorError, NotForkable, NotSwappable
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Fault
 from mutator.mutants.building import build
@@ -14,16 +14,16 @@ from mutator.targets.manifest import TargetManifest
 from mutator.triggers.kinds import always
 
 
-def unfit(manifest: TargetManifest) -> Refused | None:
+def unfit(manifest: TargetManifest) -> NotForkable | None:
     """Return why the target cannot be forked here, as far as that is known without loading it."""
     why = not_forkable(manifest)
     stepwise = (
         "" if manifest.stepwise else f"in {manifest.path.name}, name a function that makes stepwise runs"
     )
-    return Refused(why, stepwise) if why else None
+    return NotForkable(why, stepwise) if why else None
 
 
-def not_loadable(manifest: TargetManifest, home: Path) -> Refused | None:
+def not_loadable(manifest: TargetManifest, home: Path) -> NotForkable | None:
     """Load the target, and return why it cannot be forked; None if it can.
 
     `home` is a new scratch folder.
@@ -32,10 +32,10 @@ def not_loadable(manifest: TargetManifest, home: Path) -> Refused | None:
         return found
     try:
         Pool(manifest, home, None, home).close()
-    except Refused as why:
+    except NotForkable as why:
         return why
-    except Lost as why:
-        return Refused(str(why))
+    except ForkServerLost as why:
+        return NotForkable(str(why))
     return None
 
 

@@ -12,11 +12,11 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any
 
-from mutator._common.below import Outside, open_below
+from mutator._common.below import open_below
 from mutator._common.files import is_disk_full
 from mutator.engines.in_target import guard
 from mutator.engines.jobs import Raised
-from mutator.errors import MutatorError
+from mutator.errors import MutatorError, Outside
 from mutator.model import Limits, Status
 from mutator.targets.environment import FIXED, KEPT
 

@@ -17,9 +17,10 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from mutator._common.below import Outside, move_plain, open_folder, read_below
+from mutator._common.below import move_plain, open_folder, read_below
 from mutator._common.files import clear_place
 from mutator.engines.processes import parsed_report, tail
+from mutator.errors import Outside
 
 OUTPUT = "output"  # the name of the folder with the output's plain files
 _OUT, _LOG, _REPORT, _INACTIVE = "out", "log", "report.json", "inactive"

@@ -12,12 +12,12 @@ from typing import Any, Protocol
 
 import pytest
 
-from mutator._common.files import DiskFull, raising_disk_full
+from mutator._common.files import raising_disk_full
 from mutator._common.locks import living_workers, register_worker
-from mutator._common.shortages import Shortage, shortage
+from mutator._common.shortages import shortage
 from mutator.campaigns.chunks import Pending
 from mutator.campaigns.plans import Choices
-from mutator.errors import MutatorError
+from mutator.errors import DiskFull, HarnessErrors, MutatorError, Shortage
 from mutator.execution.following import followed
 from mutator.execution.phases import Lines
 from mutator.execution.session import Notify, Session, Summary, open_session
@@ -34,10 +34,6 @@ _WRITTEN = "mutator_written"
 
 class Deals(Protocol):
     def run(self, session: Session) -> None: ...
-
-
-class HarnessErrors(Exception):
-    """The harness could not judge some experiments of a chunk."""
 
 
 class CampaignItem(pytest.Item):

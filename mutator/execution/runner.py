@@ -13,15 +13,15 @@ from mutator._common.hashing import digest
 from mutator._common.unchanged_files import UnchangedFiles
 from mutator.campaigns.shared_runs import runs
 from mutator.engines.jobs import Engine, Execution, Job, RunMode
-from mutator.errors import MutatorError
+from mutator.errors import BadOutput, InvalidMutant, MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Activation, AfterHazard, Experiment, Record, Status
-from mutator.mutants.building import InvalidMutant, Mutant, build
+from mutator.mutants.building import Mutant, build
 from mutator.mutants.probe import activation_of
 from mutator.outcomes import golden
 from mutator.outcomes.blame import assign_blame, error_of
 from mutator.outcomes.channel_departures import departures
-from mutator.outcomes.golden import BadOutput, Trace
+from mutator.outcomes.golden import Trace
 from mutator.outcomes.judging import Judged, load_channels, load_judged
 from mutator.outcomes.sampling import Sampler
 from mutator.outcomes.verdicts import first_events, judge

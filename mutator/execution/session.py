@@ -17,7 +17,7 @@ from pathlib import Path
 from secrets import token_bytes
 from typing import Any
 
-from mutator._common.files import DiskFull, clear_place, is_half_written
+from mutator._common.files import clear_place, is_half_written
 from mutator._common.interrupts import terminable
 from mutator._common.locks import owned, wait_for_workers
 from mutator.audit.seal import Seals, seals_of
@@ -28,7 +28,7 @@ from mutator.campaigns.provenance import add_machine, begin_stretch, check_versi
 from mutator.engines.kinds import REFERENCE
 from mutator.engines.registry import choose_engine, not_worth_forking
 from mutator.engines.run_home import make_work
-from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK, MutatorError, MutatorWarning
+from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK, DiskFull, MutatorError, MutatorWarning
 from mutator.execution.ended_runs import Ended, ended_before, keep_end
 from mutator.execution.run_plan import open_frozen
 from mutator.execution.written_files import WrittenFiles

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from mutator._common.below import inside
 from mutator._common.hashing import content_id
-from mutator.errors import MutatorError
+from mutator.errors import InvalidMutant, MutatorError
 from mutator.faults.fault_models import PROBE_TEMPLATE, FaultModels
 from mutator.model import FIXED_ANCHORS, Fault, Hold, Injection, Trigger
 from mutator.mutants.anchors import ParsedFile, parsed
@@ -39,10 +39,6 @@ from mutator.mutants.splicing import (
 from mutator.targets.locations import check_location
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.source_tree import SourceTree
-
-
-class InvalidMutant(MutatorError):
-    """The mutated file does not compile; such a mutant is never run."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,9 +14,8 @@ from mutator._common.below import inside
 from mutator._common.bounded import MOST_JSON, read_bounded
 from mutator._common.hashing import digest
 from mutator._common.shortages import shortage
-from mutator.errors import MutatorError
+from mutator.errors import BadOutput, BadTrace, MutatorError
 from mutator.outcomes import trace_files
-from mutator.outcomes.mcap_files import BadTrace
 from mutator.outcomes.trace_files import own_times
 from mutator.targets.channels import Channel
 from mutator.targets.manifest import TargetManifest
@@ -27,10 +26,6 @@ Trace = Mapping[str, np.ndarray]  # channel name -> a value for each step or for
 _LARGEST = sys.float_info.max
 _TRIAL = 64 << 20  # bytes
 _TINY = 1e-9  # s
-
-
-class BadOutput(MutatorError):
-    """A run finished, but its trace or record is missing or does not match the manifest."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from mutator.errors import MutatorError
-from mutator.outcomes.golden import BadOutput, Trace, alerts_of, load_record, load_trace, on_steps
+from mutator.errors import BadOutput, MutatorError
+from mutator.outcomes.golden import Trace, alerts_of, load_record, load_trace, on_steps
 from mutator.targets.judging import Hazard, Metric
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.severity import DELTA_V

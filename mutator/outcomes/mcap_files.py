@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from mutator._common.bounded import MOST_JSON, MOST_WHOLE, read_bounded
+from mutator.errors import BadTrace
 
 _MAGIC = b"\x89MCAP0\r\n"
 _CHANNEL, _MESSAGE, _CHUNK = 4, 5, 6  # kinds of records; others are skipped
@@ -17,14 +18,6 @@ _CHUNK_HEAD = struct.Struct("<QQQI")  # first and last time, size when unpacked,
 _SIZE = struct.Struct("<Q")
 
 Values = tuple[list[float], dict[str, list[Any]]]  # times in s, and the values of each field
-
-
-class BadTrace(ValueError):
-    """An invalid trace file: what was found, and what was expected."""
-
-    def __init__(self, got: str, expected: str) -> None:
-        super().__init__(got)
-        self.got, self.expected = got, expected
 
 
 def read_topics(path: Path, fields: Mapping[str, Iterable[str]]) -> dict[str, Values]:

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from mutator._common.bounded import MOST_WHOLE, read_bounded
+from mutator.errors import BadTrace
 from mutator.outcomes import npz
-from mutator.outcomes.mcap_files import BadTrace, read_topics
+from mutator.outcomes.mcap_files import read_topics
 from mutator.targets.channels import Channel
 from mutator.targets.manifest import TargetManifest
 

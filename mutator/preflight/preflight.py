@@ -9,19 +9,13 @@ from typing import Any
 from mutator._common import kept_folders
 from mutator._common.below import inside
 from mutator._common.bounded import read_bounded
-from mutator._common.files import (
-    DiskFull,
-    json_bytes,
-    raising_disk_full,
-    read_json,
-    write_atomic,
-)
+from mutator._common.files import json_bytes, raising_disk_full, read_json, write_atomic
 from mutator._common.hashing import digest
 from mutator.campaigns import machine
 from mutator.campaigns.provenance import sources
 from mutator.campaigns.shared_runs import same_in
-from mutator.errors import CheckFailed, MutatorError
-from mutator.mutants.building import InvalidMutant, build
+from mutator.errors import CheckFailed, DiskFull, InvalidMutant, MutatorError
+from mutator.mutants.building import build
 from mutator.preflight import preflight_cache, unreached
 from mutator.preflight.preflight_rules import (
     CheckRun,

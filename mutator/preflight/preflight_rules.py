@@ -8,10 +8,10 @@ from mutator._common.below import inside
 from mutator._common.bounded import read_bounded
 from mutator._common.hashing import digest
 from mutator.engines.jobs import Execution
+from mutator.errors import BadOutput
 from mutator.model import Status
 from mutator.mutants.probe import was_triggered
 from mutator.outcomes import golden
-from mutator.outcomes.golden import BadOutput
 from mutator.outcomes.judging import load_judged
 from mutator.targets.manifest import TargetManifest
 

@@ -16,7 +16,7 @@ from mutator._common.files import make_folder
 from mutator._common.locks import alone_in
 from mutator._common.shipped import refuse_shipped
 from mutator._common.version import VERSION
-from mutator.errors import CheckFailed, MutatorError
+from mutator.errors import MutatorError, ReviewConflict
 from mutator.review import review_file, seen_texts
 from mutator.review.catalogue import Group
 from mutator.review.commits import check_four_eyes, library_commit
@@ -57,16 +57,6 @@ class Change:
     kind: Kind
     by: str
     text: str = ""
-
-
-class Conflict(CheckFailed):
-    """Somebody else changed the review of these groups after the caller read it. Nothing was written.
-
-    `groups` are their ids, `review` is the current review.
-    """
-
-    groups: tuple[str, ...] = ()
-    review: "Review"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -166,9 +156,9 @@ def record(workspace: Workspace, target: str, changes: Sequence[Change], seen: M
     """Apply all changes or none, and return the stored review.
 
     `seen` are the revisions of the groups that the caller saw (`Review.revision`; missing groups had no
-    review). A lock serializes callers across processes. Conflict if somebody else has changed the review of
-    one of the groups since; MutatorError for an unusable name or text, for an approval that `four_eyes`
-    forbids, and for the library shipped with mutator, which is read-only.
+    review). A lock serializes callers across processes. ReviewConflict if somebody else has changed the
+    review of one of the groups since; MutatorError for an unusable name or text, for an approval that
+    `four_eyes` forbids, and for the library shipped with mutator, which is read-only.
     """
     made = [replace(change, by=_line(change.by, "by"), text=_line(change.text, "text")) for change in changes]
     for change in made:
@@ -202,7 +192,7 @@ def _refuse_unseen(review: Review, changes: Sequence[Change], looked_at: Mapping
     if not unseen:
         return
     told = [f"  {one.id}  {_last_word(review, one)}" for one in unseen]
-    conflict = Conflict(
+    conflict = ReviewConflict(
         "\n".join(["somebody else has changed the review in the meantime:", *told]),
         where=review.path,
         expected="no changes since you last looked",

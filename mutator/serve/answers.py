@@ -12,10 +12,8 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.types import Receive, Scope, Send
 
-from mutator.errors import MutatorError
+from mutator.errors import Absent, MutatorError, UnknownPage
 from mutator.serve.home import error_page
-from mutator.serve.page_tokens import UnknownPage
-from mutator.serve.runs import Absent
 
 _KINDS = {
     ".css": "text/css; charset=utf-8",

@@ -5,12 +5,12 @@ from urllib.parse import parse_qsl
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
-from mutator.errors import MutatorError
+from mutator.errors import GroupsChanged, JobEnded, MutatorError
 from mutator.serve.answers import error_facts
-from mutator.serve.jobs import Ended, Jobs
+from mutator.serve.jobs import Jobs
 from mutator.serve.orders import Desk, Work
 from mutator.serve.page_tokens import HEADER, HOME, PageTokens, review_page, run_page
-from mutator.serve.reviews import Decisions, Moved, Reviews, Selection
+from mutator.serve.reviews import Decisions, Reviews, Selection
 from mutator.serve.runs import Runs
 
 _MOST_WORDS = 100  # the maximum number of parameters in an address
@@ -29,7 +29,7 @@ class ReviewApi:
         chosen, wanted = asked(self._reviews, request), Decisions.model_validate_json(body)
         try:
             return JSONResponse(self._reviews.decide(chosen, wanted))
-        except Moved as moved:
+        except GroupsChanged as moved:
             return JSONResponse({"conflict": moved.got, "groups": moved.groups}, 409)
 
     def changes(self, request: Request) -> Response:
@@ -82,7 +82,7 @@ class JobApi:
         self._check(request, job.work)
         try:
             self._jobs.cancel(job.id)
-        except Ended as err:
+        except JobEnded as err:
             return JSONResponse(error_facts(err), 409)
         return JSONResponse({"id": job.id})
 

@@ -14,7 +14,7 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
 from starlette.routing import Route
 
-from mutator.errors import MutatorError
+from mutator.errors import Absent, MutatorError
 from mutator.serve.answers import OpenFile, kind_of, on_error
 from mutator.serve.api import JobApi, ReviewApi, asked
 from mutator.serve.home import home_page, offered
@@ -23,7 +23,7 @@ from mutator.serve.orders import TRIES, Desk, Work
 from mutator.serve.page_tokens import HOME, PageTokens, review_page
 from mutator.serve.report_pages import Shown
 from mutator.serve.reviews import Reviews
-from mutator.serve.runs import Absent, Runs, open_file, report_of, told
+from mutator.serve.runs import Runs, open_file, report_of, told
 from mutator.web import asset, assets
 from mutator.workspace import Workspace
 

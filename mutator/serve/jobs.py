@@ -16,12 +16,11 @@ from pathlib import Path
 from typing import IO, Any
 
 from mutator._common.events import EVENTS_FD
-from mutator.errors import MutatorError
+from mutator.errors import Absent, JobEnded, MutatorError
 from mutator.execution.phases import endings
 from mutator.serve.answers import without_places
 from mutator.serve.job_events import Event, EventReader, Link, Phase
 from mutator.serve.orders import TRIES, Work
-from mutator.serve.runs import Absent
 
 _KEEPER = "mutator.serve.keeper"
 _COLUMNS = "200"  # line width of a job's output; pages wrap the lines
@@ -40,10 +39,6 @@ class State(StrEnum):
     DONE = "done"
     FAILED = "failed"
     CANCELLED = "cancelled"
-
-
-class Ended(MutatorError):
-    """The job has already ended and cannot be cancelled."""
 
 
 @dataclass(kw_only=True)
@@ -143,11 +138,11 @@ class Jobs:
         raise Absent(f"no job '{name}'", expected="the id of a job of this server")
 
     def cancel(self, name: str) -> None:
-        """Cancel a job with all its processes; Ended if the job has already ended."""
+        """Cancel a job with all its processes; JobEnded if the job has already ended."""
         job = self.get(name)
         with self._lock:
             if job.ended:
-                raise Ended(f"job {name} has ended ({job.state})")
+                raise JobEnded(f"job {name} has ended ({job.state})")
             self._cancel(job)
 
     def close(self) -> None:

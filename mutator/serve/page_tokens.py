@@ -11,14 +11,10 @@ import secrets
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from mutator.errors import MutatorError
+from mutator.errors import UnknownPage
 
 HEADER = "x-mutator-page"
 HOME = "home"
-
-
-class UnknownPage(MutatorError):
-    """The request comes from a page that may not send it, or from a page of an earlier server."""
 
 
 @dataclass(frozen=True, slots=True)

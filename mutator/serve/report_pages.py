@@ -12,7 +12,7 @@ from mutator._common.hashing import digest
 from mutator.audit.table_audit import tables
 from mutator.comparison import comparison as comparing
 from mutator.comparison import pages
-from mutator.errors import MutatorError
+from mutator.errors import Absent, MutatorError
 from mutator.outcomes.fault_free import fault_free_runs, own_alerts
 from mutator.report import building
 from mutator.report.panel import FOLDER
@@ -21,7 +21,7 @@ from mutator.results.table_reader import Results
 from mutator.serve.answers import STORED, OpenFile, kind_of
 from mutator.serve.page_tokens import PageTokens, run_page
 from mutator.serve.report_cache import ReportCache
-from mutator.serve.runs import Absent, Runs, open_in_run
+from mutator.serve.runs import Runs, open_in_run
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_script import read_script, script_of
 from mutator.web import load_order

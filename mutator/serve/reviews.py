@@ -13,12 +13,11 @@ from pydantic import Field
 from mutator.campaigns.clones import user_name
 from mutator.campaigns.plans import Choices, make_plan
 from mutator.config.yaml_files import StrictModel
-from mutator.errors import MutatorError
+from mutator.errors import Absent, GroupsChanged, MutatorError, ReviewConflict
 from mutator.review import catalogue, pictures, typical
 from mutator.review.catalogue import Group
-from mutator.review.decisions import Change, Conflict, Kind, Review, load_review, record
+from mutator.review.decisions import Change, Kind, Review, load_review, record
 from mutator.review.page import page_html, state_of
-from mutator.serve.runs import Absent
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -57,14 +56,6 @@ class Decisions(StrictModel):
     by: Short
     seen: dict[str, Short]
     digests: dict[str, Short] = Field(default_factory=dict)
-
-
-class Moved(MutatorError):
-    """The groups have changed since the page was loaded."""
-
-    def __init__(self, got: str, groups: dict[str, Any]) -> None:
-        super().__init__(got)
-        self.groups = groups
 
 
 class Reviews:
@@ -127,7 +118,7 @@ class Reviews:
         return {"target": chosen.target, "by": self.reviewer, "groups": _states(review, groups)}
 
     def decide(self, chosen: Selection, wanted: Decisions) -> dict[str, Any]:
-        """Save all changes or none; Moved if somebody else changed a group, or if a diff has changed."""
+        """Save all changes or none; GroupsChanged if a group or a diff was changed elsewhere."""
         known = {group.id: group for group in self.groups(chosen)}
         if strangers := [one.group for one in wanted.changes if one.group not in known]:
             raise Absent(f"no group '{strangers[0]}'", expected="the id of a group on the page")
@@ -144,9 +135,9 @@ class Reviews:
         ]
         try:
             review = record(self.workspace, chosen.target, changes, wanted.seen)
-        except Conflict as conflict:
+        except ReviewConflict as conflict:
             others = [known[name] for name in conflict.groups]
-            raise Moved(conflict.got, _states(conflict.review, others)) from None
+            raise GroupsChanged(conflict.got, _states(conflict.review, others)) from None
         return {"target": chosen.target, "by": self.reviewer, "groups": _states(review, touched)}
 
     def changes(self, chosen: Selection, name: str) -> str:
@@ -183,7 +174,7 @@ class Reviews:
         }
         if other:
             names = ", ".join(other)
-            raise Moved(f"the diff has changed in {names}; reload the page", other)
+            raise GroupsChanged(f"the diff has changed in {names}; reload the page", other)
 
     def _found(self, chosen: Selection) -> tuple[Group, ...]:
         workspace = self.workspace

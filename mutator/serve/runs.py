@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any, BinaryIO
 from urllib.parse import quote
 
-from mutator._common.below import Outside, open_below
+from mutator._common.below import open_below
 from mutator._common.places import RUN_HEAD
-from mutator.errors import MutatorError
+from mutator.errors import Absent, MutatorError, Outside
 from mutator.results.counting import outcome_counts
 from mutator.results.table_reader import Results
 from mutator.store.run_folder import RunFolder
@@ -23,10 +23,6 @@ SERVED: Mapping[str, tuple[str, ...]] = {
     "series": (".js",),
     "series/kept": (".js",),
 }
-
-
-class Absent(MutatorError):
-    """The requested object does not exist or is not served."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,8 @@ Run folders travel: evidence comes from strangers. Two rules keep every command 
 from fnmatch import fnmatchcase
 from pathlib import Path
 
-from mutator._common.below import Outside, entries_below, is_deep, is_plain, not_plain
+from mutator._common.below import entries_below, is_deep, is_plain, not_plain
+from mutator.errors import Outside
 from mutator.store import digests
 from mutator.store.run_head import CAMPAIGN, HEAD
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from itertools import pairwise, product
 
 from mutator._common.text import counted
+from mutator.errors import NotTestable
 from mutator.triggers.conditions import evaluate
 
 MAX_TESTS = 400_000  # most tests: contexts times cells
@@ -38,15 +39,11 @@ class Coverage:
     rows: tuple[str, ...] = ()
 
 
-class _BeyondError(Exception):
-    """A comparison that does not compare one variable with a constant."""
-
-
 def measure_coverage(conditions: Mapping[str, str]) -> Coverage:
     """Test the conditions of a table, row id -> condition, in every cell."""
     try:
         cuts = _cuts(conditions.values())
-    except _BeyondError as error:
+    except NotTestable as error:
         return Coverage(beyond=f"{error}; only comparisons of one variable with a constant can be tested")
     lines = [_cells(name, sorted(values)) for name, values in cuts.items()]
     total = math.prod(len(line) for line in lines)
@@ -78,7 +75,7 @@ def _cut(left: ast.expr, right: ast.expr) -> tuple[str, float]:
         value = _constant(constant)
         if isinstance(variable, ast.Name) and value is not None:
             return variable.id, value
-    raise _BeyondError(f"a condition compares '{ast.unparse(left)}' with '{ast.unparse(right)}'")
+    raise NotTestable(f"a condition compares '{ast.unparse(left)}' with '{ast.unparse(right)}'")
 
 
 def _constant(node: ast.expr) -> float | None:

@@ -18,12 +18,12 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from mutator._common.below import Outside, check_inside, check_name, files_inside, inside
+from mutator._common.below import check_inside, check_name, files_inside, inside
 from mutator._common.bounded import read_bounded
 from mutator._common.files import raising_disk_full, read_json
 from mutator._common.version import VERSION
 from mutator.engines import sandbox
-from mutator.errors import MutatorError
+from mutator.errors import MutatorError, Outside
 from mutator.execution.cluster.parcel import pack, unpack
 from mutator.faults.fault_models import FILES, FaultModels, load_fault_models
 from mutator.model import Limits

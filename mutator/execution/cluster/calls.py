@@ -10,17 +10,9 @@ from distributed import Client, Future
 from distributed.client import FutureCancelledError
 from distributed.scheduler import KilledWorker
 
-from mutator.errors import MutatorError
+from mutator.errors import MutatorError, WorkerCutOff, WorkerRefused
 
 _T = TypeVar("_T")
-
-
-class Refused(Exception):
-    """A worker gets no work, or no more work."""
-
-
-class Cut(Refused):
-    """The scheduler briefly lost its connection to the command, and dropped all tasks."""
 
 
 def submit(client: Client, address: str, function: Callable[..., _T], *arguments: Any) -> "Future[_T]":
@@ -47,7 +39,7 @@ async def call(client: Client, address: str, function: Callable[..., _T], *argum
 
 
 async def answer(future: "Future[_T]") -> _T:
-    """Return the result of a task. Raises Refused if the task raises, Cut if the scheduler dropped it.
+    """Return the result of a task. WorkerRefused if it raises, WorkerCutOff if the scheduler dropped it.
 
     If the worker is dead, this never returns.
     """
@@ -57,8 +49,8 @@ async def answer(future: "Future[_T]") -> _T:
         await asyncio.Event().wait()  # the worker is gone; other code notices that
         raise
     except FutureCancelledError:
-        raise Cut("the scheduler dropped the worker's tasks") from None
+        raise WorkerCutOff("the scheduler dropped the worker's tasks") from None
     except MutatorError as err:
-        raise Refused(str(err)) from None
+        raise WorkerRefused(str(err)) from None
     except Exception as err:
-        raise Refused(f"{type(err).__name__}: {err}") from None
+        raise WorkerRefused(f"{type(err).__name__}: {err}") from None

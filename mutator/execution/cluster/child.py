@@ -17,14 +17,14 @@ from pathlib import Path
 
 from mutator._common import caches
 from mutator._common.below import inside
-from mutator._common.files import DiskFull, raising_disk_full
+from mutator._common.files import raising_disk_full
 from mutator._common.hashing import canonical
-from mutator._common.shortages import Shortage, shortage
+from mutator._common.shortages import shortage
 from mutator.campaigns.shared_runs import runs
 from mutator.engines.jobs import FAST, Job, Setting
 from mutator.engines.reference import ReferenceEngine
 from mutator.engines.registry import make_engine
-from mutator.errors import MutatorError
+from mutator.errors import DiskFull, GoldenRunsDiffer, MutatorError, Shortage
 from mutator.execution.cluster.bundle import Site
 from mutator.execution.cluster.driven_goldens import DrivenGoldens
 from mutator.execution.cluster.pieces import Ending, Kind, Piece, Result
@@ -38,10 +38,6 @@ from mutator.store.records import line_of
 from mutator.store.run_folder import GoldenRun
 from mutator.store.series_packing import series_block
 from mutator.targets.requirements import check_requirements
-
-
-class Unlike(Exception):
-    """A golden run made here differs from the campaign's."""
 
 
 class PieceRunner:
@@ -61,7 +57,7 @@ class PieceRunner:
     def run(self, piece: Piece, tell: Callable[[str], None]) -> Result:
         """Run a piece. Calls `tell` with the id of each finished experiment.
 
-        Raises Unlike if a golden run made here differs from the campaign's.
+        Raises GoldenRunsDiffer if a golden run made here differs from the campaign's.
         """
         began = time.monotonic()
         experiments = piece.experiments()
@@ -110,7 +106,7 @@ class PieceRunner:
         return self._runners[kind]
 
     def _have_golden(self, key: str) -> None:
-        """Make a golden run or copy it from the cache. Raises Unlike if it differs from the campaign's."""
+        """Make a golden run or copy it from the cache; GoldenRunsDiffer if it differs from the campaign's."""
         golden, known = self._site.goldens[key]
         place = inside(self._goldens, key)
         self._goldens.mkdir(exist_ok=True)
@@ -132,7 +128,7 @@ class PieceRunner:
             found = look(site.manifest, execution)
             if found.problem or found.digest != known:
                 came = found.problem or f"has the digest {found.digest[:16]} here, not {known[:16]}"
-                raise Unlike(f"golden run {golden.key} {came}")
+                raise GoldenRunsDiffer(f"golden run {golden.key} {came}")
             execution.out.rename(place)
             if golden.seed is not None:  # the images of a hundred seeds would fill the disk
                 caches.make_room(site.manifest.cache_name)
@@ -163,7 +159,7 @@ def _result(runner: PieceRunner, piece: Piece, tell: Callable[[str], None]) -> R
     try:
         with raising_disk_full(runner.place):
             return runner.run(piece, tell)
-    except Unlike as err:
+    except GoldenRunsDiffer as err:
         return Result(number=piece.number, ending=Ending.UNLIKE, text=str(err))
     except Exception as err:
         known = err if isinstance(err, MutatorError) else shortage(err)

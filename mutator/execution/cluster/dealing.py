@@ -14,12 +14,11 @@ from typing import Any
 
 from distributed import Client, Future
 
-from mutator._common.files import DiskFull
-from mutator.errors import MutatorError
+from mutator.errors import DiskFull, MutatorError, SchedulerGone, WorkerCutOff, WorkerRefused
 from mutator.execution.cluster import dask_side
 from mutator.execution.cluster.board import Board
 from mutator.execution.cluster.bundle import Bundle
-from mutator.execution.cluster.calls import Cut, Refused, answer, call, submit
+from mutator.execution.cluster.calls import answer, call, submit
 from mutator.execution.cluster.crew import Crew, describe
 from mutator.execution.cluster.intake import Intake
 from mutator.execution.cluster.pieces import Ending, Piece, Result
@@ -33,10 +32,6 @@ _FAILURES = 3  # consecutive failures after which a worker gets no more work
 _PAUSE_S = 0.1  # pause before an idle worker asks again
 _PART_S = 5.0  # time for workers to drop the run
 _PATIENCE_S = 30.0  # time for the scheduler to answer
-
-
-class _Gone(Exception):
-    """The scheduler no longer answers."""
 
 
 @dataclass
@@ -87,7 +82,7 @@ class Deal:
                 with suppress(TimeoutError):
                     await asyncio.wait_for(self._changed.wait(), _LOOK_S)
                 self._changed.clear()
-        except _Gone:
+        except SchedulerGone:
             self._session.problem = (
                 f"the scheduler at {self._address} no longer answers, but finished work is stored; "
                 "start the scheduler and its workers again, then run the same command"
@@ -131,7 +126,7 @@ class Deal:
         except (OSError, TimeoutError):
             known = None
         if known is None:
-            raise _Gone
+            raise SchedulerGone
         there = {f"{address} {one['id']}": one for address, one in known["workers"].items()}
         for key in [key for key, one in self._tended.items() if key not in there or one.is_cut]:
             await self._mourn(self._tended.pop(key))
@@ -183,7 +178,7 @@ class Deal:
         try:
             facts = await call(self._client, one.address, dask_side.facts, tuple(self._crew.packages))
             if why := self._crew.objection(facts):
-                raise Refused(why)
+                raise WorkerRefused(why)
             data, digest = self._bundle.data, self._bundle.digest
             await call(self._client, one.address, dask_side.deliver, self._run, one.name, data, digest)
             one.lease = submit(self._client, one.address, dask_side.attend, self._run)
@@ -191,11 +186,11 @@ class Deal:
             self._board.join(one.name, one.slots)
             one.facts = facts
             await self._employ(one, one.lease)
-        except Refused as why:
+        except WorkerRefused as why:
             for piece in one.has.values():
                 self._board.give_back(piece, one.name)
             one.has.clear()
-            one.is_cut = isinstance(why, Cut)
+            one.is_cut = isinstance(why, WorkerCutOff)
             if not one.is_cut:
                 self._crew.refuse(one.name, str(why))
                 self._remark(f"worker {describe(one.name, facts)} gets no work: {why}")
@@ -209,14 +204,14 @@ class Deal:
 
         async def watch() -> None:
             await answer(lease)
-            raise Refused("it left the run")
+            raise WorkerRefused("it left the run")
 
         try:
             async with asyncio.TaskGroup() as group:
                 group.create_task(watch())
                 for _ in range(one.slots * _AHEAD):
                     group.create_task(self._serve(one))
-        except* Refused as found:
+        except* WorkerRefused as found:
             raise found.exceptions[0] from None
         except* MutatorError as found:
             raise found.exceptions[0] from None
@@ -224,7 +219,7 @@ class Deal:
     async def _serve(self, one: _Tended) -> None:
         while True:
             if one.failures >= _FAILURES:
-                raise Refused(one.ailment)
+                raise WorkerRefused(one.ailment)
             piece = self._board.take(one.name, ahead=len(one.has) >= one.slots)
             if piece is None:
                 await asyncio.sleep(_PAUSE_S)
@@ -248,7 +243,7 @@ class Deal:
         self._board.give_back(piece, one.name)
         one.failures += 1
         if result.ending is Ending.UNLIKE:
-            raise Refused(result.text)
+            raise WorkerRefused(result.text)
 
     async def _done(self, piece: Piece, one: _Tended, result: Result) -> None:
         if one.facts:  # before its first results are written, run.json must name the worker

@@ -21,6 +21,7 @@ from pathlib import Path
 
 from mutator._common.files import raising_disk_full, remove_folder
 from mutator._common.shortages import shortage
+from mutator.errors import PieceNotWanted
 from mutator.execution.cluster import bundle
 from mutator.execution.cluster.bundle import Site
 from mutator.execution.cluster.pieces import Ending, Piece, Result
@@ -34,10 +35,6 @@ _CHILD = "mutator.execution.cluster.child"
 Wanted = Callable[[], bool]
 
 
-class NotWanted(Exception):
-    """The command no longer waits for this piece."""
-
-
 @dataclass
 class _Child:
     """A process that runs pieces one after another."""
@@ -46,7 +43,7 @@ class _Child:
     connection: Connection
 
     def run(self, data: bytes, piece: Piece, patience_s: float, wanted: Wanted) -> Result:
-        """Run a piece. Raises NotWanted if it is no longer wanted; the process is then unusable."""
+        """Run a piece. Raises PieceNotWanted if it is no longer wanted; the process is then unusable."""
         finished: set[str] = set()
         try:
             result = self._answer(data, patience_s, wanted, finished)
@@ -64,7 +61,7 @@ class _Child:
         since = time.monotonic()
         while time.monotonic() - since < patience_s:
             if not wanted():
-                raise NotWanted
+                raise PieceNotWanted
             if self.connection.poll(_LOOK_S):
                 said = self.connection.recv()
                 if isinstance(said, bytes):
@@ -139,7 +136,7 @@ class Host:
         self._gone.wait(_END_S)
 
     def run(self, data: bytes, wanted: Wanted) -> Result:
-        """Run a piece. Raises NotWanted if it is no longer wanted, MutatorError if `data` is damaged."""
+        """Run a piece. Raises PieceNotWanted if it is no longer wanted, MutatorError if `data` is damaged."""
         piece = Piece.of(data)
         try:
             child = self._borrowed()
@@ -159,7 +156,7 @@ class Host:
                 child.end()
 
     def _borrowed(self) -> _Child:
-        """Return an idle process or a new one. Raises NotWanted if the host has ended."""
+        """Return an idle process or a new one. Raises PieceNotWanted if the host has ended."""
         with self._lock:
             if self._idle:
                 return self._idle.pop()
@@ -171,7 +168,7 @@ class Host:
                 if isinstance(got, Exception):
                     raise got
                 return got
-        raise NotWanted
+        raise PieceNotWanted
 
     def _started(self) -> _Child:
         """Start a process that dies with this thread."""

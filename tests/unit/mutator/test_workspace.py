@@ -5,8 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common.below import Outside
-from mutator.errors import MutatorError
+from mutator.errors import MutatorError, Outside
 from mutator.onboarding.marks import unfilled
 from mutator.workspace import Workspace
 

@@ -6,7 +6,6 @@ from pathlib import Path
 import pytest
 
 from mutator._common.below import (
-    Outside,
     check_library_name,
     check_name,
     check_plain,
@@ -19,6 +18,7 @@ from mutator._common.below import (
     unlink_below,
     write_below,
 )
+from mutator.errors import Outside
 
 OUTSIDE = [
     "",

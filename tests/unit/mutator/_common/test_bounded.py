@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common.bounded import TooLarge, bounded_lines, open_regular, read_bounded, unpacked
+from mutator._common.bounded import bounded_lines, open_regular, read_bounded, unpacked
 from mutator._common.files import is_no_file
+from mutator.errors import TooLarge
 
 TERABYTES = 4 * 10**12
 

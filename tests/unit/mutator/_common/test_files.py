@@ -10,7 +10,6 @@ import pytest
 
 from mutator._common import files
 from mutator._common.files import (
-    DiskFull,
     ScratchFolder,
     check_schema,
     raising_disk_full,
@@ -19,7 +18,7 @@ from mutator._common.files import (
     write_atomic,
     write_json,
 )
-from mutator.errors import EXIT_HARNESS_ERRORS, MutatorError
+from mutator.errors import EXIT_HARNESS_ERRORS, DiskFull, MutatorError
 
 
 def test_a_written_object_is_read_back_unchanged(tmp_path: Path) -> None:

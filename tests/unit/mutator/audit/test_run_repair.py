@@ -7,10 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common.below import Outside
 from mutator._common.locks import owned
 from mutator.audit.run_repair import _put_aside, repair
-from mutator.errors import MutatorError
+from mutator.errors import MutatorError, Outside
 from mutator.store import digests, plan_file
 from mutator.store.digests import Digest, Ledger
 from mutator.store.lines import read_segment, written

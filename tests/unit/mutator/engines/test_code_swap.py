@@ -6,7 +6,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from mutator.engines.code_swap import CodeSwap, NotSwappable, plan_swap
+from mutator.engines.code_swap import CodeSwap, plan_swap
+from mutator.errors import NotSwappable
 from mutator.targets.source_tree import SourceTree
 
 PROBE = b"def observe(): pass\n"

@@ -15,11 +15,10 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common.files import DiskFull
 from mutator.engines import bytecode
 from mutator.engines.jobs import Execution, Job
 from mutator.engines.reference import ReferenceEngine
-from mutator.errors import MutatorError
+from mutator.errors import DiskFull, MutatorError
 from mutator.model import Limits, Status
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common.below import Outside
+from mutator.errors import Outside
 from mutator.execution.merging import merge
 from mutator.store import digests
 from mutator.store.digests import Digest

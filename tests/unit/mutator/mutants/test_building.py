@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from mutator.errors import MutatorError
+from mutator.errors import InvalidMutant, MutatorError
 from mutator.faults.expansion import expand
 from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Hold, Injection, Trigger
 from mutator.mutants import building
-from mutator.mutants.building import InvalidMutant, Mutant, write_tree
+from mutator.mutants.building import Mutant, write_tree
 from mutator.mutants.probe import probe_path
 from mutator.mutants.splicing import unsplice
 from mutator.targets.source_tree import read_tree

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from mutator.errors import MutatorError
+from mutator.errors import InvalidMutant, MutatorError
 from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection, Value
 from mutator.mutants import splicing
 from mutator.mutants.anchors import parse_file
-from mutator.mutants.building import InvalidMutant, build, build_directly
+from mutator.mutants.building import build, build_directly
 from mutator.mutants.patches import changed_file
 from mutator.mutants.reusable_changes import (
     Change,

@@ -11,17 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mutator._common.shortages import Shortage
+from mutator.errors import BadOutput, Shortage
 from mutator.outcomes import trace_files
-from mutator.outcomes.golden import (
-    BadOutput,
-    alerts_of,
-    compare,
-    load_record,
-    load_trace,
-    sharing_times,
-    trace_digest,
-)
+from mutator.outcomes.golden import alerts_of, compare, load_record, load_trace, sharing_times, trace_digest
 from mutator.store.run_folder import GoldenRun
 from mutator.targets.channels import Channel
 from mutator.targets.judging import Hazard

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mutator.errors import MutatorError
-from mutator.outcomes.golden import BadOutput, compare, load_record, load_trace
+from mutator.errors import BadOutput, MutatorError
+from mutator.outcomes.golden import compare, load_record, load_trace
 from mutator.outcomes.judging import Judged, judge_run, load_judged
 from mutator.targets.channels import Channel, Role
 from mutator.targets.manifest import TargetManifest

@@ -11,9 +11,8 @@ from typing import Any
 
 import pytest
 
-from mutator._common.below import Outside
 from mutator._common.files import write_json
-from mutator.errors import MutatorError
+from mutator.errors import MutatorError, Outside
 from mutator.figures.style import themed
 from mutator.report import building
 from mutator.report.panels import failed

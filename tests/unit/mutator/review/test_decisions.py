@@ -10,11 +10,10 @@ from pathlib import Path
 import pytest
 
 from mutator._common import shipped
-from mutator._common.below import Outside
 from mutator._common.version import VERSION
-from mutator.errors import MutatorError
+from mutator.errors import MutatorError, Outside, ReviewConflict
 from mutator.review.catalogue import Group
-from mutator.review.decisions import Change, Conflict, Kind, Review, State, load_review, record
+from mutator.review.decisions import Change, Kind, Review, State, load_review, record
 from mutator.review.entries import Bound
 from mutator.review.seen_texts import changes, keep, text_of
 from mutator.workspace import Workspace
@@ -123,7 +122,7 @@ def test_a_decision_from_an_old_view_writes_nothing(toycar: Workspace) -> None:
     before = load_review(toycar, "toycar")
     say(toycar, Kind.REJECT, "a", by="Joe", text="too much")
     changes = [Change(group=group(name), kind=Kind.APPROVE, by="Jane") for name in ("a", "b")]
-    with pytest.raises(Conflict, match=r"aaaaaaaaaaaa  rejected by Joe on .*Joe: too much") as caught:
+    with pytest.raises(ReviewConflict, match=r"aaaaaaaaaaaa  rejected by Joe on .*Joe: too much") as caught:
         record(toycar, "toycar", changes, {g: before.revision(g) for g in ("a" * 12, "b" * 12)})
     assert caught.value.groups == ("a" * 12,)
     assert caught.value.review == load_review(toycar, "toycar")

@@ -20,7 +20,7 @@ SERVER = """
 import resource, sys
 from pathlib import Path
 from mutator.serve.app import Site
-from mutator.serve.runs import Runs
+from mutator.serve.runs import (Runs)
 from mutator.serve.server import serve
 from mutator.workspace import Workspace
 resource.setrlimit(resource.RLIMIT_NOFILE, (64, 64))

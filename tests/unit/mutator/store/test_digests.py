@@ -8,9 +8,8 @@ from typing import Any
 import pytest
 
 from mutator._common import files
-from mutator._common.below import Outside
 from mutator._common.files import write_atomic
-from mutator.errors import MutatorError
+from mutator.errors import MutatorError, Outside
 from mutator.store import digests
 from mutator.store.digests import Digest, Ledger
 from mutator.store.lines import LineWriter

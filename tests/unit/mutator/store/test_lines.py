@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common.files import DiskFull
-from mutator.errors import MutatorError
+from mutator.errors import DiskFull, MutatorError
 from mutator.store.lines import LineWriter, Segment, read_segment
 
 SCHEMA = "records/2"

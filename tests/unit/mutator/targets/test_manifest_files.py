@@ -5,8 +5,7 @@ from pathlib import Path
 import pytest
 
 from mutator._common import caches
-from mutator._common.below import Outside
-from mutator.errors import MutatorError
+from mutator.errors import MutatorError, Outside
 from mutator.faults.expansion import expand
 from mutator.model import AnchorKind
 from mutator.mutants.building import build

@@ -12,12 +12,12 @@ from pathlib import Path
 import pytest
 
 from mutator.campaigns.plans import Choices
-from mutator.errors import MutatorError
+from mutator.errors import MutatorError, PieceNotWanted
 from mutator.execution.cluster import bundle
 from mutator.execution.cluster.board import Board
 from mutator.execution.cluster.bundle import Bundle, Site
 from mutator.execution.cluster.driven_goldens import DrivenGoldens
-from mutator.execution.cluster.host import Host, NotWanted
+from mutator.execution.cluster.host import Host
 from mutator.execution.cluster.pieces import Ending, Piece, Result
 from mutator.execution.session import open_session
 from mutator.workspace import Workspace
@@ -115,7 +115,7 @@ def test_the_process_of_a_cancelled_piece_ends(host: Host, sent: tuple[Bundle, P
         return len(asked) < 4
 
     with attended(host):
-        with pytest.raises(NotWanted):
+        with pytest.raises(PieceNotWanted):
             host.run(sent[1].packed(), wanted)
         assert children(host) == []
 
