@@ -45,6 +45,9 @@ class Door:
     def names(self) -> tuple[str, ...]:
         return tuple(dict.fromkeys((*self.shipped(), *self.installed())))
 
+    def has(self, name: str) -> bool:
+        return name in self.shipped() or name in self.installed()
+
     def find(self, name: str) -> Any:
         """Return the object of that name.
 

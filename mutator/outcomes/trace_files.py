@@ -1,27 +1,72 @@
-"""Reads the trace files of runs. The suffix selects the reader."""
+"""Read the trace files of runs. The suffix selects the importer.
 
-import io
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+An importer is a module in `importers/`, or comes from another package (entry points of the group
+`mutator.importers`).
+"""
+
+from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from mutator._common.bounded import MOST_WHOLE, read_bounded
+from mutator._common.bounded import MOST_WHOLE
+from mutator._common.doors import IMPORTERS
 from mutator.errors import BadTrace
-from mutator.outcomes import npz
-from mutator.outcomes.mcap_files import read_topics
 from mutator.targets.channels import Channel
 from mutator.targets.manifest import TargetManifest
 
 Arrays = dict[str, np.ndarray]
 MOST_TRACE = MOST_WHOLE  # bytes of a trace, also when unpacked
-MOST_CSV = 64_000_000  # bytes; as numbers, text takes more memory
-_MOST_COLUMNS = 10_000
-_NUMERIC = ("BOOLEAN", "INT32", "INT64", "FLOAT", "DOUBLE")
+MOST_COLUMNS = 10_000
 
 
-def _check_size(size: int) -> None:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TraceRequest:
+    """What to read from a file: `channels` and the step times, which are in the channel `time`.
+
+    Channels in `also` can be missing. With `everything`, also the names that are no channels.
+    """
+
+    path: Path
+    time: str
+    channels: Sequence[Channel]
+    also: Sequence[Channel] = ()
+    everything: bool = False
+
+    def choose(self, there: Collection[str]) -> dict[str, None]:
+        """Return the names to read from a file that contains `there`, and those that it must not lack."""
+        if self.everything:
+            return dict.fromkeys(there)
+        of_time = [channel.time for channel in self.channels if channel.time]
+        names = [self.time, *of_time, *(channel.in_trace for channel in self.channels)]
+        may_miss = {name for channel in self.also for name in (channel.in_trace, channel.time)}
+        return {name: None for name in names if name in there or name not in may_miss}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Importer:
+    """A reader of traces; its name is the suffix.
+
+    `read` returns an array for each channel and for the step times, by manifest name; a channel that lacks
+    values at some steps also has its times, named by `own_times`. BadTrace for an invalid file, KeyError for
+    a missing channel. A file can claim any size, so check before you unpack it.
+    """
+
+    about: str
+    read: Callable[[TraceRequest], Arrays]
+
+
+@cache
+def _importer(name: str) -> Importer:
+    found = IMPORTERS.find(name)
+    assert isinstance(found, Importer)
+    return found
+
+
+def check_size(size: int) -> None:
     """Raise BadTrace if a trace unpacks to too many bytes."""
     if size > MOST_TRACE:
         raise BadTrace(f"{size:,} bytes when unpacked", f"at most {MOST_TRACE:,}")
@@ -43,110 +88,41 @@ def read(
     reader are not caught.
     """
     wanted = manifest.channels if channels is None else (*channels, *also)
-    if path.suffix == ".mcap":
-        return _read_mcap(path, manifest.time_channel, wanted, also)
-    of_time = [channel.time for channel in wanted if channel.time]
-    names = [manifest.time_channel, *of_time, *(channel.in_trace for channel in wanted)]
-    may_miss = {name for channel in also for name in (channel.in_trace, channel.time)}
-    columns = _COLUMNS[path.suffix](path, None if channels is None else names, may_miss)
-    known = {channel.in_trace for channel in wanted} | {*of_time}
-    rest = {name: column for name, column in columns.items() if channels is None and name not in known}
-    time = columns[manifest.time_channel]
-    # table rows without a step time belong to channels with their own times
-    steps = slice(None) if path.suffix == ".npz" else ~_empty(time)
-    values = {name: column[steps] for name, column in rest.items()} | {manifest.time_channel: time[steps]}
-    for channel in wanted:
-        if channel.in_trace not in columns and (channels is None or channel in also):
+    request = TraceRequest(
+        path=path,
+        time=manifest.time_channel,
+        channels=wanted,
+        also=also,
+        everything=channels is None,
+    )
+    return _importer(path.suffix.removeprefix(".")).read(request)
+
+
+def by_channel(columns: Arrays, request: TraceRequest, *, has_empty_cells: bool = False) -> Arrays:
+    """Return the columns of a file by manifest name, with the times of channels that have their own.
+
+    With `has_empty_cells`, rows without a step time belong to channels with their own times.
+    """
+    known = {c.in_trace for c in request.channels} | {c.time for c in request.channels if c.time}
+    rest = {name: column for name, column in columns.items() if request.everything and name not in known}
+    time = columns[request.time]
+    steps = ~_empty(time) if has_empty_cells else slice(None)
+    values = {name: column[steps] for name, column in rest.items()} | {request.time: time[steps]}
+    for channel in request.channels:
+        if channel.in_trace not in columns and (request.everything or channel in request.also):
             continue
         column = columns[channel.in_trace]
         there = steps
         if channel.time:
-            there = slice(None) if path.suffix == ".npz" else ~_empty(column)
+            there = ~_empty(column) if has_empty_cells else slice(None)
             values[own_times(channel.name)] = columns[channel.time][there]
         values[channel.name] = column[there]
     return values
 
 
+def frame_columns(frame: Any, request: TraceRequest) -> Arrays:
+    return {str(name): frame[name].to_numpy() for name in request.choose(frame.columns)}
+
+
 def _empty(values: np.ndarray) -> np.ndarray:
     return np.isnan(values) if values.dtype.kind == "f" else np.zeros(values.shape, dtype=bool)
-
-
-def _read_npz(path: Path, names: Iterable[str] | None, may_miss: Collection[str]) -> Arrays:
-    data = read_bounded(path, MOST_TRACE)
-    members = npz.members(data)
-    if members is not None:
-        return {name: members[name] for name in _wanted(members, names, may_miss)}
-    if data.startswith(npz.ARRAY):
-        raise BadTrace("a single array", "an .npz file")
-    if data.count(npz.ENTRY) > _MOST_COLUMNS:
-        raise BadTrace(f"{data.count(npz.ENTRY)} members", f"at most {_MOST_COLUMNS}")
-    with np.load(io.BytesIO(data), allow_pickle=False) as file:
-        _check_size(sum(member.file_size for member in file.zip.infolist()))
-        return {name: np.asarray(file[name]) for name in _wanted(file.files, names, may_miss)}
-
-
-def _read_csv(path: Path, names: Iterable[str] | None, may_miss: Collection[str]) -> Arrays:
-    import pandas as pd
-
-    data = read_bounded(path, MOST_CSV)
-    commas = data.count(b",", 0, data.find(b"\n") + 1 or None)
-    if commas >= _MOST_COLUMNS:
-        raise BadTrace(f"{commas + 1} columns", f"at most {_MOST_COLUMNS}")
-    return _columns(pd.read_csv(io.BytesIO(data)), names, may_miss)
-
-
-def _read_parquet(path: Path, names: Iterable[str] | None, may_miss: Collection[str]) -> Arrays:
-    import pandas as pd
-    from pyarrow import parquet  # type: ignore[import-untyped]
-
-    data = read_bounded(path, MOST_TRACE)
-    file = parquet.ParquetFile(io.BytesIO(data), pre_buffer=False)
-    wanted = list(_wanted(file.schema_arrow.names, names, may_miss))
-    _check_size(file.metadata.num_rows * min(len(wanted), file.metadata.num_columns) * 8)
-    for column in file.schema:
-        if column.name in wanted and column.physical_type not in _NUMERIC:
-            raise BadTrace(f"channel {column.name} is not numeric", "a number in each row")
-    return _columns(pd.read_parquet(io.BytesIO(data), columns=wanted), names, may_miss)
-
-
-def _columns(frame: Any, names: Iterable[str] | None, may_miss: Collection[str]) -> Arrays:
-    return {str(name): frame[name].to_numpy() for name in _wanted(frame.columns, names, may_miss)}
-
-
-def _wanted(
-    there: Collection[str], names: Iterable[str] | None, may_miss: Collection[str]
-) -> dict[str, None]:
-    """Return the names to read from a file that contains `there`: `names`, or all if None."""
-    if names is None:
-        return dict.fromkeys(there)
-    return {name: None for name in names if name in there or name not in may_miss}
-
-
-_COLUMNS: Mapping[str, Callable[[Path, Iterable[str] | None, Collection[str]], Arrays]] = {
-    ".npz": _read_npz,
-    ".csv": _read_csv,
-    ".parquet": _read_parquet,
-}
-
-
-def _read_mcap(path: Path, steps: str, channels: Iterable[Channel], also: Sequence[Channel]) -> Arrays:
-    """Read JSON messages. Channels are named `/topic:field.of.field`. Log times are simulated time in ns."""
-    places = {channel.name: channel.in_trace.partition(":")[::2] for channel in channels}
-    may_miss = {channel.name for channel in also}
-    fields: dict[str, dict[str, None]] = {steps: {}}
-    for topic, field in places.values():
-        fields.setdefault(topic, {})[field] = None
-    topics = read_topics(path, fields)
-    if not topics[steps][0]:
-        raise KeyError(steps)
-    values = {steps: np.array(topics[steps][0])}
-    for name, (topic, field) in places.items():
-        times, columns = topics[topic]
-        if not times:
-            if name in may_miss:
-                continue
-            raise KeyError(topic)
-        values[name] = np.array(columns[field])
-        if topic != steps:
-            values[own_times(name)] = np.array(times)
-    return values

@@ -6,11 +6,11 @@ from pathlib import Path
 
 from pydantic import Field
 
+from mutator._common.doors import IMPORTERS
 from mutator.config.yaml_files import Source, StrictModel
 from mutator.triggers.conditions import RESERVED
 
 ROUNDING = 1e-9  # in a channel's unit; smaller differences can come from the order of sums
-SUFFIXES = (".npz", ".csv", ".parquet", ".mcap")
 
 
 class Role(StrEnum):
@@ -97,7 +97,7 @@ class TraceModel(StrictModel, title="The trace"):
         "trace.npz",
         description="The file name in `{out}`: an `.npz` with an array for each channel, a `.csv` or "
         "`.parquet` with a column for each, or an `.mcap` with JSON messages (`pip install "
-        "mcap`).",
+        "mcap`). Other packages can add more.",
     )
     time: str = Field(
         "t",
@@ -108,11 +108,13 @@ class TraceModel(StrictModel, title="The trace"):
 
 def read_channels(models: dict[str, ChannelModel], trace: TraceModel, source: Source) -> tuple[Channel, ...]:
     """Read a manifest's channels, in order; MutatorError for an invalid trace or channel."""
-    if Path(trace.file).name != trace.file or Path(trace.file).suffix not in SUFFIXES:
+    suffix = Path(trace.file).suffix.removeprefix(".")
+    if Path(trace.file).name != trace.file or not (suffix and IMPORTERS.has(suffix)):
+        suffixes = ", ".join(f".{name}" for name in IMPORTERS.names())
         raise source.error(
             ("trace", "file"),
             f"'{trace.file}'",
-            expected=f"a bare file name (of a file in {{out}}) that ends in {', '.join(SUFFIXES)}",
+            expected=f"a bare file name (of a file in {{out}}) that ends in {suffixes}",
             remedy="have the run write such a file, and name it here",
         )
     if not any(model.role is Role.ACTUATOR for model in models.values()):

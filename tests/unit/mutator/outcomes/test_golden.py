@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from mutator.errors import BadOutput, Shortage
-from mutator.outcomes import trace_files
 from mutator.outcomes.golden import alerts_of, compare, load_record, load_trace, sharing_times, trace_digest
+from mutator.outcomes.importers import npz
 from mutator.store.run_folder import GoldenRun
 from mutator.targets.channels import Channel
 from mutator.targets.judging import Hazard
@@ -195,7 +195,7 @@ def test_a_lack_of_file_handles_is_not_blamed_on_the_run(
     def full(*given: Any, **more: Any) -> None:
         raise OSError(errno.EMFILE, "Too many open files")
 
-    monkeypatch.setattr(trace_files, "read_bounded", full)
+    monkeypatch.setattr(npz, "read_bounded", full)
     with pytest.raises(Shortage, match="too many open files"):
         load_trace(MANIFEST, tmp_path)
 

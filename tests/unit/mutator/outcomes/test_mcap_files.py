@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.outcomes import trace_files
+from mutator.outcomes.importers import mcap
+from mutator.outcomes.trace_files import TraceRequest
 from mutator.targets.channels import Channel
 from tests.costs import is_refused
 
@@ -60,7 +61,7 @@ def read(path: Path, *records: bytes, **other: str) -> dict[str, list[float]]:
     path.write_bytes(complete(*records, **other))
     channel = Channel(name="gap", unit="m", source="/cart:gap")
     try:
-        found = trace_files._read_mcap(path, "/cart", [channel], [])
+        found = mcap.IMPORTER.read(TraceRequest(path=path, time="/cart", channels=[channel]))
     except (ValueError, MemoryError, EOFError) as error:
         raise MutatorError(str(error)) from None
     return {name: values.tolist() for name, values in found.items()}
@@ -121,4 +122,4 @@ def test_other_encodings_are_refused(tmp_path: Path) -> None:
 def test_only_complete_files_are_read(tmp_path: Path) -> None:
     (tmp_path / "a.mcap").write_bytes(complete(message(0.0))[:-1])
     with pytest.raises(ValueError, match="no end"):
-        trace_files._read_mcap(tmp_path / "a.mcap", "/cart", [], [])
+        mcap.IMPORTER.read(TraceRequest(path=tmp_path / "a.mcap", time="/cart", channels=[]))

@@ -12,7 +12,8 @@ import pytest
 
 from mutator._common.files import read_json
 from mutator.errors import MutatorError
-from mutator.outcomes import trace_files
+from mutator.outcomes.importers import npz
+from mutator.outcomes.trace_files import TraceRequest
 from mutator.store import series_format
 from mutator.store.blocks import as_block, read_blocks
 from mutator.store.digests import Digest
@@ -105,8 +106,10 @@ def test_a_trace_that_unpacks_to_too_much_is_refused(tmp_path: Path, size: int, 
     (tmp_path / "trace.npz").write_bytes(_zip(size, shape))
 
     def read() -> None:
+        path = tmp_path / "trace.npz"
+        request = TraceRequest(path=path, time="t", channels=(), everything=True)
         try:
-            trace_files._read_npz(tmp_path / "trace.npz", None, ())
+            npz.IMPORTER.read(request)
         except (ValueError, MemoryError) as error:  # as `load_trace`
             raise MutatorError("refused") from error
 

@@ -1,0 +1,39 @@
+"""Read traces from .npz files, with an array for each channel."""
+
+import io
+
+import numpy as np
+
+from mutator._common.bounded import read_bounded
+from mutator.errors import BadTrace
+from mutator.outcomes import npz
+from mutator.outcomes.trace_files import (
+    MOST_COLUMNS,
+    MOST_TRACE,
+    Arrays,
+    Importer,
+    TraceRequest,
+    by_channel,
+    check_size,
+)
+
+
+def _columns(request: TraceRequest) -> Arrays:
+    data = read_bounded(request.path, MOST_TRACE)
+    members = npz.members(data)
+    if members is not None:
+        return {name: members[name] for name in request.choose(members)}
+    if data.startswith(npz.ARRAY):
+        raise BadTrace("a single array", "an .npz file")
+    if data.count(npz.ENTRY) > MOST_COLUMNS:
+        raise BadTrace(f"{data.count(npz.ENTRY)} members", f"at most {MOST_COLUMNS}")
+    with np.load(io.BytesIO(data), allow_pickle=False) as file:
+        check_size(sum(member.file_size for member in file.zip.infolist()))
+        return {name: np.asarray(file[name]) for name in request.choose(file.files)}
+
+
+def _read(request: TraceRequest) -> Arrays:
+    return by_channel(_columns(request), request)
+
+
+IMPORTER = Importer(about="an array for each channel (NumPy)", read=_read)

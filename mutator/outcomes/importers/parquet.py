@@ -1,0 +1,35 @@
+"""Read traces from .parquet files, with a column for each channel."""
+
+import io
+
+from mutator._common.bounded import read_bounded
+from mutator.errors import BadTrace
+from mutator.outcomes.trace_files import (
+    MOST_TRACE,
+    Arrays,
+    Importer,
+    TraceRequest,
+    by_channel,
+    check_size,
+    frame_columns,
+)
+
+_NUMERIC = ("BOOLEAN", "INT32", "INT64", "FLOAT", "DOUBLE")
+
+
+def _read(request: TraceRequest) -> Arrays:
+    import pandas as pd
+    from pyarrow import parquet  # type: ignore[import-untyped]
+
+    data = read_bounded(request.path, MOST_TRACE)
+    file = parquet.ParquetFile(io.BytesIO(data), pre_buffer=False)
+    wanted = list(request.choose(file.schema_arrow.names))
+    check_size(file.metadata.num_rows * min(len(wanted), file.metadata.num_columns) * 8)
+    for column in file.schema:
+        if column.name in wanted and column.physical_type not in _NUMERIC:
+            raise BadTrace(f"channel {column.name} is not numeric", "a number in each row")
+    columns = frame_columns(pd.read_parquet(io.BytesIO(data), columns=wanted), request)
+    return by_channel(columns, request, has_empty_cells=True)
+
+
+IMPORTER = Importer(about="a column for each channel", read=_read)
