@@ -4,6 +4,7 @@ import os
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
+from importlib import import_module
 from pathlib import Path
 
 from mutator._common.arguments import check_whole
@@ -14,7 +15,6 @@ from mutator._common.places import environment_path, library_files, library_fold
 from mutator._common.shipped import shipped_folder
 from mutator._common.tables import Table
 from mutator._common.text import counted, one_of, suggestion
-from mutator.engines.sandbox import check as check_sandbox
 from mutator.errors import MutatorError
 from mutator.faults.expansion import expand
 from mutator.faults.fault_models import FaultModels, load_fault_models
@@ -27,6 +27,8 @@ from mutator.stpa.context_tables import ContextTable, HazardList, load_context_t
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.manifest_files import load_manifest
 from mutator.targets.severity import Scale, load_scale
+
+_SANDBOX = "mutator.engines.sandbox"
 
 
 @dataclass(frozen=True, repr=False)
@@ -78,7 +80,7 @@ class Workspace:
         network. MutatorError if a named folder does not exist, or if this machine has no sandbox.
         """
         if sandbox:
-            check_sandbox()
+            import_module(_SANDBOX).check()  # late: what only reads loads nothing of the engines
         its_target = Path(target) if target else environment_path("MUTATOR_TARGET")
         if its_target and not its_target.is_dir():
             raise MutatorError(

@@ -2,45 +2,25 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from pathlib import Path
 
 from mutator._common.below import inside
 from mutator._common.files import ScratchFolder
-from mutator.api.experiment_results import ExperimentResult, TraceFrames, trace_frame
-from mutator.api.mutants import built
-from mutator.api.run_contents import RunContents, from_here
+from mutator.api.experiment_results import TraceFrames, trace_frame
+from mutator.api.run_contents import RunContents
+from mutator.api.stored_experiments import StoredExperiment
 from mutator.api.trials import Trial, trial_of
 from mutator.errors import MutatorError
 from mutator.execution.single_run import rerun
-from mutator.outcomes.fault_paths import FaultPath
 from mutator.outcomes.golden import Trace, load_trace
 from mutator.outcomes.sampling import keep_series
 from mutator.report.film import Filming, Shot
-from mutator.store.series import SeriesFolder
-from mutator.store.stretches import Stretch
-from mutator.targets.manifest import TargetManifest
-from mutator.targets.severity import Scale
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class RunExperiment(ExperimentResult):
+class RunExperiment(StoredExperiment):
     """An experiment of a run."""
 
     run: RunContents  #: the run that it belongs to
-
-    @cached_property
-    def patch(self) -> str:
-        """The whole patch, including the probe."""
-        kept = self.run.folder.read_patch(self.id, self.record)
-        if kept is not None:
-            return kept.decode("utf-8", "surrogateescape")
-        return built(self.run.bench, self.fault, self.experiment.trigger).patch
-
-    @property
-    def scale(self) -> Scale | None:
-        """The severity scale that the run was planned with."""
-        return self.run.folder.scale
 
     def traces(self, *, exact: bool = False) -> TraceFrames:
         """Return the golden and the faulty run as pandas frames.
@@ -96,47 +76,6 @@ class RunExperiment(ExperimentResult):
         MutatorError for a target that cannot be filmed, and for a faulty run that left no film.
         """
         return Filming.of(self.run.workspace, self.run.folder).take(self.experiment, self.record, shots)
-
-    @property
-    def stretch(self) -> Stretch | None:
-        """The versions and the machine of the experiment's run; None until it has run."""
-        return self.run.folder.stretch_of(self.id)
-
-    @property
-    def plot_file(self) -> Path:
-        """Path of the plot in the run folder."""
-        return inside(self.run.path / "plots", f"{self.id}.svg")
-
-    @property
-    def is_drawn(self) -> bool:
-        """Whether the run folder has the plot and an undamaged series."""
-        if self.record is None or not self.plot_file.exists():
-            return False
-        return SeriesFolder(self.run.path).is_readable(self.id, self.record)
-
-    def not_run(self) -> MutatorError:
-        """Return the error for an experiment that has not run."""
-        campaign, out = self.run.folder.head["campaign"], from_here(self.run.path)
-        return MutatorError(
-            f"experiment {self.id} has not run yet",
-            where=self.run.path,
-            remedy=f"run it: `mutator run {campaign} --out {out}`",
-        )
-
-    @property
-    def fault_path(self) -> FaultPath | None:
-        """How far the fault propagated along the control structure; None if that is unknown, if the fault was
-        never active, or if the run has no outcome.
-        """
-        fault_paths = self.run.fault_paths
-        return fault_paths.path(self.experiment, self.record) if fault_paths and self.record else None
-
-    def _channels(self) -> Sequence[Sequence[str]]:
-        channels: Sequence[Sequence[str]] = self.run.folder.head.get("channels", ())
-        return channels
-
-    def _target(self) -> TargetManifest:
-        return self.run.bench.manifest
 
     def _load_traces(self) -> tuple[Trace, Trace]:
         if self.record is None:

@@ -6,14 +6,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mutator._common.arguments import check_type
-from mutator._common.places import run_folders
 from mutator._common.tables import Table
 from mutator._common.text import one_of, seeds_text
 from mutator.api.audits import Audit, verify
 from mutator.api.experiment_results import trace_frame
 from mutator.api.html import facts_html, text_html
-from mutator.api.run_contents import RunContents, from_here
+from mutator.api.run_contents import RunContents
 from mutator.api.run_experiments import RunExperiment
 from mutator.api.selection import WorkspaceLike, open_workspace
 from mutator.audit.seal import Seals, not_verifiable, seals_of
@@ -49,17 +47,6 @@ def load_run(path: str | Path, *, workspace: WorkspaceLike = None) -> "Run":
     folder.
     """
     return Run(RunFolder.open(Path(path)), None if workspace is None else open_workspace(workspace))
-
-
-def newest_run(root: Path) -> Path:
-    found = run_folders(root)
-    if not found:
-        raise MutatorError(
-            "no run folder in runs/",
-            argument="run",
-            remedy="name one with `run`, or make one: `mutator run quickstart --out runs/first`",
-        )
-    return from_here(found[0])
 
 
 def merge_runs(shards: Sequence[str | Path], out: str | Path, *, accept_versions: bool = False) -> "Run":
@@ -141,8 +128,7 @@ class Run(RunContents):
 
     def experiment(self, id: str) -> RunExperiment:
         """Return the planned experiment whose id starts with `id`; MutatorError for none or several."""
-        check_type("id", id, str, "the id of an experiment, or the start of one")
-        wanted = self.folder.find(id)
+        wanted = self._find(id)
         return RunExperiment(experiment=self.experiments[wanted], record=self.records.get(wanted), run=self)
 
     def golden(

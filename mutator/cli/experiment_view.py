@@ -4,9 +4,10 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import mutator
 from mutator._common.text import counted
 from mutator.api.experiment_results import describe
-from mutator.api.runs import load_run, newest_run
+from mutator.api.stored_experiments import StoredExperiment, newest_run, stored_run
 from mutator.api.worst import worst_results
 from mutator.cli.console import NO_BREAK, STYLES, Terminal, short_path
 from mutator.errors import MutatorError
@@ -28,15 +29,23 @@ _TIMES = {
 }
 
 
+def stored_experiment(workspace: "Workspace", run: Path | None, prefix: str) -> StoredExperiment:
+    """Find an experiment of a run, the newest by default, only to read what is stored about it."""
+    return stored_run(run or newest_run(workspace.library.parent), workspace).experiment(prefix)
+
+
 def find_experiment(workspace: "Workspace", run: Path | None, prefix: str) -> "RunExperiment":
-    return load_run(run or newest_run(workspace.library.parent), workspace=workspace).experiment(prefix)
+    """Find an experiment of a run, the newest by default, which can be rerun."""
+    return mutator.load_run(run or newest_run(workspace.library.parent), workspace=workspace).experiment(
+        prefix
+    )
 
 
 def list_worst(
     terminal: Terminal, workspace: "Workspace", run: Path | None, only: str | None, limit: int
 ) -> None:
     folder = run or newest_run(workspace.library.parent)
-    found, count = worst_results(load_run(folder).path, only, limit)
+    found, count = worst_results(stored_run(folder).path, only, limit)
     rows = [_line(row) for row in found]
     if terminal.as_json:
         terminal.emit({"run": str(folder), "count": count, "worst": rows})
@@ -139,7 +148,7 @@ def _no_alert(record: "Record", manifest: "TargetManifest", reaction_s: float | 
     return "" if record.alerts else "no alert"
 
 
-def print_path(terminal: Terminal, found: "RunExperiment") -> None:
+def print_path(terminal: Terminal, found: StoredExperiment) -> None:
     if (path := found.fault_path) is None:
         return
     terminal.say("path of the fault:")

@@ -1,6 +1,7 @@
 """`show` and `rerun`: one experiment of a run."""
 
 import math
+import shlex
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -15,6 +16,7 @@ from mutator.errors import EXIT_CHECK_FAILED, MutatorError
 
 if TYPE_CHECKING:
     from mutator.api.run_experiments import RunExperiment
+    from mutator.api.stored_experiments import StoredExperiment
 
 DIFFERS = "the new run differs from the campaign's record: see `mutator rerun`"
 
@@ -27,10 +29,11 @@ def register(app: typer.Typer) -> None:
 SHOW_EXAMPLES = """\b
 Examples:
   mutator show 3f9a                          an experiment of the newest run in runs/
-  mutator show 3f9a --run runs/first --no-plot
+  mutator show 3f9a --run runs/first --plot  plot it, too
   mutator show                               the ten worst experiments
   mutator show --only 'severity >= "S2"' --limit 30
   mutator show 3f9a --patch | (cd target && patch -p1)
+  mutator show 3f9a --drive                  rerun it, and keep trace, series and plot
   mutator show 3f9a --video 3f9a.mp4         rerun and film the golden and the faulty run
   mutator show 3f9a --still 14.5             one frame of the film, for the report
   mutator show 3f9a --still 14.5=early.png --still 20=late.png
@@ -52,7 +55,10 @@ def show(
     plot: Annotated[
         bool,
         typer.Option(help="Plot the golden and the faulty run; rerun the experiment if no trace was kept."),
-    ] = True,
+    ] = False,
+    drive: Annotated[
+        bool, typer.Option("--drive", help="Rerun the experiment, and keep trace, series and plot.")
+    ] = False,
     video: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Film the golden and the faulty run side by side: a .mp4 or .gif."),
@@ -76,9 +82,11 @@ def show(
     *,
     place: Place,
 ) -> None:
-    """Show an experiment: diff, times, verdict, plot, film.
+    """Show an experiment: diff, times, verdict, path of the fault.
 
-    Without an experiment, lists the worst experiments of a run, by severity class, delta-v and margin.
+    Reads what the run folder stores. With --drive, --plot, --video or --still, also reruns the experiment
+    and writes into the run folder. Without an experiment, lists the worst ones of a run, by severity class,
+    delta-v and margin.
     """
     from mutator.cli import experiment_view
 
@@ -86,33 +94,43 @@ def show(
     if experiment is None:
         experiment_view.list_worst(terminal, place.workspace(), run, only, limit)
         return
-    found = experiment_view.find_experiment(place.workspace(), run, experiment)
+    workspace = place.workspace()
+    found = experiment_view.stored_experiment(workspace, run, experiment)
     patch = found.patch
     if patch_alone:
         terminal.diff(patch)
         return
-    drawn = _plot(terminal, found) if plot and found.record else None
-    filmed = _film(terminal, found, video, still or [])
+    drawn, filmed = found.plot_file if found.is_drawn else None, list[Path]()
+    if drive or plot or video or still:
+        drivable = experiment_view.find_experiment(workspace, run, experiment)
+        if (drive or plot) and found.record:
+            drawn = _plot(terminal, drivable, anew=drive)
+        filmed = _film(terminal, drivable, video, still or [])
     if as_json:
         terminal.emit(_facts(found, patch, drawn) | {"films": filmed})
-        return
     _print(terminal, found, patch)
     if drawn:
-        terminal.say(f"plot: {short_path(drawn)}")
+        terminal.link("plot", drawn)
     for path in filmed:
-        terminal.say(f"film: {short_path(path)}")
+        terminal.link("film", path)
+    if found.record and not drawn and not filmed:
+        terminal.say(f"no plot is stored; to rerun and plot it: {_plot_command(found)}", whole=True)
 
 
-def _facts(found: "RunExperiment", patch: str, drawn: Path | None) -> dict[str, object]:
+def _plot_command(found: "StoredExperiment") -> str:
+    return shlex.join(["mutator", "show", found.id, "--run", short_path(found.run.path), "--plot"])
+
+
+def _facts(found: "StoredExperiment", patch: str, drawn: Path | None) -> dict[str, object]:
     from mutator.api.experiment_results import describe
 
     facts = {**describe(found.experiment), **found.verdict, "patch": patch}
     facts |= {"run": str(found.run.path), "plot": str(drawn) if drawn else None}
-    facts |= {"run_with": found.stretch, "verifiable": found.run.verifiable}
+    facts |= {"run_with": found.stretch, "verifiable": found.run.verifiable, "has_series": found.has_series}
     return facts | {"path": asdict(found.fault_path) if found.fault_path else None}
 
 
-def _print(terminal: Terminal, found: "RunExperiment", patch: str) -> None:
+def _print(terminal: Terminal, found: "StoredExperiment", patch: str) -> None:
     from mutator.cli import experiment_view
 
     experiment_view.print_experiment(terminal, found.experiment, patch)
@@ -127,10 +145,10 @@ def _print(terminal: Terminal, found: "RunExperiment", patch: str) -> None:
         terminal.say("not verifiable: an older version of mutator wrote this run, without digests")
 
 
-def _plot(terminal: Terminal, found: "RunExperiment") -> Path | None:
-    if found.is_drawn:
+def _plot(terminal: Terminal, found: "RunExperiment", *, anew: bool) -> Path | None:
+    if found.is_drawn and not anew:
         return found.plot_file
-    with terminal.wait("no trace was kept: rerunning"):
+    with terminal.wait("rerunning" if anew else "no trace was kept: rerunning"):
         trial = found.rerun(keep=True)
     if trial.same_as_record is False:
         terminal.note(DIFFERS)

@@ -152,9 +152,9 @@ def diff(
     terminal = Terminal(as_json)
     workspace = place.workspace()
     if EXPERIMENT_ID.fullmatch(what) and not Path(what).exists():
-        from mutator.cli.experiment_view import find_experiment
+        from mutator.cli.experiment_view import stored_experiment
 
-        found = find_experiment(workspace, run, what)
+        found = stored_experiment(workspace, run, what)
         _print_diffs(terminal, [(found.fault.label, found.id, found.patch)], whole=patch)
         return
     from mutator.api.mutants import built

@@ -132,13 +132,11 @@ class Desk:
 
     def _film(self, order: Film) -> Work:
         film = self.runs.folder(order.run) / "plots" / f"{order.experiment}.mp4"
-        return self._of_experiment(order, "film", "show", order.experiment, "--no-plot", f"--video={film}")
+        return self._of_experiment(order, "film", "show", order.experiment, f"--video={film}")
 
     def _still(self, order: Still) -> Work:
         what = f"picture at {order.t:.2f} s"
-        return self._of_experiment(
-            order, what, "show", order.experiment, "--no-plot", f"--still={order.t:.2f}"
-        )
+        return self._of_experiment(order, what, "show", order.experiment, f"--still={order.t:.2f}")
 
     def _of_experiment(self, order: Rerun | Film | Still, what: str, *words: str) -> Work:
         folder = self._folder(order.run)

@@ -163,7 +163,7 @@ def test_rerun_restores_damaged_series(
 
 def test_the_audit_names_the_command_that_restores_a_series(cli: Cli, sealed: str) -> None:
     name = next(iter(packed().entries))
-    assert cli("show", name, "--run", "run").code == 0
+    assert cli("show", name, "--run", "run", "--plot").code == 0
     kept = SeriesFolder(Path("run")).kept(name)
     assert cli("rerun", name, "--trace", "--run", "run").code == 0
     data = kept.read_bytes()
@@ -171,7 +171,7 @@ def test_the_audit_names_the_command_that_restores_a_series(cli: Cli, sealed: st
     found = cli("verify", "run")
     assert found.code == 1 and f"- series/kept/{name}.js: damaged; " in found.out
     assert f"`mutator rerun {name} --trace" in found.out
-    assert cli("show", name, "--run", "run").code == 0
+    assert cli("show", name, "--run", "run", "--plot").code == 0
     assert kept.read_bytes() == data
     assert cli("verify", "run").code == 0
 

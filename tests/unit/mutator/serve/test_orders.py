@@ -122,9 +122,9 @@ def test_requests_become_command_lines(desk: Desk) -> None:
     assert work(desk, kind="rerun", **about).words == ("rerun", experiment, *of_run)
     assert work(desk, kind="plot", **about).words == ("rerun", experiment, "--trace", *of_run)
     film = f"--video={run}/plots/{experiment}.mp4"
-    assert work(desk, kind="film", **about).words == ("show", experiment, "--no-plot", film, *of_run)
+    assert work(desk, kind="film", **about).words == ("show", experiment, film, *of_run)
     still = work(desk, kind="still", t=3, **about)
-    assert still.words == ("show", experiment, "--no-plot", "--still=3.00", *of_run)
+    assert still.words == ("show", experiment, "--still=3.00", *of_run)
     assert still.result == f"/runs/first/report/index.html#e={experiment}"
     assert work(desk, kind="report", run="first").words == ("report", str(run), *place)
     given = {"value": -2.5, "seed": 3, "variant": "shifted", "trigger": "v_ego > 3"}

@@ -1,0 +1,178 @@
+"""What a run folder stores about an experiment. Nothing here reruns one, so no engine is imported."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from mutator._common.arguments import check_type
+from mutator._common.below import inside
+from mutator._common.places import run_folders
+from mutator.api.experiment_results import ExperimentResult
+from mutator.api.mutants import built
+from mutator.api.selection import Bench
+from mutator.errors import MutatorError
+from mutator.model import Experiment, Fault, Record
+from mutator.outcomes.fault_paths import FaultPath, FaultPaths, fault_paths_of
+from mutator.outcomes.golden import Trace
+from mutator.outcomes.sampling import sampled_traces
+from mutator.store import plan_file
+from mutator.store.run_folder import RunFolder
+from mutator.store.series import SeriesFolder, making_again
+from mutator.store.stretches import Stretch
+from mutator.targets.manifest import TargetManifest
+from mutator.targets.severity import Scale
+from mutator.workspace import Workspace
+
+
+def newest_run(root: Path) -> Path:
+    found = run_folders(root)
+    if not found:
+        raise MutatorError(
+            "no run folder in runs/",
+            argument="run",
+            remedy="name one with `run`, or make one: `mutator run quickstart --out runs/first`",
+        )
+    return from_here(found[0])
+
+
+def from_here(path: Path) -> Path:
+    here = Path.cwd()
+    return path.relative_to(here) if path.is_relative_to(here) else path
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class StoredRun:
+    """A run folder and its workspace."""
+
+    folder: RunFolder  #: reads the files of the run folder
+    given_workspace: Workspace | None = None  #: the workspace that was passed; None: found when needed
+
+    @property
+    def path(self) -> Path:
+        """The folder."""
+        return self.folder.path
+
+    @cached_property
+    def workspace(self) -> Workspace:
+        """The library, templates and target of the run."""
+        return self.given_workspace or Workspace.find()
+
+    @cached_property
+    def bench(self) -> Bench:
+        """The run's target in the workspace."""
+        return Bench.of(self.workspace, self.folder.head["target"])
+
+    @cached_property
+    def faults(self) -> dict[str, Fault]:
+        """The planned faults by id: value, aim, and what is injected where."""
+        return plan_file.read_faults(self.path)
+
+    @cached_property
+    def experiments(self) -> dict[str, Experiment]:
+        """The planned experiments by id, in plan order."""
+        return {e.id: e for e in plan_file.read_all(self.path)}
+
+    @cached_property
+    def records(self) -> Mapping[str, Record]:
+        """The records by experiment id."""
+        return self.folder.records()
+
+    @property
+    def verifiable(self) -> bool:
+        """Whether the content can be verified; runs of older schemas have no digests."""
+        return self.folder.verifiable
+
+    @cached_property
+    def fault_paths(self) -> FaultPaths | None:
+        """The paths of faults through the target; None if unknown."""
+        return fault_paths_of(self.folder.head)
+
+    def experiment(self, id: str) -> "StoredExperiment":
+        """Return the planned experiment whose id starts with `id`; MutatorError for none or several."""
+        wanted = self._find(id)
+        return StoredExperiment(
+            experiment=self.experiments[wanted], record=self.records.get(wanted), run=self
+        )
+
+    def _find(self, id: str) -> str:
+        check_type("id", id, str, "the id of an experiment, or the start of one")
+        return self.folder.find(id)
+
+
+def stored_run(path: Path, workspace: Workspace | None = None) -> StoredRun:
+    """Open the run folder at `path`; MutatorError if it is not one."""
+    return StoredRun(RunFolder.open(path), workspace)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class StoredExperiment(ExperimentResult):
+    """An experiment of a run, as far as the run folder stores it."""
+
+    run: StoredRun  #: the run that it belongs to
+
+    @cached_property
+    def patch(self) -> str:
+        """The whole patch, including the probe."""
+        kept = self.run.folder.read_patch(self.id, self.record)
+        if kept is not None:
+            return kept.decode("utf-8", "surrogateescape")
+        return built(self.run.bench, self.fault, self.experiment.trigger).patch
+
+    @property
+    def scale(self) -> Scale | None:
+        """The severity scale that the run was planned with."""
+        return self.run.folder.scale
+
+    @property
+    def stretch(self) -> Stretch | None:
+        """The versions and the machine of the experiment's run; None until it has run."""
+        return self.run.folder.stretch_of(self.id)
+
+    @property
+    def plot_file(self) -> Path:
+        """Path of the plot in the run folder."""
+        return inside(self.run.path / "plots", f"{self.id}.svg")
+
+    @property
+    def has_series(self) -> bool:
+        """Whether the run folder has an undamaged series of the experiment."""
+        return self.record is not None and SeriesFolder(self.run.path).is_readable(self.id, self.record)
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether the run folder has the plot and an undamaged series."""
+        return self.record is not None and self.plot_file.exists() and self.has_series
+
+    def not_run(self) -> MutatorError:
+        """Return the error for an experiment that has not run."""
+        campaign, out = self.run.folder.head["campaign"], from_here(self.run.path)
+        return MutatorError(
+            f"experiment {self.id} has not run yet",
+            where=self.run.path,
+            remedy=f"run it: `mutator run {campaign} --out {out}`",
+        )
+
+    @property
+    def fault_path(self) -> FaultPath | None:
+        """How far the fault propagated along the control structure; None if that is unknown, if the fault was
+        never active, or if the run has no outcome.
+        """
+        fault_paths = self.run.fault_paths
+        return fault_paths.path(self.experiment, self.record) if fault_paths and self.record else None
+
+    def _channels(self) -> Sequence[Sequence[str]]:
+        channels: Sequence[Sequence[str]] = self.run.folder.head.get("channels", ())
+        return channels
+
+    def _target(self) -> TargetManifest:
+        return self.run.bench.manifest
+
+    def _load_traces(self) -> tuple[Trace, Trace]:
+        if self.record is None:
+            raise self.not_run()
+        found = SeriesFolder(self.run.path).read(self.id, self.record)
+        if found is None:
+            remedy = f"rerun the experiment: {making_again(self.run.path, self.id)}"
+            raise MutatorError(f"no series of {self.id}", where=self.run.path, remedy=remedy)
+        return sampled_traces(*found, self._target().time_channel)
