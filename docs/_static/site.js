@@ -1,3 +1,4 @@
+// @ts-check
 // Adds a copy button to each code block, keeps long cells wide, and lets the search work in local files.
 "use strict";
 

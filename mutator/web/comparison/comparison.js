@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 /* Filters the table of changed experiments by text and change, and shows the first matches. The URL fragment contains
    the chosen filters. */

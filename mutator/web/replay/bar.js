@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 // The time bar of a replay, which the user can drag. It has marks for events and, below, a button for each event.
 
@@ -5,7 +6,9 @@ class ReplayBar {
   /** `describe(t)` returns the state at a time as text. */
   constructor(series, clock, describe) {
     const { el } = Dom;
-    Object.assign(this, { series, clock, describe });
+    this.series = series;
+    this.clock = clock;
+    this.describe = describe;
     this.handle = el("span.handle");
     this.done = el("span.done");
     this.window = el("span.window", { hidden: true });

@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 // The clock of a replay: playing, stepping and the frame rate.
 
@@ -11,7 +12,15 @@ class ReplayClock {
 
   /** A clock from `start` to `end` s, which pauses at each of `stops`. It calls `draw(clock)` after every change. */
   constructor({ start, end, stops, steps, at }, draw) {
-    Object.assign(this, { start, end, stops, steps, draw, t: at, speed: 1, isPlaying: false, rate: 0 });
+    this.start = start;
+    this.end = end;
+    this.stops = stops;
+    this.steps = steps;
+    this.draw = draw;
+    this.t = at;
+    this.speed = 1;
+    this.isPlaying = false;
+    this.rate = 0;
     this.calm = matchMedia("(prefers-reduced-motion: reduce)");
   }
 

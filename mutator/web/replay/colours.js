@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 // The current colours of the page for canvases, and canvases at screen resolution.
 

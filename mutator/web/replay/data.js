@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 // The values of a series (SeriesFile.load) for the replay: at a time, as text, or on an axis.
 

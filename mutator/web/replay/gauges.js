@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 // The instruments, which show the faulty and golden value of each channel. Pressing one shows or hides its plot.
 
@@ -8,7 +9,8 @@ class ReplayGauges {
   /** `isPlotted(name)` returns whether a channel is plotted; `toggle(name)` changes it. */
   constructor(channels, axes, { isPlotted, toggle }) {
     const { el } = Dom;
-    Object.assign(this, { isPlotted, written: -Infinity });
+    this.isPlotted = isPlotted;
+    this.written = -Infinity;
     this.gauges = channels.map((channel, i) => this.#gauge(channel, axes[i], toggle));
     const all = el("button.more", { type: "button", onclick: () => {
       this.element.classList.add("has-all");

@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 // Plots a channel over time: golden as a broad line, faulty as a narrow line above it, grey after the drive.
 
@@ -8,7 +9,11 @@ class ReplayPlot {
 
   constructor(channel, axis, series) {
     const { el } = Dom, unit = ReplayData.unit(channel);
-    Object.assign(this, { channel, axis, series, end: ReplayData.until(series), places: ReplayData.digits(axis) });
+    this.channel = channel;
+    this.axis = axis;
+    this.series = series;
+    this.end = ReplayData.until(series);
+    this.places = ReplayData.digits(axis);
     this.largest = ReplayData.largest(channel, this.end);
     this.golden = el("span.value.golden");
     this.faulty = el("span.value.faulty");

@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 // The plots below a replay: the chosen channels on one time axis, which the user can zoom and move.
 
@@ -9,7 +10,12 @@ class ReplayPlots {
 
   constructor(channels, axes, series, clock, zoomed) {
     const { el } = Dom;
-    Object.assign(this, { series, clock, zoomed, hovered: null, written: -Infinity, colours: null });
+    this.series = series;
+    this.clock = clock;
+    this.zoomed = zoomed;
+    this.hovered = null;
+    this.written = -Infinity;
+    this.colours = null;
     this.plots = channels.map((channel, i) => new ReplayPlot(channel, axes[i], series));
     this.view = { from: series.start, to: series.end };
     this.axis = el("canvas.axis", { "aria-hidden": "true" });
@@ -63,7 +69,8 @@ class ReplayPlots {
   draw(colours) {
     const width = Math.floor(this.list.clientWidth);
     if (!width || (width === this.width && colours === this.colours)) return;
-    Object.assign(this, { width, colours });
+    this.width = width;
+    this.colours = colours;
     for (const plot of this.shown) plot.draw(width, this.view, colours);
     this.#times(width, colours);
     this.written = -Infinity;

@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 // The replay of an experiment: scene, instruments and plots at one time. The user plays, drags or steps the time.
 
@@ -16,8 +17,10 @@ const Replay = (() => {
 
   class Player {
     constructor(place, series, facts) {
-      Object.assign(this, { place, series, facts });
-      this.channels = [...series.channels].sort((a, b) => (b.role === "actuator") - (a.role === "actuator"));
+      this.place = place;
+      this.series = series;
+      this.facts = facts;
+      this.channels = [...series.channels].sort((a, b) => Number(b.role === "actuator") - Number(a.role === "actuator"));
       this.axes = this.channels.map((channel) => ReplayData.range(channel, ReplayData.until(series)));
       const at = Math.max(series.start, (series.active?.[0] ?? series.marks[0]?.[1] ?? series.start) - BEFORE);
       this.clock = new ReplayClock({ start: series.start, end: series.end, stops: series.tEnd === null ? [] : [series.tEnd], steps: ReplayData.steps(series), at },
@@ -149,7 +152,8 @@ const Replay = (() => {
     #drawScene(t, colours) {
       const width = this.root.clientWidth, height = Math.round(Math.min(260, Math.max(200, width * 0.27)));
       if (this.drawn !== width || this.colours !== colours) {
-        Object.assign(this, { drawn: width, colours });
+        this.drawn = width;
+        this.colours = colours;
         this.context = ReplayColours.fitted(this.canvas, width, height);
       }
       this.scene.draw(this.context, width, height, t, colours);

@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 // A scene from above on a canvas: the faulty run solid, the golden run as an outline, events marked on the ground.
 
@@ -9,7 +10,9 @@ class ReplayScene {
   static ZOOM = [3, 17]; // minimum and maximum number of pixels per metre
 
   constructor(tracks, series) {
-    Object.assign(this, { tracks, series, end: ReplayData.until(series) });
+    this.tracks = tracks;
+    this.series = series;
+    this.end = ReplayData.until(series);
     this.pins = tracks.follow < 0 ? [] : series.marks.map(([kind, t, label]) => ({ kind, t, label, ...tracks.followed("faulty", t) }));
     this.impact = series.tEnd === null ? null : tracks.contact(series.tEnd);
     this.fixed = tracks.follow < 0 ? tracks.bounds(this.end) : null;
@@ -19,7 +22,11 @@ class ReplayScene {
 
   /** Draw the time `t` into a context of `width` x `height` CSS pixels; `colours` by name. */
   draw(context, width, height, t, colours) {
-    Object.assign(this, { context, width, height, t, colours });
+    this.context = context;
+    this.width = width;
+    this.height = height;
+    this.t = t;
+    this.colours = colours;
     this.view = this.fixed ? this.#whole() : this.#following();
     context.clearRect(0, 0, width, height);
     this.#ground();

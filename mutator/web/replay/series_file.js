@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 // Reads the series of experiments (format series/1): channels over time, golden and faulty. Chunks are scripts in the
 // run's folder series/, because a page opened from disk can load only scripts.
@@ -208,7 +209,7 @@ const SeriesFile = (() => {
     try {
       return await found(id, known, isNew);
     } catch (error) {
-      throw new Error(`The series of ${id} cannot be read: ${error.message}`);
+      throw new Error(`The series of ${id} cannot be read: ${error.message}`, { cause: error });
     }
   }
 

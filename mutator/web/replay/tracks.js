@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 // The positions of a scene's actors in both runs of a series, from the manifest's formulas over its channels.
 
@@ -69,7 +70,8 @@ class ReplayTracks {
     return [i, next, part];
   }
 
-  static #between(values, [i, next, part]) {
+  static #between(values, near) {
+    const [i, next, part] = near;
     const a = values[i], b = values[next];
     return Number.isFinite(a) && Number.isFinite(b) ? a + (b - a) * part : a;
   }

@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 // The fold-out menu in which the user chooses the columns of the list.
 

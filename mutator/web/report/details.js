@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 // Diff, spec and trigger of each experiment, assembled from shared parts (report/browse.py: details).
 

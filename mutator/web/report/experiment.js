@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 // An open experiment next to the list: events, path, replay, diff, and commands to run it again.
 
@@ -6,7 +7,12 @@ class Experiment {
 
   /** `actions`: `move(by)` moves within the list, `place()` returns the position in the list, `close()` closes the panel. */
   constructor(place, table, state, facts, actions) {
-    Object.assign(this, { place, table, state, facts, actions, title: document.title });
+    this.place = place;
+    this.table = table;
+    this.state = state;
+    this.facts = facts;
+    this.actions = actions;
+    this.title = document.title;
     this.mode = innerWidth > 1100 ? "split" : "unified";
     this.row = -1;
   }
@@ -169,7 +175,7 @@ class Experiment {
     if (typeof Path === "undefined") return;
     const { table, row } = this;
     const results = { row, text: (name) => table.text(row, name), number: (name) => table.number(row, name) };
-    Path.strip(this.#content("path"), results, this.facts);
+    Path.strip(this.#content("path"), results);
   }
 
   #change(patch) {

@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 // The filters above the table: a fold-out menu with counts for each facet, and removable chips for chosen values.
 

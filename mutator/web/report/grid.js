@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 // The table of experiments. Only visible rows are in the document.
 
@@ -6,7 +7,8 @@ class Grid {
   static SPARE = 8; // extra rows rendered above and below the visible ones
   static PRINTED = 500; // rows printed on paper
 
-  /** Column name, title, width in px and cell content. `narrow` columns are also shown on a phone. */
+  /** Column name, title, width in px and cell content. `narrow` columns are also shown on a phone.
+   *  @type {any[]} */
   static COLUMNS = [
     { name: "kind", title: "fault type", px: 174, narrow: true },
     { name: "variant", title: "variant", px: 72 },
@@ -60,7 +62,7 @@ class Grid {
   static #more(table, metrics) {
     const known = new Map(metrics.map(([name, unit, about]) => [name, { unit, about }]));
     const names = [...table.columns.keys()].filter((name) => !Grid.COLUMNS.some((column) => column.name === name));
-    names.sort((a, b) => known.has(b) - known.has(a));
+    names.sort((a, b) => Number(known.has(b)) - Number(known.has(a)));
     return names.map((name) => {
       const { unit, about } = known.get(name) || {};
       const title = name.replaceAll("_", " ") + (unit && unit !== "-" ? ` [${unit}]` : "");

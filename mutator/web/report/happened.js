@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 // What happened in an experiment: scenario, trigger, alert, events with their times, severity and metrics.
 
@@ -6,7 +7,9 @@ class Happened {
   static ALERTED = { "no alert at all": ", no alert at all,", "alert only after the hazard": ", no alert before it,", "alert before the hazard": " after an alert," };
 
   constructor(table, row, facts) {
-    Object.assign(this, { table, row, facts });
+    this.table = table;
+    this.row = row;
+    this.facts = facts;
   }
 
   get parts() {

@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 // The map of fault type by scenario. Each cell shows a share, or a metric's median or worst value, as text and colour.
 // Selecting a cell sets the filters.
@@ -72,7 +73,7 @@ class HeatMap {
     const width = this.columns.values.length + 1, height = this.rows.values.length + 1;
     if (this.table.map) {
       const told = this.table.map.cells[measure.name];
-      this.#draw(measure, measure.value ? HeatMap.#coloured(measure, told) : told.map(([n, all]) => HeatMap.#shareOf(n, all)), width, height);
+      this.#draw(measure, measure.value ? HeatMap.#coloured(measure, told) : told.map(([n, all]) => HeatMap.#shareOf(n, all)), width);
       return;
     }
     const cells = Array.from({ length: width * height }, () => []);
@@ -84,7 +85,7 @@ class HeatMap {
       // last row and column: totals
       for (const at of [y * width + x, y * width + width - 1, (height - 1) * width + x, height * width - 1]) cells[at].push(told);
     }
-    this.#draw(measure, measure.value ? HeatMap.#summaries(measure, cells) : cells.map(HeatMap.#share), width, height);
+    this.#draw(measure, measure.value ? HeatMap.#summaries(measure, cells) : cells.map(HeatMap.#share), width);
   }
 
   /** The text, description and colour (0 to 1) of each cell of a share. */
@@ -113,7 +114,7 @@ class HeatMap {
     return values.map((value, at) => ({ all: told[at][1], text: Grid.number(value), what: `${Grid.number(value)}, over ${told[at][1]}`, rate: rate(value) }));
   }
 
-  #draw(measure, cells, width, height) {
+  #draw(measure, cells, width) {
     const { el } = Dom;
     const kinds = [...this.rows.values, null], scenarios = [...this.columns.values, null];
     const focused = this.place.contains(document.activeElement) ? document.activeElement.dataset.at : null;

@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 // The path of a fault through the controller: a box for each component in causal order, with its state.
 

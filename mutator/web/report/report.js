@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 // The interactive part of the report. Creates the components, ties them to the state and handles keys.
 

@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 // The results as columns. For 100,000 experiments, search, counts and sorting take less time than passes between two keystrokes.
 
@@ -197,7 +198,7 @@ const Rows = (() => {
         for (let row = 0; row < this.count; row++) key[row] = rank[found.words ? found.codes[row] : row];
       }
       const empty = (row) => Number.isNaN(key[row]);
-      return [...rows].sort((a, b) => empty(a) - empty(b) || (empty(a) ? a - b : turn * (key[a] - key[b]) || a - b));
+      return [...rows].sort((a, b) => Number(empty(a)) - Number(empty(b)) || (empty(a) ? a - b : turn * (key[a] - key[b]) || a - b));
     }
   }
 

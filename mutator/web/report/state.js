@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 // The view's state, kept in the address after #, so that it can be shared and Back works:
 // #e=EXPERIMENT&q=words&kind=sensor%2Fshifted&scenario=S1,S2&sort=-t_hazard&heat=silent&cols=kind,delta_v

@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 // Shows the counts of the chosen fault type in the control structure, which report/path_drawing.py draws.
 

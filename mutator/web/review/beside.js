@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 // Fetches the server's data on a group when it scrolls into view: images, a typical experiment, and changes.
 

@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 // The card of a group, with place, decision, diff, values and remarks.
 
@@ -7,7 +8,9 @@ class Card {
 
   /** `actions`: mark(ids, kind, text), show(id), unfold(id), resolve(id, isMine). */
   constructor(group, data, actions) {
-    Object.assign(this, { group, data, actions });
+    this.group = group;
+    this.data = data;
+    this.actions = actions;
     this.element = this.#made();
   }
 

@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 // A diff of diffs: what a reviewer saw against the current state. Each line has a sign and, where the content is a diff,
 // that diff's sign too.

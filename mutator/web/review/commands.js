@@ -1,10 +1,12 @@
+// @ts-check
 "use strict";
 // Turns the marks on a page without a server into commands that record the decisions.
 
 class Commands {
   /** `changed(ids)` is called with the ids of the groups whose marks changed. */
   constructor(data, changed) {
-    Object.assign(this, { data, changed });
+    this.data = data;
+    this.changed = changed;
     this.marks = new Map(); // group id -> "approve" or "reject", in the order of marking
     for (const id of ["by", "remark"]) document.getElementById(id).addEventListener("input", () => this.#show());
   }

@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 // Ignores clicks and keys that cannot be meant for a served review: events of scripts, repeats of a key that is held down, and
 // input in the first instants after the page appears, which the user may have meant for the page before it.

@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 // Sends each mark on a served page as soon as it is made. Unconfirmed marks survive reloads and server restarts and are
 // sent again. Every few seconds, asks the server for marks of other reviewers.
@@ -9,7 +10,9 @@ class Outbox {
 
   /** `events`: changed(ids), kept(ids), refused(id, words), conflict(id, words, item), offline(words or ""). */
   constructor(served, groups, events) {
-    Object.assign(this, { served, groups, events });
+    this.served = served;
+    this.groups = groups;
+    this.events = events;
     this.address = `${served.api}${served.query}`;
     this.key = `mutator-review ${this.address}`;
     this.queue = Outbox.#stored(this.key).filter((item) => groups.has(item.group));

@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 // Asks for confirmation in the page's dialog `ask`.
 

@@ -1,11 +1,11 @@
+// @ts-check
 "use strict";
 // The review page: find, inspect and decide on groups. The part of the address after # is the view, so that it can be shared:
 // #g=GROUP&q=words&state=new,changed&flag=1&diff=split
 
 const Review = (() => {
-  const { el } = Dom;
+  const { el } = Dom, { plural } = Card;
   const find = (id) => document.getElementById(id);
-  const plural = Card.plural;
   const DECISIONS = ["approve", "reject"];
 
   class Page {
@@ -129,8 +129,8 @@ const Review = (() => {
 
     /** Mark groups. Repeating the decision on a single group withdraws it. Returns false if nothing was marked. */
     mark(all, kind, text = "") {
-      const outbox = this.data.served && this.marks;
-      if (!outbox) return this.marks.mark(all, kind);
+      const { marks } = this;
+      if (marks instanceof Commands) return marks.mark(all, kind);
       const ids = all.filter((id) => !this.groups.get(id).isOther);
       for (const id of all) if (!ids.includes(id)) this.#say(id, `not saved: ${Outbox.OTHER}`, true);
       if (!ids.length) return false;
@@ -140,13 +140,13 @@ const Review = (() => {
         find("by").reportValidity();
         return false;
       }
-      const [id] = ids, isDown = ids.length === 1 && this.cards.get(id).isMarked(kind, outbox.pending(id));
+      const [id] = ids, isDown = ids.length === 1 && this.cards.get(id).isMarked(kind, marks.pending(id));
       const done = isDown ? (kind === "flag" ? "unflag" : "clear") : kind;
       for (const one of ids) {
         this.#settle(one);
         this.#say(one, "saving");
       }
-      outbox.add(ids.map((group) => ({ group, kind: done, text })), by);
+      marks.add(ids.map((group) => ({ group, kind: done, text })), by);
       return true;
     }
 
@@ -174,7 +174,7 @@ const Review = (() => {
       const { kind, text, by } = this.conflicts.get(id);
       this.#settle(id);
       this.#say(id, isMine ? "saving" : "");
-      if (isMine) this.marks.add([{ group: id, kind, text }], by);
+      if (isMine && this.marks instanceof Outbox) this.marks.add([{ group: id, kind, text }], by);
       this.cards.get(id).element.focus({ preventScroll: true });
     }
 

@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 // Stacks the groups of one template in one function under the first of them, until the user opens the stack.
 
@@ -6,7 +7,8 @@ class Stacks {
 
   /** `cards`: group id -> Card, in the order of the page; `actions`: mark(ids, kind), unfold(id). */
   constructor(cards, actions) {
-    Object.assign(this, { cards, actions });
+    this.cards = cards;
+    this.actions = actions;
     this.open = new Set(); // the numbers (`like`) of open stacks
     this.members = new Map(); // first id -> ids of the others
   }

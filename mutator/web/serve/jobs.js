@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 // The server's jobs on every served page: progress, cancel, log and result. The server keeps the list, so it
 // survives a reload. The first page can start and cancel any job, a report only those of its run.
@@ -21,7 +22,7 @@ const Jobs = (() => {
   /** The server's answer. Throws an Error with a readable message if the server refuses or is unreachable. */
   async function ask(address, body) {
     const post = body && { method: "POST", headers: { "Content-Type": "application/json", "X-Mutator-Page": token }, body: JSON.stringify(body) };
-    let response = null;
+    let response;
     try {
       response = await fetch(address, post);
     } catch {

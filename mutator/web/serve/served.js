@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 // Buttons on an experiment of a served report for actions that would otherwise need a shell.
 

@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 // The forms of the first page: try a fault, and run a small campaign.
 

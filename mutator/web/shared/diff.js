@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 // Renders unified diffs in one column or two, with Python coloured and the tags of injected lines dimmed.
 //

@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 // Creates elements in one expression. Strings become text, never markup.
 

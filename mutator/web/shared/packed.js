@@ -1,3 +1,4 @@
+// @ts-check
 "use strict";
 // Reads data that is embedded in a page as gzipped JSON in base64 (web/__init__.py: embedded).
 

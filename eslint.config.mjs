@@ -1,0 +1,40 @@
+// Rules for the pages' scripts. A script may use the constants of all scripts that its pages load (order.txt).
+import { readFileSync } from "node:fs";
+import js from "@eslint/js";
+import globals from "globals";
+
+const WEB = "mutator/web", PAGES = ["comparison", "report", "review", "serve"];
+const lines = (file) => readFileSync(`${WEB}/${file}`, "utf8").trim().split("\n");
+const orders = PAGES.map((page) => lines(`${page}/order.txt`).filter((name) => name.endsWith(".js")));
+orders[3].unshift(...orders[1]); // the server adds its scripts to a report
+
+/** The constants of the scripts that are in every page with scripts of `folder`. */
+function constants(folder) {
+  const [first, ...others] = orders.filter((order) => order.some((name) => name.startsWith(`${folder}/`)));
+  const names = first.filter((name) => others.every((order) => order.includes(name)))
+    .flatMap((file) => lines(file).flatMap((line) => line.match(/^(?:const|class) (\w+)/)?.[1] ?? []));
+  return Object.fromEntries(names.map((name) => [name, "readonly"]));
+}
+
+const rules = {
+  eqeqeq: "error",
+  "no-redeclare": ["error", { builtinGlobals: false }], // each script declares one of those constants
+  "no-shadow": "off",
+  "no-unused-vars": ["error", { vars: "local", args: "all", argsIgnorePattern: "^_$" }],
+  "no-use-before-define": ["error", { functions: false, classes: false, variables: false }],
+  "no-var": "error",
+  "prefer-const": ["error", { destructuring: "all" }],
+  strict: ["error", "global"],
+};
+
+export default [
+  js.configs.recommended,
+  { ignores: ["**/*.js", "!mutator/web/**", "!docs/_static/*"] },
+  ...["shared", "replay", ...PAGES].map((folder) => ({
+    files: [`${WEB}/${folder}/*.js`],
+    languageOptions: { sourceType: "script", globals: { ...globals.browser, ...constants(folder) } },
+    rules,
+  })),
+  { files: ["docs/_static/*.js"], languageOptions: { sourceType: "script", globals: { ...globals.browser, DOCUMENTATION_OPTIONS: "readonly" } }, rules },
+  { files: ["**/*.mjs"], languageOptions: { globals: globals.node } },
+];
