@@ -14,6 +14,7 @@ from mutator.outcomes.trace_files import own_times
 from mutator.outcomes.verdicts import reaction_time, severity_of, since_activation, since_manifestation
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.severity import Scale
+from mutator.targets.target_facts import ChannelFacts
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -124,7 +125,7 @@ class ExperimentResult(ABC):
         """
         import pandas as pd
 
-        facts = {name: (component, role, unit) for name, unit, role, component, _ in self._channels()}
+        facts = {c.name: (c.component, c.role.value, c.unit) for c in self._channels()}
         left = sorted(self.record.left if self.record else (), key=lambda departure: departure[1])
         rows = [(name, *facts.get(name, ("", "", "")), first, largest) for name, first, largest in left]
         heads = ["channel", "component", "role", "unit", "t_first", "max_dev"]
@@ -140,7 +141,7 @@ class ExperimentResult(ABC):
         return draw_run(golden, faulty, self._target(), title=title, marks=marks, end=end)
 
     @abstractmethod
-    def _channels(self) -> Sequence[Sequence[str]]: ...
+    def _channels(self) -> Sequence[ChannelFacts]: ...
 
     @abstractmethod
     def _target(self) -> TargetManifest: ...

@@ -22,6 +22,7 @@ from mutator.store.series import SeriesFolder, making_again
 from mutator.store.stretches import Stretch
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.severity import Scale
+from mutator.targets.target_facts import ChannelFacts
 from mutator.workspace import Workspace
 
 
@@ -161,9 +162,8 @@ class StoredExperiment(ExperimentResult):
         fault_paths = self.run.fault_paths
         return fault_paths.path(self.experiment, self.record) if fault_paths and self.record else None
 
-    def _channels(self) -> Sequence[Sequence[str]]:
-        channels: Sequence[Sequence[str]] = self.run.folder.head.get("channels", ())
-        return channels
+    def _channels(self) -> Sequence[ChannelFacts]:
+        return self.run.folder.head.channels
 
     def _target(self) -> TargetManifest:
         return self.run.bench.manifest

@@ -1,5 +1,6 @@
 """Run one fault once, outside a campaign or as a rerun of a campaign's experiment."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -13,11 +14,11 @@ from mutator.errors import MutatorError
 from mutator.execution.single_run import Single, run_single
 from mutator.figures.run_plot import save
 from mutator.model import Experiment, Method, Record
-from mutator.outcomes.channel_departures import channel_facts
 from mutator.outcomes.golden import Trace, load_trace
 from mutator.outcomes.judging import load_judged
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.severity import Scale
+from mutator.targets.target_facts import ChannelFacts, channel_facts
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -77,7 +78,7 @@ class Trial(ExperimentResult):
         save(self.plot(), [path])
         return path
 
-    def _channels(self) -> list[list[str]]:
+    def _channels(self) -> Sequence[ChannelFacts]:
         return channel_facts(self.manifest)
 
     def _target(self) -> TargetManifest:

@@ -4,7 +4,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
-from typing import Any
 
 from mutator._common.below import inside
 from mutator._common.hashing import digest
@@ -20,6 +19,7 @@ from mutator.store import plan_file
 from mutator.store.lines import read_segment
 from mutator.store.records import record_from
 from mutator.store.run_folder import RunFolder
+from mutator.store.run_head import Head
 from mutator.targets.manifest import TargetManifest
 
 _DIGEST = 64  # hex digits
@@ -105,7 +105,7 @@ def _built(manifest: TargetManifest, models: FaultModels, fault: Fault, trigger:
 
 
 def verdicts(
-    head: Mapping[str, Any], records: Sequence[Recorded], manifest: TargetManifest | None
+    head: Head, records: Sequence[Recorded], manifest: TargetManifest | None
 ) -> Iterator[MutatorError]:
     """Yield an error for each field that contradicts another field, run.json or the manifest."""
     tolerances = {channel.name: channel.tolerance for channel in manifest.compared} if manifest else {}
@@ -154,7 +154,7 @@ def _flaws_of_bad_end(record: Record) -> Flaws:
             yield f"{name} {value}", f"none, because the experiment ended as {record.status.value}"
 
 
-def _flaws_of_names(record: Record, head: Mapping[str, Any], tolerances: Mapping[str, float]) -> Flaws:
+def _flaws_of_names(record: Record, head: Head, tolerances: Mapping[str, float]) -> Flaws:
     """Hazards or channels that the target does not have, and differences beyond the tolerance without a
     manifestation.
     """
@@ -172,14 +172,14 @@ def _flaws_of_names(record: Record, head: Mapping[str, Any], tolerances: Mapping
         yield f"{beyond[0]} differs, but no manifestation is recorded", "the time of the first difference"
 
 
-def _flaws_of_path(record: Record, head: Mapping[str, Any]) -> Flaws:
+def _flaws_of_path(record: Record, head: Head) -> Flaws:
     """Channels that the target does not have, times after the end of the drive, and a manifestation time that
     is not the first time at which an actuator differs from the golden run.
     """
     if "channels" not in head:
         return
     end = inf if record.t_end is None else record.t_end + _TINY
-    known = [name for name, *_ in head["channels"]]
+    known = [channel.name for channel in head.channels]
     for name, first, _ in record.left:
         if name not in known:
             yield f"channel {name} left golden", f"one of {', '.join(known)}"

@@ -25,14 +25,14 @@ from mutator.campaigns.plans import Plan, Planning
 from mutator.campaigns.provenance import check_sources, check_version, sources
 from mutator.errors import MutatorError
 from mutator.model import Experiment
-from mutator.outcomes.channel_departures import channel_facts
-from mutator.results.column_facts import PLAN_COLUMNS, metric_columns, plan_row
+from mutator.results.column_facts import PLAN_COLUMNS, plan_row
 from mutator.store import digests, plan_file
 from mutator.store.digests import Digest, DigestingFile, Ledger
 from mutator.store.opening import check_contents
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN, HEAD, SCHEMA
 from mutator.targets.manifest import TargetManifest
+from mutator.targets.target_facts import channel_facts, metric_facts
 from mutator.workspace import Workspace
 
 CSV = "plan.csv"
@@ -180,12 +180,12 @@ def target_facts(workspace: Workspace, manifest: TargetManifest) -> dict[str, An
         "hazards": manifest.hazards,
         "alerts": manifest.alerts,
         "compared": [channel.name for channel in manifest.compared],
-        "metrics": metric_columns(manifest),
+        "metrics": [metric.plain() for metric in metric_facts(manifest)],
         "about_hazards": [
             {"name": one.name, "about": one.about, "terminal": bool(one.terminal)} for one in manifest.rules
         ],
         "severity": scale.plain() if scale else None,
-        "channels": channel_facts(manifest),
+        "channels": [channel.plain() for channel in channel_facts(manifest)],
         "structure": structure.model_dump(mode="json", by_alias=True) if structure else None,
         "golden_files": manifest.outputs,
         "target_files": manifest.tree.digests,

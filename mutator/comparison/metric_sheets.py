@@ -20,9 +20,10 @@ NO_CONTACT = "no contact"
 def metrics_sheets(pairs: Sequence[Pair], a: Side, b: Side, names: Names) -> tuple[Sheet, Sheet]:
     whole: list[tuple[Cell, ...]] = []
     parts: list[tuple[Cell, ...]] = []
-    units = {name: (unit, worse) for name, unit, _, worse in a.folder.head.get("metrics", ())}
+    units = {metric.name: (metric.unit, metric.worse) for metric in a.folder.head.metrics}
     usable = [pair for pair in pairs if pair.usable]
-    for name, unit, _, worse in b.folder.head.get("metrics", ()):
+    for metric in b.folder.head.metrics:
+        name, unit, worse = metric.name, metric.unit, metric.worse
         frame = _values(usable, a, b, name)
         if units.get(name) != (unit, worse) or frame.empty:
             continue

@@ -7,12 +7,13 @@ from typing import NamedTuple
 from mutator.campaigns.filters import compile_filter
 from mutator.model import Experiment, Record, Value
 from mutator.preflight import equivalence
-from mutator.results.column_facts import PLAN_COLUMNS, T_END, plan_row
+from mutator.results.column_facts import PLAN_COLUMNS, plan_row
 from mutator.results.rows import Row
 from mutator.results.table_reader import row_of
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.targets.severity import Scale
+from mutator.targets.target_facts import T_END
 
 
 class Key(NamedTuple):

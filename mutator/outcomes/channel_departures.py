@@ -6,7 +6,6 @@ import numpy as np
 
 from mutator.outcomes.golden import Trace, deviation, end_of_shorter
 from mutator.targets.channels import Channel
-from mutator.targets.manifest import TargetManifest
 
 Departure = tuple[str, float, float]  # channel, first time (s), largest deviation
 
@@ -31,7 +30,3 @@ def departures(
             if first <= end and first < np.inf:
                 found.append((channel.name, first, one.largest(end)))
     return tuple(found)
-
-
-def channel_facts(manifest: TargetManifest) -> list[list[str]]:
-    return [[c.name, c.unit, c.role.value, c.component, c.about] for c in manifest.channels]

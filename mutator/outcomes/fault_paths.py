@@ -19,6 +19,7 @@ from mutator.outcomes.topology import PossibleRoute, chained, links_of, steps_fr
 from mutator.store.run_head import REMEDY, Head
 from mutator.stpa.analysis import Kind, StructureModel
 from mutator.targets.channels import Role
+from mutator.targets.target_facts import ChannelFacts
 
 
 class ComponentState(StrEnum):
@@ -115,15 +116,14 @@ class PathInputs(NamedTuple):
 class FaultPaths:
     """The paths of faults through a target.
 
-    `channels` have name, unit, role, component and meaning, as in run.json. Without a `structure`, the
-    components form a chain: those of internal channels, then those of actuators, then those of ground truth.
-    In a chain, the place of injection is unknown.
+    Without a `structure`, the components form a chain: those of internal channels, then those of actuators,
+    then those of ground truth. In a chain, the place of injection is unknown.
     """
 
-    def __init__(self, channels: Sequence[Sequence[str]], structure: StructureModel | None) -> None:
-        self.component_of = {name: component for name, _, _, component, _ in channels}
-        self._roles = {component: role for _, _, role, component, _ in channels if component}
-        self._actuators = {component for _, _, role, component, _ in channels if role == Role.ACTUATOR.value}
+    def __init__(self, channels: Sequence[ChannelFacts], structure: StructureModel | None) -> None:
+        self.component_of = {channel.name: channel.component for channel in channels}
+        self._roles = {c.component: c.role for c in channels if c.component}
+        self._actuators = {c.component for c in channels if c.role is Role.ACTUATOR}
         self.structure = structure
         self._links = links_of(structure) if structure else {}
         # links from unrecorded components back to the components that feed them
@@ -289,13 +289,13 @@ class FaultPaths:
 
 def fault_paths_of(head: Head) -> FaultPaths | None:
     """Return the fault paths of a run's target, from run.json. None if no channel names a component."""
-    if not any(component for *_, component, _ in head.get("channels", ())):
+    if not any(channel.component for channel in head.channels):
         return None
     try:
         structure = StructureModel.model_validate(head["structure"]) if head.get("structure") else None
     except ValueError:
         raise MutatorError("damaged at 'structure'", where=head.path, remedy=REMEDY) from None
-    return FaultPaths(head["channels"], structure)
+    return FaultPaths(head.channels, structure)
 
 
 _CHANGED = (ComponentState.REACHED, ComponentState.PASSED, ComponentState.FEEDBACK)

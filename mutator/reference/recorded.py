@@ -8,7 +8,6 @@ from mutator.results.column_facts import (
     PLAN_COLUMNS,
     TIMINGS,
     Column,
-    metric_columns,
     result_columns,
     severity_columns,
 )
@@ -18,6 +17,7 @@ from mutator.targets.judging import Hazard, Metric
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.observation import variable_units
 from mutator.targets.severity import DELTA_V
+from mutator.targets.target_facts import metric_facts
 from mutator.workspace import Workspace
 
 _ARROW = {"text": "string", "flag": "int8", "count": "int64", "number": "double"}
@@ -59,7 +59,7 @@ def _table_of(manifest: TargetManifest) -> Iterator[str]:
     yield f"## Target {manifest.name}\n"
     compared = [channel.name for channel in manifest.compared]
     severity = severity_columns({"severity": manifest.contact})
-    columns = (manifest.hazards, compared, metric_columns(manifest), severity)
+    columns = (manifest.hazards, compared, metric_facts(manifest), severity)
     yield from _columns(result_columns(*columns, paths=True))
 
 

@@ -31,7 +31,7 @@ def answers_of(run: ReportedRun) -> tuple[Answer, ...]:
     """All answers for which the run has the data."""
     frame = _told(run)
     has_alerts = run.folder.has_alerts
-    made = [dangerous(frame, run.folder.head.get("metrics", ()), has_alerts=has_alerts)]
+    made = [dangerous(frame, run.folder.head.metrics, has_alerts=has_alerts)]
     if (frame["outcome"] == "hazard").any():
         made.append(first_to_fix(frame, run.paths, has_alerts=has_alerts))
     if has_alerts:

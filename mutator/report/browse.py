@@ -70,7 +70,7 @@ def browse_data(run: ReportedRun) -> Browse:
     facts = {
         **_of_target(folder, workspace),
         "series": series_facts(folder),
-        "metrics": folder.head.get("metrics", []),
+        "metrics": [metric.plain() for metric in folder.head.metrics],
         "severity": folder.head.get("severity"),
         "hazards": folder.head.get("about_hazards", []),
         "meanings": meanings_of(run),

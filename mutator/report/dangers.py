@@ -6,6 +6,7 @@ from typing import Any
 import pandas as pd
 
 from mutator.report.answer_parts import Answer, Link, Listing, bar, by_kind, kind_link, share, to_list
+from mutator.targets.target_facts import MetricFacts
 
 WORST = 10  # maximum number of experiments listed as most dangerous
 CONTACTS = 6  # maximum number with contact among them, if there are also hazards without contact
@@ -16,7 +17,7 @@ HAZARD = {"outcome": ["hazard"]}  # filter for the list of experiments
 NO_CONTACT = "no contact"  # the page filter's name for an empty severity
 
 
-def dangerous(frame: pd.DataFrame, metrics: Sequence[Sequence[str]], *, has_alerts: bool) -> Answer:
+def dangerous(frame: pd.DataFrame, metrics: Sequence[MetricFacts], *, has_alerts: bool) -> Answer:
     active = frame[frame["is_activated"]]
     ranked = frame[frame["outcome"] == "hazard"].sort_values("place")
     contact = contact_measure(frame)
@@ -26,7 +27,7 @@ def dangerous(frame: pd.DataFrame, metrics: Sequence[Sequence[str]], *, has_aler
     elif contact:
         hits = int((pd.to_numeric(ranked[contact]) > 0).sum())
         says += f" {share(hits, len(ranked), 'hazards')} involved contact."
-    units = {name: unit for name, unit, *_ in metrics}
+    units = {metric.name: metric.unit for metric in metrics}
     kinds = by_kind(ranked, active)
     came = [kind for kind in kinds if kind[1]]
     lines = [(kind_link(kind, outcome=["hazard"]), bar(part, of)) for kind, part, of in came[:TYPES]]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from mutator.model import Experiment, Record
 from mutator.outcomes.fault_paths import FaultPath, FaultPaths, LinkState, UntimedPath
 from mutator.store.run_folder import RunFolder
+from mutator.targets.target_facts import ChannelFacts
 
 if TYPE_CHECKING:
     import numpy as np
@@ -49,7 +50,7 @@ class RunPaths:
     """The known paths of a run, and the distinct untimed paths of its experiments."""
 
     fault_paths: FaultPaths
-    channels: Sequence[Sequence[str]]  # as in run.json
+    channels: Sequence[ChannelFacts]
     by_id: Mapping[str, FaultPath]
     records: Mapping[str, Record]
     untimed_paths: Sequence[UntimedPath] = ()
@@ -67,7 +68,7 @@ class RunPaths:
         by_id = _PathsById(fault_paths, planned, records)
         return cls(
             fault_paths=fault_paths,
-            channels=folder.head["channels"],
+            channels=folder.head.channels,
             by_id=by_id,
             records=records,
             untimed_paths=untimed_paths,
@@ -89,7 +90,7 @@ class RunPaths:
         """
         shapes: dict[str, int] = {}
         columns: dict[str, Any] = {}
-        codes, by, names = [], {}, [name for name, *_ in self.channels]
+        codes, by, names = [], {}, [channel.name for channel in self.channels]
         first: list[list[float | None]] = [[] for _ in names]
         largest: list[list[float | str | None]] = [[] for _ in names]
         for row, name in enumerate(ids):
@@ -109,7 +110,7 @@ class RunPaths:
         return {
             "schema": SCHEMA,
             "components": self.components,
-            "channels": [[name, unit, component, about] for name, unit, _, component, about in self.channels],
+            "channels": [[c.name, c.unit, c.component, c.about] for c in self.channels],
             "by": by,
             "shapes": [columns[key] for key in shapes],
             "shape": codes,
@@ -130,7 +131,7 @@ class RunPaths:
         """Label and meaning of each component."""
         structure = self.fault_paths.structure
         if structure is None:
-            return {name: {"label": name, "about": ""} for _, _, _, name, _ in self.channels if name}
+            return {name: {"label": name, "about": ""} for c in self.channels if (name := c.component)}
         return {name: {"label": c.label, "about": c.about} for name, c in structure.components.items()}
 
 

@@ -26,10 +26,10 @@ def map_of(run: ReportedRun) -> dict[str, Any]:
     for name, part, of in _shares(frame, alerts=run.folder.has_alerts):
         cells[name] = _pairs(_counted(y, x, part & of, shape), _counted(y, x, of, shape))
     active = frame["is_activated"].to_numpy(dtype=bool)
-    for name, _, _, worse in run.folder.head.get("metrics", ()):
-        values = pd.to_numeric(frame[name]).to_numpy(dtype=float)
+    for metric in run.folder.head.metrics:
+        values = pd.to_numeric(frame[metric.name]).to_numpy(dtype=float)
         known = active & ~np.isnan(values)
-        cells |= _summaries(name, worse, values[known], y[known], x[known], shape)
+        cells |= _summaries(metric.name, metric.worse, values[known], y[known], x[known], shape)
     return {"kinds": kinds, "scenarios": scenarios, "cells": cells}
 
 

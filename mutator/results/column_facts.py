@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 from mutator.model import Experiment, fault_label
 from mutator.targets.manifest import TargetManifest
+from mutator.targets.target_facts import T_END, MetricFacts
 
 ColumnType = Literal["text", "flag", "count", "number"]
 
@@ -69,7 +70,6 @@ _TO_REACTION = (
         "time from the first alert to the first hazard; empty unless the alert came first",
     ),
 )
-T_END = "t_end"
 SEVERITY = Column(
     "severity", "text", "", "class of the contact that ended the drive; empty without a contact"
 )
@@ -116,15 +116,14 @@ _TEXTS |= {*_DERIVED_TEXTS}
 def result_columns(
     hazards: Iterable[str],
     compared: Sequence[str],
-    metrics: Sequence[Sequence[str]] = (),
+    metrics: Sequence[MetricFacts] = (),
     severity: Sequence[Column] = (),
     *,
     paths: bool = False,
 ) -> tuple[Column, ...]:
     """Return the columns of results.csv, in order.
 
-    `metrics` is from `metric_columns`, `severity` from `severity_columns`. `paths` adds the columns of the
-    fault's path.
+    `severity` is from `severity_columns`. `paths` adds the columns of the fault's path.
     """
     return (
         *_TO_MANIFEST,
@@ -134,7 +133,7 @@ def result_columns(
             Column(column, "number", "the channel's", f"largest difference of `{name}` from golden")
             for name, column in deviation_columns(compared).items()
         ),
-        *(Column(name, "number", unit, about) for name, unit, about, _ in metrics),
+        *(Column(metric.name, "number", metric.unit, metric.about) for metric in metrics),
         *(
             Column(
                 column,
@@ -142,7 +141,8 @@ def result_columns(
                 "the channel's",
                 f"largest difference of `{name}` from golden, up to `t_end`",
             )
-            for name, column in driven_columns(compared, metrics).items()
+            for name, column in driven_columns(compared).items()
+            if T_END in {metric.name for metric in metrics}
         ),
         *severity,
         *(OF_PATHS if paths else ()),
@@ -155,16 +155,6 @@ def severity_columns(head: Mapping[str, Any]) -> tuple[Column, ...]:
     if "severity" not in head:
         return ()
     return (SEVERITY, *SINCE) if head["severity"] else SINCE
-
-
-def metric_columns(manifest: TargetManifest) -> list[list[str]]:
-    """Return the name, unit, meaning and worse direction of each of a target's metric columns.
-
-    If a hazard can end the drive, the end of the drive comes first.
-    """
-    ends = any(hazard.terminal for hazard in manifest.rules)
-    end = [[T_END, "s", "when a terminal hazard ended the drive; metrics do not cover later steps", "lower"]]
-    return [*(end if ends else ()), *([m.name, m.unit, m.about, m.worse] for m in manifest.measures)]
 
 
 def is_text(column: str) -> bool:
@@ -203,10 +193,8 @@ def _deviation_columns(channels: tuple[str, ...]) -> Mapping[str, str]:
     }
 
 
-def driven_columns(channels: Sequence[str], metrics: Iterable[Sequence[str]]) -> dict[str, str]:
-    """Map each compared channel to its `dev_` column; empty if no hazard can end the drive."""
-    if T_END not in (name for name, *_ in metrics):
-        return {}
+def driven_columns(channels: Sequence[str]) -> dict[str, str]:
+    """Map each compared channel to its `dev_` column, which exists if a hazard can end the drive."""
     return {name: column.removeprefix("max_") for name, column in deviation_columns(channels).items()}
 
 
@@ -217,7 +205,7 @@ def check_names(manifest: TargetManifest) -> None:
     compared = [channel.name for channel in manifest.compared]
     taken = {column.name for column in result_columns((), compared, paths=True)}
     taken |= {SEVERITY.name, *(column.name for column in SINCE)}
-    taken |= {*DERIVED, T_END, *driven_columns(compared, [[T_END]]).values()}
+    taken |= {*DERIVED, T_END, *driven_columns(compared).values()}
     named = isinstance(manifest.source.data.get("hazards"), dict)
     for i, hazard in enumerate(manifest.hazards):
         names = {column.name for column in hazard_columns(hazard)}

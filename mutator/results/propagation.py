@@ -5,6 +5,7 @@ from typing import Any
 
 from mutator.model import Record
 from mutator.results.column_facts import Column
+from mutator.targets.target_facts import ChannelFacts
 
 COLUMNS = (
     Column("experiment_id", "text", "", "the experiment"),
@@ -16,9 +17,9 @@ COLUMNS = (
 )
 
 
-def columns_of(records: Iterable[Record], channels: Sequence[Sequence[str]]) -> Mapping[str, list[Any]]:
+def columns_of(records: Iterable[Record], channels: Sequence[ChannelFacts]) -> Mapping[str, list[Any]]:
     """Return the columns of propagation.parquet, which has a row for each channel that left golden."""
-    facts = {name: (component, role) for name, _, role, component, _ in channels}
+    facts = {channel.name: (channel.component, channel.role.value) for channel in channels}
     made: dict[str, list[Any]] = {column.name: [] for column in COLUMNS}
     for record in records:
         if record.left:

@@ -86,7 +86,7 @@ def _write_results(folder: RunFolder, paths: Mapping[str, Path]) -> None:
         table = record_batch(rows.columns, list(zip(*cells, strict=True)))
         if not tells_propagation:
             return csv_lines(cells), table, None
-        found = columns_of((record for _, record in done), folder.head["channels"])
+        found = columns_of((record for _, record in done), folder.head.channels)
         return csv_lines(cells), table, record_batch(propagation.COLUMNS, list(found.values()))
 
     with ExitStack() as stack:

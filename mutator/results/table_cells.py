@@ -6,7 +6,6 @@ from mutator.model import Experiment, Record, Status
 from mutator.outcomes.fault_paths import fault_paths_of
 from mutator.outcomes.verdicts import reaction_time, severity_of, since_activation, since_manifestation
 from mutator.results.column_facts import (
-    T_END,
     deviation_columns,
     hazard_columns,
     plan_row,
@@ -15,6 +14,7 @@ from mutator.results.column_facts import (
 )
 from mutator.store.run_folder import RunFolder
 from mutator.targets.severity import Scale
+from mutator.targets.target_facts import T_END
 
 _TIME_DIGITS = 6  # decimals of a time in s: finer than any step, coarser than a double's precision
 
@@ -77,11 +77,10 @@ class ResultRows:
 
     def __init__(self, folder: RunFolder) -> None:
         head = folder.head
-        metrics = head.get("metrics", ())
         self._hazards, self._scale, self._fault_paths = head["hazards"], folder.scale, fault_paths_of(head)
-        self._ends = T_END in (name for name, *_ in metrics)
+        self._ends = T_END in (metric.name for metric in head.metrics)
         self.columns = result_columns(
-            *(head["hazards"], head["compared"], metrics, severity_columns(head)),
+            *(head["hazards"], head["compared"], head.metrics, severity_columns(head)),
             paths=self._fault_paths is not None,
         )
         self._names = [column.name for column in self.columns]

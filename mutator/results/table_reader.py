@@ -167,8 +167,8 @@ class Results:
     def _metric_units(self, frame: "pd.DataFrame") -> dict[str, str]:
         """Return the units of the target's metrics; empty if the table is not in a run folder."""
         folder = self.path.parent
-        metrics = RunFolder.unverified(folder).head.get("metrics", ()) if RunFolder.exists(folder) else ()
-        return {name: unit for name, unit, *_ in metrics if name in frame}
+        metrics = RunFolder.unverified(folder).head.metrics if RunFolder.exists(folder) else ()
+        return {metric.name: metric.unit for metric in metrics if metric.name in frame}
 
     def propagation(self) -> "pd.DataFrame":
         """Return a frame of propagation.parquet, with a row for each channel that left golden."""

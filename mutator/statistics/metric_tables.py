@@ -10,6 +10,7 @@ from mutator.statistics.medians import median_interval
 from mutator.statistics.shares import share
 from mutator.statistics.sheet import Cell, Sheet
 from mutator.targets.severity import CLASSES
+from mutator.targets.target_facts import MetricFacts
 
 HIGHER = "higher"
 TOTAL = "total"
@@ -19,18 +20,17 @@ _INTERVAL = (
 )
 
 
-def metrics_sheet(frame: pd.DataFrame, metrics: Sequence[Sequence[str]]) -> Sheet:
-    """Tabulate the spread of each metric, given as (name, unit, meaning, worse direction). Without values,
-    the table has no lines.
-    """
+def metrics_sheet(frame: pd.DataFrame, metrics: Sequence[MetricFacts]) -> Sheet:
+    """Tabulate the spread of each metric. Without values, the table has no lines."""
     lines: list[tuple[Cell, ...]] = []
-    activated = frame.loc[frame["is_activated"], ["kind", "fault_id", *(name for name, *_ in metrics)]]
-    for name, unit, _, worse in metrics:
-        for kind, values, faults in _groups(activated, pd.to_numeric(activated[name])):
-            is_higher = worse == HIGHER
+    activated = frame.loc[frame["is_activated"], ["kind", "fault_id", *(metric.name for metric in metrics)]]
+    for metric in metrics:
+        column = (metric.name, metric.unit, metric.worse)
+        for kind, values, faults in _groups(activated, pd.to_numeric(activated[metric.name])):
+            is_higher = metric.worse == HIGHER
             bad = float(values.quantile(0.75 if is_higher else 0.25))
             worst = float(values.max() if is_higher else values.min())
-            lines.append((kind, name, unit, worse, len(values), *_median(values, faults), bad, worst))
+            lines.append((kind, *column, len(values), *_median(values, faults), bad, worst))
     return Sheet(
         name="metrics",
         title="Metrics by fault type",

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import fields
+from functools import cached_property
 from pathlib import Path
 from types import NoneType
 from typing import Any
@@ -11,8 +12,8 @@ from mutator._common.files import read_json
 from mutator._common.places import RUN_HEAD
 from mutator.errors import MutatorError
 from mutator.model import Limits
-from mutator.targets.channels import Role
 from mutator.targets.severity import Scale
+from mutator.targets.target_facts import ChannelFacts, MetricFacts
 
 SCHEMA, FIRST_SCHEMA = "run/3", "run/1"  # the first schema had neither digests nor checksums
 HEAD, CAMPAIGN = RUN_HEAD, "campaign.yaml"
@@ -62,7 +63,7 @@ _SHAPES: dict[str, Any] = {
     "stretches": [_STRETCH],
     "chunks": [[int]],
 }
-_SIZES = {"goldens": (2, 3), "chunks": (3,), "metrics": (4,), "channels": (5,)}  # allowed lengths of items
+_SIZES = {"goldens": (2, 3), "chunks": (3,), "metrics": (4,)}  # allowed lengths of items
 
 
 class Head(dict[str, Any]):
@@ -71,6 +72,14 @@ class Head(dict[str, Any]):
     def __init__(self, path: Path, content: Mapping[str, Any]) -> None:
         super().__init__(content)
         self.path = path
+
+    @cached_property
+    def channels(self) -> tuple[ChannelFacts, ...]:
+        return tuple(map(ChannelFacts.from_plain, self.get("channels", ())))
+
+    @cached_property
+    def metrics(self) -> tuple[MetricFacts, ...]:
+        return tuple(map(MetricFacts.from_plain, self.get("metrics", ())))
 
     def __missing__(self, key: str) -> Any:
         raise MutatorError(f"no key '{key}'", where=self.path, expected="a complete run.json", remedy=REMEDY)
@@ -104,7 +113,9 @@ def _wrong(head: Head) -> Iterator[str]:
     yield from (
         key for key, size in _SIZES.items() if any(len(item) not in size for item in head.get(key, ()))
     )
-    if not {role for _, _, role, *_ in head.get("channels", ())} <= {*Role}:
+    try:
+        _ = head.channels
+    except ValueError:
         yield "channels"
     try:
         if told := head.get("severity"):

@@ -129,7 +129,7 @@ def _spreads(run: ReportedRun) -> tuple[Sheet, ...]:
     made = (
         severity_sheet(run.frame),
         tolerant_times_sheet(run.frame, alerts=run.folder.has_alerts),
-        metrics_sheet(run.frame, run.folder.head.get("metrics", ())),
+        metrics_sheet(run.frame, run.folder.head.metrics),
     )
     return tuple(sheet for sheet in made if sheet.lines)
 

@@ -9,9 +9,10 @@ import pytest
 
 from mutator.audit.record_audit import Recorded, verdicts
 from mutator.model import Activation, Outcome, Record, Status
+from mutator.store.run_head import Head
 from mutator.targets.channels import Channel
 
-HEAD = {"hazards": ["H1", "H3"], "compared": ["gas", "brake"]}
+HEAD = Head(Path("run.json"), {"hazards": ["H1", "H3"], "compared": ["gas", "brake"]})
 MANIFEST: Any = SimpleNamespace(
     compared=[Channel(name="gas", unit="-"), Channel(name="brake", unit="-", tolerance=0.5)]
 )
@@ -42,7 +43,8 @@ def flaws(record: Record) -> list[str]:
 def test_deviations_must_fit_the_target_and_the_drive(
     record: MakeRecord, fields: dict[str, Any], told: str
 ) -> None:
-    head = HEAD | {"channels": [[name, "-", "internal", "", ""] for name in ("gas", "brake", "seen")]}
+    channels = [[name, "-", "internal", "", ""] for name in ("gas", "brake", "seen")]
+    head = Head(HEAD.path, HEAD | {"channels": channels})
     one = Recorded(Path("r.jsonl"), 7, record(**FINE | fields))
     found = [str(flaw) for flaw in verdicts(head, [one], MANIFEST)]
     assert (len(found) == 1 and told in found[0]) if told else not found

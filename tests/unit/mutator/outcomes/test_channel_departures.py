@@ -8,6 +8,7 @@ from mutator.outcomes.channel_departures import departures
 from mutator.outcomes.golden import compare
 from mutator.results.propagation import COLUMNS, columns_of
 from mutator.targets.channels import Channel
+from mutator.targets.target_facts import ChannelFacts
 
 T = np.arange(6) * 0.1
 ZEROS = np.zeros(6)
@@ -95,7 +96,7 @@ def test_the_table_keeps_the_order_of_records_and_departures() -> None:
         left=(("seen", 0.1 + 0.2, 2.5), ("gas", 0.4, 1.0)),
     )
     facts = [["gas", "-", "actuator", "pedals", ""], ["seen", "m", "internal", "eyes", ""]]
-    found = columns_of([record], facts)
+    found = columns_of([record], list(map(ChannelFacts.from_plain, facts)))
     assert list(found) == [column.name for column in COLUMNS]
     assert list(zip(*found.values(), strict=True)) == [
         ("e1", "seen", "eyes", "internal", 0.3, 2.5),

@@ -1,6 +1,7 @@
 """The paths of faults through a structure with two controllers, and through chains of components without a
 structure."""
 
+from dataclasses import replace
 from pathlib import Path as Folder
 from typing import Any
 
@@ -24,6 +25,7 @@ from mutator.model import (
 from mutator.outcomes.fault_paths import ComponentState, FaultPath, FaultPaths, LinkState, fault_paths_of
 from mutator.store.run_head import Head
 from mutator.stpa.analysis import StructureModel
+from mutator.targets.target_facts import ChannelFacts
 
 # eyes -> finder -> speed -> pedals -> car, and gauge -> wheel -> rack -> car; the gauge also feeds `speed`
 KINDS = {
@@ -63,12 +65,12 @@ STRUCTURE = StructureModel.model_validate(
     }
 )
 CHANNELS = [
-    ["seen", "m", "internal", "finder", ""],
-    ["wanted", "m/s", "internal", "speed", ""],
-    ["angle", "rad", "internal", "wheel", ""],
-    ["gas", "-", "actuator", "pedals", ""],
-    ["torque", "-", "actuator", "rack", ""],
-    ["place", "m", "truth", "car", ""],
+    ChannelFacts.from_plain(["seen", "m", "internal", "finder", ""]),
+    ChannelFacts.from_plain(["wanted", "m/s", "internal", "speed", ""]),
+    ChannelFacts.from_plain(["angle", "rad", "internal", "wheel", ""]),
+    ChannelFacts.from_plain(["gas", "-", "actuator", "pedals", ""]),
+    ChannelFacts.from_plain(["torque", "-", "actuator", "rack", ""]),
+    ChannelFacts.from_plain(["place", "m", "truth", "car", ""]),
 ]
 WAYS = FaultPaths(CHANNELS, STRUCTURE)
 
@@ -227,7 +229,8 @@ def test_the_first_changed_input_decides_between_fault_and_feedback(
     left: dict[str, float], state: ComponentState
 ) -> None:
     """The car moved differently before the speed control changed."""
-    fault_paths = FaultPaths([*CHANNELS, ["pace", "m/s", "internal", "gauge", ""]], STRUCTURE)
+    pace = ChannelFacts.from_plain(["pace", "m/s", "internal", "gauge", ""])
+    fault_paths = FaultPaths([*CHANNELS, pace], STRUCTURE)
     found = path("finder", "wheel", fault_paths=fault_paths, torque=1.0, place=1.1, wanted=1.5, **left)
     assert states(found)["speed"] is state
 
@@ -239,7 +242,7 @@ def test_a_component_with_a_single_input_is_reached_even_after_the_car() -> None
 
 
 def test_components_without_channels_are_unobserved() -> None:
-    fault_paths = FaultPaths([channel for channel in CHANNELS if channel[0] != "seen"], STRUCTURE)
+    fault_paths = FaultPaths([channel for channel in CHANNELS if channel.name != "seen"], STRUCTURE)
     found = path("eyes", fault_paths=fault_paths, wanted=1.2, gas=1.2, place=1.3)
     assert states(found)["finder"] is ComponentState.UNSEEN
     assert link_states(found)["picture"] is LinkState.UNKNOWN
@@ -276,9 +279,9 @@ def test_a_chain_has_feedback_too() -> None:
     """The fault is injected after the interface, whose channels change only after the car."""
     fault_paths = FaultPaths(
         [
-            ["seen", "", "internal", "interface", ""],
-            ["ask", "", "actuator", "control", ""],
-            ["gap", "", "truth", "car", ""],
+            ChannelFacts.from_plain(["seen", "", "internal", "interface", ""]),
+            ChannelFacts.from_plain(["ask", "", "actuator", "control", ""]),
+            ChannelFacts.from_plain(["gap", "", "truth", "car", ""]),
         ],
         None,
     )
@@ -306,11 +309,12 @@ def replace_links(links: dict[str, Any]) -> StructureModel:
 def test_the_structure_is_read_from_run_json() -> None:
     """Older runs have no components, so they have no paths."""
     structure = STRUCTURE.model_dump(mode="json", by_alias=True)
-    head = Head(Folder("run.json"), {"channels": CHANNELS, "structure": structure})
+    channels = [channel.plain() for channel in CHANNELS]
+    head = Head(Folder("run.json"), {"channels": channels, "structure": structure})
     found = fault_paths_of(head)
     assert found is not None and found.structure == STRUCTURE
     assert fault_paths_of(Head(Folder("run.json"), {})) is None
-    nothing = [[name, unit, role, "", about] for name, unit, role, _, about in CHANNELS]
+    nothing = [replace(channel, component="").plain() for channel in CHANNELS]
     assert fault_paths_of(Head(Folder("run.json"), {"channels": nothing, "structure": None})) is None
     structure["links"]["lead"]["to"] = 3
     with pytest.raises(MutatorError, match="structure"):

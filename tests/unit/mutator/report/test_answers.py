@@ -22,12 +22,13 @@ from mutator.report.warnings import NO_ALERT
 from mutator.results.column_facts import result_columns
 from mutator.results.rows import lines_of
 from mutator.store.run_folder import RunFolder
+from mutator.targets.target_facts import MetricFacts
 
 from .made_run import HEAD, make_run
 
 METRICS = [
-    ["margin_h1", "m", "how far it stayed from H1", "lower"],
-    ["contact_speed", "m/s", "closing speed at contact", "higher"],
+    MetricFacts("margin_h1", "m", "how far it stayed from H1", "lower"),
+    MetricFacts("contact_speed", "m/s", "closing speed at contact", "higher"),
 ]
 #  kind, outcome, t_activation, t_h1, alerts, t_alert, contact_speed, margin
 RUNS = [
@@ -44,7 +45,7 @@ RUNS = [
 
 @pytest.fixture
 def run(tmp_path: Path) -> ReportedRun:
-    make_run(tmp_path, metrics=METRICS)
+    make_run(tmp_path, metrics=[metric.plain() for metric in METRICS])
     columns = [c.name for c in result_columns(("H1",), ("gas",), METRICS)]
     with (tmp_path / "results.csv").open("w", newline="") as file:
         table = csv.DictWriter(file, columns, restval="")
@@ -183,7 +184,7 @@ def test_the_component_that_let_most_faults_through_is_named() -> None:
 
 def test_six_contacts_and_four_other_hazards_are_listed() -> None:
     frame = hazards(*[("a/hit", "S1", 1.0)] * 12, *[("b/miss", "", 1.0)] * 12)
-    hit, missed, _ = dangerous(frame, [["margin_h1", "m", "", "lower"]], has_alerts=True).listings
+    hit, missed, _ = dangerous(frame, [MetricFacts("margin_h1", "m", "", "lower")], has_alerts=True).listings
     assert (len(hit.lines), len(missed.lines)) == (6, 4)
     assert "severity" in hit.heads and "severity" not in missed.heads
     assert hit.lines[0][0] == Link("a/hit", "e=e0&outcome=hazard&severity=S1&sort=rank")

@@ -13,11 +13,12 @@ from mutator.outcomes.fault_paths import (
     PathLink,
 )
 from mutator.report.paths import PathCounts, RunPaths
+from mutator.targets.target_facts import ChannelFacts
 
 CHANNELS = [
-    ["seen", "m", "internal", "eyes", "what is seen"],
-    ["gas", "-", "actuator", "pedals", ""],
-    ["gap", "m", "truth", "car", ""],
+    ChannelFacts.from_plain(["seen", "m", "internal", "eyes", "what is seen"]),
+    ChannelFacts.from_plain(["gas", "-", "actuator", "pedals", ""]),
+    ChannelFacts.from_plain(["gap", "m", "truth", "car", ""]),
 ]
 
 

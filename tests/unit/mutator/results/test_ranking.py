@@ -7,8 +7,9 @@ from pathlib import Path
 from mutator.results.column_facts import SEVERITY, result_columns
 from mutator.results.ranking import places, worst, worth, worth_of
 from mutator.results.table_reader import Results
+from mutator.targets.target_facts import MetricFacts
 
-METRICS = [[name, "-", "", "lower"] for name in ("margin_h1", "margin_h2", "margin_h3", "delta_v")]
+METRICS = [MetricFacts(name, "-", "", "lower") for name in ("margin_h1", "margin_h2", "margin_h3", "delta_v")]
 COLUMNS = [column.name for column in result_columns(("H1", "H2", "H3"), ("gas",), METRICS, (SEVERITY,))]
 OK = {
     "module": "m",

@@ -233,7 +233,7 @@ def made_at_once(folder: RunFolder) -> dict[str, bytes]:
     writer.writerows(rows)
     lines = [line for _, line in sorted(folder.timings().items())]
     left = [(r.experiment_id, *one) for _, r in done for one in r.left]
-    facts = {name: (component, role) for name, _, role, component, _ in folder.head["channels"]}
+    facts = {channel.name: (channel.component, channel.role.value) for channel in folder.head.channels}
     cells = [(name, ch, *facts.get(ch, ("", "")), round(first, 6), most) for name, ch, first, most in left]
     left_names = [column.name for column in propagation.COLUMNS]
     return {

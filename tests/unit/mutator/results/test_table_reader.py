@@ -23,11 +23,12 @@ from mutator.exports.write import export
 from mutator.model import Experiment, Outcome, Status
 from mutator.report import building
 from mutator.results import table_building, table_cells
-from mutator.results.column_facts import SEVERITY, SINCE, metric_columns, result_columns
+from mutator.results.column_facts import SEVERITY, SINCE, result_columns
 from mutator.results.table_reader import Results, _table, same_parquet
 from mutator.statistics.frame import load
 from mutator.store import plan_file
 from mutator.targets.environment import THREADS
+from mutator.targets.target_facts import metric_facts
 from mutator.workspace import Workspace
 from tests.costs import is_cheap, is_refused
 
@@ -170,7 +171,7 @@ def test_a_real_run_fills_each_column(crane: Workspace, tmp_path: Path, write_ru
     record = run_single(crane, manifest, experiment, tmp_path / "single").record
     assert record.status is Status.OK
     compared = [channel.name for channel in manifest.compared]
-    columns = result_columns(manifest.hazards, compared, metric_columns(manifest), (SEVERITY, *SINCE))
+    columns = result_columns(manifest.hazards, compared, metric_facts(manifest), (SEVERITY, *SINCE))
     cells = table_cells.row(experiment, record, manifest.hazards)
     assert {*cells} == {column.name for column in columns}
     assert cells["max_dev_wheel"]

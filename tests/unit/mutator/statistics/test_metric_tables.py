@@ -9,8 +9,13 @@ import pytest
 from mutator.statistics import medians
 from mutator.statistics.medians import median_difference, median_interval
 from mutator.statistics.metric_tables import metrics_sheet, severity_sheet, tolerant_times_sheet
+from mutator.targets.target_facts import MetricFacts
 
-METRICS = [["t_end", "s", "x", "lower"], ["gap", "m", "x", "lower"], ["speed", "m/s", "x", "higher"]]
+METRICS = [
+    MetricFacts("t_end", "s", "x", "lower"),
+    MetricFacts("gap", "m", "x", "lower"),
+    MetricFacts("speed", "m/s", "x", "higher"),
+]
 FRAME = pd.DataFrame(
     {
         "kind": ["a/x"] * 5 + ["a/y", "a/y"],
