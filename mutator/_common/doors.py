@@ -32,7 +32,12 @@ class Door:
     @property
     def group(self) -> str:
         """The group of entry points."""
-        return f"mutator.{self.thing.replace(' ', '_')}s"
+        return f"mutator.{self.thing}s"
+
+    @property
+    def attribute(self) -> str:
+        """The name of the object in a shipped module."""
+        return self.thing.upper()
 
     def shipped(self) -> tuple[str, ...]:
         """Return the names of the shipped objects."""
@@ -62,7 +67,7 @@ class Door:
                 name, f"{self.thing} '{name}' comes from {' and '.join(owners)}", "uninstall all but one"
             )
         if is_shipped:
-            return _load_shipped(self.folder, self.thing, name)
+            return _load_shipped(self.folder, self.attribute, name)
         if not points:
             remedy = "correct the name, or install the package that adds it"
             raise self._refused(
@@ -97,9 +102,9 @@ def _shipped(folder: str) -> tuple[str, ...]:
 
 
 @cache
-def _load_shipped(folder: str, thing: str, name: str) -> Any:
+def _load_shipped(folder: str, attribute: str, name: str) -> Any:
     module = import_module(f"{folder}.{name.replace('-', '_')}")
-    return getattr(module, thing.upper().replace(" ", "_"))
+    return getattr(module, attribute)
 
 
 def _package(point: EntryPoint) -> str:

@@ -1,15 +1,19 @@
-"""Distribute a session's pending work to processes."""
+"""Distribute a session's pending work to processes.
 
-from pkgutil import resolve_name
+`--cluster` chooses how: a module in `distributors/`, or another package's (entry points of the group
+`mutator.distributors`).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Protocol
 
+from mutator._common.doors import DISTRIBUTORS
 from mutator.errors import MutatorError
-from mutator.execution.cluster.connecting import importing
-from mutator.execution.cluster.where import parse
 from mutator.execution.local import LocalWorkers
 from mutator.execution.session import Session
 
-_DASK = "mutator.execution.cluster.dask_workers:ClusterWorkers"
+_DEFAULT = "dask"
 
 
 class Distributor(Protocol):
@@ -23,9 +27,22 @@ class Distributor(Protocol):
     def run(self, session: Session) -> None: ...
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DistributorKind:
+    """A way to distribute work.
+
+    `open(where, insecure)` makes the distributor without opening a connection; MutatorError for an unusable
+    `where`, the text after `NAME:`. With `insecure`, it may use a network that others can reach.
+    """
+
+    about: str
+    open: Callable[[str, bool], Distributor]
+
+
 def distributor(cluster: str | None = None, *, insecure: bool = False) -> Distributor:
     """Make the distributor for a cluster or, without one, for this machine. Opens no connection.
 
+    A cluster is `NAME:WHERE` for a distributor of another package, and anything else is for Dask.
     MutatorError for an unusable cluster.
     """
     if cluster is None:
@@ -36,7 +53,9 @@ def distributor(cluster: str | None = None, *, insecure: bool = False) -> Distri
                 remedy="leave out `insecure_network`: without a cluster, all work runs on this machine",
             )
         return LocalWorkers()
-    where = parse(cluster)
-    with importing("cluster"):  # imported only on request, because the package is optional
-        deals: Distributor = resolve_name(_DASK)(where, insecure=insecure)
-    return deals
+    name, colon, where = cluster.partition(":")
+    if not (colon and DISTRIBUTORS.has(name)):
+        name, where = _DEFAULT, cluster
+    kind = DISTRIBUTORS.find(name)
+    assert isinstance(kind, DistributorKind)
+    return kind.open(where, insecure)

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from mutator._common.shipped import refuse_shipped
-from mutator.reference import api, cli, formats, models, recorded
+from mutator.reference import api, cli, doors, formats, models, recorded
 from mutator.reference.schemas import editor_schema, file_formats
 from mutator.workspace import Workspace
 
@@ -17,6 +17,7 @@ PAGES: dict[str, Callable[[Workspace], str]] = {
     "channels.md": recorded.channels,
     "cluster-file.md": formats.clusters,
     "cli.md": cli.command_line,
+    "doors.md": doors.doors_page,
     "fault-models.md": models.fault_models_page,
     "fault-spec.md": formats.fault_spec,
     "hazard-analysis.md": formats.hazard_analysis,

@@ -1,0 +1,128 @@
+"""Generate the page of doors: everything that can be added, and how."""
+
+import inspect
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pkgutil import resolve_name
+
+from mutator._common.doors import DISTRIBUTORS, EXPORTS, IMPORTERS, Door
+from mutator._common.tables import Table
+from mutator.reference.tables import generated
+from mutator.workspace import Workspace
+
+_INTRO = """\
+A door is a place where you add something to mutator. Most take one file.
+[CONTRIBUTING](../../CONTRIBUTING.md#add-something) says more about those inside the project.
+"""
+_PACKAGES = """\
+Another package adds these by an entry point. It is loaded only when somebody uses its name. If it cannot be
+loaded, is no object of the stated class, or has the name of another, the error names the package. Its code
+runs with your rights, so install only packages that you trust. Inside the project, the object is an attribute
+of a new module in the folder; the module's name is the object's name, with `_` for `-`.
+
+The package in `tests/fixtures/doors/` has an example of each.
+"""
+_EXAMPLES = {
+    EXPORTS.thing: ("a format of `mutator export`", "counts", "door_examples.counts:EXPORT"),
+    IMPORTERS.thing: ("a format of traces; its name is the suffix", "jsonl", "door_examples.jsonl:IMPORTER"),
+    DISTRIBUTORS.thing: (
+        "a way to run experiments elsewhere, chosen by `--cluster NAME:WHERE`",
+        "here",
+        "door_examples.here:DISTRIBUTOR",
+    ),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Place:
+    """A door that is no entry point, or has a page of its own."""
+
+    name: str
+    adds: str
+    protocol: str
+    register: str
+    example: str
+
+
+_PLACES = (
+    _Place(
+        name="fault model",
+        adds="what can go wrong in a statement",
+        protocol="a Jinja2 template and its YAML, with examples that are its tests",
+        register="put both into the library's `templates/`",
+        example="[Add a fault model](../how-to/add-a-fault-model.md)",
+    ),
+    _Place(
+        name="hazard, metric",
+        adds="what is judged and measured in a run, and its result columns",
+        protocol="a formula over channels",
+        register="write it into the target's manifest",
+        example="[Add a hazard](../how-to/add-a-hazard.md)",
+    ),
+    _Place(
+        name="target",
+        adds="another controller",
+        protocol="a manifest, and a class with `step()`",
+        register="put the manifest into the library's `targets/`",
+        example="[Add a target](../how-to/add-a-target.md)",
+    ),
+    _Place(
+        name="study",
+        adds="published results with which runs are compared",
+        protocol="`mutator.report.studies.Study`",
+        register="an entry point in the group `mutator.studies`",
+        example="[Add a study](../how-to/add-a-study.md)",
+    ),
+    _Place(
+        name="trigger kind",
+        adds="when a fault is active",
+        protocol="a function that makes a `Trigger` from a condition and a hold",
+        register="`mutator/triggers/kinds.py`; `READERS` and `TYPED` for the command line",
+        example="`always` in that module",
+    ),
+    _Place(
+        name="engine",
+        adds="how a run is executed",
+        protocol="`mutator.engines.kinds.EngineKind`",
+        register="`ENGINES` in `mutator/engines/kinds.py`",
+        example="`mutator/engines/reference.py`",
+    ),
+    _Place(
+        name="panel",
+        adds="a part of the report",
+        protocol="a function from a `ReportedRun` to a `Panel` or None",
+        register="`PANELS` in `mutator/report/panels/`",
+        example="`mutator/report/panels/origin.py`",
+    ),
+    _Place(
+        name="operator",
+        adds="mutants without a spec",
+        protocol="a generator of `Rule`s for an expression",
+        register="`mutator/operators/rules.py`, and its name in `names.py`",
+        example="[Mutation operators](operators.md)",
+    ),
+)
+
+
+def doors_page(workspace: Workspace) -> str:
+    heads = ("door", "what it adds", "protocol", "how to register", "example")
+    rows = [(f"**{p.name}**", p.adds, p.protocol, p.register, p.example) for p in _PLACES]
+    inside = Table(heads=heads, rows=rows).as_markdown(escape=False)
+    parts = [generated("Doors"), _INTRO, "## Entry points of other packages\n", _PACKAGES]
+    for door in (EXPORTS, IMPORTERS, DISTRIBUTORS):
+        parts += _section(door)
+    return "\n".join([*parts, "## Data and tables\n", inside]).rstrip() + "\n"
+
+
+def _section(door: Door) -> Iterator[str]:
+    adds, name, value = _EXAMPLES[door.thing]
+    kind = resolve_name(door.kind)
+    folder = door.folder.replace(".", "/")
+    yield f"### {door.thing.capitalize()}\n"
+    yield f"It adds {adds}. The object is a `{door.kind.replace(':', '.')}`."
+    yield f"Inside the project, it is the attribute `{door.attribute}` of a module in `{folder}/`.\n"
+    yield f"{inspect.cleandoc(kind.__doc__)}\n"
+    yield f'```toml\n[project.entry-points."{door.group}"]\n{name} = "{value}"\n```\n'
+    shipped = [(f"`{one}`", door.find(one).about) for one in door.shipped()]
+    yield Table(heads=(door.thing, "what it is"), rows=shipped).as_markdown(escape=False)
+    yield ""
