@@ -23,7 +23,6 @@ if TYPE_CHECKING:
         draw_control_structure,
         find_places,
         init_library,
-        upgrade_manifest,
     )
     from mutator.api.mutant_files import MutantSet
     from mutator.api.mutants import BuiltMutant, build_mutant
@@ -63,7 +62,6 @@ _HOMES = {
         "draw_control_structure",
         "find_places",
         "init_library",
-        "upgrade_manifest",
     ),
     "mutator.api.mutant_files": ("MutantSet",),
     "mutator.api.operator_mutants": ("OperatorChoice",),
@@ -139,7 +137,6 @@ __all__ = [
     "run",
     "seal",
     "try_fault",
-    "upgrade_manifest",
     "verify",
     "write_history",
 ]

@@ -236,7 +236,7 @@ def json_bytes(data: dict[str, Any]) -> bytes:
 
 
 def read_json(path: Path, schema: str) -> dict[str, Any]:
-    """Read a JSON object that has the schema `schema` (`name/version`) or an older version of it."""
+    """Read a JSON object that has the schema `schema` (`name/version`)."""
     try:
         data = read_bounded(path, MOST_JSON)
     except OSError as err:
@@ -259,16 +259,23 @@ def json_object(text: bytes, where: Path, schema: str) -> dict[str, Any]:
     return data
 
 
-def check_schema(found: object, schema: str, where: Path) -> None:
-    """Raise MutatorError unless `found` is `schema` (`name/version`) or an older version of it."""
-    name, _, known = schema.partition("/")
-    found_name, _, version = str(found).partition("/")
-    if found_name != name or not version.isdigit():
-        raise MutatorError(f"schema {found!r}", where=where, expected=repr(schema))
-    if int(version) > int(known):
-        raise MutatorError(
-            f"schema {found!r} was written by a newer mutator",
-            where=where,
-            expected=f"{schema!r} or older",
-            remedy="update mutator, or use another folder",
-        )
+def check_schema(
+    found: object, schema: str, where: str | Path, *, line: int | None = None, remedy: str | None = None
+) -> None:
+    """Raise MutatorError unless `found`, the schema of the file `where`, is `schema` (`name/version`).
+
+    `remedy` says what to do about another schema than that of a newer version.
+    """
+    if found == schema:
+        return
+    name, _, version = schema.partition("/")
+    number = re.fullmatch(rf"{name}/(\d{{1,6}})", str(found))
+    if number and int(number[1]) > int(version):
+        remedy = "use a newer version of mutator"
+    raise MutatorError(
+        "no schema" if found is None else f"schema {found!r}",
+        where=where,
+        line=line,
+        expected=schema,
+        remedy=remedy or "use the version of mutator that wrote it, or write it anew with this one",
+    )

@@ -71,7 +71,7 @@ class Audit:
 
     @property
     def seal(self) -> str | None:
-        """The seal computed from the content; None if the run is unfinished or not verifiable."""
+        """The seal computed from the content; None if the run is unfinished."""
         return self.seals.seal
 
     @property

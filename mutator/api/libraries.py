@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 
-from mutator._common.files import write_atomic
 from mutator._common.shipped import write_library
 from mutator.api.selection import WorkspaceLike, open_workspace
 from mutator.checks import fast_engines, library_check
@@ -22,9 +21,7 @@ from mutator.onboarding.survey import look_at
 from mutator.stpa.analysis import Analysis
 from mutator.stpa.checks import check_analysis
 from mutator.stpa.drawing import draw
-from mutator.targets import manifest_files
 from mutator.targets.locations import check_file
-from mutator.targets.upgrade import Upgrade
 from mutator.workspace import Workspace
 
 
@@ -48,18 +45,6 @@ def init_library(folder: str | Path, *, target: str | PathLike[str] | None = Non
 def unfilled_places(folder: str | Path) -> list[MutatorError]:
     """Return the places in a new library that you still have to fill in."""
     return list(unfilled(Path(folder)))
-
-
-def upgrade_manifest(path: str | Path) -> Upgrade | None:
-    """Rewrite a target's manifest of an older schema in the current schema; return None if it is up to date.
-
-    The result's `lost` lists the comments that rewritten lines lost; other lines stay unchanged.
-    MutatorError for a file that is not a manifest.
-    """
-    upgrade = manifest_files.upgrade_manifest(Path(path))
-    if upgrade is not None:
-        write_atomic(Path(path).resolve(), upgrade.text.encode())  # keep a symbolic link
-    return upgrade
 
 
 def check_library(workspace: WorkspaceLike = None, *, target: str | None = None) -> list[MutatorError]:

@@ -43,8 +43,6 @@ class RunContents(StoredRun):
     def propagation(self) -> "pd.DataFrame":
         """Return, for each experiment, one row for each channel that differs from the golden run, with the
         columns of propagation.parquet.
-
-        MutatorError for a run of an older version that did not record these differences.
         """
         return Results.up_to_date(self.path).propagation()
 

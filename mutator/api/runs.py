@@ -14,7 +14,7 @@ from mutator.api.html import facts_html, text_html
 from mutator.api.run_contents import RunContents
 from mutator.api.run_experiments import RunExperiment
 from mutator.api.selection import WorkspaceLike, open_workspace
-from mutator.audit.seal import Seals, not_verifiable, seals_of
+from mutator.audit.seal import Seals, seals_of
 from mutator.errors import MutatorError
 from mutator.execution.merging import merge
 from mutator.execution.session import Notify, Summary
@@ -75,8 +75,7 @@ class Run(RunContents):
         done = f"{sum(self.endings.values())} of {self.folder.planned} experiments"
         failed = len(self.harness_errors)
         errors = f", {failed} with a HARNESS ERROR" if failed else ""
-        old = "" if self.verifiable else f", {not_verifiable(self.folder)}"
-        return f"<Run {self.path.name}: {done} of {head['campaign']}, {head['reading']}{errors}{old}>"
+        return f"<Run {self.path.name}: {done} of {head['campaign']}, {head['reading']}{errors}>"
 
     def _repr_html_(self) -> str:
         note = known_alerts_note(self)
@@ -90,7 +89,7 @@ class Run(RunContents):
 
     @property
     def seal(self) -> str | None:
-        """The run's seal; None for a run that is unfinished or not verifiable."""
+        """The run's seal; None for a run that is unfinished."""
         return self.seals.seal
 
     def counts(self) -> Table:

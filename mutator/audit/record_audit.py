@@ -41,7 +41,7 @@ def recorded(folder: RunFolder, kind: str) -> list[Recorded]:
     """Return the readable records of one kind, without harness errors."""
     found = []
     for path in sorted(path for path in inside(folder.path, kind).glob("*.jsonl") if path.is_file()):
-        segment = read_segment(path, checksums=folder.verifiable)
+        segment = read_segment(path)
         for number in segment.lines:
             try:
                 record = record_from(segment.content(number))
@@ -74,7 +74,7 @@ def mutants(
         tree, patch = built[key]
         if one.record.tree != tree:
             yield one.difference(f"tree {one.record.tree[:16] or 'none'}", tree[:16] or "none")
-        if folder.verifiable and one.record.patch != patch:
+        if one.record.patch != patch:
             yield one.difference(f"patch {one.record.patch[:16] or 'none'}", patch[:16] or "none")
         stored = folder.patches.read(one.record.experiment_id)
         found = "" if stored is None else digest(stored)
@@ -86,7 +86,7 @@ def mutants(
             expected = f"the mutant's patch, {patch[:16]}" if patch else none
             yield MutatorError(got, where=where, expected=expected)
     known = {one.record.experiment_id for one in records}
-    for name in folder.patches if folder.verifiable and folder.finished else ():
+    for name in folder.patches if folder.finished else ():
         if name not in known:
             got, where = (
                 f"a patch of {name}, which is not an experiment of this run",
@@ -224,7 +224,7 @@ def proof(
         if one.record.experiment_id not in sampled:
             yield one.difference("in the proof", "only experiments of the sample that the plan determines")
     missing = sorted(sampled - {one.record.experiment_id for one in proven})
-    if folder.verifiable and folder.finished and missing:
+    if folder.finished and missing:
         yield MutatorError(
             f"no record of {missing[0]}", where=place, expected="a record of each sampled experiment"
         )

@@ -18,7 +18,7 @@ from mutator.audit.head_audit import (
     short,
 )
 from mutator.audit.record_audit import mutants, proof, recorded, verdicts
-from mutator.audit.seal import golden_digests, not_verifiable
+from mutator.audit.seal import golden_digests
 from mutator.audit.series_audit import series
 from mutator.audit.table_audit import tables
 from mutator.campaigns.freezing import CSV, plan_csv
@@ -115,16 +115,12 @@ def audit_checks(folder: RunFolder, workspace: Workspace | None) -> list[Check]:
 def _files(folder: RunFolder) -> int:
     """Return the number of files with digests."""
     try:
-        return len(digests.read(folder.path).names) if folder.verifiable else 0
+        return len(digests.read(folder.path).names)
     except MutatorError:
         return 0
 
 
 def _content(folder: RunFolder) -> Problems:
-    if not folder.verifiable:
-        yield MutatorError(
-            not_verifiable(folder), where=folder.path / HEAD, expected="a run made with this version"
-        )
     yield from folder.problems(anew=True)
     for path in filter(Path.is_file, folder.patches.files()):
         if read_blocks(path).damaged:

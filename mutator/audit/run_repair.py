@@ -38,16 +38,9 @@ _Change = tuple[str, bytes | None, str]  # file, new content (None: removed), se
 def repair(folder: RunFolder, workspace: Workspace | None = None) -> list[str]:
     """Move damaged files, lines, patches and series to `damaged/`; return a sentence for each action.
 
-    With a `workspace`, golden series are rebuilt. Raises MutatorError if a command is using the folder, its
-    schema is older, or the plan is damaged.
+    With a `workspace`, golden series are rebuilt. Raises MutatorError if a command is using the folder
+    or the plan is damaged.
     """
-    if not folder.verifiable:
-        raise MutatorError(
-            f"{folder.head['schema']} has no checksums",
-            where=folder.path,
-            expected="a run made with this version",
-            remedy="restore the damaged file from a copy of the run folder",
-        )
     with owned(folder.path, patience_s=0.0), raising_disk_full(folder.path):
         renewed = list(_renewed_ledger(folder))
         ledger = digests.settled(folder.path)

@@ -50,7 +50,7 @@ _APPROVALS = "only the review digest covers who approved what"
 class Seals:
     """The digests of a run to publish or sign, 64 hex digits each."""
 
-    seal: str | None = None  #: the seal; None for a run that is unfinished or not verifiable
+    seal: str | None = None  #: the seal; None for a run that is unfinished
     results_digest: str | None = None  #: the results digest; None like the seal
     review_digest: str | None = None  #: the review digest; None for a run without `reviewed.json`
 
@@ -95,12 +95,7 @@ def seal_of(folder: RunFolder) -> str | None:
 
 def seal_or_why_not(folder: RunFolder) -> dict[str, str]:
     """Return the texts of `seals_of`; the seal of a run without one is the reason."""
-    none = "the run is not finished" if folder.verifiable else not_verifiable(folder)
-    return {"seal": f"none: {none}"} | seals_of(folder).texts()
-
-
-def not_verifiable(folder: RunFolder) -> str:
-    return f"not verifiable, because {folder.head['schema']} has no digests"
+    return {"seal": "none: the run is not finished"} | seals_of(folder).texts()
 
 
 def without(content: Mapping[str, Any], paths: Iterable[str]) -> dict[str, Any]:
@@ -158,8 +153,8 @@ def _records(
     """Digest of what is `sealed` of each valid record's line without its checksum, by experiment id."""
     found = {}
     for path in sorted(inside(folder.path, kind).glob("*.jsonl")):
-        segment = bare_segment(path, checksums=True)
-        for number, line in intact_lines(path, checksums=True):
+        segment = bare_segment(path)
+        for number, line in intact_lines(path):
             if number > 1 and (ending := ending_on(line)).counts:
                 found[ending.experiment_id] = digest(sealed(segment.body_of(line)))
     return found

@@ -105,7 +105,7 @@ def load_campaign(path: Path) -> Campaign:
 
     The study need not be installed, so that old runs can be read. `load_study` checks it.
     """
-    model, source = read(path, CampaignModel, SCHEMA, older={SCHEMA: with_list})
+    model, source = read(path, CampaignModel, SCHEMA, prepare=with_list)
     _check_once(model, source)
     triggers = model.triggers
     for keys, name in {("target",): model.target, ("triggers", "table"): triggers.table or ""}.items():

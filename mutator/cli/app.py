@@ -58,7 +58,7 @@ EXIT_CODES = {
 THE_MACHINE_SAYS_NO = {errno.EACCES, errno.EPERM, errno.EROFS}
 
 GROUPS = (
-    ("Look around", ("list", "places", "init", "upgrade", "stpa", "check", "doctor", "cache")),
+    ("Look around", ("list", "places", "init", "stpa", "check", "doctor", "cache")),
     ("One fault", ("try", "diff", "generate")),
     ("Before a campaign", ("review",)),
     ("Campaigns", ("plan", "run", "merge", "report", "clean")),

@@ -110,4 +110,4 @@ def seal(
     if sign:
         terminal.say(f"signed: {short_path(run / 'seal.json.sig')}")
     elif not seals.seal:
-        terminal.say("seal: none: the run is not finished, or not verifiable")
+        terminal.say("seal: none: the run is not finished")

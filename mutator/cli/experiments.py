@@ -126,7 +126,7 @@ def _facts(found: "StoredExperiment", patch: str, drawn: Path | None) -> dict[st
 
     facts = {**describe(found.experiment), **found.verdict, "patch": patch}
     facts |= {"run": str(found.run.path), "plot": str(drawn) if drawn else None}
-    facts |= {"run_with": found.stretch, "verifiable": found.run.verifiable, "has_series": found.has_series}
+    facts |= {"run_with": found.stretch, "has_series": found.has_series}
     return facts | {"path": asdict(found.fault_path) if found.fault_path else None}
 
 
@@ -141,8 +141,6 @@ def _print(terminal: Terminal, found: "StoredExperiment", patch: str) -> None:
         experiment_view.print_path(terminal, found)
     if found.stretch:
         terminal.say(f"recorded on: {found.stretch}")
-    if not found.run.verifiable:
-        terminal.say("not verifiable: an older version of mutator wrote this run, without digests")
 
 
 def _plot(terminal: Terminal, found: "RunExperiment", *, anew: bool) -> Path | None:

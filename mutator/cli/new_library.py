@@ -1,4 +1,4 @@
-"""`init` and `upgrade`: create a library, and upgrade manifests."""
+"""`init`: create a library."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -21,7 +21,6 @@ Examples:
 
 def register(app: typer.Typer) -> None:
     app.command("init", epilog=INIT_EXAMPLES)(init)
-    app.command("upgrade")(upgrade)
 
 
 def init(
@@ -54,26 +53,3 @@ def init(
     if as_json:
         terminal.emit(told)
     terminal.say(f"{short_path(folder)}: {held} and a README.md with the next steps")
-
-
-def upgrade(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="A target's manifest.")],
-    as_json: Json = False,
-) -> None:
-    """Rewrite an older manifest in the current schema.
-
-    Lines that are the same in both schemas stay unchanged. Comments inside rewritten lines are printed, so
-    that you can put them back.
-    """
-    terminal = Terminal(as_json)
-    done = mutator.upgrade_manifest(file)
-    if as_json:
-        terminal.emit(
-            {"file": str(file), "upgraded": done is not None, "lost": list(done.lost) if done else []}
-        )
-    if done is None:
-        terminal.say(f"{short_path(file)}: up to date, nothing to do")
-        return
-    terminal.say(f"{short_path(file)}: upgraded to the current schema")
-    for comment in done.lost:
-        terminal.say(f"  left out: {comment}")

@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from mutator.audit.seal import not_verifiable
 from mutator.comparison.pairs import Matching, Pair
 from mutator.comparison.sides import Side
 from mutator.store.run_folder import RunFolder
@@ -81,7 +80,7 @@ def _files(head: Mapping[str, Any]) -> dict[str, str] | None:
 
 
 def remarks(a: Side, b: Side, matching: Matching) -> tuple[str, ...]:
-    """Remarks on runs that cannot be verified, and on the number of pairs that differ in each input."""
+    """Return remarks on the number of pairs that differ in each input."""
     told: tuple[tuple[str, Callable[[Pair], bool]], ...] = (
         ("with different injections", lambda p: p.a.fault.injections != p.b.fault.injections),
         ("with different trigger conditions", lambda p: p.a.trigger.condition != p.b.trigger.condition),
@@ -93,12 +92,8 @@ def remarks(a: Side, b: Side, matching: Matching) -> tuple[str, ...]:
             lambda p: p.a.after_hazard != p.b.after_hazard,
         ),
     )
-    old = (side for side in (a, b) if not side.folder.verifiable)
     counts = ((_count(matching.pairs, differs), what) for what, differs in told)
-    return (
-        *(f"The content of {side.name} is {not_verifiable(side.folder)}." for side in old),
-        *(f"Pairs {what}: {n} of {len(matching.pairs)}." for n, what in counts if n),
-    )
+    return tuple(f"Pairs {what}: {n} of {len(matching.pairs)}." for n, what in counts if n)
 
 
 def parts_remark(a: Side, b: Side) -> str:

@@ -5,7 +5,7 @@ expand to gigabytes), and without multiple documents or duplicate keys.
 """
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +15,7 @@ import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from mutator._common.bounded import read_bounded
+from mutator._common.files import check_schema
 from mutator._common.text import counted, shown
 from mutator.config import problems
 from mutator.errors import MutatorError
@@ -27,7 +28,6 @@ MAX_DEPTH = 40  # nested lists and mappings
 MAX_VALUES = 100_000  # keys, texts, numbers, lists and mappings
 _LINE_BREAK = re.compile(r"\r\n|[\r\n\x85\u2028\u2029]")
 _DIRECTIVE = re.compile(r"(?:\A\ufeff?|[\r\n\x85\u2028\u2029])%")
-_SCHEMA = re.compile(r"([a-z_]+)/(\d{1,6})\Z")
 _CORE = {
     "bool": ("tTfF", r"true|True|TRUE|false|False|FALSE"),
     "null": ("~nN\0", r"~|null|Null|NULL|"),
@@ -229,12 +229,11 @@ def _scalar(kind: str, text: str) -> Any:
 
 
 def read(
-    path: Path, model: type[M], schema: str, older: Mapping[str, Callable[[Source], Source]] | None = None
+    path: Path, model: type[M], schema: str, prepare: Callable[[Source], Source] | None = None
 ) -> tuple[M, Source]:
     """Parse `path`, check its key `schema: name/version` against `schema`, and validate the rest as `model`.
 
-    `older` maps older schemas to functions that convert a file to `schema`. MutatorError for an invalid file
-    or a newer version.
+    `prepare` changes the content before it is validated. MutatorError for an invalid file or another schema.
     """
     source = load(path)
     if not isinstance(source.data, dict):
@@ -244,11 +243,10 @@ def read(
             expected="a mapping of keys to values",
             remedy="write `key: value` lines",
         )
-    given = source.data.get("schema")
-    if older and isinstance(given, str) and given in older:
-        source = older[given](source)
-    else:
-        _check_schema(source, schema)
+    remedy = f"start the file with `schema: {schema}`, and follow its page"
+    check_schema(source.data.get("schema"), schema, path, line=source.line(("schema",)), remedy=remedy)
+    if prepare is not None:
+        source = prepare(source)
     body = {key: value for key, value in source.data.items() if key != "schema"}
     try:
         return model.model_validate(body), source
@@ -258,17 +256,3 @@ def read(
         if len(found) > 1:
             remedy += f" ({counted(len(found) - 1, 'more mistake')} after this one)"
         raise source.error(keys, got, expected=expected, remedy=remedy) from None
-
-
-def _check_schema(source: Source, schema: str) -> None:
-    given = source.data.get("schema")
-    if given == schema:
-        return
-    name, _, version = schema.partition("/")
-    match = _SCHEMA.match(given) if isinstance(given, str) else None
-    remedy = f"start the file with `schema: {schema}`"
-    if match and match[1] == name:
-        newer = int(match[2]) > int(version)
-        remedy = "use a newer version of mutator" if newer else f"update the file to {schema}"
-    got = f"schema {given!r}" if "schema" in source.data else "no schema key"
-    raise source.error(("schema",), got, expected=schema, remedy=remedy)

@@ -106,7 +106,7 @@ def is_same(folder: RunFolder, known: Record | None, found: Record) -> bool:
     if known is None:
         return True
     folder.read_patch(known.experiment_id, known)
-    return known == folder.comparable(found)
+    return known == found
 
 
 def manifest_of(workspace: Workspace, folder: RunFolder) -> TargetManifest:

@@ -40,7 +40,7 @@ def driven_again(workspace: Workspace, folder: RunFolder, ids: Sequence[str]) ->
                 limits=folder.limits,
                 golden=golden if golden.is_dir() else None,
             )
-            known, found = records[name], folder.comparable(single.record)
+            known, found = records[name], single.record
             if known != found:
                 yield MutatorError(
                     f"{name} rerun: {equivalence.difference(found, known)}",

@@ -21,7 +21,7 @@ from mutator.results.table_reader import Results
 from mutator.store.run_folder import RunFolder
 from mutator.web import asset
 
-FILES = ("HISTORY.md", "report/history.html")
+FILES = ("HISTORY.md", "history.html")
 _HEADS = (
     "run",
     "date (UTC)",

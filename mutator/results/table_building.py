@@ -149,16 +149,12 @@ def _stamp(folder: RunFolder) -> dict[str, Any]:
 
 
 def _unedited(folder: RunFolder, now: Mapping[str, str]) -> dict[str, str]:
-    """Return the digests of the tables that a build wrote, and warn about tables that were edited since.
-
-    Older folders without results.json cannot be checked.
-    """
+    """Return the digests of the tables that a build wrote, and warn about tables that were edited since."""
     stamp = _stamp(folder)
-    tells = folder.verifiable or stamp.get("made_from")
     found = {name: one for name, one in _found(folder).items() if one is not None}
     made = {name: (now[name], stamp["tables"].get(name), stamp["before"].get(name)) for name in found}
     for name in found:
-        if tells and found[name] not in made[name]:
+        if found[name] not in made[name]:
             text = f"{folder.path / name}: the table did not match the plan and records, so it was rebuilt"
             warnings.warn(text, MutatorWarning, stacklevel=2)
     return {name: one for name, one in found.items() if one in made[name]}

@@ -175,15 +175,7 @@ class Results:
         return _frame(self.propagation_parquet())
 
     def propagation_parquet(self) -> bytes:
-        path = self.path.with_name(table_building.PROPAGATION)
-        if not path.exists():
-            raise MutatorError(
-                "no propagation was recorded",
-                where=self.path.parent,
-                expected=f"{table_building.PROPAGATION}, which runs of this version of mutator have",
-                remedy="rerun the campaign into another folder",
-            )
-        return self._read(path)
+        return self._read(self.path.with_name(table_building.PROPAGATION))
 
     def timings(self) -> "pd.DataFrame":
         """Return a frame of timings.parquet, with a row for each experiment that ran."""

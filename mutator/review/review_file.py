@@ -1,31 +1,23 @@
-"""The file of a target's reviews: YAML for version control, one sorted block for each group.
-
-Blocks of `review/1`, which had a group for each kind of trigger, are converted.
-"""
+"""The file of a target's reviews: YAML for version control, one sorted block for each group."""
 
 import json
-import re
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import Field
 
-from mutator._common.hashing import content_id
 from mutator.config.yaml_files import Source, StrictModel, read
 from mutator.review.entries import Bound, Decision, Entry, Flag, Remark, Verdict
 
 SCHEMA = "review/2"
-_FIRST = "review/1"
 _HEAD = """\
 # Reviews of this target's groups of mutants. `mutator review` reads and writes this file.
 # A decision is valid while diff, function, template and calls are unchanged and all values are in its ranges.
 """
-_WHEN = re.compile(r"; (?:always|time|state), (?:while|for|to_end)\Z")  # at the end of `what` in review/1
 _DIGEST = r"^[0-9a-f]{16}$"
 _TIME = r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ$"
-_DIFFERS = "0" * 16  # for digests that differ between merged old decisions, which makes the decision invalid
 _NEEDED = ("by", "diff", "function", "template")
 
 
@@ -71,7 +63,7 @@ class Content:
 
 def load(path: Path, target: str) -> Content:
     """Read an existing file for `target`; MutatorError, with the line, for a mistake."""
-    model, source = read(path, _FileModel, SCHEMA, older={_FIRST: _from_first})
+    model, source = read(path, _FileModel, SCHEMA)
     if model.target != target:
         raise source.error(
             ("target",), f"target '{model.target}'", expected=f"'{target}', as in the file name"
@@ -86,8 +78,6 @@ def load(path: Path, target: str) -> Content:
                 remedy="keep the valid one",
             )
         entries[block.group] = _entry(block, source, i)
-    if source.data["schema"] == _FIRST:
-        entries = _merged(target, entries.values())
     return Content(entries=entries, four_eyes=model.four_eyes)
 
 
@@ -171,53 +161,3 @@ def _given(remark: Remark) -> dict[str, str]:
 def _json(value: Any) -> str:
     """Return the value as one line of JSON, which is also YAML."""
     return json.dumps(value, ensure_ascii=False)
-
-
-# `review/1`: a group for each kind of trigger, a remark with the decision
-
-
-def _from_first(source: Source) -> Source:
-    """Convert the blocks of a `review/1` file; invalid parts are left unchanged."""
-    blocks = source.data.get("decisions")
-    if not isinstance(blocks, list):
-        return source
-    made = [_new_block(block) if isinstance(block, dict) else block for block in blocks]
-    return replace(source, data={**source.data, "decisions": made})
-
-
-def _new_block(block: dict[str, Any]) -> dict[str, Any]:
-    remark = block.get("remark")
-    if not isinstance(remark, str) or not isinstance(block.get("by"), str):
-        return block
-    kept = {name: value for name, value in block.items() if name != "remark"}
-    return kept | ({"remarks": [{"by": block["by"], "text": remark}]} if remark.strip() else {})
-
-
-def _merged(target: str, entries: Iterable[Entry]) -> dict[str, Entry]:
-    """Merge the entries of groups that differed only in the kind of trigger."""
-    found: dict[tuple[str, str], list[Entry]] = {}
-    for entry in entries:
-        what = _WHEN.sub("", entry.what)
-        known = entry.group == content_id([target, entry.what])[:12]
-        key = (content_id([target, what])[:12], what) if known else (entry.group, entry.what)
-        found.setdefault(key, []).append(entry)
-    return {group: _one(group, what, parts) for (group, what), parts in found.items()}
-
-
-def _one(group: str, what: str, parts: Sequence[Entry]) -> Entry:
-    """Merge decisions: rejected if any part was rejected, else approved. `by` names all reviewers with that
-    verdict.
-    """
-    decisions = [entry.decision for entry in parts if entry.decision]
-    remarks = tuple(dict.fromkeys(remark for entry in parts for remark in entry.remarks))
-    counting = [one for one in decisions if one.verdict is Verdict.REJECTED] or decisions
-    if not counting:
-        return Entry(group=group, what=what, remarks=remarks)
-    names = dict.fromkeys(one.by for one in counting)
-    first = counting[0]
-    bound = {
-        name: digest if all(getattr(one.bound, name) == digest for one in counting) else _DIFFERS
-        for name, digest in asdict(first.bound).items()
-    }
-    decision = replace(first, group=group, what=what, by=" and ".join(names), bound=Bound(**bound))
-    return Entry(group=group, what=what, decision=decision, remarks=remarks)

@@ -3,7 +3,6 @@
 The index of a million experiments takes about 200 MB; their records as objects would take 5 GB.
 """
 
-import json
 import os
 import re
 from array import array
@@ -35,10 +34,8 @@ class IndexedLines(Mapping[str, T], Generic[T]):
         schema: str,
         made: Callable[[dict[str, Any]], T],
         replaces: Callable[["Line", "Line"], bool],
-        *,
-        checksums: bool,
     ) -> None:
-        self._made, self._checksums = made, checksums
+        self._made = made
         self._files = Files(list(paths))
         self._index: dict[str, int] = {}
         self._last: tuple[str, T] | None = None  # because some callers read an experiment twice in a row
@@ -47,7 +44,7 @@ class IndexedLines(Mapping[str, T], Generic[T]):
             self._read(file, path, schema, replaces)
 
     def _read(self, file: int, path: Path, schema: str, replaces: Callable[["Line", "Line"], bool]) -> None:
-        for number, offset, data in verified_lines(path, schema, checksums=self._checksums):
+        for number, offset, data in verified_lines(path, schema):
             name = _name(data)
             if name is None:
                 raise self._problem(path, number)
@@ -92,7 +89,7 @@ class IndexedLines(Mapping[str, T], Generic[T]):
         return self._problem(line.path, line.number)
 
     def _problem(self, path: Path, number: int) -> MutatorError:
-        return bare_segment(path, checksums=self._checksums).problem(number)
+        return bare_segment(path).problem(number)
 
 
 class Line:
@@ -109,12 +106,8 @@ class Line:
 
 
 def _name(data: bytes) -> str | None:
-    if found := _ID.search(data):
-        return found[1].decode()
-    try:
-        return str(json.loads(data)["experiment_id"])  # the JSON of older folders has spaces
-    except (KeyError, TypeError, ValueError, RecursionError):
-        return None
+    found = _ID.search(data)
+    return found[1].decode() if found else None
 
 
 class Files:

@@ -1,7 +1,6 @@
 """Check that a run folder is unchanged before anything in it is used.
 
-Files are compared with `digests.json`, lines with their checksums, and records with the plan. Folders of the
-first schema have no digests or checksums, so only their ids are checked.
+Files are compared with `digests.json`, lines with their checksums, and records with the plan.
 """
 
 from collections.abc import Collection, Iterator, Mapping
@@ -29,30 +28,29 @@ _MANY = 5  # at most this many experiments are named in one message
 
 
 def problems(
-    run: Path, head: Head, ledger: Ledger | None, shard: Shard | None, *, anew: bool = False
+    run: Path, head: Head, ledger: Ledger, shard: Shard | None, *, anew: bool = False
 ) -> Iterator[MutatorError]:
     """Yield every problem of a run folder in which `shard` runs.
 
     For a finished run that this machine has verified before, only file bytes are compared, unless `anew`.
     """
     key = ""
-    if ledger is not None:
-        found = digests_of(run, ledger)
-        wrong = [*file_problems(run, ledger, found), *_open_segments(run, ledger)]
-        yield from wrong
-        if ledger.finished:
-            others = [
-                MutatorError(
-                    f"not named in {digests.FILE}",
-                    where=path,
-                    expected="only files that the finished run wrote",
-                    remedy=_remedy(run, ""),
-                )
-                for path in strangers(run, ledger)
-            ]
-            yield from others
-            wrong += others
-            key = "" if wrong or ledger.rewriting else key_of(run, found)
+    found = digests_of(run, ledger)
+    wrong = [*file_problems(run, ledger, found), *_open_segments(run, ledger)]
+    yield from wrong
+    if ledger.finished:
+        others = [
+            MutatorError(
+                f"not named in {digests.FILE}",
+                where=path,
+                expected="only files that the finished run wrote",
+                remedy=_remedy(run, ""),
+            )
+            for path in strangers(run, ledger)
+        ]
+        yield from others
+        wrong += others
+        key = "" if wrong or ledger.rewriting else key_of(run, found)
     if key and not anew and verified_runs.recall(key).get("verified"):
         return
     try:
@@ -190,24 +188,21 @@ def strangers(run: Path, ledger: Ledger) -> Iterator[Path]:
             yield path
 
 
-def id_problems(
-    run: Path, head: Head, ledger: Ledger | None, planned: Collection[str]
-) -> Iterator[MutatorError]:
+def id_problems(run: Path, head: Head, ledger: Ledger, planned: Collection[str]) -> Iterator[MutatorError]:
     """Yield a problem for each unplanned, duplicate or missing record."""
-    patches = Patches(run) if ledger is not None else None
-    stored = dict(patches.digests()) if patches is not None else {}
+    patches = Patches(run)
+    stored = dict(patches.digests())
     for kind in digests.SEGMENTS:
         done: dict[str, int] = {}  # id -> hash of its final record
         for path in sorted((run / kind).glob("*.jsonl")):
-            segment = bare_segment(path, checksums=ledger is not None)
-            lines = intact_lines(path, checksums=segment.checksums)
+            segment, lines = bare_segment(path), intact_lines(path)
             try:
                 yield from _head_problem(segment, lines, head["plan"])
                 for number, name, patch, content in _counted(segment, lines, planned):
                     if isinstance(name, MutatorError):
                         yield name
                         continue
-                    if patches is not None and kind == "records" and stored.get(name, "") != patch:
+                    if kind == "records" and stored.get(name, "") != patch:
                         yield from patch_problems(patches, name, patch, path.stem)
                     if name in done:
                         yield second_record(path, number, name, same=done[name] == content)
@@ -215,7 +210,7 @@ def id_problems(
             except MutatorError as err:
                 yield err
         missing = [name for name in planned if name not in done]
-        if ledger is not None and ledger.finished and kind == "records" and missing:
+        if ledger.finished and kind == "records" and missing:
             more = f" and {len(missing) - _MANY} more" if len(missing) > _MANY else ""
             yield MutatorError(
                 f"no record of {', '.join(missing[:_MANY])}{more}",

@@ -103,7 +103,6 @@ class Segment:
     """
 
     path: Path
-    checksums: bool
     lines: Mapping[int, bytes]
     damaged: tuple[int, ...]
     end: int
@@ -115,8 +114,8 @@ class Segment:
             "a damaged line",
             where=self.path,
             line=number,
-            expected="bytes that match its checksum" if self.checksums else "a whole JSON object",
-            remedy=mend if self.checksums else "restore the file from a copy of the run folder",
+            expected="bytes that match its checksum",
+            remedy=mend,
         )
 
     def content(self, number: int) -> dict[str, Any]:
@@ -135,7 +134,7 @@ class Segment:
         return self.body_of(self.lines[number])
 
     def body_of(self, line: bytes) -> bytes:
-        return line[_BODY if self.checksums else 0 :]
+        return line[_BODY:]
 
     def check_head(self, schema: str) -> None:
         """Raise MutatorError for another schema, or a file that was written under another name."""
@@ -143,9 +142,7 @@ class Segment:
             return
         head = self.content(1)
         check_schema(head.get("schema"), schema, self.path)
-        if self.checksums != (head["schema"] == schema):
-            raise MutatorError(f"schema {head['schema']!r} in a folder of another schema", where=self.path)
-        if self.checksums and head.get("file") != _name(self.path):
+        if head.get("file") != _name(self.path):
             raise MutatorError(
                 f"was written as {head.get('file')}",
                 where=self.path,
@@ -164,11 +161,9 @@ class Segment:
         yield from ((number, self.content(number)) for number in self.lines if number > 1)
 
 
-def read_segment(path: Path, data: bytes | None = None, *, checksums: bool = True) -> Segment:
-    """Verify the lines of a file. `data` has its bytes, if they were already read.
-
-    Without `checksums` (an old run folder), every complete line is accepted. MutatorError if the file is
-    missing.
+def read_segment(path: Path, data: bytes | None = None) -> Segment:
+    """Verify the lines of a file. `data` has its bytes, if they were already read. MutatorError if the file
+    is missing.
     """
     data = _read(path) if data is None else data
     end = data.rfind(b"\n") + 1
@@ -176,15 +171,15 @@ def read_segment(path: Path, data: bytes | None = None, *, checksums: bool = Tru
     damaged: list[int] = []
     last = b""
     for number, line in enumerate(data[:end].split(b"\n")[:-1], start=1):
-        if not checksums or _is_intact(last, line):
+        if _is_intact(last, line):
             lines[number] = line
         else:
             damaged.append(number)
         last = line[_SUM]
-    return Segment(path=path, checksums=checksums, lines=lines, damaged=tuple(damaged), end=end)
+    return Segment(path=path, lines=lines, damaged=tuple(damaged), end=end)
 
 
-def verified_lines(path: Path, schema: str, *, checksums: bool) -> Iterator[tuple[int, int, bytes]]:
+def verified_lines(path: Path, schema: str) -> Iterator[tuple[int, int, bytes]]:
     """Yield the number, offset and bytes (without newline) of each complete line after the head.
 
     MutatorError for a damaged line, a missing file, or another schema or file name.
@@ -195,29 +190,29 @@ def verified_lines(path: Path, schema: str, *, checksums: bool) -> Iterator[tupl
             if not line.endswith(b"\n"):  # incomplete, because the process was killed
                 return
             data = line[:-1]
-            if checksums and not _is_intact(last, data):
-                raise bare_segment(path, checksums=checksums).problem(number)
+            if not _is_intact(last, data):
+                raise bare_segment(path).problem(number)
             if number == 1:
-                bare_segment(path, {1: data}, checksums=checksums).check_head(schema)
+                bare_segment(path, {1: data}).check_head(schema)
             else:
                 yield number, offset, data
             last = line[_SUM]
             offset += len(line)
 
 
-def intact_lines(path: Path, *, checksums: bool) -> Iterator[tuple[int, bytes]]:
+def intact_lines(path: Path) -> Iterator[tuple[int, bytes]]:
     """Yield the number and bytes of each complete, intact line. MutatorError if the file is missing."""
     last = b""
     with _opened(path) as file:
         for number, line in enumerate(bounded_lines(file, path), start=1):
             data = line[:-1]
-            if line.endswith(b"\n") and (not checksums or _is_intact(last, data)):
+            if line.endswith(b"\n") and _is_intact(last, data):
                 yield number, data
             last = line[_SUM]
 
 
-def bare_segment(path: Path, lines: Mapping[int, bytes] | None = None, *, checksums: bool) -> Segment:
-    return Segment(path=path, checksums=checksums, lines=lines or {}, damaged=(), end=0)
+def bare_segment(path: Path, lines: Mapping[int, bytes] | None = None) -> Segment:
+    return Segment(path=path, lines=lines or {}, damaged=(), end=0)
 
 
 def _is_intact(last: bytes, line: bytes) -> bool:

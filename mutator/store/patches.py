@@ -1,7 +1,6 @@
 """The patches of a run folder, packed. Most are stored as a difference from another patch.
 
-Each worker appends to its own file, `patches/<session>-<worker>.blocks`. Folders of earlier schemas have one
-file per patch, `patches/<xx>/<experiment>.patch`.
+Each worker appends to its own file, `patches/<session>-<worker>.blocks`.
 """
 
 import zlib
@@ -11,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 
 from mutator._common.below import inside
-from mutator._common.bounded import read_bounded, unpacked
+from mutator._common.bounded import unpacked
 from mutator._common.files import write_atomic
 from mutator._common.hashing import digest
 from mutator.store.blocks import Block, BlockWriter, as_block, intact_blocks, read_blocks
@@ -111,16 +110,12 @@ class Patches:
         self.run = run
 
     def __iter__(self) -> Iterator[str]:
-        old = (path.stem for path in (self.run / FOLDER).glob("*/*.patch"))
-        return iter(sorted({*self._places, *old}))
+        return iter(sorted(self._places))
 
     def read(self, experiment_id: str) -> bytes | None:
         """Return the newest patch of an experiment; None if it is missing or damaged."""
         place = self._places.get(experiment_id)
-        if place is None:
-            path = self.old_file(experiment_id)
-            return read_bounded(path, MOST_PATCH) if path.is_file() else None
-        return _unpacked(place.block, place.whole)
+        return None if place is None else _unpacked(place.block, place.whole)
 
     def digests(self) -> Iterator[tuple[str, str]]:
         """Yield each experiment that has a packed patch, and its SHA-256 (empty if damaged), oldest first."""
@@ -140,15 +135,9 @@ class Patches:
         place = self._places.get(experiment_id)
         if place is not None:
             return place.path
-        path = self.old_file(experiment_id)
-        if path.exists():
-            return path
         damaged = (one for one in self.files() if not one.is_file() or read_blocks(one).damaged)
         lost = inside(self.run / FOLDER, f"{worker}{SUFFIX}") if worker else self.run / FOLDER
         return next(damaged, lost)
-
-    def old_file(self, experiment_id: str) -> Path:
-        return inside(self.run / FOLDER, f"{experiment_id[:2]}/{experiment_id}.patch")
 
     def files(self) -> list[Path]:
         """Return the block files, oldest session first. A folder with such a name is included."""

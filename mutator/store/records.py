@@ -103,14 +103,14 @@ def endings(records: Mapping[str, Record]) -> Iterator[Ending]:
             yield Ending(name, one.status.value, one.outcome.value if one.outcome else None, one.patch)
 
 
-def read_records(run: Path, folder: str = "records", *, checksums: bool = True) -> IndexedLines[Record]:
+def read_records(run: Path, folder: str = "records") -> IndexedLines[Record]:
     """Return the record of each experiment that has one; a torn last line is skipped.
 
     A harness error is replaced by any other record of its experiment. MutatorError for a damaged line, and
     for a second final record of an experiment; CheckFailed if the two differ.
     """
     paths = sorted(inside(run, folder).glob("*.jsonl"))
-    return IndexedLines(paths, SCHEMA, record_from, _replaces, checksums=checksums)
+    return IndexedLines(paths, SCHEMA, record_from, _replaces)
 
 
 def _replaces(line: Line, known: Line) -> bool:
@@ -122,10 +122,10 @@ def _replaces(line: Line, known: Line) -> bool:
     return True
 
 
-def read_timings(run: Path, *, checksums: bool = True) -> IndexedLines[dict[str, Any]]:
+def read_timings(run: Path) -> IndexedLines[dict[str, Any]]:
     """Return the newest timing line of each experiment that has one; MutatorError for a damaged line."""
     paths = sorted((run / "timings").glob("*.jsonl"))
-    return IndexedLines(paths, TIMINGS_SCHEMA, _timing_from, lambda line, known: True, checksums=checksums)
+    return IndexedLines(paths, TIMINGS_SCHEMA, _timing_from, lambda line, known: True)
 
 
 def _timing_from(data: dict[str, Any]) -> dict[str, Any]:

@@ -4,7 +4,7 @@ docs/reference/run-folder.md describes its files.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
@@ -20,7 +20,7 @@ from mutator.store import digests, integrity, plan_file
 from mutator.store.opening import SCRATCH, TRACES, check_contents
 from mutator.store.patches import Patches
 from mutator.store.records import read_records, read_timings
-from mutator.store.run_head import FIRST_SCHEMA, HEAD, Head, read_head
+from mutator.store.run_head import HEAD, Head, read_head
 from mutator.store.shards import Shard
 from mutator.store.stretches import Stretch, read_stretches
 from mutator.targets.severity import Scale
@@ -67,7 +67,7 @@ class RunFolder:
     def open(cls, path: Path) -> "RunFolder":
         """Open and verify an existing run folder.
 
-        MutatorError if there is none, if it has a newer schema, if it contains links or the like
+        MutatorError if there is none, if it has another schema, if it contains links or the like
         (`check_contents`), or if anything in it is damaged, missing or not in its plan.
         """
         folder = cls.unverified(path)
@@ -96,17 +96,10 @@ class RunFolder:
         return (path / HEAD).is_file()
 
     def problems(self, *, anew: bool = False) -> list[MutatorError]:
-        """Return all differences from what was written. Earlier schemas do not reveal every change.
+        """Return all differences from what was written.
 
         With `anew`, earlier verifications are ignored (`verified_runs`).
         """
-        if not self.verifiable:
-            stray = (self.path / digests.FILE).exists()
-            downgraded = MutatorError(
-                f"schema {self.head['schema']} in a folder with {digests.FILE}", where=self.path / HEAD
-            )
-            found = [downgraded] if stray else []
-            return [*found, *integrity.problems(self.path, self.head, None, self.shard)]
         for _ in range(_LOOKS):
             try:
                 ledger = digests.read(self.path)
@@ -118,14 +111,9 @@ class RunFolder:
         return found
 
     @property
-    def verifiable(self) -> bool:
-        """Whether the folder has digests and checksums, which earlier schemas do not have."""
-        return bool(self.head["schema"] != FIRST_SCHEMA)
-
-    @property
     def finished(self) -> bool:
         """Whether every experiment has a final record, and the equivalence check is complete."""
-        return self.verifiable and digests.read(self.path).finished
+        return digests.read(self.path).finished
 
     @cached_property
     def head(self) -> Head:
@@ -227,24 +215,19 @@ class RunFolder:
 
         MutatorError if the diff is missing or does not match the record.
         """
-        if self.verifiable:
-            if record is None or not record.patch:
-                return None
-            for problem in integrity.patch_problems(self.patches, experiment_id, record.patch):
-                raise problem
+        if record is None or not record.patch:
+            return None
+        for problem in integrity.patch_problems(self.patches, experiment_id, record.patch):
+            raise problem
         return self.patches.read(experiment_id)
 
     def records(self, kind: str = "records") -> Mapping[str, Record]:
         """Return the records by experiment id, parsed on access; with kind `proof`, those of the proof."""
-        return read_records(self.path, kind, checksums=self.verifiable)
-
-    def comparable(self, record: Record) -> Record:
-        """Convert a record to the form that this folder stores: earlier schemas have no patches."""
-        return record if self.verifiable else replace(record, patch="")
+        return read_records(self.path, kind)
 
     def timings(self) -> Mapping[str, dict[str, Any]]:
         """Return the newest timing line of each experiment by id, parsed on access."""
-        return read_timings(self.path, checksums=self.verifiable)
+        return read_timings(self.path)
 
     @property
     def canary(self) -> Experiment:

@@ -15,7 +15,7 @@ from mutator.model import Limits
 from mutator.targets.severity import Scale
 from mutator.targets.target_facts import ChannelFacts, MetricFacts
 
-SCHEMA, FIRST_SCHEMA = "run/3", "run/1"  # the first schema had neither digests nor checksums
+SCHEMA = "run/3"
 HEAD, CAMPAIGN = RUN_HEAD, "campaign.yaml"
 REMEDY = "the run folder is damaged: restore the file from a copy of it"
 _TEXTS = {str: str}
@@ -86,7 +86,7 @@ class Head(dict[str, Any]):
 
 
 def read_head(run: Path) -> Head:
-    """Read the head of a run folder; MutatorError if it is damaged or has a newer schema."""
+    """Read the head of a run folder; MutatorError if it is damaged or has another schema."""
     path = run / HEAD
     head = Head(path, read_json(path, SCHEMA))
     if wrong := next(_wrong(head), ""):

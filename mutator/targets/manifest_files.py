@@ -7,7 +7,7 @@ from pydantic import Field
 
 from mutator._common.below import check_name
 from mutator._common.shipped import SHIPPED_TARGET
-from mutator.config.yaml_files import Source, StrictModel, load, read
+from mutator.config.yaml_files import Source, StrictModel, read
 from mutator.targets.channels import ChannelModel, TraceModel, read_channels
 from mutator.targets.commands import ChangeModel, EntryModel, FilmModel, check_commands, read_film
 from mutator.targets.environment import check_environment
@@ -19,10 +19,9 @@ from mutator.targets.requirements import read_requirements
 from mutator.targets.roots import INSTALLED, check_installed, find_overlay, find_root, read_packages
 from mutator.targets.scene import SceneModel, read_scene
 from mutator.targets.severity import SeverityModel, read_contact
-from mutator.targets.upgrade import NEW, OLD, Upgrade, upgraded, upgraded_text
 from mutator.triggers import stl
 
-SCHEMA = NEW
+SCHEMA = "target/2"
 
 
 class ManifestModel(StrictModel, title="The file"):
@@ -115,19 +114,9 @@ class ManifestModel(StrictModel, title="The file"):
     film: FilmModel | None = Field(None, description="How to film runs. Without it, runs cannot be filmed.")
 
 
-def upgrade_manifest(path: Path) -> Upgrade | None:
-    """Upgrade a manifest of the older schema; None if it is current. MutatorError for any other schema."""
-    source = load(path)
-    if not isinstance(source.data, dict) or source.data.get("schema") != OLD:
-        read(path, ManifestModel, SCHEMA)
-        return None
-    load_manifest(path, root=path.parent)  # the target's tree might be missing
-    return upgraded_text(source)
-
-
 def load_manifest(path: Path, root: Path | None = None, overlay: Path | None = None) -> TargetManifest:
     """Read a manifest; `root` and `overlay` override the values in the file."""
-    model, source = read(path, ManifestModel, SCHEMA, older={OLD: upgraded})
+    model, source = read(path, ManifestModel, SCHEMA)
     requires = read_requirements(model.requires, source)
     folder = (root or find_root(model.root, source, requires)).resolve()
     if not folder.is_dir():

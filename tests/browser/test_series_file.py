@@ -16,7 +16,7 @@ from mutator.store.series_format import Points, Series, encode
 from mutator.web import asset
 
 TRACE = "0123456789abcdef"
-FIXTURE = Path(__file__).parents[1] / "fixtures" / "run-3"
+FIXTURE = Path(__file__).parents[1] / "fixtures" / "run"
 LOADED = """async ([id, known]) => {
     const words = (values) => [...new Uint32Array(values.buffer)];
     try {

@@ -41,7 +41,7 @@ def pytest_campaign(toy: Workspace, *words: object) -> "subprocess.CompletedProc
         (["--campaign", "small", "--campaign-out", "out", "--require-reviewed"], 1, "not approved"),
         (["--campaign", "nosuch", "--campaign-out", "out"], 2, "no campaign 'nosuch'"),
         (["--campaign", "small", "--campaign-out", "tree"], 2, "has no run.json and is not empty (toycar)"),
-        (["--campaign", "small", "--campaign-out", "newer", "-n", "2"], 2, "written by a newer mutator"),
+        (["--campaign", "small", "--campaign-out", "newer", "-n", "2"], 2, "use a newer version of mutator"),
         (["--campaign", "unarmed", "--campaign-out", "out", "-n", "2"], 1, "canary: did not reach H3"),
     ],
 )

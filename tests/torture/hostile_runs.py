@@ -193,7 +193,7 @@ HEADS: dict[str, Any] = {
     "limits": {"cpu_s": -1, "wall_s": 10**30},
     "canary": {"fault": {}},
     "target_files": {UP: UP},
-    "schema": "run/1",
+    "schema": "run/2",
 }
 
 

@@ -27,7 +27,6 @@ pytestmark = pytest.mark.slow
 
 TRIES = 60
 WORDS = ("small", "--limit", "2", "--engine", "fork")
-OLDER = Path(__file__).parents[1] / "fixtures" / "run-1" / "small"
 FILES = {kind: pattern for kind, pattern in PATTERNS.items() if kind != "review"}  # the toy has no review
 CHOICES = (
     *(("--seed", "4"), ("--seed", "3"), ("--limit", "3"), ("--engine", "reference"), ("--engine", "warm")),
@@ -48,7 +47,7 @@ class Edits:
 
     def cases(self, seed: int) -> Sequence[Case]:
         chance = random.Random(seed)
-        kind = chance.choice([*FILES] * 2 + ["choice"] * 10 + ["commit", "older folder"] * 2)
+        kind = chance.choice([*FILES] * 2 + ["choice"] * 10 + ["commit", "other version"] * 2)
         shutil.rmtree(self.place.folder, ignore_errors=True)
         self._kill(chance)
         with self._edited(kind, chance) as (what, words):
@@ -89,14 +88,14 @@ class Edits:
         elif kind == "commit":
             commit(self.root, str(chance.random()))
             yield "commit", ()
-        elif kind == "older folder":
-            kept = self.place.run.rename(self.place.folder / "kept")
-            shutil.copytree(OLDER, self.place.run)
+        elif kind == "other version":
+            head = self.place.run / "run.json"
+            data = head.read_bytes()
+            head.write_bytes(data.replace(b'"schema": "run/', b'"schema": "run/1'))
             try:
-                yield "planned by mutator", ()
+                yield "use a newer version", ()
             finally:
-                shutil.rmtree(self.place.run)
-                kept.rename(self.place.run)
+                head.write_bytes(data)
         else:
             path = chance.choice(sorted(self.root.rglob(FILES[kind])))
             data, how = (

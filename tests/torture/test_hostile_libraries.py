@@ -36,7 +36,6 @@ QUICK: dict[str, tuple[object, ...]] = {  # commands that run no target
     "approve": ("review", "approve", "--only", 'match(spec, "*lane*")', "--by", "Jane Doe", "--yes"),
     "pictures": ("review", "show", "0", "--pictures", "OUT"),
     "stpa": ("stpa", "--svg", "OUT/analysis.svg"),
-    "upgrade": ("upgrade", "fault_library/targets/toycar.yaml"),
     "init": ("init", "OUT", "--target", "tree"),
 }
 SLOW: dict[str, tuple[object, ...]] = {

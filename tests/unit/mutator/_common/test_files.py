@@ -42,10 +42,25 @@ def test_a_pipe_is_refused_without_waiting(tmp_path: Path) -> None:
         read_json(tmp_path / "a.json", "a/1")
 
 
-def test_a_newer_schema_is_refused() -> None:
-    check_schema("run/1", "run/2", Path("run.json"))
-    with pytest.raises(MutatorError, match=r"run\.json: schema 'run/3' .*newer mutator.*update mutator"):
-        check_schema("run/3", "run/2", Path("run.json"))
+ANEW = "use the version of mutator that wrote it, or write it anew with this one"
+
+
+@pytest.mark.parametrize(
+    ("found", "got", "remedy"),
+    [
+        ("run/1", "schema 'run/1'", ANEW),
+        ("run/3", "schema 'run/3'", "use a newer version of mutator"),
+        ("run/03x", "schema 'run/03x'", ANEW),
+        ("bus/9", "schema 'bus/9'", ANEW),
+        (None, "no schema", ANEW),
+        (["run/2"], "schema ['run/2']", ANEW),
+    ],
+)
+def test_another_schema_is_refused_in_a_sentence(found: object, got: str, remedy: str) -> None:
+    check_schema("run/2", "run/2", "run.json")
+    with pytest.raises(MutatorError) as caught:
+        check_schema(found, "run/2", "run.json", line=1)
+    assert str(caught.value) == f"run.json:1: {got}; expected run/2; {remedy}"
 
 
 def test_deep_and_locked_folders_are_removed_but_not_the_targets_of_links(tmp_path: Path) -> None:

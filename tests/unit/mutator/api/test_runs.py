@@ -21,7 +21,6 @@ from mutator.api.runs import Run
 from mutator.errors import MutatorError
 from mutator.execution.single_run import rerun, run_single
 from mutator.model import Experiment, Outcome, Status
-from mutator.results.table_reader import Results
 from mutator.store import plan_file
 from mutator.store.lines import LineWriter
 from mutator.store.patches import PatchWriter
@@ -62,9 +61,6 @@ def test_propagation_is_available_as_frames(run: Run) -> None:
     assert one.propagation()["t_first"].to_dict() == {"gas": 2.0, "gap": 2.5}
     assert list(one.propagation()["unit"]) == ["-", "m"] and list(one.propagation().index) == ["gas", "gap"]
     assert one.fault_path is None  # no channel of the toy names a component
-    old = Path(__file__).parents[3] / "fixtures" / "run-2" / "small"
-    with pytest.raises(MutatorError, match="no propagation was recorded"):
-        Results(old / "results.csv").propagation()
 
 
 def test_the_columns_of_the_frame_have_types(run: Run) -> None:

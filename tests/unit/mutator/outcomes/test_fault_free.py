@@ -32,7 +32,7 @@ MANIFEST: Any = SimpleNamespace(
 def folder(path: Path, runs: dict[tuple[str, str], dict]) -> RunFolder:
     """Create a run folder whose golden runs have the given records, by scenario and change."""
     goldens = [[scenario, [change] if change else []] for scenario, change in runs]
-    (path / "run.json").write_text(json.dumps({"schema": "run/1", "goldens": goldens}))
+    (path / "run.json").write_text(json.dumps({"schema": "run/3", "goldens": goldens}))
     made = RunFolder.unverified(path)
     for (scenario, changes), record in zip(goldens, runs.values(), strict=True):
         place = made.golden(scenario, tuple(changes))

@@ -6,11 +6,12 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 from mutator.results.column_facts import result_columns
-from mutator.store import plan_file
+from mutator.store import digests, plan_file
+from mutator.store.digests import Ledger
 
 COLUMNS = [c.name for c in result_columns(("H1", "H2", "H3"), ("gas", "brake", "steer_torque"))]
 HEAD = {
-    "schema": "run/1",
+    "schema": "run/3",
     "campaign": "night_<b>drive</b>",
     "plan": "ab" * 32,
     "compared": [],
@@ -69,8 +70,8 @@ CRASHED = OK | NONE | {"status": "crashed", "detail": "IndexError"}
 
 
 def make_run(folder: Path, **head: object) -> Path:
-    """Write a run folder without digests, as older versions did, with a hazard, a crash and a harness error.
-    `head` is added to run.json."""
+    """Write a run folder whose results are only a table: a hazard, a crash and a harness error. `head` is
+    added to run.json."""
     (folder / "run.json").write_text(json.dumps(HEAD | head))
     with (folder / "results.csv").open("w", newline="") as file:
         table = csv.DictWriter(file, COLUMNS, restval="")
@@ -78,8 +79,7 @@ def make_run(folder: Path, **head: object) -> Path:
         for i, line in enumerate((OK, BAD, CRASHED)):
             table.writerow({"experiment_id": f"{i}" * 16, "fault_id": f"f{i}"} | line)
     plan_file.write(folder, [], [])
-    (folder / "patches/00").mkdir(parents=True)
-    (folder / "patches/00" / ("0" * 16 + ".patch")).write_text(PATCH)
+    digests.write(folder, Ledger(files={}))
     (folder / "plots").mkdir()
     (folder / "plots" / ("0" * 16 + "-14.50s.jpg")).write_bytes(b"picture")
     return folder

@@ -1,7 +1,6 @@
 """The first answers of a report, compared with counts by hand."""
 
 import csv
-import json
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -21,6 +20,8 @@ from mutator.report.studies import ReportedRun
 from mutator.report.warnings import NO_ALERT
 from mutator.results.column_facts import result_columns
 from mutator.results.rows import lines_of
+from mutator.store.lines import written
+from mutator.store.records import TIMINGS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.targets.target_facts import MetricFacts
 
@@ -63,13 +64,10 @@ def run(tmp_path: Path) -> ReportedRun:
         {"experiment_id": f"{i}" * 16, "cpu_s": 2.0**i, "wall_s": 1.0, "worker": f"w{i % 2}"}
         for i in range(7)
     ]
-    lines = [
-        {"schema": "timings/1", "plan": HEAD["plan"]},
-        *costs,
-        costs[0] | {"experiment_id": "7" * 16, "cpu_s": 0, "engine": "golden"},
-    ]
-    (tmp_path / "timings").mkdir()
-    (tmp_path / "timings" / "0001-main.jsonl").write_text("".join(f"{json.dumps(line)}\n" for line in lines))
+    costs.append(costs[0] | {"experiment_id": "7" * 16, "cpu_s": 0, "engine": "golden"})
+    path = tmp_path / "timings" / "0001-main.jsonl"
+    path.parent.mkdir()
+    path.write_bytes(written(path, {"schema": TIMINGS_SCHEMA, "plan": HEAD["plan"]}, costs))
     return ReportedRun.open(RunFolder.open(tmp_path), None)
 
 

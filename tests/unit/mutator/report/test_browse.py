@@ -92,7 +92,7 @@ def test_diffs_are_stored_as_shapes_and_values(experiment: Callable[..., Experim
 
 
 def test_pictures_beyond_the_budget_are_links(tmp_path: Path) -> None:
-    write_json(tmp_path / "run.json", {"schema": "run/1"})
+    write_json(tmp_path / "run.json", {"schema": "run/3"})
     plots = tmp_path / "plots"
     plots.mkdir()
     for name in ("aa-2.00s.jpg", "aa-10.00s.jpg", "aa.mp4", "bb.svg"):

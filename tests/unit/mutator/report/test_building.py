@@ -64,7 +64,11 @@ def test_the_page_needs_no_other_file(run: Path) -> None:
     assert "http" not in written.page.read_text().replace("http://www.w3.org/2000/svg", "")
 
 
-def test_the_page_contains_results_diff_and_still_of_an_experiment(run: Path) -> None:
+def test_the_page_contains_results_diff_and_still_of_an_experiment(
+    run: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stored = {"0" * 16: PATCH.encode()}
+    monkeypatch.setattr(RunFolder, "read_patch", lambda self, name, record: stored.get(name))
     page = building.write(run, None).page
     table = carried(page, "table")
     columns = {column["name"]: column for column in table["columns"]}

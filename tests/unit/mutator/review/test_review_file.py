@@ -1,6 +1,5 @@
-"""The review file, in its current and its old format."""
+"""The review file."""
 
-import shutil
 import subprocess
 from pathlib import Path
 
@@ -13,7 +12,6 @@ from mutator.review.review_file import Content
 
 BOUND = Bound(diff="d" * 16, function="f" * 16, template="0" * 16, calls="c" * 16)
 AT = "2026-11-24T16:00:00Z"
-OLD = Path(__file__).parents[3] / "fixtures" / "run-3" / "toy" / "fault_library" / "reviews" / "toycar.yaml"
 
 
 def entry(name: str) -> Entry:
@@ -87,76 +85,3 @@ def test_mistakes_are_reported_with_their_line(
         review_file.load(path, "toycar")
     assert (caught.value.where, caught.value.line) == (str(path), line)
     assert words in str(caught.value)
-
-
-@pytest.fixture
-def old(tmp_path: Path) -> Path:
-    """A file with schema `review/1`: three changes, each under two kinds of triggers, and the probe, all
-    approved."""
-    return shutil.copy(OLD, tmp_path / "toycar.yaml")
-
-
-def edited(path: Path, group: str, old: str, new: str) -> dict[str, Entry]:
-    head, block, rest = path.read_text().partition(f'group: "{group}"')
-    assert old in rest
-    path.write_text(head + block + rest.replace(old, new, 1))
-    return {one.what: one for one in review_file.load(path, "toycar").entries.values()}
-
-
-SENSE = "toycar/sensing.py Sensor.sense"
-GAP = f"{SENSE} after_assign gap: offset(by, low, target=gap)"
-OFFSET = f"{SENSE} after_assign offset: offset(by, target=offset)"
-SILENCE = f"{SENSE} before_call self.publish: omission()"
-PROBE = "the probe, observing at toycar/go.py Drive.step after_assign now"
-
-
-def test_an_old_file_has_a_decision_for_each_change(old: Path) -> None:
-    """A change is approved if it was approved under each kind of trigger."""
-    found = {one.what: one for one in review_file.load(old, "toycar").entries.values()}
-    assert set(found) == {GAP, OFFSET, SILENCE, PROBE}
-    decision = found[OFFSET].decision
-    assert decision is not None
-    assert (decision.verdict, decision.by, decision.at) == (Verdict.APPROVED, "Jane Doe", None)
-    assert decision.bound == Bound(
-        diff="119123172159a027", function="3eff22e1db4eaddf", template="3307b2f6026230e8", calls=None
-    )
-    assert decision.values is None
-    assert found[PROBE].decision is not None and found[PROBE].decision.by == "reader"
-
-
-def test_an_old_rejection_applies_under_any_trigger(old: Path) -> None:
-    edited(old, "d32713d465f1", "approved", "rejected")
-    found = edited(old, "d32713d465f1", "Jane Doe", "Joe")[OFFSET].decision
-    assert found is not None and (found.verdict, found.by) == (Verdict.REJECTED, "Joe")
-
-
-def test_old_approvals_of_different_diffs_are_invalid(old: Path) -> None:
-    found = edited(old, "50d62901775b", "119123172159a027", "9" * 16)[OFFSET].decision
-    assert found is not None
-    assert found.bound == Bound(diff="0" * 16, function="3eff22e1db4eaddf", template="3307b2f6026230e8")
-
-
-def test_old_remarks_are_kept(old: Path) -> None:
-    edited(old, "4f924f1dc5e6", 'remark: ""', 'remark: "once"')
-    edited(old, "6ee7b871b4c7", 'remark: ""', 'remark: "twice"')
-    entry = edited(old, "6ee7b871b4c7", "Jane Doe", "Joe")[SILENCE]
-    assert {(one.by, one.text, one.at) for one in entry.remarks} == {
-        ("Jane Doe", "once", None),
-        ("Joe", "twice", None),
-    }
-    assert entry.decision is not None and entry.decision.by == "Jane Doe and Joe"
-
-
-def test_a_mistake_in_an_old_file_is_reported_at_its_line(old: Path) -> None:
-    with pytest.raises(MutatorError, match=r"toycar\.yaml:8: 'aproved' for 'decision'"):
-        edited(old, "08a4799889df", "approved", "aproved")
-    old.write_text('schema: review/1\ntarget: "toycar"\ndecisions: 1.5\n')
-    with pytest.raises(MutatorError, match=r"toycar\.yaml:3: 1\.5 for 'decisions'"):
-        review_file.load(old, "toycar")
-
-
-def test_writing_upgrades_the_file(old: Path) -> None:
-    found = review_file.load(old, "toycar")
-    old.write_text(review_file.text("toycar", found))
-    assert f"schema: {review_file.SCHEMA}\n" in old.read_text()
-    assert review_file.load(old, "toycar") == found

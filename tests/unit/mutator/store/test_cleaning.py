@@ -73,7 +73,8 @@ def test_a_run_folder_with_another_file_is_not_deleted(run: Path, stranger: str)
 
 def test_a_foreign_folder_is_not_deleted_despite_its_run_json(tmp_path: Path) -> None:
     for head, names in (
-        ('{"schema":"run/1"}', ["a", "b", "c", "d", "e"]),
+        ('{"schema":"run/3"}', ["a", "b", "c", "d", "e"]),
+        ('{"schema":"run/1"}', []),
         ('{"schema":"run/99"}', []),
         ('{"schema":"other/1"}', []),
         ("{}", []),

@@ -40,7 +40,7 @@ def sparse(tmp_path: Path) -> Path:
     "read",
     [
         lambda path: read_segment(path),
-        lambda path: list(verified_lines(path, "records/1", checksums=True)),
+        lambda path: list(verified_lines(path, "records/1")),
         lambda path: list(lines_of(path)),
         lambda path: read_blocks(path),
         lambda path: read_json(path, "run/3"),

@@ -21,7 +21,7 @@ def things(folder: Path, **files: list[dict[str, Any]]) -> IndexedLines[dict[str
 
 def opened(folder: Path) -> IndexedLines[dict[str, Any]]:
     paths = sorted(folder.glob("*.jsonl"))
-    return IndexedLines(paths, SCHEMA, dict, lambda line, known: True, checksums=True)
+    return IndexedLines(paths, SCHEMA, dict, lambda line, known: True)
 
 
 def test_the_newest_line_replaces_the_first(tmp_path: Path) -> None:
@@ -51,9 +51,7 @@ def test_an_invalid_line_is_reported_with_file_and_line(tmp_path: Path) -> None:
     lines = LineWriter(path, {"schema": SCHEMA})
     lines.append({"experiment_id": "aa"})
     lines.close()
-    found = IndexedLines(
-        [path], SCHEMA, lambda line: int(line["n"]), lambda line, known: True, checksums=True
-    )
+    found = IndexedLines([path], SCHEMA, lambda line: int(line["n"]), lambda line, known: True)
     with pytest.raises(MutatorError, match=r"a\.jsonl:2: a damaged line"):
         found["aa"]
     with pytest.raises(MutatorError, match=r"b\.jsonl:2: a damaged line"):

@@ -66,7 +66,7 @@ def test_a_folder_or_link_in_place_of_a_file_is_reported(run: Path, name: str, w
 
 def test_these_tests_list_all_sealed_files(run: Path) -> None:
     folder = RunFolder.open(run)
-    assert folder.verifiable and folder.finished and folder.problems() == []
+    assert folder.finished and folder.problems() == []
     found = {path.relative_to(run).as_posix() for path in run.rglob("*") if path.is_file()}
     others = {name for name in found if name.startswith(("patches/", "timings/", "golden/B", "golden/A+"))}
     assert found - others == {*SEALED, "owner.lock"} and len(others) == 8
@@ -188,17 +188,6 @@ def test_a_plan_with_duplicates_or_missing_experiments_is_refused(
     assert f"{path}: 23 experiments; expected 24" in str(problem(run))
 
 
-def test_a_folder_disguised_as_an_older_version_is_refused(run: Path) -> None:
-    head = run / "run.json"
-    head.write_text(head.read_text().replace('"run/3"', '"run/1"'))
-    assert "run/1 in a folder with digests.json" in str(problem(run))
-    (run / digests.FILE).unlink()
-    folder = RunFolder.unverified(run)
-    assert not folder.verifiable
-    with pytest.raises(MutatorError, match="schema 'records/2' in a folder of another schema"):
-        folder.records()
-
-
 def test_a_folder_that_is_being_written_is_not_damaged(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     real, seen = integrity.problems, []
 
@@ -211,13 +200,13 @@ def test_a_folder_that_is_being_written_is_not_damaged(run: Path, monkeypatch: p
         return found
 
     monkeypatch.setattr(integrity, "problems", look)
-    assert RunFolder.open(run).verifiable
+    RunFolder.open(run)
+    assert seen
 
 
 @pytest.mark.parametrize("key", ["limits", "goldens", "chunks", "sources", "choices", "provenance", "plan"])
-def test_an_invalid_value_in_an_old_run_json_is_reported_by_key(run: Path, key: str) -> None:
-    data = json.loads((run / "run.json").read_text()) | {"schema": "run/1"}
-    (run / digests.FILE).unlink()
+def test_an_invalid_value_in_run_json_is_reported_by_key(run: Path, key: str) -> None:
+    data = json.loads((run / "run.json").read_text())
     for value in (3, [3], [[3]], {"a": [None]}):
         (run / "run.json").write_text(json.dumps(data | {key: value}))
         assert f"run.json: damaged at '{key}'" in str(problem(run))

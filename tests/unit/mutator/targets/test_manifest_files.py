@@ -44,30 +44,6 @@ def test_ground_truth_can_be_computed(toy: Workspace) -> None:
     assert expressions["v_lead"] == "_fi.hypot(now.v[0], now.v[1]) > 3"
 
 
-def test_a_manifest_of_the_older_schema_is_read(toy: Workspace) -> None:
-    """An older manifest observes the same four values for every target."""
-    path = toy.library / "targets" / "toy.yaml"
-    before, text = toy.manifest("toy").observation, path.read_text()
-    head, _, rest = text.partition("  time: now.time")
-    tail = rest.partition("hazards:")[2]
-    channels = "trace: {file: trace.npz, time: time}\nrecord: record.json\nchannels:\n"
-    files = "trace_file: trace.npz\ntime_channel: time\nrecord_file: record.json\ncompare:\n"
-    head = head.replace(channels, files).replace(", role: actuator", "")
-    old = "  t: now.time\n  d_rel: now.gap\n  v_ego: now.speed\n  v_lead: now.lead_speed\nhazards:"
-    path.write_text(head.replace("target/2", "target/1") + old + tail)
-    manifest = toy.manifest("toy")
-    after = manifest.observation
-    assert (manifest.outputs, manifest.time_channel) == (("trace.npz", "record.json"), "time")
-    assert [(c.name, c.tolerance) for c in manifest.compared] == [("speed", 0.5)]
-    assert after.expressions == before.expressions
-    assert [(v.name, v.text, v.unit) for v in after.derived] == [
-        (v.name, v.text, v.unit) for v in before.derived
-    ]
-    path.write_text(path.read_text().replace("now.gap", "now.gap()"))
-    with pytest.raises(MutatorError, match=r"toy.yaml:20: 'now.gap\(\)'; expected names, attributes"):
-        toy.manifest("toy")
-
-
 def test_arguments_have_placeholders_and_changes(toy: Workspace) -> None:
     manifest = toy.manifest("toy")
     given = manifest.arguments(scenario=Path("s.yaml"), seed=3, out=Path("o"), changes=("alone",))
