@@ -12,9 +12,8 @@ if TYPE_CHECKING:
     from mutator.api.audits import Audit, seal, verify
     from mutator.api.caches import cache_entries, cache_folder, clear_caches, prune_caches
     from mutator.api.campaigns import run
-    from mutator.api.comparisons import RunComparison, compare
+    from mutator.api.comparisons import RunComparison, compare, write_history
     from mutator.api.experiment_results import TraceFrames
-    from mutator.api.histories import write_history
     from mutator.api.libraries import (
         check_hazard_analysis,
         check_library,
@@ -51,9 +50,8 @@ _HOMES = {
     "mutator.api.audits": ("Audit", "seal", "verify"),
     "mutator.api.caches": ("cache_entries", "cache_folder", "clear_caches", "prune_caches"),
     "mutator.api.campaigns": ("run",),
-    "mutator.api.comparisons": ("RunComparison", "compare"),
+    "mutator.api.comparisons": ("RunComparison", "compare", "write_history"),
     "mutator.api.experiment_results": ("TraceFrames",),
-    "mutator.api.histories": ("write_history",),
     "mutator.api.libraries": (
         "check_hazard_analysis",
         "check_library",

@@ -1,8 +1,17 @@
-"""The caches on this machine; results never depend on them."""
+"""What can be deleted: the caches on this machine, on which no result depends, and run folders."""
 
 from mutator._common.caches import clear as clear_caches
 from mutator._common.caches import entries as cache_entries
 from mutator._common.caches import folder as cache_folder
 from mutator._common.caches import prune as prune_caches
+from mutator.store.cleaning import check as check_run_folder
+from mutator.store.cleaning import clean as delete_run_folder
 
-__all__ = ["cache_entries", "cache_folder", "clear_caches", "prune_caches"]
+__all__ = [
+    "cache_entries",
+    "cache_folder",
+    "check_run_folder",
+    "clear_caches",
+    "delete_run_folder",
+    "prune_caches",
+]

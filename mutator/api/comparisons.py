@@ -1,4 +1,4 @@
-"""Comparison of two runs of the same faults, as pandas frames."""
+"""Comparison of two runs of the same faults, as pandas frames, and the history of many."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,6 +15,8 @@ from mutator.comparison import pages
 from mutator.comparison.comparison import Comparison, Finding, Gate
 from mutator.comparison.pairs import Change, Pair
 from mutator.errors import MutatorError
+from mutator.report import history
+from mutator.report.history import History
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -118,3 +120,10 @@ def _frame(pairs: Sequence[Pair]) -> "pd.DataFrame":
     frame = pd.DataFrame([pages.pair_line(pair) for pair in pairs])
     times = [name for name in frame.columns if name.startswith("t_")]
     return frame.astype(dict.fromkeys(times, float))
+
+
+def write_history(folder: str | Path) -> History:
+    """Write HISTORY.md and history.html into a folder of run folders: the results of each run, and what
+    changed between runs of the same plan. MutatorError if the folder holds no run with results.
+    """
+    return history.write_history(Path(folder))

@@ -79,11 +79,6 @@ class StoredRun:
         """The records by experiment id."""
         return self.folder.records()
 
-    @property
-    def verifiable(self) -> bool:
-        """Whether the content can be verified; runs of older schemas have no digests."""
-        return self.folder.verifiable
-
     @cached_property
     def fault_paths(self) -> FaultPaths | None:
         """The paths of faults through the target; None if unknown."""

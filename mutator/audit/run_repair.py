@@ -107,10 +107,6 @@ def _drop_patches(folder: RunFolder, lost: Collection[str]) -> list[str]:
     file with damaged blocks. Other patches in these files are kept.
     """
     run, patches, said = folder.path, folder.patches, []
-    for one in lost:
-        name = patches.old_file(one).relative_to(run).as_posix()
-        _put_aside(run, name)
-        unlink_below(run, name)
     for path in patches.files():
         name = path.relative_to(run).as_posix()
         if not path.is_file():

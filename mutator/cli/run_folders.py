@@ -153,16 +153,16 @@ def clean(
 
     Refuses a link, a run in progress, and a folder that holds anything that the run did not write.
     """
-    from mutator.api.cleaning import check, delete
+    from mutator.api.caches import check_run_folder, delete_run_folder
 
     terminal = Terminal()
     for run in runs:
-        check(run)
+        check_run_folder(run)
     if not yes:
         if not sys.stdin.isatty():
             raise MutatorError("no terminal to ask for confirmation", remedy="add --yes to delete anyway")
         if not typer.confirm(f"delete {', '.join(map(short_path, runs))}?"):
             return
     for run in runs:
-        delete(run)
+        delete_run_folder(run)
         terminal.say(f"deleted {short_path(run)}")

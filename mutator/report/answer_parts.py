@@ -1,10 +1,19 @@
-"""The parts of a report's answers: sentences, small tables, links into the list of experiments."""
+"""The parts of a report's answers: sentences, small tables, links into the list of experiments; and which
+hazards came with a warning, or were *silent*.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from urllib.parse import quote
 
+import numpy as np
 import pandas as pd
+
+from mutator.results.rows import Row
+
+FIRST = "alert before the hazard"
+NO_ALERT, LATE = "no alert at all", "alert only after the hazard"
+SILENT = (NO_ALERT, LATE)  # silent hazards: no alert before the hazard
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,3 +85,19 @@ def kind_link(kind: str, **facets: Sequence[str]) -> Link:
 
 def bar(part: int, of: int) -> Part:
     return Part(part, of, f"{part:,} of {of:,}")
+
+
+def warning(row: Row) -> str:
+    """Return the value of the page's filter `warning`; '' without a hazard."""
+    if not row.hazards:
+        return ""
+    if not row.alerts:
+        return NO_ALERT
+    return LATE if row.reaction_time is None else FIRST
+
+
+def warnings_of(frame: pd.DataFrame) -> np.ndarray:
+    """Return the value of `warning` for each row of a frame from `statistics.frame`."""
+    late = np.where(frame["reaction_time"] == "", LATE, FIRST)
+    hazard = np.where(frame["alerts"] == "", NO_ALERT, late)
+    return np.where(frame["is_hazard"], hazard, "")

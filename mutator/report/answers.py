@@ -6,6 +6,10 @@ from mutator._common.text import counted
 from mutator.engines.jobs import RunMode
 from mutator.execution.phases import duration
 from mutator.report.answer_parts import (
+    FIRST,
+    LATE,
+    NO_ALERT,
+    SILENT,
     Answer,
     Link,
     Listing,
@@ -15,13 +19,13 @@ from mutator.report.answer_parts import (
     kind_link,
     share,
     to_list,
+    warnings_of,
     were,
 )
 from mutator.report.dangers import dangerous, worst_of
 from mutator.report.fix_order import first_to_fix
 from mutator.report.seen import PLACE, UNTIMED_PATH
 from mutator.report.studies import ReportedRun
-from mutator.report.warnings import FIRST, LATE, NO_ALERT, SILENT, warnings_of
 from mutator.results.rows import Row, lines_of, row_from
 
 TYPES = 6  # maximum number of fault types that an answer lists

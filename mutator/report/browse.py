@@ -18,13 +18,12 @@ from mutator.config.locations import as_written_at
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Fault
 from mutator.mutants.readable_diffs import readable
+from mutator.report.answer_parts import warning
 from mutator.report.panel import FOLDER
 from mutator.report.paths import RunPaths
-from mutator.report.scenes import scene_facts
 from mutator.report.series import series_facts
 from mutator.report.source_lines import SourceLines
 from mutator.report.studies import ReportedRun
-from mutator.report.warnings import warning
 from mutator.report.whole_map import map_of
 from mutator.report.words import meanings_of
 from mutator.results.column_facts import is_text
@@ -33,7 +32,9 @@ from mutator.results.rows import Row, lines_of, row_from
 from mutator.review.groups import Shape, shapes
 from mutator.statistics.mutation_score import PERMANENT, TRANSIENT
 from mutator.store.run_folder import RunFolder
+from mutator.targets.manifest import TargetManifest
 from mutator.triggers.kinds import ALWAYS
+from mutator.triggers.trees import Tree, tree
 from mutator.web import embedded
 
 if TYPE_CHECKING:
@@ -296,3 +297,22 @@ def media(folder: RunFolder, seen_from: Path, budget: int) -> dict[str, dict[str
                 link = f"data:image/{kind};base64,{base64.b64encode(read_bounded(path)).decode()}"
             here["stills"].append([time.removesuffix("s"), link])
     return {name: kept for name, kept in found.items() if any(kept.values())}
+
+
+def scene_facts(manifest: TargetManifest) -> dict[str, Any] | None:
+    """Return the data that web/replay/scene.js draws; None if the target's manifest has no scene."""
+    scene = manifest.scene
+    if scene is None:
+        return None
+    channels = {channel.name for channel in manifest.channels}
+    derived = {v.name: v.text for v in manifest.observation.derived if v.name not in channels}
+
+    def made(text: str) -> Tree:
+        return tree(text, derived)
+
+    actors = [
+        asdict(actor) | {key: made(getattr(actor, key)) for key in ("x", "y", "heading", "visible")}
+        for actor in scene.actors
+    ]
+    lines = [asdict(line) | {"y": made(line.y) if line.y else None} for line in scene.lines]
+    return {"actors": actors, "lines": lines, "follow": scene.follow, "speed": made(scene.speed)}

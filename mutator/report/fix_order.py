@@ -7,10 +7,9 @@ from math import inf
 import pandas as pd
 
 from mutator.outcomes.fault_paths import UntimedPath
-from mutator.report.answer_parts import Answer, Cell, Link, Listing, kind_link, share, to_list
+from mutator.report.answer_parts import FIRST, SILENT, Answer, Cell, Link, Listing, kind_link, share, to_list
 from mutator.report.dangers import NO_CONTACT, SEVERITY
 from mutator.report.paths import RunPaths, link_text
-from mutator.report.warnings import FIRST, SILENT
 
 LISTED = 5  # maximum number of fault types listed
 

@@ -10,14 +10,13 @@ import pandas as pd
 import pytest
 
 from mutator.outcomes.fault_paths import LinkState, PathLink, UntimedPath
-from mutator.report.answer_parts import Answer, Link, Part, to_list
+from mutator.report.answer_parts import NO_ALERT, Answer, Link, Part, to_list
 from mutator.report.answers import answers_of
 from mutator.report.dangers import dangerous
 from mutator.report.fix_order import first_to_fix
 from mutator.report.panels.answers import answers_panel
 from mutator.report.paths import RunPaths
 from mutator.report.studies import ReportedRun
-from mutator.report.warnings import NO_ALERT
 from mutator.results.column_facts import result_columns
 from mutator.results.rows import lines_of
 from mutator.store.lines import written

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from mutator.report.scenes import scene_facts
+from mutator.report.browse import scene_facts
 from mutator.triggers.trees import Tree
 from mutator.workspace import Workspace
 
