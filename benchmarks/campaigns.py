@@ -45,7 +45,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--campaign", default="paper_smoke")
     parser.add_argument("--limit", metavar="N", help="run only N experiments of the campaign")
-    parser.add_argument("--engine", help="reference, warm or fork, if not the one that mutator chooses")
+    parser.add_argument("--engine", help="reference or fork, if not the one that mutator chooses")
     parser.add_argument("--rounds", type=int, default=1)
     parser.add_argument("--json", type=Path, metavar="FILE")
     options = parser.parse_args()

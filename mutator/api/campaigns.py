@@ -7,6 +7,7 @@ from mutator._common.arguments import check_type, check_whole
 from mutator.api.runs import Run
 from mutator.api.selection import WorkspaceLike, open_workspace
 from mutator.campaigns.plans import Choices
+from mutator.engines.registry import check_offered
 from mutator.errors import IncompleteRun
 from mutator.execution.distribution import distributor
 from mutator.execution.running import run_campaign
@@ -34,7 +35,7 @@ def run(
     apply where you give none.
 
     * `workers`: number of processes; 0: only this one.
-    * `engine`: a name from `mutator.engines.kinds`; None: the fastest for this many experiments.
+    * `engine`: `reference` or `fork`; None: the fastest for this many experiments.
     * `reviewed`: refuse to run mutants without an approval.
     * `accept_versions`: resume even if versions of Python or packages have changed, and record the change.
     * `cluster`: the address of a Dask scheduler, its scheduler file, `local:N`, or a cluster file. Its
@@ -47,6 +48,7 @@ def run(
     approval is missing, or if the checks before the campaign or the equivalence check fail.
     """
     check_whole("workers", workers)
+    check_offered(engine)
     if choices is not None:
         check_type("choices", choices, Choices, "mutator.Choices")
     found, place = open_workspace(workspace), Path(out)

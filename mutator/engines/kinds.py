@@ -8,13 +8,14 @@ class EngineKind:
     """An engine.
 
     `factory` is `module:function`, imported when the engine is made from a `Setting`. `forks`: the engine
-    needs a forkable target.
+    needs a forkable target. `offered`: users can choose it; others are for tests and benchmarks.
     """
 
     name: str
     about: str
     factory: str
     forks: bool = False
+    offered: bool = True
 
 
 REFERENCE, WARM, FORK = "reference", "warm", "fork"
@@ -31,6 +32,7 @@ ENGINES = {
             about="a fork of the loaded target",
             factory="mutator.engines.fork:make_warm",
             forks=True,
+            offered=False,
         ),
         EngineKind(
             name=FORK,
@@ -40,3 +42,4 @@ ENGINES = {
         ),
     )
 }
+OFFERED = tuple(name for name, kind in ENGINES.items() if kind.offered)

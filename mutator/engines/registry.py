@@ -5,7 +5,7 @@ import sys
 from pkgutil import resolve_name
 
 from mutator.engines.jobs import Engine, Setting
-from mutator.engines.kinds import ENGINES, FORK, REFERENCE
+from mutator.engines.kinds import ENGINES, FORK, OFFERED, REFERENCE
 from mutator.errors import MutatorError
 from mutator.targets.manifest import TargetManifest
 
@@ -21,10 +21,16 @@ def choose_engine(asked: str | None, manifest: TargetManifest, experiments: int)
         return REFERENCE if not_worth_forking(manifest, experiments) else FORK
     why = not_forkable(manifest)
     if asked not in ENGINES:
-        raise MutatorError(f"engine '{asked}'", argument="engine", expected=f"one of {', '.join(ENGINES)}")
+        check_offered(asked)
     if ENGINES[asked].forks and why:
         raise MutatorError(f"engine '{asked}': {why}", argument="engine", remedy=f"use {REFERENCE}")
     return asked
+
+
+def check_offered(asked: str | None) -> None:
+    """Raise MutatorError for an engine that users cannot choose; None leaves the choice to the harness."""
+    if asked is not None and asked not in OFFERED:
+        raise MutatorError(f"engine '{asked}'", argument="engine", expected=f"one of {', '.join(OFFERED)}")
 
 
 def make_engine(name: str, setting: Setting) -> Engine:

@@ -90,7 +90,7 @@ def test_a_run_has_a_worker_for_each_usable_core(
     assert started == [3, 0, 1]
 
 
-@pytest.mark.parametrize("engine", ["reference", "warm", "fork"])
+@pytest.mark.parametrize("engine", ["reference", "fork"])
 def test_a_fault_that_hides_a_name_is_refused_before_any_run(cli: Cli, root: Path, engine: str) -> None:
     """The fault would make a module's name local to a function."""
     driver = root / "tree" / "toycar" / "driver.py"

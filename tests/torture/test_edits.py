@@ -29,7 +29,7 @@ TRIES = 60
 WORDS = ("small", "--limit", "2", "--engine", "fork")
 FILES = {kind: pattern for kind, pattern in PATTERNS.items() if kind != "review"}  # the toy has no review
 CHOICES = (
-    *(("--seed", "4"), ("--seed", "3"), ("--limit", "3"), ("--engine", "reference"), ("--engine", "warm")),
+    *(("--seed", "4"), ("--seed", "3"), ("--limit", "3"), ("--engine", "reference")),
     *(("-n", "1"), ("--only", "value > 1"), ("--shard", "1/2"), ("--reading", "as_coded")),
 )
 

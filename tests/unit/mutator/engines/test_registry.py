@@ -5,7 +5,7 @@ from pkgutil import resolve_name
 import pytest
 
 from mutator.engines.kinds import ENGINES, FORK, REFERENCE
-from mutator.engines.registry import choose_engine
+from mutator.engines.registry import check_offered, choose_engine
 from mutator.errors import MutatorError
 from mutator.workspace import Workspace
 
@@ -20,5 +20,13 @@ def test_the_default_engine_depends_on_the_size_of_the_campaign(toycar: Workspac
     manifest = toycar.manifest("toycar")
     assert choose_engine(None, manifest, 3) == REFERENCE
     assert choose_engine(None, manifest, 1000) == FORK
-    with pytest.raises(MutatorError, match="engine 'quick'; expected one of reference, warm, fork"):
+    with pytest.raises(MutatorError, match="engine 'quick'; expected one of reference, fork"):
         choose_engine("quick", manifest, 3)
+
+
+@pytest.mark.parametrize("name", ["warm", "quick", ""])
+def test_users_choose_among_the_offered_engines(name: str) -> None:
+    check_offered(None)
+    check_offered(FORK)
+    with pytest.raises(MutatorError, match=f"engine: engine '{name}'; expected one of reference, fork"):
+        check_offered(name)
