@@ -65,7 +65,9 @@ def _kept(folder: RunFolder, there: SeriesFolder, manifest: TargetManifest | Non
             if name in planned and (run := folder.golden_folder(planned[name])).is_dir():
                 assert manifest is not None
                 if not _are_same(golden, Sampler(manifest, load_channels(manifest, run)).golden):
-                    raise MutatorError("differs", where=path, expected=f"the series of golden/{run.name}")
+                    raise MutatorError(
+                        "differs", where=path, expected=f"the series of {run.relative_to(folder.path)}"
+                    )
         except MutatorError as err:
             yield _told(err, err.got, f"{making_again(folder.path, name)} rebuilds it")
 

@@ -65,12 +65,12 @@ class Goldens:
         folder_of: Callable[[Experiment], Path],
         *,
         several_seeds: bool = False,
-        digests: Mapping[str, str] | None = None,
+        digests: Mapping[Path, str] | None = None,
     ) -> None:
         self.folder = folder_of  # finds the output folder of the fault-free run
         self._manifest = manifest
         self._several_seeds = several_seeds
-        self._digests = digests  # what `digest_of` must return, by the folder's name
+        self._digests = digests  # what `digest_of` must return, by folder
         self._files = lru_cache(_KEPT)(self._watched)
         self._trace = lru_cache(_KEPT)(lambda folder: self._unchanged(folder, load_channels))
         self._sampler = lru_cache(_KEPT)(lambda folder: Sampler(manifest, self._trace(folder)))
@@ -94,7 +94,7 @@ class Goldens:
     def _watched(self, folder: Path) -> UnchangedFiles:
         paths = [path for name in self._manifest.outputs if (path := inside(folder, name)).is_file()]
         files = UnchangedFiles({str(path): read_bounded(path) for path in paths})
-        if self._digests is not None and digest_of(self._manifest, folder) != self._digests[folder.name]:
+        if self._digests is not None and digest_of(self._manifest, folder) != self._digests[folder]:
             raise _changed(folder)
         return files
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from mutator._common import caches
+from mutator._common.below import inside
 from mutator._common.files import raising_disk_full
 from mutator.campaigns.chunks import Pending
 from mutator.campaigns.provenance import check_sources, sources
@@ -128,7 +129,9 @@ class Worker:
             self._manifest,
             folder.golden_folder,
             several_seeds=several,
-            digests=self._assignment.goldens,
+            digests={
+                inside(folder.path / "golden", key): one for key, one in self._assignment.goldens.items()
+            },
         )
         models = self._workspace.fault_models()
         return Runner(

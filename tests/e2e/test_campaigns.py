@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+import mutator
 from mutator.campaigns.chunks import Pending
 from mutator.campaigns.plans import Choices
 from mutator.engines.jobs import Execution, Job
@@ -240,6 +241,7 @@ def test_scenarios_can_be_in_a_subfolder_of_the_library(toy: Workspace, tmp_path
     path.write_text(path.read_text().replace("[A]", "[more/A]").replace("scenario: A", "scenario: more/A"))
     summary = run_campaign(toy, "small", tmp_path / "run", choices=Choices(limit=2))
     assert (summary.exit_code, summary.done) == (0, 2)
+    assert mutator.verify(tmp_path / "run", workspace=toy).passed
 
 
 def test_a_campaign_that_cannot_be_planned_leaves_no_folder(toy: Workspace, tmp_path: Path) -> None:

@@ -97,7 +97,7 @@ class PieceRunner:
                 site.manifest,
                 lambda experiment: inside(self._goldens, self._golden_of(experiment).key),
                 several_seeds=site.meta["several_seeds"],
-                digests={key: known for key, (_, known) in site.goldens.items()},
+                digests={inside(self._goldens, key): known for key, (_, known) in site.goldens.items()},
             )
             with_series = kind is Kind.RUN and site.meta["series"]
             self._runners[kind] = Runner(

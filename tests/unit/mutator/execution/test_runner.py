@@ -172,7 +172,7 @@ def test_nothing_is_compared_with_a_changed_golden_run(
     place.mkdir(parents=True)
     write(place)
     (place / "said.json").write_text("{}")
-    digests = {"A": digest_of(manifest, place)}
+    digests = {place: digest_of(manifest, place)}
     said: Outputs = {"said": {"hazards": {}, "alert_events": []}, "trace": {"gas": np.zeros(20)}, "ran": RAN}
 
     class Changing(PlayedEngine):
