@@ -38,6 +38,8 @@ test("a few huge values do not hide all others", () => {
   const { high, cut } = ReplayData.range(channel([...values, 1e9]), 1000);
   assert.ok(high < 20);
   assert.deepEqual(cut, [0, 1e9]);
+  const { low } = ReplayData.range(channel([...values, -1e9]), 1000);
+  assert.ok(low > -20 && low < 0);
   assert.equal(ReplayData.range(channel(values), 1000).cut, null);
 });
 
