@@ -20,6 +20,7 @@ from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
 from time import process_time
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -69,7 +70,7 @@ def answers(cache: Path) -> Iterator[object]:
     """
     import cv2
     from selfdrive.common import compiled
-    from selfdrive.sim import effects, vision
+    from selfdrive.sim import effects
 
     cv2.setNumThreads(1)
     compiled.use(cache)
@@ -78,13 +79,22 @@ def answers(cache: Path) -> Iterator[object]:
         kind, *words = json.loads(line)
         if kind == "has":
             yield (
-                vision.DETECTORS,
+                choices().DETECTORS,
                 [k for k, made in EFFECTS.items() if not made or hasattr(effects, made[0])],
             )
         else:
             detector, effect, count = words
             case = cases.get((detector, effect)) or Drive(detector, effect, cache)
             yield cases.setdefault((detector, effect), case).pictures(count)
+
+
+def choices() -> ModuleType:
+    """Return the module of a version that lists its detectors and translations."""
+    try:
+        from selfdrive.sim import pictures
+    except ImportError:
+        from selfdrive.sim import vision as pictures  # older versions
+    return pictures
 
 
 class Drive:
@@ -95,7 +105,7 @@ class Drive:
         from selfdrive.sim.road import Road
 
         coded = detector == "as_coded"
-        move = "as_coded" if coded else vision.GROUND
+        move = "as_coded" if coded else choices().GROUND
         pictures = vision.Pictures(detector=detector, cache=cache, translation=move)
         self._seen = vision.build_vision(pictures, Road(None, None), 0)
         self._offset = 0.1 * list(EFFECTS).index(effect)  # cases share no poses

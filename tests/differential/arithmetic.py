@@ -20,12 +20,12 @@ from selfdrive.sim.effects.effect import Moment
 from selfdrive.sim.effects.levels import LEVELS
 from selfdrive.sim.moved_picture import CodedView, GroundView, ShiftedView
 from selfdrive.sim.picture import Picture
+from selfdrive.sim.pictures import AS_CODED, CODED, DASHED, DETECTORS, Pictures
 from selfdrive.sim.road_look import Look, Paint
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.sim.run import simulate
 from selfdrive.sim.scenario import PLANTS, load_scenario, on_plant
 from selfdrive.sim.trace_file import pieces
-from selfdrive.sim.vision import DETECTORS, Pictures
 
 SCENARIOS = Path(__file__).parents[2] / "fault_library" / "scenarios"
 WORN = Look(  # with every feature of a road
@@ -49,9 +49,9 @@ def digests() -> Iterator[tuple[str, str]]:
         for plant in PLANTS if path.stem[0] != "L" else PLANTS[:1]:  # the other has only straight roads
             yield f"{path.stem} on the {plant} plant", trace(path, plant, None)
     for detector in DETECTORS:
-        pictures = Pictures(detector=detector, marks=vision.DASHED)
+        pictures = Pictures(detector=detector, marks=DASHED)
         yield f"S1 through {detector}", trace(SCENARIOS / "S1.yaml", "standard", pictures)
-    coded = Pictures(detector=vision.AS_CODED, translation=vision.CODED)
+    coded = Pictures(detector=AS_CODED, translation=CODED)
     yield "S1 on the reference plant, as coded", trace(SCENARIOS / "S1.yaml", "reference", coded)
 
 

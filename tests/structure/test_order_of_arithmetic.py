@@ -15,9 +15,7 @@ NO_RESULT = (  # files that draw, compare or train; CasADi computes symbols in t
     "selfdrive/sim/compare/*",
     "selfdrive/sim/effects/page.py",
     "selfdrive/sim/effects/severity.py",
-    "selfdrive/visiond/evaluate.py",
-    "selfdrive/visiond/under_effects.py",
-    "selfdrive/visiond/train*.py",
+    "selfdrive/visiond_lab/*",
     "selfdrive/controls/lib/lateral_ocp.py",
     "selfdrive/controls/lib/mpc_solver.py",
 )

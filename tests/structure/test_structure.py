@@ -149,6 +149,19 @@ VIOLATIONS = {
         "mutator/mutants/patches.py",
         "import typing\nif typing.TYPE_CHECKING:\n    from mutator.mutants import building",
     ),
+    "direction in the target": (
+        "target/selfdrive/controls/controlsd.py",
+        "from selfdrive.car.honda import values",
+    ),
+    "direction in the target, in a function": (
+        "target/selfdrive/visiond/hog.py",
+        "def f():\n    from selfdrive.sim import road_look",
+    ),
+    "cycle in the target": (
+        "target/selfdrive/sim/pictures.py",
+        "def f():\n    from selfdrive.sim import vision",
+    ),
+    "new package in the target": ("target/selfdrive/novel.py", "X = 1"),
     "target": ("mutator/engines/reference.py", "import selfdrive.sim.run"),
     "harness": ("target/selfdrive/sim/run.py", "import mutator.errors"),
     "study": ("mutator/report/building.py", "from mutator import paper"),

@@ -1,7 +1,6 @@
 """controlsd: the control loop, every 10 ms."""
 
-from selfdrive.car.honda.interface import CarInterface
-from selfdrive.car.params import CarParams
+from selfdrive.common.car import Car, CarParams
 from selfdrive.common.conversions import KPH_TO_MS
 from selfdrive.controls.lib.alertmanager import AlertManager
 from selfdrive.controls.lib.angle_offset import AngleOffset
@@ -38,7 +37,7 @@ LEARN_EVERY, LEARN_AT = 5, 2  # cycles, angle offset learning at 20 Hz
 class Controlsd:
     """The control loop. `state` and `plan` are those of the last update."""
 
-    def __init__(self, params: CarParams, car: CarInterface, fit: ModelFit) -> None:
+    def __init__(self, params: CarParams, car: Car, fit: ModelFit) -> None:
         self._params = params
         self._car = car
         self._planner = Planner(params, fit)

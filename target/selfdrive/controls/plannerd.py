@@ -1,6 +1,6 @@
 """plannerd: plans speed and path from leads, set speed and road."""
 
-from selfdrive.car.params import CarParams
+from selfdrive.common.car import CarParams
 from selfdrive.common.conversions import KPH_TO_MS
 from selfdrive.common.realtime import DT_CTRL
 from selfdrive.controls.lib.cruise_plan import cruise_limits, is_following

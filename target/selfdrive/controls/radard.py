@@ -2,7 +2,7 @@
 
 from collections import deque
 
-from selfdrive.car.params import CarParams
+from selfdrive.common.car import CarParams
 from selfdrive.common.interp import interp
 from selfdrive.common.realtime import DT_MDL
 from selfdrive.controls.lib.pathplanner import ModelFit, PathPlanner

@@ -20,9 +20,9 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim import image_folder, lead_picture, road_look, road_renderer, road_texture
 from selfdrive.sim.image_folder import ImageFolder
 from selfdrive.sim.picture import Picture
+from selfdrive.sim.pictures import Pictures
 from selfdrive.sim.road_look import DASH_PERIOD
 from selfdrive.sim.road_renderer import RoadRenderer
-from selfdrive.sim.vision import Pictures
 
 FRAMES, PERIODS = 600, 66  # of the rendered road, which repeats seamlessly after 805.2 m
 SPACING = PERIODS * DASH_PERIOD / FRAMES  # m between frames: 1.342, for 20 frames per second at 60 mph

@@ -13,7 +13,7 @@ as 1/speed; at walking pace it becomes the kinematic model.
 from math import cos, sin
 from typing import Protocol
 
-from selfdrive.car.params import CarParams
+from selfdrive.common.car import CarParams
 from selfdrive.common.interp import clip
 from selfdrive.common.realtime import DT_CTRL
 

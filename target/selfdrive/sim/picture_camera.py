@@ -5,8 +5,8 @@ from selfdrive.messages import CameraView
 from selfdrive.sim.camera import Camera
 from selfdrive.sim.image_library import ImageLibrary
 from selfdrive.sim.moved_picture import CodedView, GroundView, ShiftedView
+from selfdrive.sim.pictures import GROUND, SHIFT
 from selfdrive.sim.truth import GroundTruth
-from selfdrive.sim.vision import GROUND, SHIFT
 
 
 class PictureCamera:

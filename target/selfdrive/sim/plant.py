@@ -1,6 +1,6 @@
 """The standard plant: openpilot's longitudinal PC simulation with realistic steering."""
 
-from selfdrive.car.params import CarParams
+from selfdrive.common.car import CarParams
 from selfdrive.common.interp import interp
 from selfdrive.common.realtime import DT_CTRL
 from selfdrive.messages import Actuators

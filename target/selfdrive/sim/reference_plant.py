@@ -3,7 +3,7 @@
 Do not draw conclusions about driving from it: its lateral motion and messages are crude.
 """
 
-from selfdrive.car.params import CarParams
+from selfdrive.common.car import CarParams
 from selfdrive.common.conversions import DEG_TO_RAD, MS_TO_KPH
 from selfdrive.common.realtime import DT_CTRL
 from selfdrive.sim.plant import Plant

@@ -32,6 +32,7 @@ SEEING = (
     "sim/lead_picture.py",
     "sim/moved_picture.py",
     "sim/picture.py",
+    "sim/pictures.py",
     "sim/remembering_detector.py",
     "sim/road_*.py",
     "sim/vision.py",

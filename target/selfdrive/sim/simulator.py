@@ -13,6 +13,7 @@ from selfdrive.sim.actuators import ActuatorReceiver
 from selfdrive.sim.film.recorder import Film
 from selfdrive.sim.hazards import HazardMonitor
 from selfdrive.sim.lead import LeadVehicle
+from selfdrive.sim.pictures import Pictures
 from selfdrive.sim.plant import Plant
 from selfdrive.sim.radar import RadarSensor
 from selfdrive.sim.recorder import Recorder
@@ -21,7 +22,7 @@ from selfdrive.sim.road import Road
 from selfdrive.sim.scenario import REFERENCE, STANDARD, Scenario
 from selfdrive.sim.sensors import CarSensors
 from selfdrive.sim.truth import GroundTruth
-from selfdrive.sim.vision import Pictures, build_vision
+from selfdrive.sim.vision import build_vision
 from selfdrive.visiond.detector import MirroredDetector
 from selfdrive.visiond.visiond import Visiond
 

@@ -4,7 +4,6 @@ Only runs with pictures import picture libraries, which load slowly.
 """
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Protocol
 
 from selfdrive.common import compiled
@@ -12,32 +11,10 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.errors import ConfigError
 from selfdrive.messages import CameraView
 from selfdrive.sim.camera import Camera
+from selfdrive.sim.pictures import AS_CODED, PAPER, Pictures
 from selfdrive.sim.road import Road
 from selfdrive.sim.truth import GroundTruth
 from selfdrive.visiond.detector import IdealDetector, LaneDetector
-
-DETECTORS = PAPER, ROBUST, AS_CODED = "paper", "robust", "as_coded"
-MARKS = SOLID, DASHED = "solid", "dashed"
-TRANSLATIONS = GROUND, SHIFT, CODED = "ground", "shift", "as_coded"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Pictures:
-    """The pictures of a run, and their detector.
-
-    `frames` is a folder of user frames; None: a rendered road with these `marks` (both solid, or the right
-    one dashed). `translation` is how frames follow the car's offset and heading: by the ground's homography,
-    or by shifting, as in the paper's text or in its authors' code. The folder `cache` stores frames and
-    detections; None: nothing is stored. With `forget`, stored detections are not used, as needed for
-    detection code that depends on time.
-    """
-
-    detector: str = PAPER
-    marks: str = SOLID
-    frames: Path | None = None
-    translation: str = GROUND
-    cache: Path | None = None
-    forget: bool = False
 
 
 class RoadCamera(Protocol):

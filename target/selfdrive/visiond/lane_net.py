@@ -28,7 +28,7 @@ class LaneNet:
 
     @classmethod
     def load(cls, path: Path = WEIGHTS) -> "LaneNet":
-        """Load a net that `python -m selfdrive.visiond.train` wrote."""
+        """Load a net that `python -m selfdrive.visiond_lab.train` wrote."""
         with np.load(path) as stored:
             return cls(stored["hidden"], stored["hidden_bias"], stored["out"], stored["out_bias"])
 

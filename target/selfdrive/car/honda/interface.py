@@ -5,7 +5,7 @@ from operator import attrgetter
 
 from selfdrive.car.honda.carcontroller import CarController
 from selfdrive.car.honda.carstate import CarStateReader
-from selfdrive.car.params import CarParams
+from selfdrive.common.car import CarParams
 from selfdrive.common.conversions import RAD_TO_DEG
 from selfdrive.controls.lib.events import (
     ENABLE,

@@ -1,6 +1,6 @@
 """Lateral control: from lanes to steering torque."""
 
-from selfdrive.car.params import CarParams
+from selfdrive.common.car import CarParams
 from selfdrive.common.conversions import DEG_TO_RAD
 from selfdrive.controls.lib.lateral_mpc import Lanes, LateralMpc
 from selfdrive.controls.lib.pid import PIController

@@ -7,7 +7,7 @@ import math
 from array import array
 from dataclasses import dataclass
 
-from selfdrive.car.params import CarParams
+from selfdrive.common.car import CarParams
 from selfdrive.controls.lib.compiled_mpc import build_lateral
 from selfdrive.controls.lib.horizon import N_NODES
 from selfdrive.controls.lib.mpc_iteration import Iteration

@@ -1,6 +1,6 @@
 """Longitudinal control: from target speed and acceleration to gas and brake."""
 
-from selfdrive.car.params import CarParams
+from selfdrive.common.car import CarParams
 from selfdrive.common.interp import clip, interp
 from selfdrive.common.realtime import DT_CTRL
 from selfdrive.controls.lib.pid import PIController

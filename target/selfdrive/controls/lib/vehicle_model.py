@@ -3,7 +3,7 @@
 Source: M. Guiggiani, The Science of Vehicle Dynamics (2014), steady-state cornering.
 """
 
-from selfdrive.car.params import CarParams
+from selfdrive.common.car import CarParams
 
 
 class VehicleModel:

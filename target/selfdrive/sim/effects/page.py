@@ -69,8 +69,8 @@ strongest. Lines show what the detectors find: **broad red** for `paper`, **narr
   (from Udacity's first project on lane finding, MIT licence). Random effects are applied with 20 seeds. The
   detectors have no memory of earlier pictures. The counts are not independent, because they come from only
   six roads. The repository contains [the counts](image-effects/real-frames.csv), but not the frames. For your
-  own frames, `python -m selfdrive.visiond.under_effects FRAMES TRUTH` counts the misses and, with `--strips`,
-  shows all levels. The detectors were tuned only for rain and snow on rendered roads.
+  own frames, `python -m selfdrive.visiond_lab.under_effects FRAMES TRUTH` counts the misses and, with
+  `--strips`, shows all levels. The detectors were tuned only for rain and snow on rendered roads.
 
 ## What a level of the paper's effects represents
 

@@ -2,7 +2,7 @@
 
 import pytest
 from selfdrive.car.honda.interface import get_params
-from selfdrive.car.params import CarParams
+from selfdrive.common.car import CarParams
 
 
 @pytest.fixture

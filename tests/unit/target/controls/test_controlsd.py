@@ -4,7 +4,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
-from selfdrive.car.params import CarParams
+from selfdrive.common.car import CarParams
 from selfdrive.common.conversions import KPH_TO_MS
 from selfdrive.controls.controlsd import Controlsd
 from selfdrive.controls.lib import events as ev

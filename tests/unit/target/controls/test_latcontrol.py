@@ -3,7 +3,7 @@
 from math import nan
 
 import pytest
-from selfdrive.car.params import CarParams
+from selfdrive.common.car import CarParams
 from selfdrive.common.conversions import DEG_TO_RAD
 from selfdrive.controls.lib.latcontrol import LatControl
 from selfdrive.controls.lib.lateral_mpc import Lanes

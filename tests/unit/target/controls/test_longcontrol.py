@@ -1,7 +1,7 @@
 """Gas and brake in every state of longitudinal control."""
 
 import pytest
-from selfdrive.car.params import CarParams
+from selfdrive.common.car import CarParams
 from selfdrive.controls.lib.longcontrol import OFF, PID, STARTING, STOPPING, LongControl
 from selfdrive.messages import CarState, Plan
 

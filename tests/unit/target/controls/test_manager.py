@@ -3,7 +3,7 @@
 from types import SimpleNamespace
 
 import pytest
-from selfdrive.car.params import CarParams
+from selfdrive.common.car import CarParams
 from selfdrive.manager import START_STEP, Manager
 from selfdrive.messages import RadarData
 

@@ -4,7 +4,7 @@ from itertools import pairwise
 from types import SimpleNamespace
 
 import pytest
-from selfdrive.car.params import CarParams
+from selfdrive.common.car import CarParams
 from selfdrive.controls.lib.pathplanner import ModelFit
 from selfdrive.controls.plannerd import Planner
 from selfdrive.messages import CarState, LeadData, LeadVision, ModelData, PathData, Plan, RadarState

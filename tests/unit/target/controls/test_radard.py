@@ -1,7 +1,7 @@
 """radard agrees with numbers measured on openpilot, and selects leads."""
 
 import pytest
-from selfdrive.car.params import CarParams
+from selfdrive.common.car import CarParams
 from selfdrive.controls.lib.pathplanner import ModelFit
 from selfdrive.controls.radard import Radard
 from selfdrive.messages import (

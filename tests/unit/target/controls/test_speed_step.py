@@ -5,7 +5,7 @@ of the relative speed resets nothing, unless the plan cannot follow it."""
 from typing import NamedTuple
 
 import pytest
-from selfdrive.car.params import CarParams
+from selfdrive.common.car import CarParams
 from selfdrive.controls.lib.pathplanner import ModelFit
 from selfdrive.controls.plannerd import Planner
 from selfdrive.controls.radard import Radard

@@ -1,7 +1,7 @@
 """Steady-state bicycle model."""
 
 import pytest
-from selfdrive.car.params import CarParams
+from selfdrive.common.car import CarParams
 from selfdrive.controls.lib.vehicle_model import VehicleModel
 
 

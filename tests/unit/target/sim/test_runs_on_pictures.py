@@ -17,10 +17,10 @@ from selfdrive.sim.effects import PaperRain
 from selfdrive.sim.image_library import SPACING
 from selfdrive.sim.picture import Picture
 from selfdrive.sim.picture_camera import PictureCamera
+from selfdrive.sim.pictures import AS_CODED, CODED, GROUND, PAPER, ROBUST, SHIFT, Pictures
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.sim.run import main, simulate, write
 from selfdrive.sim.scenario import REFERENCE, STANDARD, load_scenario, on_plant
-from selfdrive.sim.vision import AS_CODED, CODED, GROUND, PAPER, ROBUST, SHIFT, Pictures
 from selfdrive.visiond.detector import LaneLines, RoadLine, path_between
 
 CALIBRATION = f"""\
@@ -164,7 +164,7 @@ def test_a_run_on_frames_has_one_thread(scenarios, frames, tmp_path):
     code = (
         "import os, sys; from pathlib import Path; from dataclasses import replace\n"
         "from selfdrive.sim.run import simulate; from selfdrive.sim.scenario import load_scenario\n"
-        "from selfdrive.sim.vision import Pictures\n"
+        "from selfdrive.sim.pictures import Pictures\n"
         "scenario = replace(load_scenario(Path(sys.argv[1])), steps=20)\n"
         "simulate(scenario, 0, Pictures(frames=Path(sys.argv[2]), cache=Path(sys.argv[3])))\n"
         "print(len(os.listdir('/proc/self/task')))"

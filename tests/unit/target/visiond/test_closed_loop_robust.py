@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from selfdrive.sim.pictures import ROBUST, Pictures
 from selfdrive.sim.run import simulate
 from selfdrive.sim.scenario import load_scenario
-from selfdrive.sim.vision import ROBUST, Pictures
 
 SCENARIOS = Path(__file__).resolve().parents[4] / "fault_library" / "scenarios"
 

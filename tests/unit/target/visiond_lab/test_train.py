@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from selfdrive.visiond import train
 from selfdrive.visiond.lane_net import LaneNet
-from selfdrive.visiond.training_windows import EACH, labelled_windows
+from selfdrive.visiond_lab import train
+from selfdrive.visiond_lab.windows import EACH, labelled_windows
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""Measures how well a detector finds real lanes: `python -m selfdrive.visiond.evaluate FRAMES TRUTH`.
+"""Measures how well a detector finds real lanes: `python -m selfdrive.visiond_lab.evaluate FRAMES TRUTH`.
 
 TRUTH is a JSON file: {"lines": {KEY: {"L": [a, b], "R": [a, b]}}} with x = a * row + b, or, if only the
 lines' centres in row 278 are known, {KEY: {"gt": [xl, xr]}}. Coordinates are in the canonical frame: 640 x
@@ -266,7 +266,8 @@ def _write_overlays(folder: Path, detector: str, findings: list[Finding]) -> Non
 
 def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
-        prog="selfdrive.visiond.evaluate", description="Compare detected lanes of real frames with the truth."
+        prog="selfdrive.visiond_lab.evaluate",
+        description="Compare detected lanes of real frames with the truth.",
     )
     parser.add_argument("frames", type=Path, metavar="FRAMES", help="folder of frames")
     parser.add_argument("truth", type=Path, metavar="TRUTH", help="JSON file with the true lines")

@@ -1,4 +1,4 @@
-"""Trains the neural net of the paper's lane detector: `python -m selfdrive.visiond.train`.
+"""Trains the neural net of the paper's lane detector: `python -m selfdrive.visiond_lab.train`.
 
 Training uses only rendered roads, drawn from the seed; the accuracy on different roads is printed. It takes
 minutes, or seconds with `--small`. Needs scikit-learn.
@@ -17,7 +17,7 @@ from sklearn.neural_network import MLPClassifier
 from threadpoolctl import threadpool_limits
 
 from selfdrive.visiond.lane_net import HIDDEN, WEIGHTS, LaneNet
-from selfdrive.visiond.training_windows import labelled_windows
+from selfdrive.visiond_lab.windows import labelled_windows
 
 FULL, SMALL = (600, 60), (12, 4)  # roads for training and testing
 EPOCHS = 25
@@ -43,7 +43,7 @@ def train(features: np.ndarray, labels: np.ndarray, seed: int) -> LaneNet:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(prog="python -m selfdrive.visiond.train", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m selfdrive.visiond_lab.train", description=__doc__)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--out", type=Path, default=WEIGHTS, help="the file to write")
     parser.add_argument("--small", action="store_true", help="few roads, for a trial")

@@ -1,8 +1,9 @@
 """Measures how well detectors find real lanes in bad weather.
 
-`python -m selfdrive.visiond.under_effects FRAMES TRUTH` takes the same input as `selfdrive.visiond.evaluate`.
-Each frame is changed by each level of each effect, once per seed. The result is the number of pictures in
-which a detector misses a line; these counts are not independent, because a frame always shows the same road.
+`python -m selfdrive.visiond_lab.under_effects FRAMES TRUTH` takes the same input as
+`selfdrive.visiond_lab.evaluate`. Each frame is changed by each level of each effect, once per seed. The
+result is the number of pictures in which a detector misses a line; these counts are not independent, because
+a frame always shows the same road.
 """
 
 import argparse
@@ -19,9 +20,9 @@ from selfdrive.common.errors import ConfigError, writing
 from selfdrive.sim.effects.effect import Effect, Moment
 from selfdrive.sim.effects.levels import LEVELS
 from selfdrive.sim.effects.page import panel
-from selfdrive.visiond.evaluate import EXIT_INPUT, PAPER, ROBUST, Finding, Frame, build, look, read_frames
 from selfdrive.visiond.paper_detector import PaperDetector
 from selfdrive.visiond.robust_detector import RobustDetector
+from selfdrive.visiond_lab.evaluate import EXIT_INPUT, PAPER, ROBUST, Finding, Frame, build, look, read_frames
 
 SEEDS = 20
 MOMENT = Moment(2.0, 50.0, 26.82)
@@ -127,7 +128,7 @@ def _write_strips(folder: Path, frames: Sequence[Frame], kinds: Sequence[type[Ef
 
 def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
-        prog="selfdrive.visiond.under_effects",
+        prog="selfdrive.visiond_lab.under_effects",
         description="Count the real frames in which detectors miss a line behind image effects.",
     )
     parser.add_argument("frames", type=Path, metavar="FRAMES", help="folder of frames")

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 from selfdrive.sim.road_renderer import RoadRenderer
-from selfdrive.visiond.evaluate import SOURCES, TUSIMPLE, UDACITY, canonical, main
+from selfdrive.visiond_lab.evaluate import SOURCES, TUSIMPLE, UDACITY, canonical, main
 
 
 @cache

@@ -1,7 +1,8 @@
 """The search for the threshold of the detector as coded, run on a few images."""
 
 import pytest
-from selfdrive.visiond import coded_detector, coded_threshold
+from selfdrive.visiond import coded_detector
+from selfdrive.visiond_lab import coded_threshold
 
 
 @pytest.fixture(autouse=True)

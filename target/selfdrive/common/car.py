@@ -1,6 +1,10 @@
-"""Physical data and tuning of a car."""
+"""What the controller needs of a car: its data and tuning, and a way to read and command it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
+
+from selfdrive.messages import CanFrame, CarControl, CarState
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,3 +38,13 @@ class CarParams:
     radar_offset: float  # m from the camera to the radar, which is at the front bumper
     steer_limit_alert: bool
     start_acceleration: float = 0.5  # m/s^2, target while the brake is released to start moving
+
+
+class Car(Protocol):
+    def update(self, frames: Sequence[CanFrame], t: float) -> CarState:
+        """Return the car's state at time `t` (s), from the frames received since the last call."""
+        ...
+
+    def apply(self, control: CarControl, frame: int) -> list[CanFrame]:
+        """Return the frames that command the car in this cycle, the `frame`-th."""
+        ...

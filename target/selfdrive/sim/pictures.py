@@ -1,0 +1,27 @@
+"""What the pictures of a run show, how they follow the car, and which detector sees them."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+DETECTORS = PAPER, ROBUST, AS_CODED = "paper", "robust", "as_coded"
+MARKS = SOLID, DASHED = "solid", "dashed"
+TRANSLATIONS = GROUND, SHIFT, CODED = "ground", "shift", "as_coded"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pictures:
+    """The pictures of a run, and their detector.
+
+    `frames` is a folder of user frames; None: a rendered road with these `marks` (both solid, or the right
+    one dashed). `translation` is how frames follow the car's offset and heading: by the ground's homography,
+    or by shifting, as in the paper's text or in its authors' code. The folder `cache` stores frames and
+    detections; None: nothing is stored. With `forget`, stored detections are not used, as needed for
+    detection code that depends on time.
+    """
+
+    detector: str = PAPER
+    marks: str = SOLID
+    frames: Path | None = None
+    translation: str = GROUND
+    cache: Path | None = None
+    forget: bool = False

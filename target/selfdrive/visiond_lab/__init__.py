@@ -1,0 +1,1 @@
+"""Training and evaluation of the lane detectors; no part of a run."""
