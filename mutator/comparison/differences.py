@@ -41,8 +41,6 @@ def facts(a: Side, b: Side) -> tuple[Fact, ...]:
     """Everything that the runs' results depend on, with packages last."""
     heads = [_facts(side) for side in (a, b)]
     names = dict.fromkeys(name for head in heads for name in head)
-    if not all("stretches" in side.folder.head for side in (a, b)):  # older runs list all installed packages
-        names = {n: None for n in names if not n.startswith("package ") or all(n in head for head in heads)}
     return tuple(Fact(name=n, a=heads[0].get(n, "-"), b=heads[1].get(n, "-")) for n in names)
 
 

@@ -32,7 +32,7 @@ _STRETCH = {
     "accepted": [str],
     "machines": [{"worker": str, "host": str, "python": str, "platform": str}],
 }
-_LATER = {"machines"}  # older folders do not have these keys
+_OPTIONAL = {"machines"}  # left out without a cluster
 _SHAPES: dict[str, Any] = {
     "plan": str,
     "campaign": str,
@@ -134,6 +134,6 @@ def _fits(value: object, shape: Any) -> bool:
             return False
         if str in shape:
             return all(_fits(item, shape[str]) for item in value.values())
-        wanted = {key: shape[key] for key in shape if key in value or key not in _LATER}
+        wanted = {key: shape[key] for key in shape if key in value or key not in _OPTIONAL}
         return all(key in value and _fits(value[key], wanted[key]) for key in wanted)
     return isinstance(value, shape)

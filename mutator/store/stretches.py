@@ -35,10 +35,7 @@ class Stretch:
 
 
 def read_stretches(head: Mapping[str, Any]) -> tuple[Stretch, ...]:
-    """Return the stretches of work in a run.json, oldest first. Old files have only the planning session."""
-    if "stretches" not in head:
-        planned = head["provenance"]
-        return (Stretch(python=planned["python"], packages=planned["packages"], platform=planned["machine"]),)
+    """Return the stretches of work in a run.json, oldest first."""
     try:
         return tuple(Stretch(**stretch) for stretch in head["stretches"])
     except TypeError as err:

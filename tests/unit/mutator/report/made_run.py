@@ -5,9 +5,11 @@ import json
 from html.parser import HTMLParser
 from pathlib import Path
 
+from mutator._common.hashing import plain
 from mutator.results.column_facts import result_columns
 from mutator.store import digests, plan_file
 from mutator.store.digests import Ledger
+from mutator.store.stretches import Stretch
 
 COLUMNS = [c.name for c in result_columns(("H1", "H2", "H3"), ("gas", "brake", "steer_torque"))]
 HEAD = {
@@ -24,12 +26,8 @@ HEAD = {
     "chunks": [],
     "runs": 2,
     "sources": {"target": "cd" * 32},
-    "provenance": {
-        "mutator": "0.1.0",
-        "python": "3.11.7",
-        "machine": "Linux",
-        "packages": {"numpy": "2.4.6"},
-    },
+    "provenance": {"mutator": "0.2.0"},
+    "stretches": [plain(Stretch(python="3.11.7", platform="Linux", packages={"numpy": "2.4.6"}))],
 }
 OK = {
     "module": "radar",

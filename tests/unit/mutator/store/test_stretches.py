@@ -22,13 +22,6 @@ def test_stretches_are_read_as_written() -> None:
     assert read_stretches({"stretches": [asdict(BEFORE)]}) == (BEFORE,)
 
 
-def test_an_older_run_has_one_stretch() -> None:
-    planned = {"python": "3.11.2", "machine": "Linux x86_64", "packages": {"numpy": "2.0"}}
-    (found,) = read_stretches({"provenance": planned})
-    assert (found.python, found.platform, found.packages) == ("3.11.2", "Linux x86_64", {"numpy": "2.0"})
-    assert (found.cpu, found.records) == (None, "*")
-
-
 @pytest.mark.parametrize("stretch", [{}, {"python": "3"}, asdict(BEFORE) | {"stranger": 1}, 7])
 def test_a_damaged_stretch_is_reported(stretch: Any) -> None:
     with pytest.raises(MutatorError, match=r"run\.json: a damaged stretch of work"):
