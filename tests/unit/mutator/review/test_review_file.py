@@ -68,6 +68,7 @@ def test_decisions_about_different_groups_merge(tmp_path: Path) -> None:
         ("toycar", "other", 4, "other"),
         ("four_eyes: true", "four_eyes: 4", 5, "4"),
         ("review/2", "review/3", 3, "newer version"),
+        ("review/2", "review/1", 3, "expected review/2; start the file with `schema: review/2`"),
         ("review/2", "[]", 3, "schema []"),
         ("decisions:", "decisions: [", 7, "YAML"),
         ('"bbbbbbbbbbbb"', '"aaaaaaaaaaaa"', 23, "appears twice"),

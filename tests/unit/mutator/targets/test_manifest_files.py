@@ -44,6 +44,17 @@ def test_ground_truth_can_be_computed(toy: Workspace) -> None:
     assert expressions["v_lead"] == "_fi.hypot(now.v[0], now.v[1]) > 3"
 
 
+@pytest.mark.parametrize(
+    ("schema", "remedy"),
+    [("target/1", "start the file with `schema: target/2`"), ("target/3", "use a newer version of mutator")],
+)
+def test_a_manifest_of_another_schema_is_refused(toy: Workspace, schema: str, remedy: str) -> None:
+    path = toy.library / "targets" / "toy.yaml"
+    path.write_text(path.read_text().replace("target/2", schema))
+    with pytest.raises(MutatorError, match=rf"toy\.yaml:1: schema '{schema}'; expected target/2; {remedy}"):
+        toy.manifest("toy")
+
+
 def test_arguments_have_placeholders_and_changes(toy: Workspace) -> None:
     manifest = toy.manifest("toy")
     given = manifest.arguments(scenario=Path("s.yaml"), seed=3, out=Path("o"), changes=("alone",))
