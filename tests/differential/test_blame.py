@@ -222,6 +222,7 @@ class Blamed:
         self.models = toy.fault_models()
         limits = Limits(cpu_s=1, wall_s=900, memory_mb=1024, steps=500)
         self.reference = ReferenceEngine(self.manifest, folder, limits)
+        self.goldens: dict[str, Path] = {}  # by scenario
         self.engines: dict[str, Engine] = {}
         for name in ENGINES:
             work = folder / name
@@ -231,10 +232,10 @@ class Blamed:
 
     def golden(self, experiment: Experiment) -> Path:
         scenario = experiment.scenario
-        folder = self.folder / f"golden-{scenario}"
-        if not folder.exists():
-            self.reference.execute(Job(name="g", scenario=self.toy.scenario(scenario), seed=SEED), folder)
-        return folder / "out"
+        if scenario not in self.goldens:
+            job = Job(name="g", scenario=self.toy.scenario(scenario), seed=SEED)
+            self.goldens[scenario] = self.reference.execute(job, self.folder / f"golden-{scenario}").out
+        return self.goldens[scenario]
 
     def experiment(self, fault: Fault, trigger: Trigger = FROM_2_S, scenario: str = "A") -> Experiment:
         return Experiment(

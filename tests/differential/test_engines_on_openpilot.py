@@ -28,10 +28,11 @@ def test_the_engines_give_the_same_records(tmp_path: Path, campaign: str, limit:
     (tmp_path / "work").mkdir()
     limits = plan.campaign.limits
     reference = ReferenceEngine(manifest, tmp_path / "work", limits)
+    outputs: dict[str, Path] = {}
     for one in plan.goldens():
         job = Job(name=one.key, scenario=clone.scenario(one.scenario), seed=plan.seed, changes=one.changes)
-        reference.execute(job, tmp_path / one.key)
-    goldens = Goldens(manifest, lambda e: tmp_path / GoldenRun.of(e, several_seeds=False).key / "out")
+        outputs[one.key] = reference.execute(job, tmp_path / one.key).out
+    goldens = Goldens(manifest, lambda e: outputs[GoldenRun.of(e, several_seeds=False).key])
     found: dict[str, dict[str, Record]] = {}
     for name in ENGINES:
         work = tmp_path / name
