@@ -246,3 +246,26 @@ def _argument(arg: ast.arg, default: ast.expr | None, typed: bool) -> str:
     if default is None:
         return text
     return f"{text} = {ast.unparse(default)}" if typed else f"{text}={ast.unparse(default)}"
+
+
+def stub() -> str:
+    """Return `mutator/__init__.pyi`: type checkers cannot follow names that are imported on first use."""
+    lines = [
+        f"from {module} import {name} as {name}"
+        for module, names in sorted(mutator.HOMES.items())
+        for name in sorted(names)
+    ]
+    exported = ",\n".join(f'    "{name}"' for name in mutator.__all__)
+    head = "# Generated from `HOMES` in __init__.py by `python -m mutator.reference`; do not edit."
+    return "\n".join(
+        [
+            head,
+            *lines,
+            "",
+            "HOMES: dict[str, tuple[str, ...]]",
+            "__version__: str",
+            "",
+            f"__all__ = [\n{exported},\n]",
+            "",
+        ]
+    )

@@ -1,4 +1,4 @@
-"""The generated files of the documentation."""
+"""The generated files of the documentation, and the public names for type checkers."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -11,6 +11,7 @@ from mutator.workspace import Workspace
 
 FOLDER = Path("docs") / "reference"
 SCHEMAS = FOLDER / "schemas"
+STUB = Path("mutator") / "__init__.pyi"
 PAGES: dict[str, Callable[[Workspace], str]] = {
     "api.md": api.python_api,
     "campaign.md": formats.campaigns,
@@ -27,7 +28,7 @@ PAGES: dict[str, Callable[[Workspace], str]] = {
 
 
 def generated_files(workspace: Workspace) -> dict[Path, str]:
-    files = {FOLDER / name: make(workspace) for name, make in PAGES.items()}
+    files = {FOLDER / name: make(workspace) for name, make in PAGES.items()} | {STUB: api.stub()}
     known = workspace.fault_models()
     for kind in file_formats(workspace.readings()):
         text = json.dumps(editor_schema(kind, known), indent=1, ensure_ascii=False)

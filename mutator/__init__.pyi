@@ -1,0 +1,112 @@
+# Generated from `HOMES` in __init__.py by `python -m mutator.reference`; do not edit.
+from mutator.api.audits import Audit as Audit
+from mutator.api.audits import seal as seal
+from mutator.api.audits import verify as verify
+from mutator.api.caches import cache_entries as cache_entries
+from mutator.api.caches import cache_folder as cache_folder
+from mutator.api.caches import clear_caches as clear_caches
+from mutator.api.caches import prune_caches as prune_caches
+from mutator.api.campaigns import run as run
+from mutator.api.comparisons import RunComparison as RunComparison
+from mutator.api.comparisons import compare as compare
+from mutator.api.comparisons import write_history as write_history
+from mutator.api.experiment_results import TraceFrames as TraceFrames
+from mutator.api.libraries import check_hazard_analysis as check_hazard_analysis
+from mutator.api.libraries import check_library as check_library
+from mutator.api.libraries import check_target as check_target
+from mutator.api.libraries import doctor as doctor
+from mutator.api.libraries import draw_control_structure as draw_control_structure
+from mutator.api.libraries import find_places as find_places
+from mutator.api.libraries import init_library as init_library
+from mutator.api.mutant_files import MutantSet as MutantSet
+from mutator.api.mutants import BuiltMutant as BuiltMutant
+from mutator.api.mutants import build_mutant as build_mutant
+from mutator.api.operator_mutants import OperatorChoice as OperatorChoice
+from mutator.api.plans import plan as plan
+from mutator.api.reviews import ReviewedGroups as ReviewedGroups
+from mutator.api.reviews import load_review as load_review
+from mutator.api.run_experiments import RunExperiment as RunExperiment
+from mutator.api.runs import Run as Run
+from mutator.api.runs import load_run as load_run
+from mutator.api.runs import merge_runs as merge_runs
+from mutator.api.trials import Trial as Trial
+from mutator.api.trials import try_fault as try_fault
+from mutator.audit.seal import Seals as Seals
+from mutator.campaigns.plans import Choices as Choices
+from mutator.campaigns.plans import Plan as Plan
+from mutator.comparison.comparison import Gate as Gate
+from mutator.errors import CheckFailed as CheckFailed
+from mutator.errors import IncompleteRun as IncompleteRun
+from mutator.errors import MutatorError as MutatorError
+from mutator.errors import MutatorWarning as MutatorWarning
+from mutator.execution.session import Summary as Summary
+from mutator.exports import Format as Format
+from mutator.model import Experiment as Experiment
+from mutator.model import Fault as Fault
+from mutator.model import Outcome as Outcome
+from mutator.model import Record as Record
+from mutator.model import Status as Status
+from mutator.model import Trigger as Trigger
+from mutator.report.film import Shot as Shot
+from mutator.report.history import History as History
+from mutator.store.progress import Progress as Progress
+from mutator.workspace import Workspace as Workspace
+
+HOMES: dict[str, tuple[str, ...]]
+__version__: str
+
+__all__ = [
+    "Audit",
+    "BuiltMutant",
+    "CheckFailed",
+    "Choices",
+    "Experiment",
+    "Fault",
+    "Format",
+    "Gate",
+    "History",
+    "IncompleteRun",
+    "MutantSet",
+    "MutatorError",
+    "MutatorWarning",
+    "OperatorChoice",
+    "Outcome",
+    "Plan",
+    "Progress",
+    "Record",
+    "ReviewedGroups",
+    "Run",
+    "RunComparison",
+    "RunExperiment",
+    "Seals",
+    "Shot",
+    "Status",
+    "Summary",
+    "TraceFrames",
+    "Trial",
+    "Trigger",
+    "Workspace",
+    "__version__",
+    "build_mutant",
+    "cache_entries",
+    "cache_folder",
+    "check_hazard_analysis",
+    "check_library",
+    "check_target",
+    "clear_caches",
+    "compare",
+    "doctor",
+    "draw_control_structure",
+    "find_places",
+    "init_library",
+    "load_review",
+    "load_run",
+    "merge_runs",
+    "plan",
+    "prune_caches",
+    "run",
+    "seal",
+    "try_fault",
+    "verify",
+    "write_history",
+]
