@@ -19,6 +19,7 @@ from mutator.store.run_head import CAMPAIGN, HEAD
 
 SCRATCH, ASIDE, TRACES = "work", "damaged", "traces"
 SIGNATURE = ("seal.json", "seal.json.sig")
+_TABLES = ("results", "propagation", "timings")
 CONTENT = (  # all files that a run folder can contain; * matches any text, including folders
     *(HEAD, digests.FILE, CAMPAIGN, "plan.csv", "plan/*.jsonl", "reviewed.json", "checks.json"),
     *SIGNATURE,
@@ -29,7 +30,9 @@ CONTENT = (  # all files that a run folder can contain; * matches any text, incl
     *("results.csv", "results.parquet", "propagation.parquet", "timings.parquet", "results.json"),
     *("report/*.md", "report/*.html", "report/made_from.json", "report/series/*.js"),
     *("report/tables/*.csv", "report/figures/*.svg", "report/figures/*.png", "report/compare-*/*.csv"),
-    "exports/*",  # in formats that other packages can add
+    *("exports/junit.xml", "exports/mcap/*.mcap"),
+    *(f"exports/{name}.{kind}" for name in _TABLES for kind in ("csv", "parquet")),
+    "exports/*.json",  # in formats that other packages add
     *(f"{ASIDE}/*", "owner.lock", "workers/*", f"{SCRATCH}/*"),
 )
 FOLDERS = {pattern.partition("/")[0] for pattern in CONTENT if "/" in pattern}

@@ -82,7 +82,7 @@ def test_a_killed_merge_loses_no_series(runs: Runs, tmp_path: Path, monkeypatch:
         seen.append(len(list((run / "series").iterdir())))
         return table_building.build(run)
 
-    monkeypatch.setattr(merging, "results", SimpleNamespace(build=build))
+    monkeypatch.setattr(merging, "table_building", SimpleNamespace(build=build))
     merge([runs["1/2"], runs["2/2"]], tmp_path / "out")
     assert seen == [3]
 

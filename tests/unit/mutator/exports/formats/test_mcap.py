@@ -65,7 +65,8 @@ def became(e: Experiment) -> dict[str, Any]:
         "alerts": (("brake_hard", 0.4),),
         "hazards": (("H3", 0.45), ("H1", 0.5)),
         "t_end": 0.45,
-        "left": (("gas", 0.35, 0.75),),
+        "left": (("gas", 0.35, 0.875),),
+        "max_dev": (("gas", 0.875),),
     }
 
 
@@ -207,7 +208,7 @@ def test_the_tables_of_propagation_and_timings_are_exported(run: Path, tmp_path:
     written = export(run, Format.CSV, tmp_path / "p.csv", parts=parts)
     rows = pd.read_csv(written)
     assert list(rows["experiment_id"]) == sorted(hazardous(run))
-    assert rows[["channel", "t_first", "max_dev"]].values.tolist() == [["gas", 0.35, 0.75]] * len(rows)
+    assert rows[["channel", "t_first", "max_dev"]].values.tolist() == [["gas", 0.35, 0.875]] * len(rows)
     assert export(run, Format.PARQUET, None, parts=parts).name == "propagation.parquet"
     kept = (run / "exports" / "propagation.parquet").read_bytes()
     assert kept == (run / "propagation.parquet").read_bytes()
