@@ -68,7 +68,7 @@ def record(experiment: Experiment, number: int, patch: bytes) -> Record:
         tree="f" * 64,
         activation=Activation(first=1.0 + number / 10, last=5.0, count=number) if active else None,
         t_manifest=1.5 + number / 10 if active else None,
-        max_dev=(("gas", 0.3 if number == 7 else number / 7), ("brake", 0.0), ("wheel_turn", 0.0)),
+        max_dev=(("gas", 0.3 if number in (1, 2, 7) else number / 7), ("brake", 0.0), ("wheel_turn", 0.0)),
         hazards=(("H3", 4.0 + number / 10),) if hazard else (),
         alerts=(("brake_hard", 3.0),) if hazard and number % 2 else (),
         trace_digest="f" * 64,
