@@ -15,6 +15,8 @@ import sys
 from collections.abc import Iterator
 from contextlib import ExitStack
 from hashlib import sha256
+from importlib import import_module
+from importlib.util import find_spec
 from math import sin
 from pathlib import Path
 from statistics import median
@@ -90,11 +92,8 @@ def answers(cache: Path) -> Iterator[object]:
 
 def choices() -> ModuleType:
     """Return the module of a version that lists its detectors and translations."""
-    try:
-        from selfdrive.sim import pictures
-    except ImportError:
-        from selfdrive.sim import vision as pictures  # older versions
-    return pictures
+    name = "selfdrive.sim.pictures"
+    return import_module(name if find_spec(name) else "selfdrive.sim.vision")  # the latter in older versions
 
 
 class Drive:
@@ -106,7 +105,7 @@ class Drive:
 
         coded = detector == "as_coded"
         move = "as_coded" if coded else choices().GROUND
-        pictures = vision.Pictures(detector=detector, cache=cache, translation=move)
+        pictures = choices().Pictures(detector=detector, cache=cache, translation=move)
         self._seen = vision.build_vision(pictures, Road(None, None), 0)
         self._offset = 0.1 * list(EFFECTS).index(effect)  # cases share no poses
         self._number = 0
