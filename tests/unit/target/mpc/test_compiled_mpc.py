@@ -14,7 +14,7 @@ import casadi
 import pytest
 from selfdrive.common import compiled
 from selfdrive.controls.lib import compiled_mpc, mpc_parts
-from selfdrive.controls.lib.compiled_mpc import C_SOURCE, CompiledSolver, build_lateral, build_longitudinal
+from selfdrive.controls.lib.compiled_mpc import CompiledSolver, build_lateral, build_longitudinal
 from selfdrive.controls.lib.lateral_mpc import FIRST_RATE
 from selfdrive.controls.lib.lateral_ocp import lateral_ocp
 from selfdrive.controls.lib.long_ocp import long_ocp
@@ -125,10 +125,9 @@ def test_a_solvers_result_does_not_depend_on_earlier_problems(name: str) -> None
     assert run(iteration) == run(Iteration(solver)) == run(Iteration(COMPILED[name]())) == wanted
 
 
-def test_the_c_file_is_current() -> None:
+def test_the_generated_header_is_current() -> None:
     assert casadi.__version__ == compiled_mpc.CASADI
-    text = C_SOURCE.read_text()
-    assert mpc_parts.with_parts(text) == text
+    assert mpc_parts.HEADER.read_text() == mpc_parts.header()
     assert long_ocp().weights == compiled_mpc.LONGITUDINAL_WEIGHTS
     assert lateral_ocp(RATE_COST).weights == (*compiled_mpc.LATERAL_WEIGHTS, RATE_COST)
 
@@ -152,11 +151,13 @@ def test_the_library_is_not_used_with_another_version_of_daqp(
     assert found is None and compiled_mpc._code() is not None
 
 
-@pytest.mark.parametrize("edited", ["mpc.c", "mpc_solver.py", "long_ocp.py", "lateral_ocp.py", "horizon.py"])
+@pytest.mark.parametrize(
+    "edited", ["mpc.c", "mpc_generated.h", "mpc_solver.py", "long_ocp.py", "lateral_ocp.py", "horizon.py"]
+)
 def test_an_edited_problem_is_solved_by_casadi(all_compiled: Path, tmp_path: Path, edited: str) -> None:
     target = tmp_path / "target"
     shutil.copytree(
-        mpc_parts.C_FILE.parents[3] / "selfdrive",
+        mpc_parts.HEADER.parents[3] / "selfdrive",
         target / "selfdrive",
         ignore=shutil.ignore_patterns("*.pyc"),
     )
@@ -184,7 +185,7 @@ def test_a_compiled_run_without_frames_does_not_import_casadi(all_compiled: Path
         "open_run(['--scenario', %r, '--out', 'none', '--compiled', %r]).step(); "
         "print([name for name in ('casadi', 'cv2', 'skimage') if name in sys.modules])"
     )
-    root = mpc_parts.C_FILE.parents[3]
+    root = mpc_parts.HEADER.parents[3]
     scenario = root.parent / "fault_library/scenarios/S1.yaml"
     command = [sys.executable, "-c", code % (str(scenario), str(all_compiled))]
     ran = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True)
