@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from .conftest import Page
 
 COUNT = 24
-LOADED = """async ([id, trace]) => {
-    const series = await SeriesFile.load(id, trace), words = (values) => [...new Uint32Array(values.buffer)];
+LOADED = """async ([id, trace, largest]) => {
+    const series = await SeriesFile.load(id, {trace, largest}), words = (values) => [...new Uint32Array(values.buffer)];
     const channels = series.channels.map((channel) => (
         { ...channel, t: [...channel.t], golden: words(channel.golden), faulty: words(channel.faulty) }));
     return { ...series, channels };
@@ -187,7 +187,8 @@ def test_series_are_loaded_from_their_files(page: "Page", run: Path, rows: list[
         page.page.wait_for_selector("#experiment .replay-player")
         assert "H3" in page.page.inner_text("#experiment .replay")
         one = record(planned[name], 7, b"")
-        found, read = page.page.evaluate(LOADED, [name, one.trace_digest]), series.read(name, one)
+        known = [name, one.trace_digest, dict(one.max_dev)]
+        found, read = page.page.evaluate(LOADED, known), series.read(name, one)
         assert read is not None
         golden, faulty = read
         assert [channel["name"] for channel in found["channels"]] == [

@@ -224,7 +224,6 @@ class Blamed:
         self.reference = ReferenceEngine(self.manifest, folder, limits)
         self.goldens: dict[str, Path] = {}  # by scenario
         self.engines: dict[str, Engine] = {}
-        self.goldens: dict[str, Path] = {}  # output folders of golden runs, by scenario
         for name in ENGINES:
             work = folder / name
             work.mkdir()
