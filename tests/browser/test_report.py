@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 
 COUNT = 24
 LOADED = """async ([id, trace, largest]) => {
-    const series = await SeriesFile.load(id, {trace, largest}), words = (values) => [...new Uint32Array(values.buffer)];
+    const series = await SeriesFile.load(id, {trace, largest});
+    const words = (values) => [...new Uint32Array(values.buffer)];
     const channels = series.channels.map((channel) => (
         { ...channel, t: [...channel.t], golden: words(channel.golden), faulty: words(channel.faulty) }));
     return { ...series, channels };
