@@ -7,6 +7,7 @@ A format is an `Export`: in a module of `formats/`, or from another package (ent
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import EnumType, StrEnum
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -73,7 +74,8 @@ class Export:
     """A format.
 
     `write` returns the content of the file, or None if it has written the folder `out` itself. `file` is the
-    default name in the run's `exports/`; `{table}` in it is the name of the table.
+    default name in the run's `exports/`; `{table}` in it is the name of the table. In another package, it is
+    the name of the format with a suffix.
     """
 
     about: str
@@ -88,6 +90,12 @@ def find_export(name: str) -> Export:
     """Return the format of that name; MutatorError if there is none, or if its package is broken."""
     found = EXPORTS.find(name)
     assert isinstance(found, Export)
+    if name not in EXPORTS.shipped() and not fnmatchcase(found.file, f"{name}.?*"):
+        raise MutatorError(  # `mutator clean` knows an export by this name
+            f"export '{name}' writes the file '{found.file}'",
+            expected=f"the name '{name}' with a suffix",
+            remedy="correct `file` in the package that adds it",
+        )
     return found
 
 

@@ -8,6 +8,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from mutator._common.below import unlink_below
+from mutator._common.doors import EXPORTS
 from mutator._common.files import complete, is_half_written, read_json, remove_folder
 from mutator._common.locks import owned
 from mutator.errors import MutatorError
@@ -101,9 +102,14 @@ def check(path: Path) -> list[Path]:
     return ours
 
 
-def _is_known(name: str) -> bool:
+def _patterns() -> tuple[str, ...]:
+    """Return the patterns of all files that a run folder can contain, also in formats of other packages."""
+    return (*CONTENT, *(f"exports/{name}.*" for name in EXPORTS.installed()))
+
+
+def _matches(name: str, patterns: Iterable[str]) -> bool:
     whole = Path(name).with_name(complete(Path(name).name)).as_posix()
-    return any(fnmatchcase(whole, pattern) for pattern in CONTENT)
+    return any(fnmatchcase(whole, pattern) for pattern in patterns)
 
 
 def _sorted_out(path: Path) -> tuple[list[Path], list[Path]]:
@@ -112,6 +118,7 @@ def _sorted_out(path: Path) -> tuple[list[Path], list[Path]]:
     """
     ours: list[Path] = []
     strangers: list[Path] = []
+    patterns = _patterns()
     for folder, folders, files in os.walk(path):
         for name in (*files, *folders):
             entry = Path(folder, name)
@@ -119,7 +126,7 @@ def _sorted_out(path: Path) -> tuple[list[Path], list[Path]]:
             is_folder = name in folders and not entry.is_symlink()
             if is_folder and not is_closed(words) and words.partition("/")[0] in FOLDERS:
                 continue
-            if is_closed(words) if is_folder else _is_known(words) and not entry.is_symlink():
+            if is_closed(words) if is_folder else _matches(words, patterns) and not entry.is_symlink():
                 ours.append(entry)
             else:
                 strangers.append(entry)

@@ -30,9 +30,8 @@ CONTENT = (  # all files that a run folder can contain; * matches any text, incl
     *("results.csv", "results.parquet", "propagation.parquet", "timings.parquet", "results.json"),
     *("report/*.md", "report/*.html", "report/made_from.json", "report/series/*.js"),
     *("report/tables/*.csv", "report/figures/*.svg", "report/figures/*.png", "report/compare-*/*.csv"),
-    *("exports/junit.xml", "exports/mcap/*.mcap"),
+    *("exports/mutation-elements.json", "exports/junit.xml", "exports/mcap/*.mcap"),
     *(f"exports/{name}.{kind}" for name in _TABLES for kind in ("csv", "parquet")),
-    "exports/*.json",  # in formats that other packages add
     *(f"{ASIDE}/*", "owner.lock", "workers/*", f"{SCRATCH}/*"),
 )
 FOLDERS = {pattern.partition("/")[0] for pattern in CONTENT if "/" in pattern}

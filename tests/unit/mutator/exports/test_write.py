@@ -4,7 +4,11 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
+import pytest
+
 import mutator
+from mutator.errors import MutatorError
+from mutator.exports import find_export
 from mutator.workspace import Workspace
 
 
@@ -19,3 +23,13 @@ def test_a_format_of_another_package_is_written(
     assert written == run.path / "exports" / "counts.json"
     assert sum(json.loads(written.read_text()).values()) == len(run.folder.records())
     run.delete()  # what another package exports is no stranger in the folder
+
+
+def test_a_file_that_clean_would_not_know_is_refused(tmp_path: Path, install: Callable[[Path], None]) -> None:
+    source = "from mutator.exports import Export\nE = Export(about='', file='mine.csv', write=bytes)"
+    (tmp_path / "odd_export.py").write_text(source)
+    text = '[project]\nname = "odd"\nversion = "1"\n[project.entry-points."mutator.exports"]\n'
+    (tmp_path / "pyproject.toml").write_text(f'{text}odd = "odd_export:E"\n')
+    install(tmp_path)
+    with pytest.raises(MutatorError, match=r"writes the file 'mine\.csv'; expected the name 'odd'"):
+        find_export("odd")
