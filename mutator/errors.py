@@ -24,7 +24,7 @@ EXIT_HARNESS_ERRORS = 3
 
 
 class MutatorError(Exception):
-    """An error that the user can fix, shown without a traceback.
+    """An error that the user can fix, shown without a traceback. Do what `remedy` says.
 
     Names in backquotes in the remedy are arguments of the API; the command line shows the matching options.
     """
@@ -73,7 +73,7 @@ class MutatorError(Exception):
 
 
 class MutatorWarning(UserWarning):
-    """A warning for the user, shown in one line."""
+    """A warning for the user, shown in one line. The command goes on; correct what it names."""
 
 
 def _short(text: str) -> str:
@@ -85,7 +85,9 @@ def _rebuild(cls: type[MutatorError], got: str, state: dict[str, Any]) -> Mutato
 
 
 class CheckFailed(MutatorError):
-    """A check failed: a campaign cannot start, its results are invalid, or a comparison failed a gate."""
+    """A check failed: a campaign cannot start, its results are invalid, or a comparison failed a gate. Read
+    what the check found; the command ran as asked.
+    """
 
     exit_code = EXIT_CHECK_FAILED  #: exit code of a command that ends with this error
 
