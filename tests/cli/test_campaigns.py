@@ -60,17 +60,6 @@ def experiment_with(run: Path, word: str) -> str:
     return next(line.split(",")[0] for line in results(run) if f",{word}," in line)
 
 
-def test_plan_writes_the_plan_and_runs_nothing(cli: Cli, root: Path) -> None:
-    answer = cli("plan", "toy", "--out", "p", "--only", 'fault_type == "distance"', "-n", "4")
-    assert answer.code == 0
-    for wanted in ("sensor/distance", "guided", "random", "total", "with 4 workers", "MB of disk"):
-        assert wanted in answer.out
-    assert "run it: mutator run toy --out p -n 4" in answer.out
-    assert "sensor/lane" not in answer.out
-    assert (Path("p") / "plan.csv").read_text().startswith("experiment_id,")
-    assert not (Path("p") / "records").exists()
-
-
 def test_a_run_has_a_worker_for_each_usable_core(
     cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -104,35 +93,6 @@ def test_a_fault_that_hides_a_name_is_refused_before_any_run(cli: Cli, root: Pat
     assert "sensor/lane/shifted" in answer.err
     assert "driver.py:12: the lines would make 'HEADWAY_S' local in drive" in answer.err
     assert not list(Path("r").glob("golden/*"))
-
-
-def test_a_plan_is_the_same_each_time(cli: Cli, root: Path) -> None:
-    one, two = (cli("plan", "toy", "--out", out, "--json").json for out in "ab")
-    other = cli("plan", "toy", "--out", "c", "--seed", "8", "--json").json
-    assert one["digest"] == two["digest"] != other["digest"]
-    assert one["experiments"] == sum(group["experiments"] for group in one["groups"]) == 24
-    assert one["cost"]["wall_s"] > 0
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["toys", "--out", "p"], "toy"),
-        (["toy", "--out", "p", "--only", "fault_typ == 'x'"], "fault_type"),
-        (["toy", "--out", "p", "--only", "value >"], "value >"),
-        (["toy", "--out", "p", "--exclude", "value >= 0 or trigger != ''"], "no experiment is left"),
-        (["toy", "--out", "p", "--reading", "as_read"], "as_described"),
-        (["toy", "--out", "full"], "not empty"),
-    ],
-)
-def test_an_invalid_plan_is_refused(cli: Cli, root: Path, words: list[str], said: str) -> None:
-    Path("full").mkdir()
-    Path("full/mine.txt").touch()
-    answer = cli("plan", *words)
-    assert answer.code == 2
-    assert said in answer.err
-    assert "Traceback" not in answer.err
-    assert not Path("p/run.json").exists()
 
 
 def test_run_prints_the_table_and_the_path_of_the_report(finished: tuple[Path, Any]) -> None:
