@@ -97,8 +97,8 @@ def watched(value: str, words: list[str]) -> None:
 
 
 def hops(clone: Path, value: str, words: list[str]) -> Hops:
-    said = run(clone, [__file__, "--watch", value, *words])
-    return Counter({(one, other): count for one, other, count in json.loads(said.splitlines()[-1])})
+    output = run(clone, [__file__, "--watch", value, *words])
+    return Counter({(one, other): count for one, other, count in json.loads(output.splitlines()[-1])})
 
 
 def run(clone: Path, words: list[str]) -> str:
@@ -146,14 +146,14 @@ def main() -> None:
     parser.add_argument("--against", type=Path, metavar="CLONE", help="also count in another version")
     parser.add_argument("--pairs", action="store_true", help="list every pair of modules")
     parser.add_argument("--watch", nargs=argparse.REMAINDER, help=argparse.SUPPRESS)
-    given = parser.parse_args()
-    if given.watch:
-        watched(given.watch[0], given.watch[1:])
-    versions = {"this version": ROOT} | ({"the other": given.against.resolve()} if given.against else {})
+    options = parser.parse_args()
+    if options.watch:
+        watched(options.watch[0], options.watch[1:])
+    versions = {"this version": ROOT} | ({"the other": options.against.resolve()} if options.against else {})
     for version, clone in versions.items():
         print(f"{version}:")
         for name, found in ways(clone).items():
-            describe(name, found, pairs=given.pairs)
+            describe(name, found, pairs=options.pairs)
 
 
 if __name__ == "__main__":

@@ -124,9 +124,9 @@ class ReferenceEngine:
         path = folder / "job.json"
         path.write_bytes(request)
         scenario = job.scenario.resolve()
-        given = UnchangedFiles({str(path): request, str(scenario): read_bounded(scenario)})
+        inputs = UnchangedFiles({str(path): request, str(scenario): read_bounded(scenario)})
         ended = self._guarded(job, path, home)
-        changed = tree.first_changed() or given.first_changed().removeprefix(f"{folder}/")
+        changed = tree.first_changed() or inputs.first_changed().removeprefix(f"{folder}/")
         if not (changed or new):
             self._base_tree.take_back(tree)
         return ended, changed

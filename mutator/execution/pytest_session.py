@@ -230,8 +230,8 @@ class Controller:
     @pytest.hookimpl(optionalhook=True)
     def pytest_configure_node(self, node: Any) -> None:
         assert self.begun is not None
-        given = node.workerinput[_INPUT] = self.begun.worker_input()
-        self.begun.written.begin(given["session"] + node.gateway.id)
+        worker_input = node.workerinput[_INPUT] = self.begun.worker_input()
+        self.begun.written.begin(worker_input["session"] + node.gateway.id)
 
     @pytest.hookimpl(optionalhook=True)
     def pytest_testnodedown(self, node: Any, error: object | None) -> None:
