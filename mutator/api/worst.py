@@ -6,7 +6,7 @@ from pathlib import Path
 from mutator.campaigns.filters import compile_filter
 from mutator.results.column_facts import is_text
 from mutator.results.ranking import places
-from mutator.results.rows import Row, lines_of, row_from
+from mutator.results.rows import Row, lines_of, rows_of
 from mutator.results.table_reader import Results
 
 _BATCH = 10_000  # rows filtered at a time
@@ -25,7 +25,7 @@ def worst_results(run: Path, only: str | None = None, limit: int | None = None) 
         lines = (line for first in batches for line in lines_of(texts.iloc[first : first + _BATCH]))
         fits = [accepts(_typed(line)) for line in lines]
         order = [row for row in order if fits[row]]
-    return [row_from(line) for line in lines_of(texts.iloc[order[:limit]])], len(order)
+    return rows_of(texts.iloc[order[:limit]]), len(order)
 
 
 def _typed(line: Mapping[str, str]) -> dict[str, object]:

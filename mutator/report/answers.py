@@ -26,7 +26,7 @@ from mutator.report.dangers import dangerous, worst_of
 from mutator.report.fix_order import first_to_fix
 from mutator.report.seen import PLACE, UNTIMED_PATH
 from mutator.report.studies import ReportedRun
-from mutator.results.rows import Row, lines_of, row_from
+from mutator.results.rows import Row, rows_of
 
 TYPES = 6  # maximum number of fault types that an answer lists
 
@@ -53,7 +53,7 @@ def _told(run: ReportedRun) -> pd.DataFrame:
     frame = run.frame
     told = frame.assign(place=frame[PLACE], untimed_path=frame[UNTIMED_PATH], warning=warnings_of(frame))
     shown = worst_of(told)
-    rows = [row_from(line) for line in lines_of(run.texts[run.texts["experiment_id"].isin(shown)])]
+    rows = rows_of(run.texts[run.texts["experiment_id"].isin(shown)])
     words = {
         "fault": {row.experiment_id: row.fault for row in rows},
         "hazard_names": {row.experiment_id: ", ".join(name for name, _ in row.hazards) for row in rows},

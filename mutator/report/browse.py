@@ -28,7 +28,7 @@ from mutator.report.whole_map import map_of
 from mutator.report.words import meanings_of
 from mutator.results.column_facts import is_text
 from mutator.results.ranking import worst
-from mutator.results.rows import Row, lines_of, row_from
+from mutator.results.rows import Row, lines_of, rows_of
 from mutator.review.groups import Shape, shapes
 from mutator.statistics.mutation_score import PERMANENT, TRANSIENT
 from mutator.store.run_folder import RunFolder
@@ -107,8 +107,8 @@ def _of_target(folder: RunFolder, workspace: "Workspace | None") -> dict[str, An
 
 def _listed(run: ReportedRun) -> tuple[list[Row], list[dict[str, str]]]:
     """Return the rows that the page lists, in reading order, and their cells."""
-    lines = lines_of(run.texts[run.seen.places < LISTED])
-    rows = [row_from(line) for line in lines]
+    listed = run.texts[run.seen.places < LISTED]
+    rows, lines = rows_of(listed), lines_of(listed)
     order = sorted(range(len(rows)), key=lambda i: reading_order(rows[i]))
     return [rows[i] for i in order], [lines[i] for i in order]
 

@@ -6,11 +6,15 @@ Hazards, compared channels and metrics of a target add columns; the others are t
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
+from mutator.errors import MutatorError
 from mutator.model import Experiment, fault_label
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.target_facts import T_END, MetricFacts
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 ColumnType = Literal["text", "flag", "count", "number"]
 
@@ -25,7 +29,7 @@ class Column:
     about: str
 
 
-_TO_MANIFEST = (
+_OF_PLAN = (
     Column(
         "experiment_id",
         "text",
@@ -47,6 +51,8 @@ _TO_MANIFEST = (
         "the trigger's name; for a random time, `random/` and the name of the guided partner's trigger",
     ),
     Column("seed", "count", "", "the seed of all draws"),
+)
+_TO_MANIFESTATION = (
     Column("status", "text", "", "whether the experiment itself worked"),
     Column("outcome", "text", "", "what the fault did; empty unless the status is `ok`"),
     Column("activated", "flag", "", "whether an injected statement ran while the trigger held"),
@@ -104,11 +110,11 @@ TIMINGS = (
     Column("host", "text", "", "the machine that ran the experiment"),
     Column("worker", "text", "", "the worker that ran the experiment"),
 )
-PLAN_COLUMNS = (*(column.name for column in _TO_MANIFEST[:11]), "variant", "aim", "condition")
+PLAN_COLUMNS = (*(column.name for column in _OF_PLAN), "variant", "aim", "condition")
 # Columns that are added when the table is read. No hazard can have one of these names.
 _DERIVED_TEXTS = ("kind", "fault", "row", "ending", "hazards", "warning", "through")
 DERIVED = (*_DERIVED_TEXTS, "rank", "hazard", "t_hazard")
-_PLAIN = (*_TO_MANIFEST, *_TO_REACTION, SEVERITY, *OF_PATHS, *EXTRA)
+_PLAIN = (*_OF_PLAN, *_TO_MANIFESTATION, *_TO_REACTION, SEVERITY, *OF_PATHS, *EXTRA)
 _TEXTS = {column.name for column in _PLAIN if column.type == "text"}
 _TEXTS |= {*_DERIVED_TEXTS}
 
@@ -126,7 +132,8 @@ def result_columns(
     `severity` is from `severity_columns`. `paths` adds the columns of the fault's path.
     """
     return (
-        *_TO_MANIFEST,
+        *_OF_PLAN,
+        *_TO_MANIFESTATION,
         *(column for name in hazards for column in hazard_columns(name)),
         *_TO_REACTION,
         *(
@@ -171,10 +178,18 @@ def hazard_columns(hazard: str) -> tuple[Column, Column]:
     )
 
 
-def hazards_in(columns: Iterable[str]) -> tuple[str, ...]:
-    """Return the hazards of a table, in order: each name that also occurs with the prefix `t_`."""
-    known = dict.fromkeys(columns)
-    return tuple(name.upper() for name in known if f"t_{name}" in known)
+def hazards_of(frame: "pd.DataFrame") -> tuple[str, ...]:
+    """Return the hazards of a frame that `Results` read, in the order of run.json. MutatorError for a frame
+    without them.
+    """
+    try:
+        return tuple(frame.attrs["hazards"])
+    except KeyError:
+        raise MutatorError(
+            "a frame of results without the names of its hazards",
+            expected='`frame.attrs["hazards"]`, which frames of a run have',
+            remedy="set it to the names of the target's hazards",
+        ) from None
 
 
 def deviation_columns(channels: Sequence[str]) -> Mapping[str, str]:

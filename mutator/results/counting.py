@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from mutator.model import Outcome, Status
-from mutator.results.column_facts import hazards_in
+from mutator.results.column_facts import hazards_of
 from mutator.results.rows import UNUSABLE, Count
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def outcome_counts(texts: "pd.DataFrame") -> dict[str, int]:
 
 def hazard_names(texts: "pd.DataFrame") -> tuple[str, ...]:
     """Return the hazards that were checked, including those that never occurred."""
-    return tuple(sorted(name for name in hazards_in(texts.columns) if (texts[name.lower()] != "").any()))
+    return tuple(sorted(name for name in hazards_of(texts) if (texts[name.lower()] != "").any()))
 
 
 def came(texts: "pd.DataFrame", hazard: str) -> "pd.Series[bool]":

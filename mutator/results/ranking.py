@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from mutator.model import Outcome, Status
-from mutator.results.column_facts import hazards_in
+from mutator.results.column_facts import hazards_of
 from mutator.results.counting import came, endings
 from mutator.results.rows import Row
 from mutator.targets.severity import CLASSES, DELTA_V
@@ -77,7 +77,7 @@ def _turn(
     import pandas as pd
 
     turn = np.full(len(texts), np.inf)
-    had = {name: came(texts, name).to_numpy() for name in hazards_in(texts.columns)}
+    had = {name: came(texts, name).to_numpy() for name in hazards_of(texts)}
     any_came = np.any(list(had.values()), axis=0) if had else np.zeros(len(texts), dtype=bool)
     for name, flag in had.items():
         if (column := f"margin_{name.lower()}") not in texts:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from mutator.model import Outcome, Status, fault_label
-from mutator.results.column_facts import hazards_in
+from mutator.results.column_facts import hazards_of
 from mutator.targets.severity import DELTA_V
 
 if TYPE_CHECKING:
@@ -105,11 +105,18 @@ def lines_of(texts: "pd.DataFrame") -> list[dict[str, str]]:
     return [dict(zip(names, cells, strict=True)) for cells in zip(*columns, strict=True)]
 
 
-def row_from(line: Mapping[str, str]) -> Row:
-    """Parse a line of results.csv, given by column. KeyError or ValueError if it is invalid."""
-    checked = [name for name in hazards_in(line) if line[name.lower()]]
+def rows_of(texts: "pd.DataFrame") -> list[Row]:
+    hazards = hazards_of(texts)
+    return [row_from(line, hazards) for line in lines_of(texts)]
+
+
+def row_from(line: Mapping[str, str], hazards: Sequence[str]) -> Row:
+    """Parse a line of results.csv, given by column, of a target with these hazards. KeyError or ValueError if
+    it is invalid.
+    """
+    checked = [name for name in hazards if line[name.lower()]]
     times = {name: line[f"t_{name.lower()}"] for name in checked}
-    hazards = [(name, float(time)) for name, time in times.items() if time]
+    came = [(name, float(time)) for name, time in times.items() if time]
     return Row(
         experiment_id=line["experiment_id"],
         module=line["module"],
@@ -125,14 +132,14 @@ def row_from(line: Mapping[str, str]) -> Row:
         t_activation=_number(line["t_activation"]),
         t_manifest=_number(line["t_manifest"]),
         checked=tuple(checked),
-        hazards=tuple(sorted(hazards, key=lambda h: h[1])),
+        hazards=tuple(sorted(came, key=lambda h: h[1])),
         alerts=tuple(a for a in line["alerts"].split(";") if a),
         t_alert=_number(line["t_alert"]),
         reaction_time=_number(line["reaction_time"]),
         detail=line["detail"],
         severity=line.get("severity", ""),
         delta_v=_number(line.get(DELTA_V, "")),
-        margins=_margins(line, [name for name, _ in hazards] or checked),
+        margins=_margins(line, [name for name, _ in came] or checked),
     )
 
 

@@ -15,13 +15,13 @@ from mutator._common.bounded import MOST_DATA, check_open, open_regular, read_bo
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Outcome, Record, Status
 from mutator.results import table_building, table_cells
-from mutator.results.column_facts import SINCE, hazards_in
+from mutator.results.column_facts import SINCE, hazard_columns
 from mutator.results.rows import Row, row_from
-from mutator.store.run_folder import RunFolder
+from mutator.store.run_head import Head, read_head
 from mutator.targets.severity import Scale
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     import pandas as pd
 
@@ -49,7 +49,7 @@ _REMEDY = "rebuild it: `mutator report DIR`"
 
 @dataclass(frozen=True, slots=True)
 class Results:
-    """A results table: the results.csv at `path`, and the results.parquet next to it.
+    """A results table: the results.csv at `path`, and the results.parquet and run.json next to it.
 
     Every access reads the files. MutatorError if a file is missing or not a results table.
     """
@@ -101,12 +101,14 @@ class Results:
 
     def rows(self) -> tuple[Row, ...]:
         try:
-            return tuple(map(row_from, self.lines()))
+            lines = list(self.lines())
+            hazards = self._hazards(lines[0]) if lines else ()
+            return tuple(row_from(line, hazards) for line in lines)
         except (KeyError, TypeError, ValueError) as err:
             raise self._no_table(str(err)) from None
 
     def texts(self) -> "pd.DataFrame":
-        """Return a frame of the cells as text ('' if empty)."""
+        """Return a frame of the cells as text ('' if empty); its `attrs["hazards"]` are the target's."""
         import pandas as pd
         import pyarrow as pa  # type: ignore[import-untyped]
         from pyarrow import csv as arrow_csv
@@ -128,7 +130,9 @@ class Results:
         for name in names:  # one column at a time, to avoid two copies in memory
             columns[name] = table.select([name]).combine_chunks().to_pandas(use_threads=False)[name]
             table = table.drop_columns([name])
-        return pd.DataFrame(columns)
+        texts = pd.DataFrame(columns)
+        texts.attrs["hazards"] = self._hazards(names)
+        return texts
 
     def _opened(self) -> BinaryIO:
         try:
@@ -145,12 +149,13 @@ class Results:
         Names are categories; `outcome` and `status` are ordered. Flags are nullable booleans (NA: the run
         failed). Times are floats in simulated seconds (NaN: no such event). Added columns are `kind`
         (`sensor/bias`), `hazard` (any hazard) and `t_hazard` (the first one). `frame.attrs["units"]` has the
-        unit of each number.
+        unit of each number, and `frame.attrs["hazards"]` the target's hazards.
         """
         import pandas as pd
 
         frame = _frame(self.parquet()).set_index("experiment_id")
-        hazards = [name.lower() for name in hazards_in(frame.columns)]
+        frame.attrs["hazards"] = self._hazards(frame.columns)
+        hazards = [name.lower() for name in frame.attrs["hazards"]]
         frame["kind"] = (frame["module"] + "/" + frame["fault_type"]).astype("category")
         for name in ("activated", "manifested", *hazards):
             frame[name] = frame[name].astype("boolean")
@@ -161,14 +166,20 @@ class Results:
         came = frame[hazards].any(axis=1).astype("boolean")
         frame["hazard"] = came.mask(frame["status"] != Status.OK.value)
         frame["t_hazard"] = frame[[f"t_{name}" for name in hazards]].min(axis=1).astype(float)
-        frame.attrs["units"] = _units(frame) | self._metric_units(frame)
+        metrics = {metric.name: metric.unit for metric in self._head().metrics if metric.name in frame}
+        frame.attrs["units"] = _units(frame) | metrics
         return frame
 
-    def _metric_units(self, frame: "pd.DataFrame") -> dict[str, str]:
-        """Return the units of the target's metrics; empty if the table is not in a run folder."""
-        folder = self.path.parent
-        metrics = RunFolder.unverified(folder).head.metrics if RunFolder.exists(folder) else ()
-        return {metric.name: metric.unit for metric in metrics if metric.name in frame}
+    def _hazards(self, columns: "Iterable[str]") -> tuple[str, ...]:
+        """Return the hazards that the run's target checks; MutatorError if the table lacks one."""
+        hazards, known = tuple(self._head()["hazards"]), set(columns)
+        needed = (column.name for hazard in hazards for column in hazard_columns(hazard))
+        if missing := next((name for name in needed if name not in known), None):
+            raise self._no_table(f"no column '{missing}', although run.json names that hazard")
+        return hazards
+
+    def _head(self) -> Head:
+        return read_head(self.path.parent)
 
     def propagation(self) -> "pd.DataFrame":
         """Return a frame of propagation.parquet, with a row for each channel that left golden."""
@@ -197,7 +208,7 @@ def row_of(
     experiment: Experiment, record: Record, hazards: "Sequence[str]", scale: Scale | None = None
 ) -> Row:
     cells = table_cells.row(experiment, record, hazards, scale=scale)
-    return row_from({name: "" if value is None else str(value) for name, value in cells.items()})
+    return row_from({name: "" if value is None else str(value) for name, value in cells.items()}, hazards)
 
 
 def same_parquet(path: Path, made: Path) -> bool:

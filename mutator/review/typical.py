@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from mutator.model import Outcome, Status
 from mutator.results.counting import endings
 from mutator.results.ranking import places
-from mutator.results.rows import UNUSABLE, Row, lines_of, row_from
+from mutator.results.rows import UNUSABLE, Row, rows_of
 from mutator.results.table_reader import Results
 from mutator.review.catalogue import Group
 from mutator.review.groups import group_label
@@ -94,7 +94,7 @@ def _typical(
 
 
 def _case(texts: "pd.DataFrame", number: int, about: Mapping[str, str]) -> Case:
-    row = row_from(lines_of(texts.iloc[[number]])[0])
+    [row] = rows_of(texts.iloc[[number]])
     return Case(
         id=row.experiment_id,
         label=f"{row.fault}, {row.scenario}, {row.trigger}",

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from mutator.results.column_facts import hazards_in
+from mutator.results.column_facts import hazards_of
 from mutator.results.rows import UNUSABLE
 from mutator.results.table_reader import Results
 
@@ -19,7 +19,7 @@ _RANDOM = "random/"  # prefix of a random run's trigger: random/C1
 
 
 def load(results: Path) -> pd.DataFrame:
-    """Load the usable experiments of a results.csv, in order. Raise MutatorError if the file is invalid.
+    """Load the usable experiments of a run folder's results.csv, in order. MutatorError if it is invalid.
 
     Harness errors and invalid mutants are left out; crashes and timeouts are kept.
     """
@@ -27,7 +27,7 @@ def load(results: Path) -> pd.DataFrame:
 
 
 def prepare(frame: pd.DataFrame) -> pd.DataFrame:
-    """Convert a frame of text cells from results.csv to types, and add the derived columns."""
+    """Convert a frame of `Results.texts` to types, and add the derived columns."""
     unusable = frame["status"].isin([str(status) for status in UNUSABLE])
     if unusable.any():
         frame = frame[~unusable]
@@ -73,4 +73,4 @@ def slim(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
 
 def hazard_names(frame: pd.DataFrame) -> tuple[str, ...]:
     """Return the hazards in the table, sorted. A hazard NEAR has a flag `near` and a time `t_near`."""
-    return tuple(sorted(hazards_in(frame.columns)))
+    return tuple(sorted(hazards_of(frame)))

@@ -8,7 +8,7 @@ from mutator._common.tables import Table
 from mutator.model import Status
 from mutator.report.panel import Panel, rendered
 from mutator.report.studies import ReportedRun
-from mutator.results.rows import Row, lines_of, row_from
+from mutator.results.rows import Row, rows_of
 
 _HEADS = ("status", "experiment", "fault", "scenario", "message")
 LISTED, PAGE_LISTED = 30, 200  # maximum number of runs in Markdown and on the page, whose search finds all
@@ -29,13 +29,13 @@ def failed_panel(run: ReportedRun) -> Panel | None:
         return None
     by = {"other": texts["status"] != Status.HARNESS_ERROR.value, **texts[["status", "experiment_id"]]}
     order = DataFrame(by).sort_values([*by]).index[: max(LISTED, PAGE_LISTED)]
-    failed, count = [row_from(line) for line in lines_of(texts.loc[order])], len(texts)
+    failed = rows_of(texts.loc[order])
     failings = [status.value for status in Status if status is not Status.OK]
     return Panel(
         anchor="failed",
         link="Failed runs",
-        markdown=f"## Runs that did not finish normally\n\n{_markdown(failed, count)}",
-        html=rendered(_HTML, table=_linked(failed), more=count - PAGE_LISTED, failings=failings),
+        markdown=f"## Runs that did not finish normally\n\n{_markdown(failed, len(texts))}",
+        html=rendered(_HTML, table=_linked(failed), more=len(texts) - PAGE_LISTED, failings=failings),
     )
 
 

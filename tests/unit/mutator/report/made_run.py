@@ -16,6 +16,7 @@ HEAD = {
     "schema": "run/3",
     "campaign": "night_<b>drive</b>",
     "plan": "ab" * 32,
+    "hazards": ["H1", "H2", "H3"],
     "compared": [],
     "seed": 7,
     "reading": "as_described",

@@ -45,7 +45,7 @@ RUNS = [
 
 @pytest.fixture
 def run(tmp_path: Path) -> ReportedRun:
-    make_run(tmp_path, metrics=[metric.plain() for metric in METRICS])
+    make_run(tmp_path, hazards=["H1"], metrics=[metric.plain() for metric in METRICS])
     columns = [c.name for c in result_columns(("H1",), ("gas",), METRICS)]
     with (tmp_path / "results.csv").open("w", newline="") as file:
         table = csv.DictWriter(file, columns, restval="")

@@ -2,6 +2,7 @@
 
 import csv
 import random
+from collections.abc import Iterable
 from pathlib import Path
 
 from mutator.results.column_facts import SEVERITY, result_columns
@@ -48,15 +49,21 @@ WORST_FIRST = {
 }
 
 
+def results(run: Path, lines: Iterable[dict[str, str]]) -> Results:
+    """Return the results of a made-up run folder, with these lines in its table."""
+    (run / "run.json").write_text('{"schema": "run/3", "hazards": ["H1", "H2", "H3"]}')
+    with (run / "results.csv").open("w", newline="", encoding="utf-8") as file:
+        table = csv.DictWriter(file, COLUMNS, restval="")
+        table.writeheader()
+        table.writerows(lines)
+    return Results.of_run(run)
+
+
 def test_the_worst_results_come_first(tmp_path: Path) -> None:
     """The order is by severity class, then by delta-v. Without a class, it is by ending, then by the margin
     of each hazard. Ids decide ties."""
-    path = tmp_path / "results.csv"
-    with path.open("w", newline="", encoding="utf-8") as file:
-        table = csv.DictWriter(file, COLUMNS, restval="")
-        table.writeheader()
-        table.writerows(line | {"experiment_id": name} for name, line in WORST_FIRST.items())
-    rows = list(Results(path).rows())
+    table = results(tmp_path, [line | {"experiment_id": name} for name, line in WORST_FIRST.items()])
+    rows = list(table.rows())
     random.Random(1).shuffle(rows)
     assert [row.experiment_id for row in worst(rows)] == list(WORST_FIRST)
 
@@ -70,12 +77,7 @@ def test_columns_and_rows_are_ranked_in_the_same_order(tmp_path: Path) -> None:
         for name in ("margin_h1", "margin_h2", "margin_h3"):
             if draw.random() < 0.3:
                 line[name] = str(draw.randint(-3, 3))
-    path = tmp_path / "results.csv"
-    with path.open("w", newline="", encoding="utf-8") as file:
-        table = csv.DictWriter(file, COLUMNS, restval="")
-        table.writeheader()
-        table.writerows(lines)
-    found = Results(path)
+    found = results(tmp_path, lines)
     texts = found.texts()
     order = texts["experiment_id"].to_numpy()[places(texts).argsort()]
     assert list(order) == [row.experiment_id for row in worst(found.rows())]

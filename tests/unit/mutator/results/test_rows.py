@@ -28,6 +28,7 @@ SEEN = {
 
 
 def write_table(path: Path, *lines: dict[str, str]) -> Path:
+    path.with_name("run.json").write_text('{"schema": "run/3", "hazards": ["H1", "H2", "H3"]}')
     with path.open("w", newline="", encoding="utf-8") as file:
         table = csv.DictWriter(file, COLUMNS, restval="")
         table.writeheader()

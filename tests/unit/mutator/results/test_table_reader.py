@@ -23,9 +23,9 @@ from mutator.exports.write import export
 from mutator.model import Experiment, Outcome, Status
 from mutator.report import building
 from mutator.results import table_building, table_cells
-from mutator.results.column_facts import SEVERITY, SINCE, result_columns
+from mutator.results.column_facts import SEVERITY, SINCE, hazards_of, result_columns
 from mutator.results.table_reader import Results, _table, same_parquet
-from mutator.statistics.frame import load
+from mutator.statistics.frame import hazard_names, load, prepare
 from mutator.store import plan_file
 from mutator.targets.environment import THREADS
 from mutator.targets.target_facts import metric_facts
@@ -246,3 +246,35 @@ def test_a_long_text_that_is_stored_once_is_not_copied_into_each_row(tmp_path: P
     assert "bytes of text" in is_refused(lambda: _table(path))
     is_cheap(lambda: same_parquet(path, genuine))
     assert not same_parquet(path, genuine) and same_parquet(genuine, genuine)
+
+
+def test_hazards_have_the_names_of_run_json(run: Path, reseal: Callable[[Path], None]) -> None:
+    """The columns tell neither how a hazard is spelt, nor a hazard from a pair of metrics `x` and `t_x`."""
+    head = run / "run.json"
+    facts = json.loads(head.read_text())
+    metrics = [[name, "-", "-", "lower"] for name in ("way", "t_way")]
+    head.write_text(json.dumps(facts | {"hazards": ["Dropped", "CRUSHED"], "metrics": metrics}))
+    reseal(run)
+    table_building.build(run)
+    table = Results.of_run(run)
+    assert {row.checked for row in table.rows() if row.status is Status.OK} == {("Dropped", "CRUSHED")}
+    assert hazards_of(table.texts()) == hazards_of(table.frame()) == ("Dropped", "CRUSHED")
+    assert hazard_names(load(table.path)) == ("CRUSHED", "Dropped")
+    assert "way" in table.texts()
+
+
+def test_a_table_without_a_hazard_of_run_json_is_refused(run: Path) -> None:
+    table = Results.up_to_date(run)
+    head = run / "run.json"
+    head.write_text(head.read_text().replace("CRUSHED", "BROKEN"))
+    for read in (table.rows, table.texts, table.frame):
+        with pytest.raises(MutatorError, match="no column 'broken'"):
+            read()
+
+
+def test_a_frame_without_its_hazards_is_refused(run: Path) -> None:
+    """Pandas keeps them in frames made from a frame of a run, but another frame has none."""
+    texts = Results.up_to_date(run).texts()
+    assert hazards_of(texts[texts["status"] == "ok"].reset_index(drop=True)) == hazards_of(texts)
+    with pytest.raises(MutatorError, match="without the names of its hazards"):
+        prepare(pd.DataFrame(texts.to_dict("list")))

@@ -27,4 +27,6 @@ def results(*rows: dict[str, Any]) -> pd.DataFrame:
         _ROW | {"experiment_id": str(i)} | {name: str(value) for name, value in row.items()}
         for i, row in enumerate(rows)
     ]
-    return prepare(pd.DataFrame(texts))
+    frame = pd.DataFrame(texts)
+    frame.attrs["hazards"] = ("H1", "H2", "H3")
+    return prepare(frame)

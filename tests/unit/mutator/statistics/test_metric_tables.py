@@ -32,6 +32,7 @@ FRAME = pd.DataFrame(
         "t_hazard": [2.0, 3, 4, 5, 6, math.nan, math.nan],
     }
 )
+FRAME.attrs["hazards"] = ()
 
 
 def test_each_metric_has_its_spread_by_fault_type() -> None:

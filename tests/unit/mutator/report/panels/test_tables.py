@@ -23,7 +23,7 @@ HEADER = (
 
 @pytest.fixture
 def run(tmp_path: Path) -> RunFolder:
-    head = {"schema": "run/3", "target": "openpilot", "goldens": [["S1", []]]}
+    head = {"schema": "run/3", "target": "openpilot", "goldens": [["S1", []]], "hazards": ["H1"]}
     (tmp_path / "run.json").write_text(json.dumps(head))
     plan_file.write(tmp_path, [], [])
     line = "{0},a,radar,chaff,distance,35,m,S1,{0},C2,1,ok,hazard,5,6,1,9,fcw,8,1,"
