@@ -17,13 +17,13 @@ from pathlib import Path
 from statistics import median
 from time import process_time
 
+from mutator._common.doors import OPERATORS
 from mutator.campaigns.plans import make_plan
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Experiment
 from mutator.mutants.anchors import parse_file
 from mutator.mutants.building import build, build_directly
 from mutator.operators.chosen import find_mutations, sampled
-from mutator.operators.names import Operator
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.kinds import always
 from mutator.workspace import Workspace
@@ -42,9 +42,9 @@ def rate(make: Callable[[Experiment], object], experiments: list[Experiment]) ->
 
 def operators(manifest: TargetManifest, models: FaultModels, count: int) -> tuple[float, float]:
     """Return how many mutants of operators are found and how many are built per second of CPU."""
-    find_mutations(manifest, models, [Operator.RETURN], PLACES)  # parses the files, as every campaign must
+    find_mutations(manifest, models, ["return"], PLACES)  # parses the files, as every campaign must
     start = process_time()
-    found = find_mutations(manifest, models, list(Operator), PLACES)
+    found = find_mutations(manifest, models, OPERATORS.names(), PLACES)
     took = process_time() - start
     faults = [mutation.fault("as_described") for mutation in sampled(found, count, 1)]
     trigger = always()

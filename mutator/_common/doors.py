@@ -7,6 +7,7 @@ kind. Whatever is not asked for by name is not imported.
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
+from keyword import iskeyword
 from pathlib import Path
 from pkgutil import iter_modules, resolve_name
 from typing import TYPE_CHECKING, Any
@@ -23,13 +24,14 @@ class Door:
     """One kind of addition. `thing` is its name, `kind` (`module:class`) is what every object must be.
 
     The modules of the package `folder` hold the shipped ones, each as an attribute named like `thing`, in
-    capitals. A module's name is the name of the object, with `-` for `_`.
+    capitals. A module's name is the name of the object, with `_` for `-`, and after a keyword of Python.
     """
 
     thing: str
     folder: str
     kind: str
     argument: str  # the API's argument that names one
+    first: tuple[str, ...] = ()  # these come before all others, in this order
 
     @property
     def group(self) -> str:
@@ -43,7 +45,7 @@ class Door:
 
     def shipped(self) -> tuple[str, ...]:
         """Return the names of the shipped objects."""
-        return _shipped(self.folder)
+        return tuple(sorted(_shipped(self.folder), key=self.place))
 
     def installed(self) -> tuple[str, ...]:
         """Return the names that other packages add."""
@@ -51,6 +53,10 @@ class Door:
 
     def names(self) -> tuple[str, ...]:
         return tuple(dict.fromkeys((*self.shipped(), *self.installed())))
+
+    def place(self, name: str) -> tuple[int, str]:
+        """Return a key that sorts names."""
+        return self.first.index(name) if name in self.first else len(self.first), name
 
     def has(self, name: str) -> bool:
         return name in self.shipped() or name in self.installed()
@@ -100,13 +106,13 @@ class Door:
 @cache
 def _shipped(folder: str) -> tuple[str, ...]:
     path = Path(__file__).parent.parent.joinpath(*folder.split(".")[1:])  # without importing the package
-    return tuple(sorted(module.name.replace("_", "-") for module in iter_modules([str(path)])))
+    return tuple(module.name.rstrip("_").replace("_", "-") for module in iter_modules([str(path)]))
 
 
 @cache
 def _load_shipped(folder: str, attribute: str, name: str) -> Any:
-    module = import_module(f"{folder}.{name.replace('-', '_')}")
-    return getattr(module, attribute)
+    module = name.replace("-", "_") + "_" * iskeyword(name)
+    return getattr(import_module(f"{folder}.{module}"), attribute)
 
 
 def _entry_points(group: str) -> "EntryPoints":
@@ -133,4 +139,12 @@ IMPORTERS = Door(
     folder="mutator.outcomes.importers",
     kind="mutator.outcomes.trace_files:Importer",
     argument="trace",
+)
+OPERATORS = Door(
+    thing="operator",
+    folder="mutator.operators.shipped",
+    kind="mutator.operators:Operator",
+    argument="operators",
+    # if two make the same change, it belongs to the first, so another order changes samples
+    first=("arithmetic", "comparison", "constant", "branch", "omission", "return", "argument"),
 )

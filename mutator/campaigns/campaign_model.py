@@ -2,8 +2,10 @@
 
 from typing import Annotated
 
-from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, model_validator
+from pydantic_core import PydanticKnownError
 
+from mutator._common.doors import OPERATORS
 from mutator.campaigns.operator_selection import When
 from mutator.campaigns.trigger_choice import (
     EVERY_READING,
@@ -14,7 +16,20 @@ from mutator.campaigns.trigger_choice import (
 )
 from mutator.config.yaml_files import StrictModel
 from mutator.model import AfterHazard, Method
-from mutator.operators.names import Operator
+
+
+def _operator(name: str) -> str:
+    if not OPERATORS.has(name):
+        *others, last = map(repr, OPERATORS.names())
+        raise PydanticKnownError("enum", {"expected": f"{', '.join(others)} or {last}"})
+    return name
+
+
+_Operator = Annotated[
+    str,
+    AfterValidator(_operator),
+    WithJsonSchema({"anyOf": [{"enum": OPERATORS.shipped()}, {"type": "string"}]}),
+]
 
 
 class SelectionModel(StrictModel, title="A selection"):
@@ -28,11 +43,12 @@ class SelectionModel(StrictModel, title="A selection"):
     values: int | None = Field(
         None, ge=1, description="How many values to take from each variant, spread evenly. Default: all."
     )
-    operators: list[Annotated[Operator, Field(strict=False)]] | None = Field(
+    operators: list[_Operator] | None = Field(
         None,
         min_length=1,
-        description="Instead of `spec`: mutants of these [operators](operators.md), in lines that the "
-        "golden runs of the campaign's scenarios execute.",
+        description="Instead of `spec`: mutants of these [operators](operators.md), shipped or "
+        "[of another package](doors.md#operator), in lines that the golden runs of the campaign's scenarios "
+        "execute.",
     )
     in_: list[str] | None = Field(
         None,

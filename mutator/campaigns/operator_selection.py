@@ -3,8 +3,6 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
-from mutator.operators.names import Operator
-
 
 class When(StrEnum):
     """When a mutant of an operator is active."""
@@ -17,7 +15,7 @@ class When(StrEnum):
 class OperatorSelection:
     """Which operator mutants to take: operators, places, number and activation."""
 
-    operators: tuple[Operator, ...]
+    operators: tuple[str, ...]
     places: tuple[str, ...]
     sample: int | None  # number of mutants; None: all
     when: tuple[When, ...]

@@ -8,13 +8,13 @@ import typer
 
 import mutator
 from mutator._common.below import is_inside
+from mutator._common.doors import OPERATORS
 from mutator._common.text import counted
 from mutator.cli import completion
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json, Manifest, Place, Reading, Run, Seed, Value, Variant, with_place
 from mutator.errors import EXIT_HARNESS_ERRORS, MutatorError
 from mutator.mutants.readable_diffs import readable
-from mutator.operators.names import Operator
 
 _TRIED = Path("runs/try")
 EXPERIMENT_ID = re.compile(r"[0-9a-f]{4,16}")
@@ -183,7 +183,7 @@ def _print_diffs(terminal: Terminal, diffs: list[tuple[str, str, str]], *, whole
             terminal.note(note)
 
 
-OPERATORS = ", ".join(one.value for one in Operator)
+OPERATOR_NAMES = ", ".join(OPERATORS.shipped())
 
 GENERATE_EXAMPLES = """\b
 Examples:
@@ -216,7 +216,7 @@ def generate(
         str | None,
         typer.Option(
             metavar="NAMES",
-            help=f"Use mutation operators instead of specs: {OPERATORS}; or all.",
+            help=f"Use mutation operators instead of specs: {OPERATOR_NAMES}; or all.",
         ),
     ] = None,
     places: Annotated[
@@ -301,7 +301,7 @@ def _operator_choice(
             raise MutatorError(
                 "--in, --scenario, --all-lines or --sample without --operators",
                 where="generate",
-                remedy=f"add --operators with any of {OPERATORS}, or `all`",
+                remedy=f"add --operators with any of {OPERATOR_NAMES}, or `all`",
             )
         return None
     if others or not places or (scenario is None) is not all_lines:
@@ -310,7 +310,7 @@ def _operator_choice(
             where="generate",
             expected="no specs and no campaign, at least one --in, and either --scenario or --all-lines",
         )
-    names = [one.value for one in Operator] if operators == "all" else operators.split(",")
+    names = OPERATORS.names() if operators == "all" else operators.split(",")
     return mutator.OperatorChoice(
         operators=[name.strip() for name in names],
         places=places,

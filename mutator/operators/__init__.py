@@ -1,4 +1,46 @@
 """Mutation operators: classical mutants of a target's functions, as faults without a spec.
 
-`docs/reference/operators.md` lists the operators.
+An operator is an `Operator`: in a module of `shipped/`, or from another package (entry points of the group
+`mutator.operators`).
 """
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from mutator.model import Value
+
+if TYPE_CHECKING:
+    from mutator.mutants.expressions import Expression
+    from mutator.mutants.statements import Statement
+    from mutator.operators.facts import Facts
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rule:
+    """A change of an expression: a fault model with parameters."""
+
+    model: str
+    params: tuple[tuple[str, Value], ...] = ()
+
+
+def rule(model: str, **params: Value) -> Rule:
+    return Rule(model=model, params=tuple(sorted(params.items())))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Operator:
+    """A mutation operator.
+
+    `rules` yields the changes of an expression. `omits` returns whether to leave out a statement, which is
+    alone on its lines and is not the first to give a local name its value.
+
+    `examples` are its tests. They map the body of `def f(self, a, b):` to all changes that the operator makes
+    in it. `replacements` describe them on the reference page, in Markdown: where, and the replacement.
+    """
+
+    about: str
+    replacements: tuple[tuple[str, str], ...]
+    examples: Mapping[str, Sequence[str]]
+    rules: "Callable[[Expression, Facts], Iterable[Rule]] | None" = None
+    omits: "Callable[[Statement, Facts], bool] | None" = None

@@ -14,7 +14,6 @@ from mutator.operators.enumeration import mutations_of
 from mutator.operators.equal_code import distinct
 from mutator.operators.facts import facts_of
 from mutator.operators.mutations import Mutation
-from mutator.operators.names import Operator
 from mutator.targets.locations import check_file
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.source_tree import matches
@@ -50,7 +49,7 @@ class Found:
 def find_mutations(
     manifest: TargetManifest,
     models: FaultModels,
-    operators: Collection[Operator],
+    operators: Collection[str],
     places: Sequence[str],
     executed: Lines | None = None,
 ) -> Found:
@@ -72,7 +71,7 @@ def find_mutations(
 def _in_file(
     manifest: TargetManifest,
     models: FaultModels,
-    operators: Collection[Operator],
+    operators: Collection[str],
     path: str,
     functions: Collection[str],
     executed: Lines | None,

@@ -1,8 +1,10 @@
 """Lists all mutations of a function."""
 
+import ast
 from collections import Counter
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 
+from mutator._common.doors import OPERATORS
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Anchor, AnchorKind, FaultLocation
@@ -10,28 +12,30 @@ from mutator.mutants.anchors import ParsedFile
 from mutator.mutants.expressions import parts_of
 from mutator.mutants.rendering import changed_value
 from mutator.mutants.statements import Statement
-from mutator.operators.facts import Facts, extent
+from mutator.operators import Operator
+from mutator.operators.facts import Facts
 from mutator.operators.mutations import Mutation
-from mutator.operators.names import Operator
-from mutator.operators.rules import rules_for
+from mutator.operators.names import find_operator
 
+_Operators = Mapping[str, Operator]
 LEFT_OUT = "left out"
 _ID = "ffffffff"  # an id that no operator template writes
+_UNCALCULATED = (ast.Yield, ast.YieldFrom)
 
 
 def mutations_of(
-    file: ParsedFile, facts: Facts, function: str, models: FaultModels, operators: Collection[Operator]
+    file: ParsedFile, facts: Facts, function: str, models: FaultModels, operators: Collection[str]
 ) -> list[Mutation]:
     """Return the mutations of all functions with that qualified name, by line, then by operator."""
-    found = list(_of_values(file, facts, function, models, operators))
-    if Operator.OMISSION in operators:
-        found += _omissions(file, facts, function)
-    order = list(Operator)
-    return sorted(found, key=lambda one: (one.line, order.index(one.operator)))
+    chosen = {name: find_operator(name) for name in operators}
+    found = list(_of_values(file, facts, function, models, chosen))
+    if any(operator.omits for operator in chosen.values()):
+        found += _omissions(file, facts, function, chosen)
+    return sorted(found, key=lambda one: (one.line, OPERATORS.place(one.operator)))
 
 
 def _of_values(
-    file: ParsedFile, facts: Facts, function: str, models: FaultModels, operators: Collection[Operator]
+    file: ParsedFile, facts: Facts, function: str, models: FaultModels, operators: _Operators
 ) -> Iterator[Mutation]:
     expressions = file.expressions.get(function, ())
     total = Counter(one.text for one in expressions)
@@ -42,14 +46,20 @@ def _of_values(
         nth = seen[text] if total[text] > 1 else None
         anchor = Anchor(kind=AnchorKind.VALUE, name=text, nth=nth)
         location = FaultLocation(path=file.path, function=function, anchor=anchor)
+        if any(isinstance(inner, _UNCALCULATED) for inner in ast.walk(expression.node)):
+            continue  # templates refuse `yield`
         parts = None
-        for rule in rules_for(expression, facts.augmented.get(extent(expression.node))):
-            if rule.operator not in operators:
-                continue
+        rules = (
+            (name, rule)
+            for name, operator in operators.items()
+            if operator.rules
+            for rule in operator.rules(expression, facts)
+        )
+        for name, rule in rules:
             parts = parts_of(expression) if parts is None else parts
             model = models.get(rule.model)
             yield Mutation(
-                operator=rule.operator,
+                operator=name,
                 location=location,
                 model=rule.model,
                 params=rule.params,
@@ -59,7 +69,7 @@ def _of_values(
             )
 
 
-def _omissions(file: ParsedFile, facts: Facts, function: str) -> Iterator[Mutation]:
+def _omissions(file: ParsedFile, facts: Facts, function: str, operators: _Operators) -> Iterator[Mutation]:
     every = ((f.line + 1, one) for f in file.functions.get(function, ()) for one in f.statements)
     found = [(line, one) for line, one in every if one.reason is None and one.opens is None]
     seen: Counter[tuple[str, str]] = Counter()
@@ -71,6 +81,9 @@ def _omissions(file: ParsedFile, facts: Facts, function: str) -> Iterator[Mutati
                 anchored = anchored or (verb, name, seen[verb, name])
         if anchored is None or not _can_be_left_out(statement, facts, line):
             continue
+        omitting = [name for name, one in operators.items() if one.omits and one.omits(statement, facts)]
+        if not omitting:
+            continue
         verb, name, number = anchored
         several = sum(name in one.names(verb) for _, one in found) > 1
         kind = AnchorKind.BEFORE_ASSIGN if verb == "assign" else AnchorKind.BEFORE_CALL
@@ -80,22 +93,23 @@ def _omissions(file: ParsedFile, facts: Facts, function: str) -> Iterator[Mutati
             file.resolve(location)
         except MutatorError:
             continue  # LibCST and `ast` disagree on the place
-        yield Mutation(
-            operator=Operator.OMISSION,
-            location=location,
-            model="omission",
-            params=(),
-            place=statement,
-            was=facts.texts.get(statement.first + 1, name),
-            now=LEFT_OUT,
-        )
+        for operator in omitting:
+            yield Mutation(
+                operator=operator,
+                location=location,
+                model="omission",
+                params=(),
+                place=statement,
+                was=facts.texts.get(statement.first + 1, name),
+                now=LEFT_OUT,
+            )
 
 
 def _can_be_left_out(statement: Statement, facts: Facts, function: int) -> bool:
     """Return whether a statement can be omitted. The first binding of a local name cannot, because later
     uses of the name would fail.
     """
-    if not statement.alone or statement.is_return:
+    if not statement.alone:
         return False
     names = [name for name in statement.assigns if name.isidentifier()]
     return all(facts.bound.get((function, name), 0) < statement.first + 1 for name in names)

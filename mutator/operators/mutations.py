@@ -5,19 +5,9 @@ from dataclasses import dataclass
 from mutator.model import OPERATORS, Fault, FaultLocation, Injection, Value
 from mutator.mutants.expressions import Expression
 from mutator.mutants.statements import Statement
-from mutator.operators.names import Operator
 
 _LONGEST = 60  # characters; longer texts are abbreviated
 _AROUND = 20  # unchanged characters kept before and after the change
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Rule:
-    """A fault model with parameters that an operator applies to an expression."""
-
-    operator: Operator
-    model: str
-    params: tuple[tuple[str, Value], ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,7 +17,7 @@ class Mutation:
     `place` is the changed expression or the omitted statement.
     """
 
-    operator: Operator
+    operator: str
     location: FaultLocation
     model: str
     params: tuple[tuple[str, Value], ...]
@@ -55,7 +45,7 @@ class Mutation:
         return Fault(
             spec=f"{OPERATORS}/{self.operator}/{self.location.path}::{self.location.function}",
             module=OPERATORS,
-            fault_type=self.operator.value,
+            fault_type=self.operator,
             reading=reading,
             value=self.text,
             unit="-",

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pkgutil import resolve_name
 
-from mutator._common.doors import DISTRIBUTORS, EXPORTS, IMPORTERS, Door
+from mutator._common.doors import DISTRIBUTORS, EXPORTS, IMPORTERS, OPERATORS, Door
 from mutator._common.tables import Table
 from mutator.reference.tables import generated
 from mutator.workspace import Workspace
@@ -29,6 +29,11 @@ _EXAMPLES = {
         "a way to run experiments elsewhere, chosen by `--cluster NAME:WHERE`",
         "here",
         "door_examples.here:DISTRIBUTOR",
+    ),
+    OPERATORS.thing: (
+        "mutants without a spec ([mutation operators](operators.md))",
+        "zero",
+        "door_examples.zero:OPERATOR",
     ),
 }
 
@@ -94,13 +99,6 @@ _PLACES = (
         register="`PANELS` in `mutator/report/panels/`",
         example="`mutator/report/panels/origin.py`",
     ),
-    _Place(
-        name="operator",
-        adds="mutants without a spec",
-        protocol="a generator of `Rule`s for an expression",
-        register="`mutator/operators/rules.py`, and its name in `names.py`",
-        example="[Mutation operators](operators.md)",
-    ),
 )
 
 
@@ -109,7 +107,7 @@ def doors_page(workspace: Workspace) -> str:
     rows = [(f"**{p.name}**", p.adds, p.protocol, p.register, p.example) for p in _PLACES]
     inside = Table(heads=heads, rows=rows).as_markdown(escape=False)
     parts = [generated("Doors"), _INTRO, "## Entry points of other packages\n", _PACKAGES]
-    for door in (EXPORTS, IMPORTERS, DISTRIBUTORS):
+    for door in (EXPORTS, IMPORTERS, DISTRIBUTORS, OPERATORS):
         parts += _section(door)
     return "\n".join([*parts, "## Data and tables\n", inside]).rstrip() + "\n"
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from mutator._common.shipped import refuse_shipped
-from mutator.reference import api, cli, doors, formats, models, recorded
+from mutator.reference import api, cli, doors, formats, models, operators, recorded
 from mutator.reference.schemas import editor_schema, file_formats
 from mutator.workspace import Workspace
 
@@ -22,6 +22,7 @@ PAGES: dict[str, Callable[[Workspace], str]] = {
     "fault-models.md": models.fault_models_page,
     "fault-spec.md": formats.fault_spec,
     "hazard-analysis.md": formats.hazard_analysis,
+    "operators.md": operators.operators_page,
     "results.md": recorded.results,
     "target-manifest.md": formats.manifests,
 }

@@ -21,7 +21,7 @@ from mutator.mutants.anchors import parsed
 from mutator.mutants.building import build
 from mutator.operators.enumeration import mutations_of
 from mutator.operators.facts import facts_of
-from mutator.operators.names import MODELS, Operator, operator_of
+from mutator.operators.names import MODELS, operator_of
 from mutator.review import groups
 from mutator.review.called_code import CalledCode
 from mutator.review.entries import Bound, Values
@@ -211,15 +211,16 @@ class _Catalogue:
             calls=calls,
         )
 
-    def _material_of_operator(self, fault: Fault, operator: Operator) -> Material:
+    def _material_of_operator(self, fault: Fault, operator: str) -> Material:
         """Return the texts that determine all mutants of an operator in a function, selected or not."""
         at, tree = fault.injections[0].location, self.manifest.tree
         file, facts = parsed(tree, at.path), facts_of(tree, at.path)
         found = list(mutations_of(file, facts, at.function, self.models, [operator]))
+        models = {*MODELS, *(one.model for one in found)}
         return Material(
             diff=[[one.was, one.now] for one in found],
             functions=functions_of(tree, [at]),
-            templates={one.name: one.template for one in self.models if one.name in MODELS},
+            templates={one.name: one.template for one in self.models if one.name in models},
             calls=self._called.of_expressions(at.path, at.function, [one.now for one in found]),
         )
 

@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 import yaml
 
+from mutator._common.doors import OPERATORS
 from mutator.execution.running import run_campaign
 from mutator.model import AnchorKind
-from mutator.operators.names import Operator
 from mutator.workspace import Workspace
 
 TABLES = ("results.csv", "results.parquet", "propagation.parquet")
@@ -127,7 +127,7 @@ def everything(tmp_path: Path, copy_toycar: Callable[[Path], Workspace]) -> Work
     campaign = yaml.safe_load((toy.library / "campaigns" / "toy.yaml").read_text())
     del campaign["sample"]
     operators = {
-        "operators": [operator.value for operator in Operator],
+        "operators": list(OPERATORS.shipped()),
         "in": ["toycar/sensing.py", "toycar/driver.py"],
         "sample": 40,
     }

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from mutator._common.doors import OPERATORS
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels, load_fault_models
 from mutator.model import Anchor, AnchorKind, FaultLocation, Injection
@@ -20,7 +21,6 @@ from mutator.mutants.splicing import Edit, ValueEdit, apply_edits, in_lines, joi
 from mutator.operators.enumeration import mutations_of
 from mutator.operators.facts import facts_of
 from mutator.operators.mutations import Mutation
-from mutator.operators.names import Operator
 from mutator.targets.source_tree import SourceTree
 
 TEMPLATES = Path(__file__).parents[2] / "templates"
@@ -169,7 +169,7 @@ def mutations(file: ParsedFile) -> Iterator[Mutation]:
     tree = SourceTree(root=Path(), files={file.path: file.data}, digest="", _entries={})
     facts = facts_of(tree, file.path)
     for function in file.functions:
-        yield from mutations_of(file, facts, function, models(), list(Operator))
+        yield from mutations_of(file, facts, function, models(), OPERATORS.shipped())
 
 
 def checked_mutations(names: Sequence[str], count: int) -> int:

@@ -193,7 +193,6 @@ def test_a_violation_fails_the_lint(name: str, tmp_path: Path) -> None:
 SHOWN_BY_THE_COMMAND_LINE = {
     "mutator.config.yaml_files",
     "mutator.engines.kinds",
-    "mutator.operators.names",
     "mutator.execution.phases",
     "mutator.exports",
     "mutator.mutants.readable_diffs",

@@ -49,7 +49,7 @@ def test_an_unknown_name_lists_those_that_exist(door_examples: Path) -> None:
 
 
 def test_the_command_line_starts_without_any_addition() -> None:
-    parts = (".formats.", ".importers.", ".distributors.", "importlib.metadata")
+    parts = (".formats.", ".importers.", ".distributors.", ".operators.shipped.", "importlib.metadata")
     code = f"import sys, mutator.cli.app; print([m for m in sys.modules if any(p in m for p in {parts})])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

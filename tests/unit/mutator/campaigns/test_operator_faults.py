@@ -107,6 +107,14 @@ def test_review_groups_do_not_depend_on_the_draw(toycar: Workspace, campaign: Pa
     assert groups(make_plan(toycar, campaign)) == some
 
 
+def test_a_campaign_can_name_an_operator_of_another_package(
+    toycar: Workspace, campaign: Path, door_examples: Path
+) -> None:
+    plan = make_plan(toycar, _edited(campaign, "[arithmetic, branch]", "[zero]"))
+    assert {one.fault.fault_type for one in plan.experiments} == {"zero"}
+    assert [one for one in of_plan(toycar, plan) if one.what.endswith(": operator zero")]
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from mutator._common.doors import OPERATORS
 from mutator.errors import MutatorError
 from mutator.mutants.anchors import parsed
 from mutator.mutants.building import build, build_directly
@@ -14,82 +15,12 @@ from mutator.operators.enumeration import mutations_of
 from mutator.operators.equal_code import distinct
 from mutator.operators.facts import facts_of
 from mutator.operators.mutations import Mutation
-from mutator.operators.names import Operator, operators_named
+from mutator.operators.names import find_operator, operators_named
 from mutator.targets.source_tree import read_tree
 from mutator.triggers.kinds import always
 from mutator.workspace import Workspace
 
 Make = Callable[..., list[Mutation]]
-CHANGES = {
-    "arithmetic": {
-        "return a + b": ["a + b -> a - b", "a + b -> a * b", "a + b -> a / b"],
-        "return a - b": ["a - b -> a + b", "a - b -> a * b", "a - b -> a / b"],
-        "return a // b": ["a // b -> a / b", "a // b -> a * b"],
-        "return a % b": ["a % b -> a // b", "a % b -> a * b"],
-        "return a ** b": ["a ** b -> a * b", "a ** b -> a / b"],
-        "return a << b": ["a << b -> a >> b"],
-        "return a & b": ["a & b -> a | b", "a & b -> a ^ b"],
-        "return -a": ["-a -> -(-a)"],
-        "a += b": ["b -> -b"],
-        "a *= b": ["b -> 1 / b"],
-        "return 'a' + b": [],
-        "return [a] + b": [],
-        "a |= b": [],
-    },
-    "comparison": {
-        "return a < b": [f"a < b -> a {to} b" for to in ("<=", ">", ">=", "==", "!=")],
-        "return a == b": ["a == b -> a != b"],
-        "return a is not b": ["a is not b -> a is b"],
-        "return a not in b": ["a not in b -> a in b"],
-        "return a and b": ["a and b -> a or b"],
-        "return a or b or c": ["a or b or c -> (a or b) and c"],
-        "return not a": ["not a -> not (not a)"],
-        "return a < b < c": [],
-    },
-    "constant": {
-        "return a[2]": ["2 -> 0", "2 -> 1", "2 -> -1", "2 -> 3", "2 -> -2"],
-        "return 0": ["0 -> 1", "0 -> -1"],
-        "return -0.5": ["-0.5 -> 0.0", "-0.5 -> 1.0", "-0.5 -> -1.0", "-0.5 -> 0.5", "-0.5 -> -1.5"],
-        "return True": ["True -> False"],
-        "return 'a'": [],
-        "return None": [],
-    },
-    "branch": {
-        "if a: return b": ["a -> not a", "a -> True", "a -> False"],
-        "return b if a else c": ["a -> not a", "a -> True", "a -> False"],
-        "return [b for b in c if a]": ["a -> not a", "a -> True", "a -> False"],
-        "if (c := a) > b: return c": ["(c := a) > b -> not ((c := a) > b)"],  # a constant would not set `c`
-        "return a": [],
-    },
-    "omission": {
-        "a = b": ["a = b -> left out"],
-        "self.a = b": ["self.a = b -> left out"],
-        "a += b": ["a += b -> left out"],
-        "a(b)": ["a(b) -> left out"],
-        "c = b": [],  # the first value of `c`, without which the name would not exist
-        "if a: b = c": [],
-        "a([c for c in b])\n    c = b": [
-            "a([c for c in b]) -> left out"
-        ],  # the `c` inside is a different variable
-    },
-    "return": {
-        "return a": ["a -> None", "a -> 0", "a -> -a"],
-        "return a < b": ["a < b -> None", "a < b -> not (a < b)"],
-        "return [a]": ["[a] -> None", "[a] -> []"],
-        "return a, b": ["(a, b) -> None", "(a, b) -> ()"],
-        "return {}": ["{} -> None"],
-        "return 'a'": ["'a' -> None", "'a' -> ''"],
-        "return 1": ["1 -> None"],
-        "return -1": ["-1 -> None"],
-        "return": [],
-    },
-    "argument": {
-        "a(b, c)": ["a(b, c) -> a(c, b)"],
-        "a(b, c=1, d=2)": ["a(b, c=1, d=2) -> a(b, d=2)", "a(b, c=1, d=2) -> a(b, c=1)"],
-        "a(*b, c)": [],
-        "a(b)": [],
-    },
-}
 
 
 @pytest.fixture
@@ -100,16 +31,31 @@ def make(tmp_path: Path, clone: Workspace) -> Make:
     def made(body: str, *operators: str, head: str = "def f(self, a, b):") -> list[Mutation]:
         (tmp_path / "m.py").write_text(f"{head}\n    {body}\n")
         tree = read_tree(tmp_path, ["m.py"])
-        file, names = parsed(tree, "m.py"), operators_named(operators or [one.value for one in Operator])
+        file, names = parsed(tree, "m.py"), operators_named(operators or OPERATORS.names())
         return list(distinct(file, mutations_of(file, facts_of(tree, "m.py"), "f", models, names)).mutations)
 
     return made
 
 
-@pytest.mark.parametrize("operator", CHANGES)
-def test_each_operator_makes_the_expected_changes(operator: str, make: Make) -> None:
-    for body, expected in CHANGES[operator].items():
-        assert [one.text for one in make(body, operator)] == expected, body
+@pytest.mark.parametrize("name", OPERATORS.names())
+def test_each_operator_makes_the_changes_of_its_examples(name: str, make: Make) -> None:
+    examples = find_operator(name).examples
+    assert any(examples.values())
+    for body, expected in examples.items():
+        assert [one.text for one in make(body, name)] == list(expected), body
+
+
+def test_an_operator_of_another_package_is_used_like_the_others(
+    door_examples: Path, make: Make, toycar: Workspace
+) -> None:
+    test_each_operator_makes_the_changes_of_its_examples("zero", make)
+    both = make("return a(b, c)", "zero", "return")  # `return 0` is one change, made by the shipped one
+    assert [one.operator for one in both] == ["return"] * 3
+    manifest, models = toycar.manifest("toycar"), toycar.fault_models()
+    found = find_mutations(manifest, models, ["zero"], ["toycar/**"])
+    fault = found.mutations[0].fault("as_described")
+    assert fault.spec.startswith("operators/zero/") and str(fault.value).endswith(" -> 0")
+    assert build(manifest, models, fault, always()).patch
 
 
 def test_an_expression_with_a_yield_has_no_mutations(make: Make) -> None:
@@ -119,7 +65,7 @@ def test_an_expression_with_a_yield_has_no_mutations(make: Make) -> None:
 def test_mutations_to_equal_code_are_dropped(make: Make) -> None:
     assert [one.text for one in make("while True: a()", "branch")] == ["True -> not True"]
     denied = make("return not a", "comparison", "return")
-    assert [(one.operator.value, one.now) for one in denied] == [
+    assert [(one.operator, one.now) for one in denied] == [
         ("comparison", "not (not a)"),
         ("return", "None"),
     ]
@@ -140,7 +86,7 @@ def test_mutants_of_a_file_with_a_byte_order_mark_compile(tmp_path: Path, clone:
     (tmp_path / "m.py").write_bytes("\ufeffdef f(a):\n    return a + 1\n".encode())
     tree = read_tree(tmp_path, ["m.py"])
     file, models = parsed(tree, "m.py"), clone.fault_models()
-    made = mutations_of(file, facts_of(tree, "m.py"), "f", models, [Operator.ARITHMETIC])
+    made = mutations_of(file, facts_of(tree, "m.py"), "f", models, ["arithmetic"])
     assert made and not distinct(file, made).invalid
 
 
@@ -153,7 +99,7 @@ def test_places_can_be_files_functions_and_globs(toycar: Workspace) -> None:
     manifest, models = toycar.manifest("toycar"), toycar.fault_models()
 
     def found(place: str, executed: dict[str, list[int]] | None = None) -> Found:
-        return find_mutations(manifest, models, list(Operator), [place], executed)
+        return find_mutations(manifest, models, OPERATORS.shipped(), [place], executed)
 
     whole, part = found("toycar/sensing.py"), found("toycar/sensing.py::Sensor.*")
     assert part.mutations and set(part.mutations) <= set(whole.mutations)
@@ -174,7 +120,7 @@ def test_places_can_be_files_functions_and_globs(toycar: Workspace) -> None:
 
 def test_samples_are_stratified_and_reproducible(toycar: Workspace) -> None:
     manifest, models = toycar.manifest("toycar"), toycar.fault_models()
-    found = find_mutations(manifest, models, list(Operator), ["toycar/**"])
+    found = find_mutations(manifest, models, OPERATORS.shipped(), ["toycar/**"])
     drawn = sampled(found, len(found.mutations) // 3, 4)
     assert drawn == sampled(found, len(found.mutations) // 3, 4) != sampled(found, len(drawn), 5)
     spec = Counter(one.fault("r").spec for one in found.mutations)
@@ -185,7 +131,7 @@ def test_samples_are_stratified_and_reproducible(toycar: Workspace) -> None:
 
 def test_every_mutant_of_the_toy_can_be_built(toycar: Workspace) -> None:
     manifest, models = toycar.manifest("toycar"), toycar.fault_models()
-    found = find_mutations(manifest, models, list(Operator), ["toycar/sensing.py", "toycar/driver.py"])
+    found = find_mutations(manifest, models, OPERATORS.shipped(), ["toycar/sensing.py", "toycar/driver.py"])
     faults = [one.fault("as_described") for one in found.mutations]
     assert len({fault.id for fault in faults}) == len(faults)
     for fault in faults:

@@ -1,0 +1,1 @@
+"""The operators of the harness: one module for each, with an `OPERATOR`."""

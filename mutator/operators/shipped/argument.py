@@ -1,0 +1,36 @@
+"""Swap two neighbouring positional arguments of a call, or drop a keyword argument."""
+
+import ast
+from collections.abc import Iterator
+
+from mutator.mutants.expressions import Expression
+from mutator.operators import Operator, Rule, rule
+from mutator.operators.facts import Facts
+
+
+def _rules(expression: Expression, facts: Facts) -> Iterator[Rule]:
+    node = expression.node
+    if not isinstance(node, ast.Call):
+        return
+    starred = (place for place, one in enumerate(node.args) if isinstance(one, ast.Starred))
+    for first in range(1, next(starred, len(node.args))):
+        yield rule("operator_swap", first=first)
+    for place, keyword in enumerate(node.keywords, len(node.args) + 1):
+        if keyword.arg is not None:
+            yield rule("operator_drop", place=place)
+
+
+OPERATOR = Operator(
+    about="swapped or missing arguments of a call",
+    replacements=(
+        ("two neighbouring positional arguments of a call", "swapped"),
+        ("a keyword argument", "dropped"),
+    ),
+    rules=_rules,
+    examples={
+        "a(b, c)": ["a(b, c) -> a(c, b)"],
+        "a(b, c=1, d=2)": ["a(b, c=1, d=2) -> a(b, d=2)", "a(b, c=1, d=2) -> a(b, c=1)"],
+        "a(*b, c)": [],
+        "a(b)": [],
+    },
+)

@@ -1,0 +1,77 @@
+"""Replace an arithmetic operator."""
+
+import ast
+from collections.abc import Iterator
+
+from mutator.mutants.expressions import Expression
+from mutator.operators import Operator, Rule, rule
+from mutator.operators.facts import Facts, extent
+
+_OTHERS: dict[type[ast.operator], tuple[str, ...]] = {
+    ast.Add: ("-", "*", "/"),
+    ast.Sub: ("+", "*", "/"),
+    ast.Mult: ("/", "+", "-"),
+    ast.Div: ("*", "+", "-"),
+    ast.FloorDiv: ("/", "*"),
+    ast.Mod: ("//", "*"),
+    ast.Pow: ("*", "/"),
+    ast.MatMult: ("*",),
+    ast.BitAnd: ("|", "^"),
+    ast.BitOr: ("&", "^"),
+    ast.BitXor: ("&", "|"),
+    ast.LShift: (">>",),
+    ast.RShift: ("<<",),
+}
+_AUGMENTED: dict[type[ast.operator], str] = {ast.Add: "-", ast.Sub: "-", ast.Mult: "1 /", ast.Div: "1 /"}
+_NO_NUMBERS = (ast.List, ast.ListComp, ast.Dict, ast.Set, ast.Tuple, ast.JoinedStr)
+
+
+def _rules(expression: Expression, facts: Facts) -> Iterator[Rule]:
+    node = expression.node
+    if isinstance(node, ast.BinOp) and _is_number(node.left) and _is_number(node.right):
+        yield from (rule("operator_infix", to=to) for to in _OTHERS[type(node.op)])
+    match node:
+        case ast.UnaryOp(op=ast.USub(), operand=operand) if not isinstance(operand, ast.Constant):
+            yield rule("operator_prefix", to="-")
+    augmented = facts.augmented.get(extent(node))
+    if augmented is not None and type(augmented) in _AUGMENTED and _is_number(node):
+        yield rule("operator_prefix", to=_AUGMENTED[type(augmented)])
+
+
+def _is_number(node: ast.expr) -> bool:
+    if isinstance(node, ast.Constant):
+        return isinstance(node.value, int | float | complex)
+    return not isinstance(node, _NO_NUMBERS)
+
+
+OPERATOR = Operator(
+    about="another arithmetic operator",
+    replacements=(
+        ("`a + b`, `a - b`, `a * b`, `a / b`", "each of the other three"),
+        ("`a // b`", "`a / b`, `a * b`"),
+        ("`a % b`", "`a // b`, `a * b`"),
+        ("`a ** b`", "`a * b`, `a / b`"),
+        ("`a @ b`", "`a * b`"),
+        (r"`&`, `\|`, `^`", "each of the other two"),
+        ("`<<`, `>>`", "the other"),
+        ("`-a`", "`-(-a)`"),
+        ("`x += b`, `x -= b`", "`b` becomes `-b`"),
+        ("`x *= b`, `x /= b`", "`b` becomes `1 / b`"),
+    ),
+    rules=_rules,
+    examples={
+        "return a + b": ["a + b -> a - b", "a + b -> a * b", "a + b -> a / b"],
+        "return a - b": ["a - b -> a + b", "a - b -> a * b", "a - b -> a / b"],
+        "return a // b": ["a // b -> a / b", "a // b -> a * b"],
+        "return a % b": ["a % b -> a // b", "a % b -> a * b"],
+        "return a ** b": ["a ** b -> a * b", "a ** b -> a / b"],
+        "return a << b": ["a << b -> a >> b"],
+        "return a & b": ["a & b -> a | b", "a & b -> a ^ b"],
+        "return -a": ["-a -> -(-a)"],
+        "a += b": ["b -> -b"],
+        "a *= b": ["b -> 1 / b"],
+        "return 'a' + b": [],
+        "return [a] + b": [],
+        "a |= b": [],
+    },
+)

@@ -1,0 +1,25 @@
+"""Leave out a statement."""
+
+from mutator.mutants.statements import Statement
+from mutator.operators import Operator
+from mutator.operators.facts import Facts
+
+
+def _omits(statement: Statement, facts: Facts) -> bool:
+    return not statement.is_return
+
+
+OPERATOR = Operator(
+    about="a statement that is left out",
+    replacements=(("an assignment, an augmented assignment or a call, alone on its lines", "left out"),),
+    omits=_omits,
+    examples={
+        "a = b": ["a = b -> left out"],
+        "self.a = b": ["self.a = b -> left out"],
+        "a += b": ["a += b -> left out"],
+        "a(b)": ["a(b) -> left out"],
+        "c = b": [],  # the first value of `c`, without which the name would not exist
+        "if a: b = c": [],
+        "a([c for c in b])\n    c = b": ["a([c for c in b]) -> left out"],  # the `c` inside is another one
+    },
+)
