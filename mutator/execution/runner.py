@@ -235,8 +235,9 @@ class Runner:
         if execution.status is not Status.OK or execution.probe is None:
             return self._failed(experiment, built, execution), None
         activation = activation_of(execution.probe)
+        reference = self.goldens.trace(experiment)
         try:
-            faulty, judged = load_judged(self.manifest, execution.out)
+            faulty, judged = load_judged(self.manifest, execution.out, reference)
         except BadOutput as err:
             if activation is None:
                 raise

@@ -112,6 +112,17 @@ def _newest(times: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarray
     return np.concatenate(([np.nan], values))[np.searchsorted(times, at + _TINY, side="right")]
 
 
+def at_steps_of_other(times: np.ndarray, values: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    """Return a run's values, one for each of its `times`, at the steps of another run (s).
+
+    Steps that differ get the newest value. Before its first step and after its last one, it is NaN.
+    """
+    rows = min(len(times), len(steps))
+    if np.array_equal(times[:rows], steps[:rows]):
+        return np.concatenate((values[:rows], np.full(len(steps) - rows, np.nan)))
+    return np.where(steps > times[-1] + _TINY, np.nan, _newest(times, values, steps))
+
+
 def load_record(manifest: TargetManifest, out: Path) -> dict[str, Any]:
     """Load the record that the target wrote in `out`, or an empty one if the manifest names no record."""
     if manifest.record_file is None:

@@ -9,12 +9,19 @@ from typing import Any
 import numpy as np
 
 from mutator.errors import BadOutput, MutatorError
-from mutator.outcomes.golden import Trace, alerts_of, load_record, load_trace, on_steps
+from mutator.outcomes.golden import (
+    Trace,
+    alerts_of,
+    at_steps_of_other,
+    load_record,
+    load_trace,
+    on_steps,
+)
 from mutator.targets.judging import Hazard, Metric
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.severity import DELTA_V
 from mutator.triggers import over_time, stl
-from mutator.triggers.conditions import TIME, names_in
+from mutator.triggers.conditions import GOLDEN, TIME, names_in
 
 Values = Mapping[str, np.ndarray]
 
@@ -31,10 +38,13 @@ class Judged:
     metrics: tuple[tuple[str, float], ...]  # including margins; metrics without a value are omitted
 
 
-def load_judged(manifest: TargetManifest, out: Path) -> tuple[Trace, Judged]:
-    """Load and judge the run in `out`. BadOutput if trace or record is missing or cannot be judged."""
+def load_judged(manifest: TargetManifest, out: Path, golden: Trace | None = None) -> tuple[Trace, Judged]:
+    """Load and judge the run in `out`; `golden` is as in `judge_run`.
+
+    BadOutput if trace or record is missing or cannot be judged.
+    """
     trace = load_channels(manifest, out)
-    return trace, judge_run(manifest, trace, load_record(manifest, out))
+    return trace, judge_run(manifest, trace, load_record(manifest, out), golden)
 
 
 def load_channels(manifest: TargetManifest, out: Path) -> Trace:
@@ -47,9 +57,15 @@ def load_channels(manifest: TargetManifest, out: Path) -> Trace:
     return load_trace(manifest, out, [c for c in manifest.channels if c in needed], others)
 
 
-def judge_run(manifest: TargetManifest, trace: Trace, record: Mapping[str, Any]) -> Judged:
-    """Judge a run. `trace` must have the channels that the manifest needs for judging."""
+def judge_run(
+    manifest: TargetManifest, trace: Trace, record: Mapping[str, Any], golden: Trace | None = None
+) -> Judged:
+    """Judge a run. Its trace and that of its golden run must have the channels that the manifest needs for
+    judging. Without a golden run (this is one), metrics that use it have no value.
+    """
     values = values_of(manifest, trace)
+    if golden is not None and any(metric.uses_golden for metric in manifest.metrics):
+        values = {**values, **_golden_values(values_of(manifest, golden), values[TIME])}
     hazards, metrics = [], []
     ends: dict[str, float] = {}
     for hazard in manifest.rules:
@@ -62,12 +78,13 @@ def judge_run(manifest: TargetManifest, trace: Trace, record: Mapping[str, Any])
         if hazard.metric is not None:
             numbers = robust if robust is not None else over_time.numbers(hazard.margin, values)
             metrics.append((hazard.metric, numbers))
-    metrics += [(metric, _numbers(metric, values)) for metric in manifest.metrics]
+    measured = [metric for metric in manifest.metrics if golden is not None or not metric.uses_golden]
+    metrics += [(metric, _numbers(metric, values)) for metric in measured]
     t_end = min(ends.values(), default=None)
     found = {metric.name: _aggregate(metric, numbers, values, t_end) for metric, numbers in metrics}
     contact = manifest.contact
     if contact and t_end is not None and ends.get(contact.hazard) == t_end:
-        speed = found[contact.speed]
+        speed = found.get(contact.speed)
         found[DELTA_V] = None if speed is None else contact.delta_v(speed)
     return Judged(
         hazards=tuple(hazards),
@@ -90,6 +107,13 @@ def values_of(manifest: TargetManifest, trace: Trace) -> Values:
         if value.name not in values and all(name in values for name in names_in(value.text)):
             values[value.name] = over_time.numbers(value.text, values)
     return values
+
+
+def _golden_values(golden: Values, steps: np.ndarray) -> Values:
+    """Return the values of the golden run at the steps of another run; NaN at steps that it does not have."""
+    return {
+        GOLDEN + name: at_steps_of_other(golden[TIME], numbers, steps) for name, numbers in golden.items()
+    }
 
 
 def _robustness(hazard: Hazard, values: Values, manifest: TargetManifest) -> np.ndarray:
@@ -131,9 +155,14 @@ def _end(hazard: Hazard, first: float | None, values: Values) -> float | None:
 
 
 def _numbers(metric: Metric, values: Values) -> np.ndarray:
+    """Return a metric's value at each step; NaN, which is not aggregated, if it needs a golden step that is
+    missing.
+    """
     if metric.aggregate == "duration":
-        return over_time.holds(metric.formula, values).astype(float)
-    return over_time.numbers(metric.formula, values)
+        numbers = over_time.holds(metric.formula, values).astype(float)
+    else:
+        numbers = over_time.numbers(metric.formula, values)
+    return np.where(np.isnan(values[GOLDEN + TIME]), np.nan, numbers) if metric.uses_golden else numbers
 
 
 def _aggregate(metric: Metric, numbers: np.ndarray, values: Values, t_end: float | None) -> float | None:

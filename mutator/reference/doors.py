@@ -60,7 +60,7 @@ _PLACES = (
     _Place(
         name="hazard, metric",
         adds="what is judged and measured in a run, and its result columns",
-        protocol="a formula over channels",
+        protocol="a formula over channels; of a metric, also over those of the golden run",
         register="write it into the target's manifest",
         example="[Add a hazard](../how-to/add-a-hazard.md)",
     ),

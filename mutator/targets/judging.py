@@ -10,7 +10,7 @@ from pydantic import Field
 from mutator.config.yaml_files import Keys, Source, StrictModel
 from mutator.targets.formulas import condition, formula
 from mutator.triggers import stl
-from mutator.triggers.conditions import parse
+from mutator.triggers.conditions import GOLDEN, TIME, parse
 
 Aggregate = Literal["min", "max", "mean", "last", "integral", "duration", "at_end"]
 _AGGREGATES = get_args(Aggregate)
@@ -20,7 +20,7 @@ _WORSE = Literal["higher", "lower"]
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Metric:
     """A number for each run: an aggregate of `formula` over the steps in which `where` holds, up to the first
-    terminal hazard.
+    terminal hazard. Both may name values of the golden run (`golden.gap`).
     """
 
     name: str
@@ -31,6 +31,10 @@ class Metric:
     worse: _WORSE
     about: str
     source: str = ""
+
+    @property
+    def uses_golden(self) -> bool:
+        return GOLDEN in self.formula or GOLDEN in self.where
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,7 +112,9 @@ class HazardModel(StrictModel, title="A hazard"):
 
 class MetricModel(StrictModel, title="A metric"):
     """A column of the results, by its name. Give exactly one of the aggregates. They cover the drive up to
-    the first terminal hazard, and skip steps in which the value is infinite or NaN.
+    the first terminal hazard, and skip steps in which the value is infinite or NaN. `golden.NAME` is a value
+    of the golden run in the same step (`max: abs(gap - golden.gap)`); steps that only one of the runs has are
+    skipped.
     """
 
     min: str | None = Field(None, description="The minimum of this formula over channels.")
@@ -207,6 +213,7 @@ def read_metrics(
     models: dict[str, MetricModel], known: Collection[str], source: Source
 ) -> tuple[Metric, ...]:
     """Read a manifest's metrics; the arguments and errors are those of `read_hazards`."""
+    known = (*known, *(GOLDEN + name for name in known if name != TIME))
     return tuple(_metric(name, model, known, source) for name, model in models.items())
 
 

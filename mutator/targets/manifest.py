@@ -20,7 +20,7 @@ from mutator.targets.scene import Scene
 from mutator.targets.severity import DELTA_V, Contact
 from mutator.targets.source_tree import SourceTree, matches, read_tree
 from mutator.triggers import stl
-from mutator.triggers.conditions import names_in
+from mutator.triggers.conditions import GOLDEN, names_in
 
 _DELTA_V = Metric(
     name=DELTA_V,
@@ -213,4 +213,4 @@ def _names_of(rules: Iterable[Hazard], metrics: Iterable[Metric], known: Collect
     texts = [text for rule in rules for text in (rule.when, rule.margin, rule.terminal)]
     texts += [text for metric in metrics for text in (metric.formula, metric.where)]
     in_stl = (name for rule in rules for name in stl.names_in(rule.stl, known))
-    return {name for text in texts if text for name in names_in(text)}.union(in_stl)
+    return {name.removeprefix(GOLDEN) for text in texts if text for name in names_in(text)}.union(in_stl)

@@ -14,6 +14,7 @@ from mutator._common.text import counted, operator_hint
 from mutator.errors import MutatorError
 
 TIME = "t"  # s; every target has it
+GOLDEN = "golden."  # before a name: its value in the golden run
 _FUNCTIONS = ("abs", "min", "max", "hypot")
 _OVER_TIME = ("ever", "rate")  # whether a condition has held so far; a number's change per second
 _ARGUMENTS = {"abs": (1, 1), "hypot": (2, 2), "rate": (1, 1)}  # minimum, maximum; others take two or more
@@ -116,10 +117,19 @@ def parse(text: str) -> ast.expr:
     if len(text) > _MAX_LENGTH:
         raise MutatorError(f"a condition of {len(text)} characters", expected=f"at most {_MAX_LENGTH}")
     try:
-        return ast.parse(text.strip(), mode="eval").body
+        tree = ast.parse(text.strip(), mode="eval").body
+        return _GoldenNames().visit(tree) if GOLDEN in text else tree
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         hint = operator_hint(text) or "rewrite it"
         raise _refuse(f"{getattr(error, 'msg', error)}", text, None, hint) from None
+
+
+class _GoldenNames(ast.NodeTransformer):
+    """Turns `golden.gap` into one name."""
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
+        name = ast.unparse(node)
+        return ast.copy_location(ast.Name(name, ast.Load()), node) if name.startswith(GOLDEN) else node
 
 
 class _Writer:
@@ -214,7 +224,7 @@ class _Writer:
             return repr(float(self.constants[name]))
         if name == "inf":
             return self.written["inf"]
-        if name not in _NAMES and (self.variables is None or name in self.variables):
+        if name not in _NAMES and (GOLDEN not in name if self.variables is None else name in self.variables):
             return name
         remedy = (
             f"the known constants are {', '.join(self.constants)}" if self.constants else "check its spelling"

@@ -53,6 +53,17 @@ def test_a_campaign_can_be_run_resumed_and_compared(toycar: Workspace, tmp_path:
         same.findings(["bad"])
 
 
+def test_a_metric_over_both_runs_needs_the_manifest_alone(toycar: Workspace, tmp_path: Path) -> None:
+    with toycar.manifest("toycar").path.open("a") as file:
+        file.write('metrics: {wheel_apart: {max: abs(wheel_turn - golden.wheel_turn), unit: "-", ')
+        file.write("worse: higher, about: largest difference of the wheel}}\n")
+    run = mutator.run("small", tmp_path / "a", choices=TWO, workspace=toycar)
+    assert run.results["wheel_apart"].tolist() == run.results["max_dev_wheel"].tolist()
+    assert run.results["wheel_apart"].max() > 0.0
+    assert "wheel_apart" in (tmp_path / "a" / "results.csv").read_text().splitlines()[0].split(",")
+    assert "wheel_apart" in run.report().page.read_text()
+
+
 def test_a_warning_names_harness_errors(
     toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -55,6 +55,18 @@ def write(out: Path, **channels: np.ndarray) -> None:
         np.savez(out / "log.npz", **{"time": T, **quiet, **channels})
 
 
+METRICS = """\
+metrics:
+  gas_apart: {max: abs(gas - golden.gas), unit: "-", worse: higher, about: difference of gas from golden}
+"""
+
+
+@pytest.fixture
+def with_metrics(toycar: Workspace) -> None:
+    with toycar.manifest("toycar").path.open("a") as file:
+        file.write(METRICS)
+
+
 @pytest.fixture
 def judged(toycar: Workspace, tmp_path: Path) -> Callable[..., Record]:
     manifest = toycar.manifest("toycar")
@@ -144,6 +156,14 @@ def test_a_crash_keeps_its_activation_and_a_timeout_does_not(
     record = judged(status, ran=RAN)
     assert (record.status, record.outcome, record.detail) == (status, None, "why")
     assert (record.activation is not None) == kept
+
+
+@pytest.mark.usefixtures("with_metrics")
+def test_a_metric_compares_each_judged_run_with_its_golden_run(judged: Callable[..., Record]) -> None:
+    values = [judged(ran=ran).metrics for ran in (RAN, NEVER)]
+    assert values == [(("gas_apart", 0.0),)] * 2
+    assert judged(ran=RAN, trace={"gas": stepped(5, 0.5)}).metrics == (("gas_apart", 0.5),)
+    assert judged(Status.CRASHED, ran=RAN, trace={"gas": stepped(5, 0.5)}).metrics == ()
 
 
 def test_mutants_that_cannot_be_built_are_not_run(toycar: Workspace, tmp_path: Path) -> None:

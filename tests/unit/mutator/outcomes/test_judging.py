@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mutator.errors import BadOutput, MutatorError
-from mutator.outcomes.golden import compare, load_record, load_trace
+from mutator.outcomes.golden import Trace, compare, load_record, load_trace
 from mutator.outcomes.judging import Judged, judge_run, load_judged
 from mutator.targets.channels import Channel, Role
 from mutator.targets.manifest import TargetManifest
@@ -54,9 +54,9 @@ def write(tmp_path: Path) -> Write:
     return manifest
 
 
-def judged(manifest: TargetManifest, **channels: Any) -> Judged:
+def judged(manifest: TargetManifest, golden_run: Trace | None = None, **channels: Any) -> Judged:
     trace = {"time": T, "gap": GAP, "speed": SPEED, "force": SPEED} | channels
-    return judge_run(manifest, trace, {"hazards": {}})
+    return judge_run(manifest, trace, {"hazards": {}}, golden_run)
 
 
 @pytest.mark.parametrize(
@@ -134,6 +134,77 @@ def test_a_hazard_can_occur_before_the_end_of_the_drive(write: Write) -> None:
     found = judged(write('hazards: {NEAR: {when: "gap <= 1", terminal: "gap <= 0", unit: m}}\n'))
     assert (found.hazards, found.t_end) == ((("NEAR", 1.0),), 3.0)
     assert dict(found.metrics) == {"margin_near": -1.0}  # gap - 1, at contact
+
+
+GOLDEN = np.array([3.0, 2.0, 1.0, 1.0, 1.0, 1.0])
+
+
+@pytest.mark.parametrize(
+    ("metric", "value"),
+    [
+        ("max: abs(gap - golden.gap)", 1.0),  # up to contact; later the two are 2 m and 3 m apart
+        ("min: gap - golden.gap", -1.0),
+        ("last: golden.gap - gap", 1.0),
+        ("mean: golden.gap", 7 / 4),
+        ("integral: golden.gap", 6.0),
+        ('duration: "gap < golden.gap"', 1.0),
+        ("at_end: golden.gap", 1.0),
+        ('{max: speed, where: "golden.gap < 2"}', 2.0),
+        ("max: golden.left", 0.5),  # a derived value: 3 m, 2 m, 1 m, 1 m at 6 m/s
+        ("max: rate(golden.gap)", 0.0),
+    ],
+)
+def test_a_metric_can_compare_a_run_with_its_golden_run(write: Write, metric: str, value: float) -> None:
+    manifest = write(
+        'hazards: {HIT: {when: "gap <= 0", terminal: true}}\n'
+        f"metrics: {{it: {{{metric.strip('{}')}, unit: m, worse: lower, about: x}}}}\n",
+        observation="  golden: {unit: m}\nobservation:",
+    )
+    golden = {"time": T, "gap": GOLDEN, "speed": np.full(6, 6.0), "golden": T}
+    assert dict(judged(manifest, golden, golden=T).metrics)["it"] == value
+    assert "it" not in dict(judged(manifest, golden=T).metrics)  # the golden run itself
+
+
+@pytest.mark.parametrize(
+    ("steps", "golden_steps", "worst", "apart_s", "final"),
+    [
+        (6, 6, 5.0, 5.0, 5.0),
+        (3, 6, 2.0, 2.0, None),  # the faulty run ends at 2 s, without contact
+        (6, 3, 2.0, 3.0, None),  # the golden run ends at 2 s, before the contact at 5 s
+        (6, 0, None, 0.0, None),
+    ],
+)
+def test_a_metric_of_both_runs_covers_the_steps_that_both_have(
+    write: Write, steps: int, golden_steps: int, worst: float | None, apart_s: float, final: float | None
+) -> None:
+    manifest = write(
+        'hazards: {HIT: {when: "gap >= 5", terminal: true}}\nmetrics:\n'
+        "  worst: {max: abs(gap - golden.gap), unit: m, worse: higher, about: x}\n"
+        '  apart_s: {duration: "not gap == golden.gap - 9", unit: s, worse: higher, about: x}\n'
+        "  final: {at_end: gap - golden.gap, unit: m, worse: higher, about: x}\n"
+    )
+    golden = {"time": T[:golden_steps], "gap": np.zeros(golden_steps), "speed": T[:golden_steps]}
+    run = dict.fromkeys(("time", "gap", "speed", "force"), T[:steps])
+    found = dict(judged(manifest, golden, **run).metrics)
+    expected = {"margin_hit": 6.0 - steps, "worst": worst, "apart_s": apart_s, "final": final}
+    assert found == {name: value for name, value in expected.items() if value is not None}
+
+
+def test_a_run_without_a_channel_that_a_metric_reads_of_the_golden_run_is_refused(
+    write: Write, tmp_path: Path
+) -> None:
+    manifest = write("hazards: {}\nmetrics: {it: {max: golden.gap, unit: m, worse: lower, about: x}}\n")
+    np.savez(tmp_path / "trace.npz", time=T, force=SPEED)
+    with pytest.raises(BadOutput, match="no channel 'gap'"):
+        load_judged(manifest, tmp_path)
+
+
+def test_other_steps_are_compared_with_the_newest_golden_value(write: Write) -> None:
+    manifest = write("hazards: {}\nmetrics: {it: {last: golden.gap, unit: m, worse: lower, about: x}}\n")
+    golden = {"time": T, "gap": GAP, "speed": SPEED}
+    run = {name: np.zeros(3) for name in ("gap", "speed", "force")}
+    for times, newest in (([0.0, 0.5, 1.9], 1.0), ([0.5, 2.0, 3.0], 0.0), ([0.5, 4.0, 7.0], -1.0)):
+        assert dict(judged(manifest, golden, time=np.array(times), **run).metrics) == {"it": newest}
 
 
 CONTACT = (
