@@ -10,6 +10,7 @@
     MutatorWarning, IncompleteRun
     Signal                  caught by the harness itself; users see what it makes of it
 
+Each docstring has a line on each (`When:`, `To do:`). The page of the Python API shows those of public ones.
 Code in a target's process has its exceptions beside it, because it cannot import this module.
 """
 
@@ -24,9 +25,11 @@ EXIT_HARNESS_ERRORS = 3
 
 
 class MutatorError(Exception):
-    """An error that the user can fix, shown without a traceback. Do what `remedy` says.
+    """An error that the user can fix, shown without a traceback.
 
-    Names in backquotes in the remedy are arguments of the API; the command line shows the matching options.
+    * When: an argument, a file, a folder or the target is not as a command or a function needs it.
+    * To do: what `remedy` says. Names in backquotes in it are arguments of the API; the command line shows
+      the matching options.
     """
 
     exit_code = EXIT_WRONG_INPUT  #: exit code of a command that ends with this error
@@ -73,7 +76,11 @@ class MutatorError(Exception):
 
 
 class MutatorWarning(UserWarning):
-    """A warning for the user, shown in one line. The command goes on; correct what it names."""
+    """A warning for the user, shown in one line.
+
+    * When: a command goes on although something is probably not as intended.
+    * To do: correct what the warning names, unless it is intended.
+    """
 
 
 def _short(text: str) -> str:
@@ -85,16 +92,20 @@ def _rebuild(cls: type[MutatorError], got: str, state: dict[str, Any]) -> Mutato
 
 
 class CheckFailed(MutatorError):
-    """A check failed: a campaign cannot start, its results are invalid, or a comparison failed a gate. Read
-    what the check found; the command ran as asked.
+    """A check says no. The command ran as asked.
+
+    * When: a campaign cannot start, its results are invalid, or a comparison fails a gate.
+    * To do: read what the check found, and correct that.
     """
 
     exit_code = EXIT_CHECK_FAILED  #: exit code of a command that ends with this error
 
 
 class ReviewConflict(CheckFailed):
-    """Somebody else changed the review of these groups after the caller read it. Nothing was written: read
-    the review again, then decide again.
+    """Somebody else changed the review. Nothing was written.
+
+    * When: another review of these groups was stored after the caller had read it.
+    * To do: read the review again, then decide again.
 
     `groups` are their ids, `review` is the current `mutator.review.decisions.Review`.
     """
@@ -104,48 +115,73 @@ class ReviewConflict(CheckFailed):
 
 
 class Shortage(MutatorError):
-    """The machine is out of a resource, or this process has reached a limit. Finished work is kept: raise the
-    limit, then run the same command again.
+    """The machine is out of a resource. Finished work is kept.
+
+    * When: memory, processes or open files are used up, or this process has reached its limit of them.
+    * To do: raise the limit, then run the same command again.
     """
 
     exit_code = EXIT_HARNESS_ERRORS
 
 
 class DiskFull(MutatorError):
-    """No space left on the disk. Finished work is kept: free space, then run the same command again."""
+    """No space is left on the disk. Finished work is kept.
+
+    * When: a file cannot be written for lack of space.
+    * To do: free space, then run the same command again.
+    """
 
     exit_code = EXIT_HARNESS_ERRORS
 
 
 class Outside(MutatorError):
-    """A name points out of its folder, or something in a folder is not a plain file or folder. Do not use
-    the folder, unless you know who made it so.
+    """A folder is not safe to read.
+
+    * When: a name points out of its folder, or something in the folder is a link, a pipe or a device.
+    * To do: do not use the folder, unless you know who made it so.
     """
 
 
 class TooLarge(MutatorError, ValueError):
-    """A file is larger than anything that belongs there: restore it.
+    """A file is larger than anything that belongs there.
+
+    * When: a file has more bytes than its reader allows.
+    * To do: restore the file.
 
     Also a ValueError, so that readers that skip a damaged file (of a cache) skip it as well.
     """
 
 
 class InvalidMutant(MutatorError):
-    """The mutated file does not compile. Such a mutant is never run: correct the spec or the template."""
+    """A mutant is never run because its file is not valid Python.
+
+    * When: the mutated file does not compile.
+    * To do: correct the spec or the template.
+    """
 
 
 class BadOutput(MutatorError):
-    """A run finished, but its trace or record is missing or does not match the manifest. Correct the
-    manifest, or the code that records the run.
+    """A run finished without usable output.
+
+    * When: its trace or record is missing or does not match the manifest.
+    * To do: correct the manifest, or the code that records the run.
     """
 
 
 class JobEnded(MutatorError):
-    """The server's job has already ended and cannot be cancelled: read its result."""
+    """A job of the server cannot be cancelled.
+
+    * When: it has already ended.
+    * To do: read its result.
+    """
 
 
 class GroupsChanged(MutatorError):
-    """The groups of a review have changed since the page was loaded. The page loads them again: `groups`."""
+    """A decision of the review page is refused.
+
+    * When: the groups have changed since the page was loaded.
+    * To do: show the current `groups`, then decide again.
+    """
 
     def __init__(self, got: str, groups: dict[str, Any]) -> None:
         super().__init__(got)
@@ -153,24 +189,42 @@ class GroupsChanged(MutatorError):
 
 
 class Absent(MutatorError):
-    """What a request names does not exist or is not served: begin at the server's first page."""
+    """A request to the server names something that it does not serve.
+
+    * When: no such run, job, group, target or file exists.
+    * To do: begin at the server's first page.
+    """
 
 
 class UnknownPage(MutatorError):
-    """A request comes from a page that may not send it, or from a page of an earlier server: reload it."""
+    """A request to the server is refused.
+
+    * When: it comes from a page that may not send it, or from a page of an earlier server.
+    * To do: reload the page.
+    """
 
 
 class IncompleteRun(UserWarning):
-    """Warning: a run ended with unfinished experiments or harness errors. Run the campaign again."""
+    """A warning: a run is incomplete.
+
+    * When: it ended with unfinished experiments or harness errors.
+    * To do: run the campaign again.
+    """
 
 
 class Signal(Exception):
-    """What the harness raises for itself and always catches. What to do stands at each."""
+    """What the harness raises for itself; users see what the catcher makes of it.
+
+    * When: a function cannot do its part, and its caller has another way.
+    * To do: catch it.
+    """
 
 
 class BadTrace(Signal, ValueError):
-    """An invalid trace file: what was found, and what was expected. The reader of the run's output reports
-    it as a BadOutput with the file's path.
+    """A trace file is invalid.
+
+    * When: its bytes are not what its format prescribes, or its format cannot be read here.
+    * To do: report it as a BadOutput with the file's path.
     """
 
     def __init__(self, got: str, expected: str) -> None:
@@ -179,12 +233,18 @@ class BadTrace(Signal, ValueError):
 
 
 class ForkServerLost(Signal):
-    """A process of the fork server is gone or does not answer. The engine starts another server."""
+    """The fork server cannot be used any more.
+
+    * When: one of its processes is gone, does not answer, or does not have the pristine tree.
+    * To do: start another server.
+    """
 
 
 class NotForkable(Signal):
-    """A target or run that cannot be forked. The text says why; `remedy` says what to do, if known. The
-    reference engine runs it.
+    """A target or run that cannot be forked. The text says why; `remedy` is for the user, if known.
+
+    * When: the target is not stepwise, cannot be loaded or driven, or has threads.
+    * To do: run it on the reference engine.
     """
 
     def __init__(self, why: str, remedy: str = "") -> None:
@@ -196,34 +256,64 @@ class NotForkable(Signal):
 
 
 class NotSwappable(Signal):
-    """The mutant cannot be put into a running program; the text says why. The reference engine runs it."""
+    """A mutant that cannot be put into a running program. The text says why.
+
+    * When: it changes more than functions, or a line that does not ask the probe first.
+    * To do: run it on the reference engine.
+    """
 
 
 class NotTestable(Signal):
-    """A comparison that does not compare one variable with a constant. Coverage is then not measured."""
+    """A comparison whose boundary cannot be tested.
+
+    * When: it does not compare one variable with a constant.
+    * To do: report that coverage is not measured.
+    """
 
 
 class HarnessErrors(Signal):
-    """The harness could not judge some experiments of a chunk. The pytest item fails with this text."""
+    """The work of a pytest item failed.
+
+    * When: the harness could not judge some of its experiments, or the session met a problem.
+    * To do: fail the item with this text.
+    """
 
 
 class PieceNotWanted(Signal):
-    """The command no longer waits for this piece of work. The worker drops it."""
+    """A piece of work is no longer needed.
+
+    * When: the command no longer waits for it.
+    * To do: have the worker drop it.
+    """
 
 
 class GoldenRunsDiffer(Signal):
-    """A golden run made on a worker differs from the campaign's. The worker gets no work."""
+    """A worker computes something else than the machine of the command.
+
+    * When: a golden run made on the worker differs from the campaign's.
+    * To do: give the worker no work.
+    """
 
 
 class WorkerRefused(Signal):
-    """A worker gets no work, or no more work. Others do it."""
+    """A worker gets no work, or no more work.
+
+    * When: its calls fail, it differs from the command's machine, or it left the run.
+    * To do: give its work to others.
+    """
 
 
 class WorkerCutOff(WorkerRefused):
-    """The scheduler briefly lost its connection to the command, and dropped all tasks. Admit the worker
-    again.
+    """The scheduler dropped all tasks of a worker.
+
+    * When: it briefly lost its connection to the command.
+    * To do: admit the worker again.
     """
 
 
 class SchedulerGone(Signal):
-    """The scheduler no longer answers. The session ends; the same command resumes it."""
+    """A session on a cluster cannot go on.
+
+    * When: the scheduler no longer answers.
+    * To do: end the session; the same command resumes it.
+    """

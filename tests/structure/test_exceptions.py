@@ -2,8 +2,11 @@
 
 import ast
 import builtins
+import re
 from collections.abc import Iterator
 from pathlib import Path
+
+import pytest
 
 from mutator import errors
 
@@ -26,6 +29,13 @@ def exceptions_in(source: str) -> Iterator[ast.ClassDef]:
                 yield node
 
 
+def when_and_remedy(docstring: str) -> tuple[str, str] | None:
+    """When an exception is raised and what to do, if its docstring has a summary and both."""
+    form = r"\w[^*]+\.\n\n\* When: (\w[^*]+\.)\n\* To do: (\w[^*]+\.)"
+    found = re.match(form, docstring)
+    return None if found is None else (found[1], found[2])
+
+
 def test_no_other_module_defines_an_exception() -> None:
     strangers = [
         f"{path.relative_to(CLONE)}: {node.name}"
@@ -46,4 +56,21 @@ def test_each_says_when_and_what_to_do() -> None:
     source = (CLONE / "mutator" / "errors.py").read_text()
     texts = {node.name: ast.get_docstring(node) or "" for node in exceptions_in(source)}
     assert len(texts) >= 25
-    assert [name for name, text in texts.items() if len(text) < 40] == []
+    assert [name for name, text in texts.items() if when_and_remedy(text) is None] == []
+    cases = [when_and_remedy(text) for text in texts.values()]
+    assert len({when for when, _ in filter(None, cases)}) == len(texts)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "The machine is out of a resource. Finished work is kept: run the same command again.",
+        "The disk is full.\n\n* When: a file cannot be written.",
+        "The disk is full.\n\n* To do: free space.",
+        "The disk is full.\n\n* When: .\n* To do: free space.",
+        "The disk is full.\n\n* When: a file cannot be written.\n* To do:",
+        "* When: a file cannot be written.\n* To do: free space.",
+    ],
+)
+def test_a_docstring_without_one_of_the_two_is_noticed(text: str) -> None:
+    assert when_and_remedy(text) is None
