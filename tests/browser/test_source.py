@@ -55,6 +55,7 @@ def test_a_mark_lists_its_experiments(
     page.wait_for_rows(2)
     assert page.found == "2 of 18 experiments"
     page.page.click("#grid tr[data-at]")
+    page.page.wait_for_selector("#experiment .pictures .command")
     verbs = {one.split()[1] for one in page.texts("#experiment .command code")}
     assert verbs == {"report", "rerun", "show"}  # `try` needs a spec, and no spec has this mutant
 

@@ -187,7 +187,7 @@ def test_a_run_page_starts_and_cancels_only_jobs_of_its_run(
         for token in [*strangers(client, HOME, night), *([own] if "run" not in order else [])]:
             assert client.ask("POST", "/api/jobs", {HEADER: token}, order).status in (400, 403)
     assert not client.get("/api/jobs").json["jobs"]
-    monkeypatch.setattr(client.site.jobs, "_started", lambda job: None)
+    monkeypatch.setattr(client.site.jobs, "_started", lambda job, events: None)
     ids = [client.ask("POST", "/api/jobs", {HEADER: own}, orders[0]).json["id"]]
     ids += [client.post("/api/jobs", order).json["id"] for order in orders[:1]]
     campaign = client.post("/api/jobs", orders[2] | {"name": "later"}).json["id"]
