@@ -1,46 +1,31 @@
 """The frozen plan on disk: one line per experiment, read as a whole or chunk by chunk."""
 
-import json
-import re
 from bisect import bisect_right
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
-from dataclasses import fields
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, partial
 from hashlib import sha256
 from itertools import accumulate, islice
-from operator import itemgetter
 from pathlib import Path
 from typing import Any, Protocol, TypeVar, overload
 
-from mutator._common.below import check_library_name
 from mutator._common.bounded import bounded_lines, check_open, open_regular
 from mutator._common.files import raising_disk_full, writing_atomic
-from mutator._common.hashing import added_values, canonical, content_id, plain
+from mutator._common.hashing import added_values, canonical, plain
 from mutator._common.text import counted
 from mutator.errors import MutatorError
-from mutator.model import (
-    AfterHazard,
-    Anchor,
-    AnchorKind,
-    Experiment,
-    Fault,
-    FaultLocation,
-    Hold,
-    Injection,
-    Method,
-    Trigger,
+from mutator.model import Experiment, Fault
+from mutator.store.plan_lines import (
+    REMEDY,
+    content,
+    experiment_from,
+    experiment_of,
+    fault_from,
+    fault_of,
+    id_of,
 )
-from mutator.store.plan_lines import experiment_as_written
 
 EXPERIMENTS = "plan/experiments.jsonl"
 FAULTS = "plan/faults.jsonl"
-_REMEDY = "the plan is damaged: restore the file from a copy of the run folder, or plan into a new one"
-
-_ID = re.compile(rb'\{(?:"after_hazard":"[a-z_]+",)?"fault":"[0-9a-f]{16}","id":"([0-9a-f]{16})",')
-_AN_ID = re.compile(r"[0-9a-f]{16}")
-# the input of Experiment.id
-_HASHED = ("fault", "scenario", "scenario_digest", "method", "trigger", "seed", "setting")
-_FIELDS = {"id", *_HASHED}
 
 _T = TypeVar("_T")
 Chunk = tuple[int, int, int]  # offset and length in bytes, number of experiments
@@ -92,27 +77,31 @@ def _lines(path: Path) -> _Lines:
     return enumerate(lines_of(path), start=1)
 
 
-def _tried(path: Path, lines: _Lines, made: Callable[[dict[str, Any]], _T]) -> Iterator[_T | MutatorError]:
-    """Yield what `made` returns for each line of the plan file at `path`, or the line's problem."""
+def _read(path: Path, lines: _Lines, read: Callable[[bytes], _T]) -> Iterator[_T]:
+    """Yield what `read` returns for each line of the plan file at `path`."""
     for number, line in lines:
         try:
-            yield made(json.loads(line))
+            yield read(line)
         except MutatorError as err:
-            yield MutatorError(err.got, where=path, line=number, expected=err.expected, remedy=err.remedy)
-        except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
-            yield MutatorError("a damaged line", where=path, line=number, remedy=_REMEDY)
+            raise _placed(err, path, number) from None
 
 
-def _read(path: Path, lines: _Lines, made: Callable[[dict[str, Any]], _T]) -> Iterator[_T]:
-    for found in _tried(path, lines, made):
-        if isinstance(found, MutatorError):
-            raise found
-        yield found
+def _tried(path: Path, read: Callable[[bytes], _T]) -> Iterator[_T | MutatorError]:
+    """Yield what `read` returns for each line of the plan file at `path`, or the line's problem."""
+    for number, line in _lines(path):
+        try:
+            yield read(line)
+        except MutatorError as err:
+            yield _placed(err, path, number)
+
+
+def _placed(err: MutatorError, path: Path, number: int | None) -> MutatorError:
+    return type(err)(err.got, where=path, line=number, expected=err.expected, remedy=err.remedy)
 
 
 def read_faults(run: Path) -> dict[str, Fault]:
     path = run / FAULTS
-    return {fault.id: fault for fault in _read(path, _lines(path), fault_from)}
+    return {fault.id: fault for fault in _read(path, _lines(path), fault_of)}
 
 
 def fault_lines(run: Path) -> dict[str, bytes]:
@@ -139,7 +128,7 @@ def read_chunk(run: Path, chunk: Sequence[int], faults: Mapping[str, Fault]) -> 
     found = tuple(_experiments(path, ((None, line) for line in chunk_lines(run, chunk)), faults))
     if len(found) != count:
         got = f"{counted(len(found), 'experiment')} in a chunk of {count}"
-        raise MutatorError(got, where=path, remedy=_REMEDY)
+        raise MutatorError(got, where=path, remedy=REMEDY)
     return found
 
 
@@ -187,7 +176,7 @@ def lines_of(path: Path) -> Iterator[bytes]:
         with open_regular(path) as file:
             yield from bounded_lines(file, path)
     except OSError as err:
-        raise MutatorError(f"cannot be read ({err.strerror})", where=path, remedy=_REMEDY) from None
+        raise MutatorError(f"cannot be read ({err.strerror})", where=path, remedy=REMEDY) from None
 
 
 def experiment_on(path: Path, number: int, line: bytes, faults: Mapping[str, Fault]) -> Experiment:
@@ -196,37 +185,27 @@ def experiment_on(path: Path, number: int, line: bytes, faults: Mapping[str, Fau
 
 
 def _experiments(path: Path, lines: _Lines, faults: Mapping[str, Fault]) -> Iterator[Experiment]:
-    for number, line in lines:
-        if experiment := experiment_as_written(line, faults):
-            check_library_name(experiment.scenario, path)
-            yield experiment
-        else:
-            yield from _read(path, [(number, line)], partial(experiment_from, faults=faults))
+    return _read(path, lines, partial(experiment_of, faults=faults))
 
 
 def ids(run: Path) -> Iterator[str]:
     path = run / EXPERIMENTS
-    for number, line in _lines(path):
-        found = _ID.match(line)
-        if found and line.count(b'"id":') == 1:  # the line as written, if it contains a single id
-            yield found[1].decode()
-        else:
-            yield from _read(path, [(number, line)], lambda data: check_id(data["id"]))
+    return _read(path, _lines(path), id_of)
 
 
 def problems(run: Path) -> Iterator[MutatorError]:
     """Yield a problem for each line that is damaged or does not match its id, and for each unused fault."""
     planned, defined = run / EXPERIMENTS, run / FAULTS
-    found = list(_tried(defined, _lines(defined), fault_from))
+    found = list(_tried(defined, fault_of))
     faults = {fault.id: fault for fault in found if isinstance(fault, Fault)}
-    used = set(_tried(planned, _lines(planned), itemgetter("fault")))
+    used = set(_tried(planned, lambda line: content(line)["fault"]))
     for number, fault in enumerate(found, start=1):
         if isinstance(fault, MutatorError):
             yield fault
         elif fault.id not in used:
             got = f"fault {fault.id}, which no experiment uses"
-            yield MutatorError(got, where=defined, line=number, remedy=_REMEDY)
-    experiments = _tried(planned, _lines(planned), partial(experiment_from, faults=faults))
+            yield MutatorError(got, where=defined, line=number, remedy=REMEDY)
+    experiments = _tried(planned, partial(experiment_of, faults=faults))
     yield from (one for one in experiments if isinstance(one, MutatorError))
 
 
@@ -249,95 +228,10 @@ def _line(experiment: Experiment) -> dict[str, Any]:
     }
 
 
-def check_id(name: object) -> str:
-    """Return the id of an experiment, which is used in names of files; ValueError for anything else."""
-    if isinstance(name, str) and _AN_ID.fullmatch(name):
-        return name
-    raise ValueError(f"not an id: {name!a}")
-
-
-def experiment_from(data: Mapping[str, Any], faults: Mapping[str, Fault]) -> Experiment:
-    """Read the experiment on a line; MutatorError if its id does not match, or for an unknown field."""
-    if data["fault"] not in faults:
-        raise MutatorError(
-            f"fault {data['fault']} is missing from {FAULTS}, or was changed there", remedy=_REMEDY
-        )
-    check_library_name(str(data["scenario"]), FAULTS)
-    trigger = data["trigger"]
-    values = {name: value for name, value in data.items() if name != "id"}
-    read = {
-        "fault": faults[data["fault"]],
-        "method": Method(data["method"]),
-        "trigger": _make(Trigger, trigger, hold=Hold(trigger["hold"])),
-        "setting": tuple(data["setting"]),
-    }
-    if "after_hazard" in data:
-        read["after_hazard"] = AfterHazard(data["after_hazard"])
-    experiment = _make(Experiment, values, **read)
-    if _is_named(data):
-        vars(experiment)["id"] = data["id"]  # the value that the cached property would compute
-    elif experiment.id != data["id"]:
-        raise MutatorError(
-            f"experiment {data['id']} has the content of {experiment.id}",
-            expected="the content from which the id was made",
-            remedy=_REMEDY,
-        )
-    return experiment
-
-
-def _is_named(data: Mapping[str, Any]) -> bool:
-    """Return whether the id on a line of the plan matches the line's content, computed from the plain data.
-
-    This takes half the time of `Experiment.id`, which handles missing and new fields.
-    """
-    if data.keys() != _FIELDS or data["trigger"].keys() != _known(Trigger):
-        return False
-    return bool(content_id([data[name] for name in _HASHED]) == data["id"])
-
-
 def canary_from(head: Path, data: Mapping[str, Any]) -> Experiment:
     """Read the canary in the run.json at `head`; MutatorError if it is damaged."""
     try:
         fault = fault_from(data["fault"])
         return experiment_from({**data, "fault": fault.id}, {fault.id: fault})
     except (MutatorError, ValueError, LookupError, TypeError, AttributeError) as err:
-        raise MutatorError(f"damaged at 'canary' ({err})", where=head, remedy=_REMEDY) from None
-
-
-def fault_from(data: Mapping[str, Any]) -> Fault:
-    """Read the fault on a line of the plan; MutatorError for an unknown field."""
-    return _make(
-        Fault,
-        data,
-        injections=tuple(_injection_from(item) for item in data["injections"]),
-        hold=Hold(data["hold"]) if data["hold"] else None,
-        changes=tuple(data["changes"]),
-    )
-
-
-def _injection_from(data: Mapping[str, Any]) -> Injection:
-    location, anchor = data["location"], data["location"]["anchor"]
-    return _make(
-        Injection,
-        data,
-        location=_make(
-            FaultLocation, location, anchor=_make(Anchor, anchor, kind=AnchorKind(anchor["kind"]))
-        ),
-        params=tuple((name, value) for name, value in data["params"]),
-    )
-
-
-def _make(kind: type[_T], data: Mapping[str, Any], /, **read: Any) -> _T:
-    """Create an object from its plain data and the converted values `read`. Missing fields get defaults."""
-    if unknown := sorted(data.keys() - _known(kind)):  # type: ignore[arg-type]
-        raise MutatorError(
-            f"{kind.__name__.lower()} has '{unknown[0]}', which this version of mutator does not know",
-            expected="a plan that this version or an older one wrote",
-            remedy="update mutator, or plan into a new folder",
-        )
-    return kind(**{**data, **read})
-
-
-@lru_cache(maxsize=16)
-def _known(kind: type[Any]) -> frozenset[str]:
-    return frozenset(field.name for field in fields(kind))
+        raise MutatorError(f"damaged at 'canary' ({err})", where=head, remedy=REMEDY) from None

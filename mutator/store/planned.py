@@ -1,16 +1,14 @@
 """The experiments of a plan by id, parsed on access."""
 
-import json
-import re
 from array import array
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+from mutator.errors import MutatorError
 from mutator.model import Experiment
 from mutator.store import plan_file
 from mutator.store.indexed_lines import Files
-
-_ID = re.compile(rb'"id":"([^"\\]+)"')
+from mutator.store.plan_lines import id_of
 
 
 class Planned(Mapping[str, Experiment]):
@@ -25,9 +23,14 @@ class Planned(Mapping[str, Experiment]):
         self._files = Files([self._path])
         self._index: dict[str, int] = {}
         self._offsets = array("Q", [0])
+        offset = 0
         for number, line in enumerate(plan_file.lines_of(self._path)):
-            self._offsets.append(self._offsets[-1] + len(line))
-            self._index.setdefault(_id(line) or str(number), number)
+            self._offsets.append(offset := offset + len(line))
+            try:
+                name = id_of(line)
+            except MutatorError:
+                name = str(number)  # the line is reported when it is read
+            self._index.setdefault(name, number)
 
     def __getitem__(self, name: str) -> Experiment:
         number = self._index[name]
@@ -43,13 +46,3 @@ class Planned(Mapping[str, Experiment]):
 
     def __len__(self) -> int:
         return len(self._index)
-
-
-def _id(line: bytes) -> str | None:
-    """Return the id on a line; None for a damaged line, which is reported when it is read."""
-    if found := _ID.search(line):
-        return found[1].decode()
-    try:
-        return str(json.loads(line)["id"])
-    except (KeyError, TypeError, ValueError, RecursionError):
-        return None

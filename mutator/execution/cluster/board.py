@@ -12,10 +12,11 @@ from dataclasses import dataclass, field, replace
 from itertools import islice
 
 from mutator.campaigns.chunks import Pending
-from mutator.execution.cluster.groups import Group, Run, faults_of, golden_of, groups_of, id_of
+from mutator.execution.cluster.groups import Group, Run, faults_of, golden_of, groups_of
 from mutator.execution.cluster.pieces import Kind, Piece
 from mutator.preflight.equivalence import Sample
 from mutator.store import plan_file
+from mutator.store.plan_lines import id_of
 from mutator.store.run_folder import RunFolder
 
 LEAST_S, MOST_S = 0.5, 8.0  # shortest and longest intended duration of a piece

@@ -1,6 +1,5 @@
 """The pending work of a run folder, grouped by golden run. Plan lines are read on demand."""
 
-import json
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -10,6 +9,7 @@ from typing import Any
 from mutator.campaigns.chunks import Pending
 from mutator.execution.cluster.pieces import Piece
 from mutator.store import plan_file
+from mutator.store.plan_lines import content, experiment_of, fault_of, id_of
 from mutator.store.run_folder import RunFolder
 
 _OF_A_RUN = ("fault", "trigger", "seed")  # equal for experiments that share a run
@@ -47,26 +47,19 @@ def groups_of(folder: RunFolder, pending: Sequence[Pending], faults: Faults) -> 
 def _runs_of(folder: RunFolder, pending: Sequence[Pending]) -> Iterator[Run]:
     for one in pending:
         lines = list(plan_file.chunk_lines(folder.path, folder.head["chunks"][one.chunk]))
-        read = [(_read(lines[place]), lines[place]) for place in one.places]
-        for _, same in groupby(read, key=lambda item: [item[0][key] for key in _OF_A_RUN]):
-            yield {data["id"]: line for data, line in same}
+        for _, same in groupby((lines[place] for place in one.places), key=_what_runs):
+            yield {id_of(line): line for line in same}
+
+
+def _what_runs(line: bytes) -> list[Any]:
+    data = content(line)
+    return [data[name] for name in _OF_A_RUN]
 
 
 def golden_of(folder: RunFolder, line: bytes, faults: Faults) -> str:
-    data = _read(line)
-    fault = plan_file.fault_from(json.loads(faults[data["fault"]]))
-    experiment = plan_file.experiment_from(data, {fault.id: fault})
-    return folder.golden_of(experiment).key
+    fault = fault_of(faults[content(line)["fault"]])
+    return folder.golden_of(experiment_of(line, {fault.id: fault})).key
 
 
 def faults_of(lines: Run, faults: Faults) -> tuple[bytes, ...]:
-    return tuple(dict.fromkeys(faults[_read(line)["fault"]] for line in lines.values()))
-
-
-def id_of(line: bytes) -> str:
-    return str(_read(line)["id"])
-
-
-def _read(line: bytes) -> dict[str, Any]:
-    data: dict[str, Any] = json.loads(line)
-    return data
+    return tuple(dict.fromkeys(faults[content(line)["fault"]] for line in lines.values()))

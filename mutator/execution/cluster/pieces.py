@@ -8,7 +8,7 @@ from typing import Any
 
 from mutator.execution.cluster.parcel import pack, unpack
 from mutator.model import Experiment
-from mutator.store import plan_file
+from mutator.store.plan_lines import experiment_of, fault_of
 
 
 class Kind(StrEnum):
@@ -68,8 +68,8 @@ class Piece:
 
     def experiments(self) -> tuple[Experiment, ...]:
         """Parse the piece's experiments; MutatorError if a line does not match its id."""
-        faults = {fault.id: fault for fault in (plan_file.fault_from(json.loads(f)) for f in self.faults)}
-        return tuple(plan_file.experiment_from(json.loads(line), faults) for line in self.lines.values())
+        faults = {fault.id: fault for fault in map(fault_of, self.faults)}
+        return tuple(experiment_of(line, faults) for line in self.lines.values())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

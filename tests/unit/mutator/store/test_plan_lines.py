@@ -1,0 +1,165 @@
+"""Lines of a plan: as this version writes them, as others do, and forged or damaged ones."""
+
+import json
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from hashlib import sha256
+
+import pytest
+
+from mutator._common.hashing import canonical, plain
+from mutator.errors import MutatorError
+from mutator.model import AfterHazard, Experiment, Hold
+from mutator.store.plan_file import to_plain
+from mutator.store.plan_lines import (
+    content,
+    experiment_as_written,
+    experiment_from,
+    experiment_of,
+    fault_from,
+    fault_of,
+    id_of,
+)
+
+Make = Callable[..., Experiment]
+
+
+def line_of(experiment: Experiment) -> bytes:
+    return canonical(to_plain(experiment)).encode() + b"\n"
+
+
+def with_id_of_its_text(line: bytes) -> bytes:
+    """Return the line with the digest of its values as they are written."""
+    values = dict(
+        re.findall(rb'"(fault|scenario|scenario_digest|method|seed|setting)":("[^"]*"|\\[.*?\\]|[^,]+)', line)
+    )
+    values[b"trigger"] = line[line.index(b'"trigger":') + 10 : -2]
+    names = (b"fault", b"scenario", b"scenario_digest", b"method", b"trigger", b"seed", b"setting")
+    digest = sha256(b"[%b]" % b",".join(values[name] for name in names)).hexdigest()[:16]
+    return line.replace(id_of(line).encode(), digest.encode())
+
+
+def test_a_line_in_the_usual_format_is_read_fast(experiment: Make) -> None:
+    """Any other line takes the slow path."""
+    for planned in (
+        experiment(),
+        experiment(2.5, changes=("no_lead",)),
+        replace(experiment(), setting=("a", "b")),
+    ):
+        faults = {planned.fault.id: planned.fault}
+        line = canonical(to_plain(planned)).encode() + b"\n"
+        found = experiment_as_written(line, faults)
+        assert found == experiment_from(json.loads(line), faults) == planned
+        assert found.id == planned.id and "id" in vars(found)
+        for old, new in (
+            (b'"seed":', b'"seed":1'),
+            (b'"method":', b'"method": '),
+            (b"hwt <=", b"hwt <"),
+            (b'"name":', b'"Name":'),
+        ):
+            assert old in line and experiment_as_written(line.replace(old, new), faults) is None
+        assert experiment_as_written(line, {}) is None
+    stopping = canonical(to_plain(replace(planned, after_hazard=AfterHazard.STOP))).encode()
+    assert experiment_as_written(stopping, faults) is None
+
+
+def test_a_missing_field_of_an_older_plan_has_its_default(experiment: Make) -> None:
+    planned = experiment()
+    planned = replace(planned, trigger=replace(planned.trigger, armed_after_s=0.0))
+    line = to_plain(planned)
+    del line["trigger"]["armed_after_s"], line["trigger"]["hold_s"]
+    read = experiment_from(line, {planned.fault.id: planned.fault})
+    assert (read.trigger.armed_after_s, read.trigger.hold_s, read.trigger.hold) == (0.0, None, Hold.WHILE)
+
+
+@pytest.mark.parametrize("where", ["experiment", "trigger", "fault", "injection", "anchor"])
+def test_an_unknown_field_of_a_newer_plan_is_refused(experiment: Make, where: str) -> None:
+    """An unknown field could change the experiment."""
+    planned = experiment()
+    fault, line = plain(planned.fault), to_plain(planned)
+    injection = fault["injections"][0]
+    places = {"experiment": line, "trigger": line["trigger"], "fault": fault, "injection": injection}
+    places["anchor"] = injection["location"]["anchor"]
+    places[where]["repeat"] = 2
+    with pytest.raises(MutatorError, match=f"{where} has 'repeat', .* does not know"):
+        known = fault_from(fault)
+        experiment_from(line, {line["fault"]: known})
+
+
+SPELLINGS = [  # a number as canonical JSON, and as other JSON of the same value
+    ("1e-05", "1e-5"),
+    ("1e-05", "0.00001"),
+    ("1.0", "1.00"),
+    ("1e+22", "1e22"),
+    ("36893488147419103232", "36893488147419103232.0"),
+    ("Infinity", "1e999"),
+    ("-Infinity", "-1e999"),
+]
+
+
+@pytest.mark.parametrize(("written", "other"), SPELLINGS)
+def test_an_id_is_the_digest_of_canonical_numbers(experiment: Make, written: str, other: str) -> None:
+    """Otherwise an experiment could have several ids, and be counted several times."""
+    planned = experiment()
+    planned = replace(planned, trigger=replace(planned.trigger, hold_s=json.loads(written)))
+    faults, line = {planned.fault.id: planned.fault}, line_of(planned)
+    found = experiment_as_written(line, faults)
+    assert found == planned and found.id == planned.id == id_of(line)
+    spelled = line.replace(f'"hold_s":{written},'.encode(), f'"hold_s":{other},'.encode())
+    forged = with_id_of_its_text(spelled)
+    assert with_id_of_its_text(line) == line != spelled and id_of(forged) != planned.id
+    with pytest.raises(MutatorError, match=r"has the content of"):
+        experiment_of(forged, faults)
+    if type(json.loads(other)) is type(json.loads(written)):
+        assert experiment_of(spelled, faults).id == planned.id
+
+
+@pytest.mark.parametrize("seed", [0, -1, 2**70, 10**400])
+def test_a_seed_can_have_any_size(experiment: Make, seed: int) -> None:
+    planned = replace(experiment(), seed=seed)
+    found = experiment_as_written(line_of(planned), {planned.fault.id: planned.fault})
+    assert found is not None and (found.seed, found.id) == (seed, planned.id)
+
+
+def test_minus_zero_is_no_seed(experiment: Make) -> None:
+    planned = replace(experiment(), seed=0)
+    forged = with_id_of_its_text(line_of(planned).replace(b'"seed":0', b'"seed":-0'))
+    with pytest.raises(MutatorError, match="has the content of"):
+        experiment_of(forged, {planned.fault.id: planned.fault})
+
+
+@pytest.mark.parametrize("surrogate", [b"\\ud800", b"\xed\xa0\x80", b"\xff"])
+@pytest.mark.parametrize("text", [b"S1", b"hwt"])
+def test_text_without_a_utf_8_form_has_no_id(experiment: Make, surrogate: bytes, text: bytes) -> None:
+    planned = experiment()
+    line = with_id_of_its_text(line_of(planned).replace(text, surrogate))
+    with pytest.raises(MutatorError, match="a damaged line"):
+        experiment_of(line, {planned.fault.id: planned.fault})
+
+
+def test_an_experiment_has_the_id_that_its_line_states(experiment: Make) -> None:
+    """A second id, or one inside the trigger, does not replace it."""
+    planned = experiment()
+    faults, line = {planned.fault.id: planned.fault}, line_of(planned)
+    other = b'"id":"%b"' % (b"0" * 16)
+    for forged in (
+        line.replace(b"}\n", b",%b}\n" % other),
+        line.replace(b'{"fault"', b'{%b,"fault"' % other),
+    ):
+        stated = id_of(forged)
+        try:
+            assert experiment_of(forged, faults).id == stated
+        except MutatorError as err:
+            assert stated in err.got
+    reordered = json.dumps(dict(reversed(to_plain(planned).items()))).encode()
+    assert id_of(reordered) == experiment_of(reordered, faults).id == planned.id
+
+
+@pytest.mark.parametrize(
+    "line", [b"", b"{}", b"[]", b"3", b'"id"', b"\xff", b'{"id":3}', b'{"id":"../x"}', b"[" * 10_000]
+)
+def test_a_damaged_line_is_refused_by_every_reader(line: bytes) -> None:
+    for read in (id_of, content, fault_of, lambda line: experiment_of(line, {})):
+        with pytest.raises(MutatorError, match="a damaged line; the plan is damaged: restore"):
+            read(line)
