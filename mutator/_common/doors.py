@@ -1,7 +1,7 @@
 """Doors: where a module, or another package by an entry point, adds to the harness.
 
-A door has a folder of modules, each with one object, and a group of entry points with objects of the same
-kind. Whatever is not asked for by name is not imported.
+A door has a group of entry points and, unless packages alone add to it, a folder of modules. Each module and
+each entry point has an object of the same kind. Whatever is not asked for by name is not imported.
 """
 
 from dataclasses import dataclass
@@ -21,22 +21,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Door:
-    """One kind of addition. `thing` is its name, `kind` (`module:class`) is what every object must be.
+    """One kind of addition. `thing` is its name, `kind` (`module:class`) is what every object must be, and
+    `group` the group of entry points.
 
     The modules of the package `folder` hold the shipped ones, each as an attribute named like `thing`, in
     capitals. A module's name is the name of the object, with `_` for `-`, and after a keyword of Python.
     """
 
     thing: str
-    folder: str
+    group: str
     kind: str
-    argument: str  # the API's argument that names one
+    folder: str | None = None
+    argument: str | None = None  # the API's argument that names one; None if only files do
     first: tuple[str, ...] = ()  # these come before all others, in this order
-
-    @property
-    def group(self) -> str:
-        """The group of entry points."""
-        return f"mutator.{self.thing}s"
 
     @property
     def attribute(self) -> str:
@@ -45,7 +42,7 @@ class Door:
 
     def shipped(self) -> tuple[str, ...]:
         """Return the names of the shipped objects."""
-        return tuple(sorted(_shipped(self.folder), key=self.place))
+        return tuple(sorted(_shipped(self.folder), key=self.place)) if self.folder else ()
 
     def installed(self) -> tuple[str, ...]:
         """Return the names that other packages add."""
@@ -74,7 +71,7 @@ class Door:
             raise self._refused(
                 name, f"{self.thing} '{name}' comes from {' and '.join(owners)}", "uninstall all but one"
             )
-        if is_shipped:
+        if self.folder and is_shipped:
             return _load_shipped(self.folder, self.attribute, name)
         if not points:
             remedy = "correct the name, or install the package that adds it"
@@ -100,7 +97,8 @@ class Door:
 
     def _refused(self, name: str, got: str, remedy: str) -> MutatorError:
         others = ", ".join(other for other in self.names() if other != name)
-        return MutatorError(got, argument=self.argument, expected=f"one of {others}", remedy=remedy)
+        expected = f"one of {others}" if others else f"no {self.thing}, because none is installed"
+        return MutatorError(got, argument=self.argument, expected=expected, remedy=remedy)
 
 
 @cache
@@ -126,25 +124,34 @@ def _package(point: "EntryPoint") -> str:
 
 
 EXPORTS = Door(
-    thing="export", folder="mutator.exports.formats", kind="mutator.exports:Export", argument="format"
-)
-DISTRIBUTORS = Door(
-    thing="distributor",
-    folder="mutator.execution.distributors",
-    kind="mutator.execution.distribution:DistributorKind",
-    argument="cluster",
+    thing="export",
+    group="mutator.exports",
+    kind="mutator.exports:Export",
+    folder="mutator.exports.formats",
+    argument="format",
 )
 IMPORTERS = Door(
     thing="importer",
-    folder="mutator.outcomes.importers",
+    group="mutator.importers",
     kind="mutator.outcomes.trace_files:Importer",
+    folder="mutator.outcomes.importers",
     argument="trace",
+)
+DISTRIBUTORS = Door(
+    thing="distributor",
+    group="mutator.distributors",
+    kind="mutator.execution.distribution:DistributorKind",
+    folder="mutator.execution.distributors",
+    argument="cluster",
 )
 OPERATORS = Door(
     thing="operator",
-    folder="mutator.operators.shipped",
+    group="mutator.operators",
     kind="mutator.operators:Operator",
+    folder="mutator.operators.shipped",
     argument="operators",
     # if two make the same change, it belongs to the first, so another order changes samples
     first=("arithmetic", "comparison", "constant", "branch", "omission", "return", "argument"),
 )
+STUDIES = Door(thing="study", group="mutator.studies", kind="mutator.report.studies:Study")
+DOORS = (EXPORTS, IMPORTERS, DISTRIBUTORS, OPERATORS, STUDIES)

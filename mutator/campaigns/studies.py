@@ -5,48 +5,24 @@ A package registers its study as an entry point of the group `mutator.studies`; 
 """
 
 from collections.abc import Iterable
-from importlib.metadata import entry_points
-from typing import Any, Protocol, cast
+from typing import Protocol, cast
 
+from mutator._common.doors import STUDIES
 from mutator.errors import MutatorError
 from mutator.workspace import Workspace
 
-GROUP = "mutator.studies"
-FUNCTIONS = ("check", "published", "drawings")
-PARTS = ("about", "panels", *FUNCTIONS)
-"""Required attributes of an entry point's object: the fields of `mutator.report.studies.Study`, which this
-layer is not allowed to import.
-"""
-
 
 class Study(Protocol):
-    """The interface of a study."""
+    """The part of a study that concerns campaigns."""
 
     def check(self, workspace: Workspace) -> Iterable[MutatorError]:
         """Return the problems of the study's data in a fault library."""
         ...
 
 
-def study_names() -> tuple[str, ...]:
-    return tuple(sorted(entry_points(group=GROUP).names))
-
-
 def find_study(name: str) -> Study:
-    """Load the study of that name; MutatorError if it is not installed, cannot be loaded or is invalid."""
-    found = entry_points(group=GROUP, name=name)
-    if not found:
-        remedy = "correct the name, or install the package that provides the study"
-        raise _refused(name, f"study '{name}' is not installed", remedy)
-    [point, *_] = found
-    remedy = "correct or reinstall the package that provides it"
-    try:
-        loaded = point.load()
-    except Exception as err:  # importing it runs third-party code
-        why = f"{type(err).__name__}: {err}"
-        raise _refused(name, f"study '{name}' cannot be loaded: {point.value}: {why}", remedy) from err
-    if wrong := _wrong(loaded):
-        raise _refused(name, f"study '{name}' is not a study: {point.value} {wrong}", remedy)
-    return cast(Study, loaded)
+    """Load the study of that name; MutatorError if it is not installed, cannot be loaded or is no study."""
+    return cast(Study, STUDIES.find(name))
 
 
 def study_problems(name: str, study: Study, workspace: Workspace) -> list[MutatorError]:
@@ -62,24 +38,5 @@ def study_problems(name: str, study: Study, workspace: Workspace) -> list[Mutato
     return problems
 
 
-def _refused(name: str, got: str, remedy: str) -> MutatorError:
-    others = [other for other in study_names() if other != name]
-    expected = f"one of {', '.join(others)}" if others else "no `study`, because none is installed"
-    return MutatorError(got, expected=expected, remedy=remedy)
-
-
 def _bad_check(name: str, what: str) -> MutatorError:
     return MutatorError(f"the check of study '{name}' {what}", remedy="correct the package that provides it")
-
-
-def _wrong(loaded: Any) -> str:
-    """Return why an object cannot be used as a study; empty if it can be."""
-    if missing := [part for part in PARTS if not hasattr(loaded, part)]:
-        return f"is a {type(loaded).__name__} without {', '.join(missing)}"
-    if isinstance(loaded, type):
-        return "is a class, not an instance"
-    if idle := [name for name in FUNCTIONS if not callable(getattr(loaded, name))]:
-        return f"has no function {', '.join(idle)}"
-    if not (isinstance(loaded.panels, tuple | list) and all(map(callable, loaded.panels))):
-        return "has panels that are not functions"
-    return ""

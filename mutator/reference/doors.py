@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pkgutil import resolve_name
 
-from mutator._common.doors import DISTRIBUTORS, EXPORTS, IMPORTERS, OPERATORS, Door
+from mutator._common.doors import DISTRIBUTORS, DOORS, EXPORTS, IMPORTERS, OPERATORS, STUDIES, Door
 from mutator._common.tables import Table
 from mutator.reference.tables import generated
 from mutator.workspace import Workspace
@@ -18,9 +18,10 @@ _PACKAGES = """\
 Another package adds these by an entry point. It is loaded only when somebody uses its name. If it cannot be
 loaded, is no object of the stated class, or has the name of another, the error names the package. Its code
 runs with your rights, so install only packages that you trust. Inside the project, the object is an attribute
-of a new module in the folder; the module's name is the object's name, with `_` for `-`.
+of a new module in the folder; the module's name is the object's name, with `_` for `-`, and after a keyword
+of Python.
 
-The package in `tests/fixtures/doors/` has an example of each.
+The package in `tests/fixtures/doors/` has an example of each but the study.
 """
 _EXAMPLES = {
     EXPORTS.thing: ("a format of `mutator export`", "counts", "door_examples.counts:EXPORT"),
@@ -34,6 +35,11 @@ _EXAMPLES = {
         "mutants without a spec ([mutation operators](operators.md))",
         "zero",
         "door_examples.zero:OPERATOR",
+    ),
+    STUDIES.thing: (
+        "published results with which runs are compared ([add a study](../how-to/add-a-study.md))",
+        "crash_tests",
+        "crash_tests.study:STUDY",
     ),
 }
 
@@ -72,13 +78,6 @@ _PLACES = (
         example="[Add a target](../how-to/add-a-target.md)",
     ),
     _Place(
-        name="study",
-        adds="published results with which runs are compared",
-        protocol="`mutator.report.studies.Study`",
-        register="an entry point in the group `mutator.studies`",
-        example="[Add a study](../how-to/add-a-study.md)",
-    ),
-    _Place(
         name="trigger kind",
         adds="when a fault is active",
         protocol="a function that makes a `Trigger` from a condition and a hold",
@@ -107,7 +106,7 @@ def doors_page(workspace: Workspace) -> str:
     rows = [(f"**{p.name}**", p.adds, p.protocol, p.register, p.example) for p in _PLACES]
     inside = Table(heads=heads, rows=rows).as_markdown(escape=False)
     parts = [generated("Doors"), _INTRO, "## Entry points of other packages\n", _PACKAGES]
-    for door in (EXPORTS, IMPORTERS, DISTRIBUTORS, OPERATORS):
+    for door in DOORS:
         parts += _section(door)
     return "\n".join([*parts, "## Data and tables\n", inside]).rstrip() + "\n"
 
@@ -115,12 +114,13 @@ def doors_page(workspace: Workspace) -> str:
 def _section(door: Door) -> Iterator[str]:
     adds, name, value = _EXAMPLES[door.thing]
     kind = resolve_name(door.kind)
-    folder = door.folder.replace(".", "/")
     yield f"### {door.thing.capitalize()}\n"
     yield f"It adds {adds}. The object is a `{door.kind.replace(':', '.')}`."
-    yield f"Inside the project, it is the attribute `{door.attribute}` of a module in `{folder}/`.\n"
-    yield f"{inspect.cleandoc(kind.__doc__)}\n"
+    if door.folder:
+        folder = door.folder.replace(".", "/")
+        yield f"Inside the project, it is the attribute `{door.attribute}` of a module in `{folder}/`."
+    yield f"\n{inspect.cleandoc(kind.__doc__)}\n"
     yield f'```toml\n[project.entry-points."{door.group}"]\n{name} = "{value}"\n```\n'
     shipped = [(f"`{one}`", door.find(one).about) for one in door.shipped()]
-    yield Table(heads=(door.thing, "what it is"), rows=shipped).as_markdown(escape=False)
-    yield ""
+    if shipped:
+        yield Table(heads=(door.thing, "what it is"), rows=shipped).as_markdown(escape=False) + "\n"

@@ -113,7 +113,7 @@ class Study:
     cites it. `check` finds problems in its data in a fault library. `published` returns the counts to show
     next to those of a run, or None if they do not apply. Each function in `panels` can return a panel of
     the study's page, with files next to it. If none returns a panel, there is no page. `drawings`
-    returns the figures of that page.
+    returns the figures of that page. TypeError if a part is no function.
     """
 
     about: str
@@ -121,6 +121,12 @@ class Study:
     published: Callable[[ReportedRun], Published | None]
     panels: tuple[Callable[[ReportedRun], Panel | None], ...]
     drawings: Callable[[ReportedRun], tuple[Drawing, ...]]
+
+    def __post_init__(self) -> None:
+        parts = {"check": self.check, "published": self.published, "drawings": self.drawings}
+        parts |= {f"panels[{i}]": panel for i, panel in enumerate(self.panels)}
+        if idle := [name for name, part in parts.items() if not callable(part)]:
+            raise TypeError(f"of a study, {', '.join(idle)} must be a function")
 
 
 def _study(folder: RunFolder) -> Study | None:

@@ -7,9 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common.doors import EXPORTS
+from mutator._common import doors
+from mutator._common.doors import DOORS, EXPORTS, Door
 from mutator.errors import MutatorError
 
+CLONE = Path(__file__).parents[4]
 BROKEN = {
     "shape": ("THING = 3", "is of type int; expected a mutator.exports.Export"),
     "import": ("import no_such_module", "cannot be loaded: ModuleNotFoundError"),
@@ -46,6 +48,21 @@ def test_a_name_that_two_packages_use_is_refused(tmp_path: Path, install: Callab
 def test_an_unknown_name_lists_those_that_exist(door_examples: Path) -> None:
     with pytest.raises(MutatorError, match=r"no export 'cvs'.*csv.*counts"):
         EXPORTS.find("cvs")
+
+
+def test_the_page_lists_every_door() -> None:
+    assert {door for door in vars(doors).values() if isinstance(door, Door)} == set(DOORS)
+    page = (CLONE / "docs" / "reference" / "doors.md").read_text()
+    for door in DOORS:
+        assert f'[project.entry-points."{door.group}"]' in page
+        assert all(f"| `{name}` |" in page for name in door.shipped())
+
+
+def test_no_other_module_looks_for_entry_points() -> None:
+    folder = CLONE / "mutator"
+    looking = [path for path in folder.rglob("*.py") if "entry_points(" in path.read_text()]
+    # pytest loads the plugin; `local` asks only whether it will
+    assert {str(path.relative_to(folder)) for path in looking} == {"_common/doors.py", "execution/local.py"}
 
 
 def test_the_command_line_starts_without_any_addition() -> None:

@@ -166,7 +166,7 @@ def test_an_unknown_study_is_refused_with_its_line(toycar: Workspace, tmp_path: 
     path.write_text(TEXT)
     assert make_plan(toycar, path).campaign.study is None
     path.write_text(TEXT.replace("target: toycar", "target: toycar\nstudy: moon_landing"))
-    said = "mine.yaml:5: study 'moon_landing' is not installed; expected one of driving_agent_resilience"
+    said = "mine.yaml:5: no study 'moon_landing'; expected one of driving_agent_resilience"
     with pytest.raises(MutatorError, match=said):
         make_plan(toycar, path)
     with pytest.raises(MutatorError, match=said):
