@@ -17,7 +17,8 @@ from mutator._common.tables import Table
 from mutator._common.text import counted, one_of, suggestion
 from mutator.errors import MutatorError
 from mutator.faults.expansion import expand
-from mutator.faults.fault_models import FaultModels, load_fault_models
+from mutator.faults.fault_model_files import load_fault_models
+from mutator.faults.fault_models import FaultModels
 from mutator.faults.readings import Readings, load_readings
 from mutator.faults.specs import FaultSpec, load_spec
 from mutator.model import Fault
@@ -26,7 +27,8 @@ from mutator.stpa.analysis import Analysis, StructureModel, load_analysis, load_
 from mutator.stpa.context_tables import ContextTable, HazardList, load_context_table, load_hazards
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.manifest_files import load_manifest
-from mutator.targets.severity import Scale, load_scale
+from mutator.targets.severity import Scale
+from mutator.targets.severity_model import load_scale
 
 _SANDBOX = "mutator.engines.sandbox"
 

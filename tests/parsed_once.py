@@ -11,9 +11,9 @@ import pytest
 
 from mutator.checks import library_check
 from mutator.config import yaml_files
-from mutator.config.yaml_files import Source
+from mutator.config.sources import Source
 from mutator.errors import MutatorError
-from mutator.faults import fault_models
+from mutator.faults import fault_model_files
 from mutator.faults.fault_models import Example, FaultModel, FaultModels
 from mutator.mutants import anchors
 from mutator.mutants.anchors import ParsedFile
@@ -28,7 +28,7 @@ def parsed_once() -> Iterator[None]:
 
     Each caller gets its own copy. A text with a mistake is parsed anew, so that the error names its file.
     """
-    parse_yaml, parse_python, load_model = yaml_files.parse, anchors.parse_file, fault_models._load
+    parse_yaml, parse_python, load_model = yaml_files.parse, anchors.parse_file, fault_model_files._load
     models: dict[tuple[str, bytes, bytes], FaultModel] = {}
     run_example, examples = library_check.run_example, dict[str, str]()
 
@@ -71,6 +71,6 @@ def parsed_once() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(yaml_files, "parse", yaml)
         patch.setattr(anchors, "parse_file", python)
-        patch.setattr(fault_models, "_load", model)
+        patch.setattr(fault_model_files, "_load", model)
         patch.setattr(library_check, "run_example", example_of)
         yield

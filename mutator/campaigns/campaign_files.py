@@ -15,7 +15,8 @@ from mutator.campaigns.trigger_choice import (
     ListedTrigger,
     with_list,
 )
-from mutator.config.yaml_files import Keys, Source, read
+from mutator.config.sources import Keys, Source
+from mutator.config.yaml_files import read
 from mutator.errors import MutatorError
 from mutator.faults.readings import FILE, Readings
 from mutator.model import AfterHazard, Limits, Method

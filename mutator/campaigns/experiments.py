@@ -17,7 +17,7 @@ from mutator.campaigns.operator_faults import OperatorFault, OperatorFaults
 from mutator.campaigns.operator_selection import When
 from mutator.campaigns.sampling import spread
 from mutator.campaigns.trigger_choice import listed_triggers
-from mutator.config.yaml_files import Keys
+from mutator.config.sources import Keys
 from mutator.errors import MutatorError
 from mutator.faults.expansion import expand
 from mutator.faults.specs import FaultSpec

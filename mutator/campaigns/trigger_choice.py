@@ -6,7 +6,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
-from mutator.config.yaml_files import Keys, Source, StrictModel
+from mutator.config.sources import Keys, Source
+from mutator.config.yaml_files import StrictModel
 from mutator.model import Hold, Trigger
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.conditions import check_condition

@@ -8,7 +8,7 @@ from typing import TypeVar
 from mutator.campaigns.campaign_files import Campaign, check_readings, load_campaign, load_study
 from mutator.campaigns.studies import study_problems
 from mutator.campaigns.trigger_choice import listed_triggers
-from mutator.config.yaml_files import Keys
+from mutator.config.sources import Keys
 from mutator.errors import MutatorError
 from mutator.faults.expansion import expand
 from mutator.faults.fault_models import Example, FaultModel, FaultModels

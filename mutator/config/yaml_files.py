@@ -5,9 +5,7 @@ expand to gigabytes), and without multiple documents or duplicate keys.
 """
 
 import re
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -18,9 +16,9 @@ from mutator._common.bounded import read_bounded
 from mutator._common.files import check_schema
 from mutator._common.text import counted, shown
 from mutator.config import problems
+from mutator.config.sources import Keys, Source
 from mutator.errors import MutatorError
 
-Keys = tuple[str | int, ...]
 M = TypeVar("M", bound="StrictModel")
 
 MAX_BYTES = 1_000_000
@@ -43,36 +41,6 @@ class StrictModel(BaseModel):
     """Base of all file models: rejects unknown keys and does not convert types."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Source:
-    """A parsed file. `lines` maps a path of keys to its line (from 1)."""
-
-    path: Path
-    data: Any
-    lines: dict[Keys, int]
-
-    def line(self, keys: Keys) -> int | None:
-        """Return the line of the value at `keys`, or of the nearest enclosing value."""
-        for end in range(len(keys), -1, -1):
-            if keys[:end] in self.lines:
-                return self.lines[keys[:end]]
-        return None
-
-    def error(
-        self, keys: Keys, got: str, *, expected: str | None = None, remedy: str | None = None
-    ) -> MutatorError:
-        """Return an error that points at the value at `keys`."""
-        return MutatorError(got, where=self.path, line=self.line(keys), expected=expected, remedy=remedy)
-
-    @contextmanager
-    def placing(self, keys: Keys) -> Iterator[None]:
-        """Make every MutatorError raised in the block point at the value at `keys`."""
-        try:
-            yield
-        except MutatorError as error:
-            raise self.error(keys, error.got, expected=error.expected, remedy=error.remedy) from None
 
 
 class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]

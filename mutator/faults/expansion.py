@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from mutator._common.random_streams import generator
 from mutator._common.text import one_of
 from mutator.config import units
-from mutator.config.yaml_files import Keys
+from mutator.config.sources import Keys
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.faults.imports import check_import

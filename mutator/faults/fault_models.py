@@ -4,23 +4,15 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import lru_cache
 from pathlib import Path
 from typing import Literal
 
-from pydantic import Field
-
-from mutator._common import hashing
-from mutator._common.below import check_inside
-from mutator._common.bounded import read_bounded
 from mutator._common.text import suggestion
-from mutator.config import units
 from mutator.config.locations import PROBE_NAME
-from mutator.config.yaml_files import MAX_BYTES, Source, StrictModel, read
+from mutator.config.sources import Source
 from mutator.errors import MutatorError
-from mutator.faults.injections import InjectionModel, InjectionSpec
+from mutator.faults.injections import InjectionSpec
 
-SCHEMA = "fault_model/1"
 FILES = ("*.yaml", "*.j2")  # what a templates folder consists of
 PROBE_TEMPLATE = f"{PROBE_NAME}.py.j2"
 TARGET_UNIT = "target"
@@ -31,7 +23,6 @@ ParamType = Literal[
 ]
 NAMES = ("variable", "import")
 _PARTS = re.compile(r"\b(?:left|right|called|arguments)\b")
-_GIVEN = ("fi", "original", "left", "right", "called", "arguments", "statement", "next_statement")
 
 
 class SnippetKind(StrEnum):
@@ -68,13 +59,6 @@ class ParamSchema:
     max: float | None = None
     neutral: float | None = None
     choices: tuple[str, ...] = ()
-
-
-_TARGET = ParamSchema(
-    name="target",
-    type="variable",
-    about="the variable to change, if it is not the one that the anchor names",
-)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -148,173 +132,3 @@ class FaultModels:
                 + suggestion(name, list(self.models)),
             )
         return self.models[name]
-
-
-class _ParamModel(StrictModel, title="A parameter"):
-    """The key is the parameter's name without a unit. A spec adds the unit: `by_m` for the parameter `by`."""
-
-    type: ParamType = Field(
-        description="The type of a value. `variable`: a name in the function. `import`: a dotted name to "
-        "import. `number`, `integer`, `boolean`: a value of that type. `constant`: a number, truth value,"
-        " text or null. `choice`: one of the terms in `choices`. `unit`: the suffix of a unit. "
-        "`seed`: drawn during expansion; a spec cannot set it."
-    )
-    about: str = Field(description="What the parameter is.")
-    unit: str | None = Field(
-        None,
-        description="The unit that the template expects, or `target` for the unit of the changed variable. "
-        "Default: no unit.",
-    )
-    optional: bool = Field(
-        False, description="Whether a spec can omit the parameter. The template then gets `none`."
-    )
-    min: float | None = Field(None, description="The minimum, in the parameter's unit.")
-    max: float | None = Field(None, description="The maximum, in the parameter's unit.")
-    neutral: float | None = Field(
-        None, description="The value with which a fault changes nothing. Plans and `try` warn about it."
-    )
-    choices: list[str] = Field(
-        [], description="The terms that a `choice` allows. The template writes them verbatim."
-    )
-
-
-class _ExampleModel(StrictModel, title="An example"):
-    """Each example is shown on the page of its fault model, and `mutator check` runs it as a test."""
-
-    about: str = Field(description="What the example shows. The page prints this after *For example,*.")
-    injection: InjectionModel = Field(description="An injection, written as in a spec.")
-    before: str = Field(description="The source before the injection.")
-    after: str = Field(description="The source after the injection, tagged `example`.")
-
-
-class FaultModelModel(StrictModel, title="The file"):
-    """Name, parameters and examples of a fault model. The template is in `NAME.py.j2`, next to this file."""
-
-    name: str = Field(description="The name. It must match the file name without `.yaml`.")
-    kind: Literal["insert", "guard", "value"] = Field(
-        description="`insert`: adds lines before or after the statement. `guard`: wraps the statement. "
-        "`value`: the template is one expression that uses `original`, the value of a variable or"
-        " an expression."
-    )
-    expression: str | None = Field(
-        None,
-        description="For kind `insert` only: a second template, which applies the same change to the value "
-        "of an expression, passed as `original`.",
-    )
-    about: str = Field(description="What the model does, in one sentence.")
-    raises: bool = Field(
-        False,
-        description="Whether the model's lines raise on purpose. If so, an exception in them is a crash of "
-        "the target; otherwise it makes the mutant invalid.",
-    )
-    needs: Literal["call", "statement", "next_statement"] | None = Field(
-        None,
-        description="What the template needs in addition to its parameters. `call`: the anchored expression "
-        "is a call, passed as `called` and `arguments`. `statement`: the anchored statement on "
-        "one line. `next_statement`: also the statement after it; a guard then wraps both.",
-    )
-    params: dict[str, _ParamModel] = Field(default_factory=dict, description="Name -> parameter.")
-    examples: list[_ExampleModel] = Field(min_length=1, description="At least one.")
-
-
-def load_fault_models(folder: Path) -> FaultModels:
-    """Load the fault models of a templates folder, from memory unless a file has changed."""
-    paths = [check_inside(folder, path) for kind in FILES for path in sorted(folder.glob(kind))]
-    try:
-        contents = tuple((path, read_bounded(path, MAX_BYTES)) for path in paths)
-    except OSError:
-        return _load_all(folder)  # the error that names the file
-    return _unchanged(folder, contents)
-
-
-@lru_cache(maxsize=4)
-def _unchanged(folder: Path, contents: tuple[tuple[Path, bytes], ...]) -> FaultModels:
-    """Load a folder. `contents` of its files only distinguishes cached results."""
-    return _load_all(folder)
-
-
-def _load_all(folder: Path) -> FaultModels:
-    models = {}
-    for path in sorted(folder.glob("*.yaml")):
-        model = _load(path)
-        models[model.name] = model
-    if not models:
-        raise MutatorError("no fault model", where=folder, expected="<model>.yaml next to <model>.py.j2")
-    probe = _text(folder / PROBE_TEMPLATE)
-    texts = {
-        name: [model.template, model.expression] if model.expression else model.template
-        for name, model in models.items()
-    }
-    raising = [name for name, model in models.items() if model.raises]
-    digest = hashing.digest([texts, probe, *([raising] if raising else [])])
-    return FaultModels(folder=folder, models=models, probe=probe, digest=digest)
-
-
-def _load(path: Path) -> FaultModel:
-    model, source = read(path, FaultModelModel, SCHEMA)
-    if model.name != path.stem:
-        raise source.error(("name",), f"'{model.name}'", expected=f"'{path.stem}', the name of the file")
-    template_path, kind = path.with_suffix(".py.j2"), SnippetKind(model.kind)
-    if model.expression is not None and kind is not SnippetKind.INSERT:
-        raise source.error(
-            ("expression",),
-            f"`expression` with kind {kind.value}",
-            expected="`expression` only with kind insert",
-            remedy="delete `expression`",
-        )
-    template = _text(template_path)
-    params = tuple(_param(name, param, source) for name, param in model.params.items())
-    return FaultModel(
-        name=model.name,
-        kind=kind,
-        about=model.about,
-        raises=model.raises,
-        needs=Needs(model.needs) if model.needs else None,
-        params=(*params, _TARGET) if kind is SnippetKind.VALUE and model.needs != "call" else params,
-        examples=tuple(
-            Example(
-                about=example.about,
-                injection=example.injection.injection(source, ("examples", i, "injection")),
-                before=example.before,
-                after=example.after,
-                line=source.line(("examples", i)),
-            )
-            for i, example in enumerate(model.examples)
-        ),
-        template=template,
-        expression=template.removesuffix("\n") if kind is SnippetKind.VALUE else model.expression,
-        source=source,
-        template_path=template_path,
-    )
-
-
-def _param(name: str, model: _ParamModel, source: Source) -> ParamSchema:
-    keys = ("params", name)
-    if not name.isidentifier() or units.split(name)[1]:
-        raise source.error(keys, f"parameter '{name}'", expected="an identifier without a unit suffix")
-    if name in _GIVEN:
-        raise source.error(
-            keys,
-            f"parameter '{name}'",
-            expected=f"a name other than these, which templates already use: {', '.join(_GIVEN)}",
-            remedy="rename the parameter",
-        )
-    if model.unit not in (None, TARGET_UNIT, *units.UNITS):
-        raise source.error((*keys, "unit"), f"'{model.unit}'", expected=f"target or one of {units.KNOWN}")
-    if (model.type == "choice") != bool(model.choices):
-        state = "no `choices`" if model.type == "choice" else "`choices`"
-        raise source.error(
-            keys,
-            f"parameter '{name}' of type {model.type} has {state}",
-            expected="`choices` for a choice, and only for a choice",
-        )
-    return ParamSchema(name=name, **model.model_dump() | {"choices": tuple(model.choices)})
-
-
-def _text(path: Path) -> str:
-    try:
-        return read_bounded(path, MAX_BYTES).decode()
-    except (OSError, UnicodeDecodeError) as error:
-        raise MutatorError(
-            f"cannot be read ({error})", where=path, remedy="put the template next to its YAML file, as UTF-8"
-        ) from None

@@ -3,16 +3,10 @@
 import math
 import re
 from dataclasses import dataclass
-from typing import Any
 
-from pydantic import Field
-
-from mutator._common.text import shown
 from mutator.config import units
-from mutator.config.instances import instance_condition
-from mutator.config.locations import AtModel
-from mutator.config.yaml_files import Keys, Source, StrictModel
-from mutator.model import FIXED_ANCHORS, AnchorKind, FaultLocation
+from mutator.config.sources import Keys
+from mutator.model import FaultLocation
 
 DIMENSIONLESS = "1"
 _REFERENCE = re.compile(r"(-?)([a-z][a-z0-9_]*)\Z")
@@ -60,119 +54,6 @@ class InjectionSpec:
     where: str | None = None
     call: int | None = None
     every: int | None = None
-
-
-class InjectionModel(StrictModel, title="An injection"):
-    """One fault model applied at one place."""
-
-    at: AtModel = Field(description="The place where the fault is injected.")
-    model: str = Field(description="A [fault model](fault-models.md).")
-    unit: str | None = Field(
-        None,
-        description="The unit of the changed variable in the source: a suffix from the table of units, or "
-        "`'1'` for a plain number. Required if the model has parameters in that unit.",
-    )
-    params: dict[str, Any] = Field(
-        default_factory=dict,
-        description="Parameters of the model, with the unit in the key. A value is a number, a name, a "
-        "constant such as `true`, or the draw's name. For a number that is written in one unit "
-        "and read as another, write `{draw: ..., written_in: ..., read_as: ...}`.",
-    )
-
-    where: str | None = Field(
-        None,
-        description="A condition that selects one instance among several: `index == 2`, `self.name == "
-        "'left'`, `item is self.items[0]`. It can use names that the function knows, attributes, "
-        "items, constants, comparisons, `and`, `or` and `not`. It is evaluated only while the "
-        "fault is active.",
-    )
-    call: int | None = Field(
-        None,
-        ge=1,
-        description="The fault acts only in this execution of the place. Executions are counted from 1 at "
-        "each activation; with `where`, only those that satisfy the condition are counted.",
-    )
-    every: int | None = Field(
-        None, ge=1, description="The fault acts in every n-th execution of the place, counted as for `call`."
-    )
-
-    def injection(self, source: Source, keys: Keys) -> InjectionSpec:
-        """Check and convert the injection; errors point into `source` at `keys`."""
-        if self.unit is not None and self.unit != DIMENSIONLESS and self.unit not in units.UNITS:
-            raise source.error(
-                (*keys, "unit"),
-                f"unit '{self.unit}'",
-                expected=f"one of {units.KNOWN}, or '1' for a plain number",
-                remedy="name the unit that the variable has in the source",
-            )
-        params = []
-        for key, value in self.params.items():
-            name, unit = units.split(key)
-            place = (*keys, "params", key)
-            suffix = unit.suffix if unit else None
-            params.append(ParamSpec(name=name, unit=suffix, value=_value(value, source, place), keys=place))
-        location = self.at.location(source, (*keys, "at"))
-        self._check_instance(location.anchor.kind, source, keys)
-        return InjectionSpec(
-            location=location,
-            model=self.model,
-            params=tuple(params),
-            unit=self.unit,
-            keys=keys,
-            where=None if self.where is None else instance_condition(self.where),
-            call=self.call,
-            every=self.every,
-        )
-
-    def _check_instance(self, kind: AnchorKind, source: Source, keys: Keys) -> None:
-        given = [name for name in ("where", "call", "every") if getattr(self, name) is not None]
-        if given and kind in FIXED_ANCHORS:
-            raise source.error(
-                (*keys, given[0]),
-                f"`{given[0]}` at a {kind.value}",
-                expected="no `where`, `call` or `every`: the value is set once a step, for all instances",
-                remedy="leave it out, or anchor where the value is used",
-            )
-        if {"call", "every"} <= set(given):
-            raise source.error(
-                (*keys, "every"), "`call` and `every`", expected="one of them", remedy="leave one out"
-            )
-        try:
-            instance_condition("True" if self.where is None else self.where)
-        except ValueError:
-            raise source.error(
-                (*keys, "where"),
-                shown(self.where),
-                expected="names, attributes, items, constants, comparisons, `and`, `or` and `not`",
-                remedy="use something that the function knows, e.g. `where: index == 2`",
-            ) from None
-
-
-def _value(value: Any, source: Source, keys: Keys) -> ParamValue:
-    if value is None or isinstance(value, bool | int | float | str):
-        return value
-    key = keys[-1]
-    if not isinstance(value, dict) or set(value) != {"draw", "written_in", "read_as"}:
-        raise source.error(
-            keys,
-            f"{shown(value)} for '{key}'",
-            expected="a number, a name, or {draw: ..., written_in: ..., read_as: ...}",
-            remedy="write a plain value",
-        )
-    for name in ("written_in", "read_as"):
-        if value[name] not in units.UNITS:
-            raise source.error(
-                (*keys, name), f"{shown(value[name])} for '{name}'", expected=f"one of {units.KNOWN}"
-            )
-    match = _REFERENCE.match(str(value["draw"]))
-    if not match:
-        raise source.error((*keys, "draw"), f"{shown(value['draw'])} for 'draw'", expected="the draw's name")
-    return Drawn(
-        name=match[2],
-        sign=-1 if match[1] else 1,
-        written_in=value["written_in"],
-        read_as=value["read_as"],
-    )
 
 
 def reference(text: str) -> Drawn | None:

@@ -4,7 +4,7 @@ from mutator._common.random_streams import generator
 from mutator._common.text import one_of, shown, suggestion
 from mutator.config import units
 from mutator.config.locations import assignable, dotted_name
-from mutator.config.yaml_files import Source
+from mutator.config.sources import Source
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import NAMES, TARGET_UNIT, FaultModel, ParamSchema
 from mutator.faults.injections import DIMENSIONLESS, Drawn, InjectionSpec, ParamSpec, quantity, reference

@@ -10,8 +10,10 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, create_model, model_validator
 
 from mutator.config import units
-from mutator.config.yaml_files import Keys, Source, StrictModel, read
-from mutator.faults.injections import InjectionModel, InjectionSpec
+from mutator.config.sources import Keys, Source
+from mutator.config.yaml_files import StrictModel, read
+from mutator.faults.injection_model import InjectionModel
+from mutator.faults.injections import InjectionSpec
 from mutator.faults.readings import Readings
 from mutator.model import Hold
 

@@ -5,7 +5,8 @@ from pathlib import Path
 
 from pydantic import Field
 
-from mutator.config.yaml_files import Source, StrictModel, read
+from mutator.config.sources import Source
+from mutator.config.yaml_files import StrictModel, read
 from mutator.statistics.published import Published
 from mutator.statistics.tallies import Tally
 

@@ -5,7 +5,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from mutator.config.yaml_files import Source, load
+from mutator.config.sources import Source
+from mutator.config.yaml_files import load
 from mutator.errors import MutatorError
 from mutator.paper.published import FILES, Paper, load_paper
 from mutator.statistics.tallies import Tally, total

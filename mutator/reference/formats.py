@@ -11,7 +11,7 @@ from mutator.faults.readings import SCHEMA as READINGS_SCHEMA
 from mutator.faults.readings import UNDECLARED, ReadingsModel
 from mutator.reference.tables import generated, sections
 from mutator.stpa import analysis, context_tables
-from mutator.targets import manifest_files, severity
+from mutator.targets import manifest_files, severity_model
 from mutator.workspace import Workspace
 
 STRICT = """\
@@ -75,8 +75,8 @@ def manifests(workspace: Workspace) -> str:
         "## Scales of severity\n",
         "The files in `fault_library/severity/` map a delta-v to a class; see [Verdicts](../explanation/"
         "verdicts.md#severity).\nA manifest names one of them in `severity.scale`. The first key is `schema: "
-        f"{severity.SCHEMA}`.\n",
-        *sections("target-manifest.md", severity.ScaleModel, below=2),
+        f"{severity_model.SCHEMA}`.\n",
+        *sections("target-manifest.md", severity_model.ScaleModel, below=2),
     )
 
 

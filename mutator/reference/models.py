@@ -4,7 +4,7 @@ import difflib
 from collections.abc import Iterator
 
 from mutator._common.tables import Table
-from mutator.faults import fault_models
+from mutator.faults import fault_model_files
 from mutator.faults.fault_models import TARGET_UNIT, Example, FaultModel, ParamSchema, SnippetKind
 from mutator.reference.tables import generated, sections
 from mutator.workspace import Workspace
@@ -52,8 +52,8 @@ def fault_models_page(workspace: Workspace) -> str:
         parts += _model(model)
     parts += [
         "## The YAML of a model\n",
-        f"The first key is `schema: {fault_models.SCHEMA}`.\n",
-        *sections("fault-models.md", fault_models.FaultModelModel, below=2),
+        f"The first key is `schema: {fault_model_files.SCHEMA}`.\n",
+        *sections("fault-models.md", fault_model_files.FaultModelModel, below=2),
     ]
     return "\n".join(parts).rstrip() + "\n"
 

@@ -9,13 +9,13 @@ from mutator.campaigns import campaign_files, campaign_model
 from mutator.config import units
 from mutator.config.yaml_files import StrictModel
 from mutator.execution.cluster import cluster_files
-from mutator.faults import fault_models, readings
+from mutator.faults import fault_model_files, readings
 from mutator.faults import specs as spec
 from mutator.faults.fault_models import NAMES, TARGET_UNIT, FaultModel, FaultModels, ParamSchema
 from mutator.faults.injections import DIMENSIONLESS
 from mutator.faults.readings import Readings
 from mutator.stpa import analysis, context_tables
-from mutator.targets import manifest_files, severity
+from mutator.targets import manifest_files, severity_model
 
 DRAFT = "http://json-schema.org/draft-07/schema#"  # best supported by editors
 _MODEL = re.compile(r"^_?(\w+?)Model$")
@@ -49,7 +49,7 @@ _FILES: tuple[tuple[type[StrictModel], str, str], ...] = (
     (readings.ReadingsModel, readings.SCHEMA, "readings.yaml"),
     (campaign_model.CampaignModel, campaign_files.SCHEMA, "campaigns/*.yaml"),
     (manifest_files.ManifestModel, manifest_files.SCHEMA, "targets/*.yaml"),
-    (severity.ScaleModel, severity.SCHEMA, "severity/*.yaml"),
+    (severity_model.ScaleModel, severity_model.SCHEMA, "severity/*.yaml"),
     (context_tables.HazardsModel, context_tables.HAZARDS_SCHEMA, "stpa/hazards.yaml"),
     (context_tables.TableModel, context_tables.CONTEXT_SCHEMA, "stpa/contexts/*.yaml"),
     (analysis.StructureModel, "control_structure/1", "stpa/control_structure.yaml"),
@@ -62,7 +62,9 @@ def file_formats(declared: Readings) -> tuple[Format, ...]:
     specs = (spec.spec_model(declared), spec.SCHEMA, "faults/*/*.yaml")
     return (
         *(Format(model=m, schema=s, files=f"fault_library/{files}") for m, s, files in (specs, *_FILES)),
-        Format(model=fault_models.FaultModelModel, schema=fault_models.SCHEMA, files="templates/*.yaml"),
+        Format(
+            model=fault_model_files.FaultModelModel, schema=fault_model_files.SCHEMA, files="templates/*.yaml"
+        ),
         Format(
             model=cluster_files.ClusterModel, schema=cluster_files.SCHEMA, files="docs/how-to/clusters/*.yaml"
         ),

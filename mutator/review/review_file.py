@@ -8,7 +8,8 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from mutator.config.yaml_files import Source, StrictModel, read
+from mutator.config.sources import Source
+from mutator.config.yaml_files import StrictModel, read
 from mutator.review.entries import Bound, Decision, Entry, Flag, Remark, Verdict
 
 SCHEMA = "review/2"

@@ -4,7 +4,7 @@ import ast
 from collections.abc import Iterator
 
 from mutator._common.text import suggestion
-from mutator.config.yaml_files import Keys
+from mutator.config.sources import Keys
 from mutator.errors import MutatorError
 from mutator.faults.specs import FaultSpec
 from mutator.stpa.analysis import Analysis, Category, FactorModel, UnsafeActionModel

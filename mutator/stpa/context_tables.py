@@ -7,7 +7,8 @@ from pathlib import Path
 
 from pydantic import Field
 
-from mutator.config.yaml_files import Source, StrictModel, read
+from mutator.config.sources import Source
+from mutator.config.yaml_files import StrictModel, read
 from mutator.errors import MutatorError
 from mutator.model import Hold, Trigger
 from mutator.stpa.coverage import Coverage, measure_coverage

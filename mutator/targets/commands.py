@@ -5,7 +5,8 @@ from collections.abc import Collection
 from pydantic import Field
 
 from mutator._common.text import one_of
-from mutator.config.yaml_files import Source, StrictModel
+from mutator.config.sources import Source
+from mutator.config.yaml_files import StrictModel
 from mutator.targets.manifest import Film
 from mutator.targets.placeholders import OF_FILMED_RUNS, OF_FILMS, OF_RUNS, check_placeholders
 

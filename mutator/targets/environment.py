@@ -3,7 +3,7 @@
 import re
 from collections.abc import Mapping
 
-from mutator.config.yaml_files import Source
+from mutator.config.sources import Source
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
 KEPT = ("PATH", "LD_LIBRARY_PATH", "HOME")  # the user's own values, needed to start Python

@@ -2,7 +2,7 @@
 
 from collections.abc import Collection
 
-from mutator.config.yaml_files import Keys, Source
+from mutator.config.sources import Keys, Source
 from mutator.triggers.conditions import check_condition, check_formula
 
 

@@ -1,20 +1,12 @@
 """Hazards, which a run must avoid, and metrics, which measure how bad a run was."""
 
-import ast
-from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal
 
-from pydantic import Field
-
-from mutator.config.yaml_files import Keys, Source, StrictModel
-from mutator.targets.formulas import condition, formula
-from mutator.triggers import stl
-from mutator.triggers.conditions import GOLDEN, TIME, parse
+from mutator.triggers.conditions import GOLDEN
 
 Aggregate = Literal["min", "max", "mean", "last", "integral", "duration", "at_end"]
-_AGGREGATES = get_args(Aggregate)
-_WORSE = Literal["higher", "lower"]
+Worse = Literal["higher", "lower"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,7 +20,7 @@ class Metric:
     formula: str
     where: str = ""
     unit: str
-    worse: _WORSE
+    worse: Worse
     about: str
     source: str = ""
 
@@ -73,171 +65,3 @@ class Hazard:
             worse="lower",
             about=f"smallest distance from the limit of {self.name}; negative beyond the limit",
         )
-
-
-class HazardModel(StrictModel, title="A hazard"):
-    """A hazard, by its name. Without `when` and `stl`, it is read from the record."""
-
-    about: str = Field("", description="What the hazard is.")
-    when: str | None = Field(
-        None,
-        description="The condition of the hazard, over channels and derived values. The syntax is that of "
-        "triggers, plus `ever(CONDITION)` (true once the condition has held) and `rate(x)` "
-        "(change per second).",
-    )
-    stl: str | None = Field(
-        None,
-        description="Instead of `when`: a formula of signal temporal logic that must hold. rtamt evaluates "
-        "it (`pip install rtamt`), and steps must be evenly spaced. The hazard occurs at the "
-        "first step at which the formula does not hold. If the formula looks ahead, the hazard "
-        "occurs that much later.",
-    )
-    for_s: float = Field(
-        0.0,
-        ge=0.0,
-        allow_inf_nan=False,
-        description="How long the condition must hold before the hazard occurs, in s.",
-    )
-    margin: str | None = Field(
-        None,
-        description="The distance of a step from the hazard, in `unit`; negative if `when` holds. If `when` "
-        "is a single comparison, the default is the difference of its two sides.",
-    )
-    unit: str = Field("-", description="The unit of the margin.")
-    terminal: bool | str = Field(
-        False,
-        description="Whether the hazard ends the drive, as a collision does; or the condition that ends it.",
-    )
-
-
-class MetricModel(StrictModel, title="A metric"):
-    """A column of the results, by its name. Give exactly one of the aggregates. They cover the drive up to
-    the first terminal hazard, and skip steps in which the value is infinite or NaN. `golden.NAME` is a value
-    of the golden run in the same step (`max: abs(gap - golden.gap)`); steps that only one of the runs has are
-    skipped.
-    """
-
-    min: str | None = Field(None, description="The minimum of this formula over channels.")
-    max: str | None = Field(None, description="The maximum of this formula over channels.")
-    mean: str | None = Field(None, description="The mean over the steps.")
-    last: str | None = Field(None, description="The value in the last step.")
-    integral: str | None = Field(None, description="The integral over time.")
-    duration: str | None = Field(None, description="The number of seconds in which this condition holds.")
-    at_end: str | None = Field(
-        None, description="The value in the step of the first terminal hazard; empty if there is none."
-    )
-    where: str | None = Field(None, description="Use only the steps in which this condition holds.")
-    unit: str = Field(description="The unit; `-` for none.")
-    worse: _WORSE = Field(description="Which values are worse: `higher` or `lower`.")
-    about: str = Field(description="What the metric measures.")
-    source: str = Field("", description="The source of the formula.")
-
-
-def read_hazards(
-    models: list[str] | dict[str, HazardModel],
-    known: Collection[str],
-    source: Source,
-    *,
-    recorded: bool,
-    step_s: float,
-) -> tuple[Hazard, ...]:
-    """Read a manifest's hazards; MutatorError, with the line, for a mistake.
-
-    `known` are the names that formulas may use, `recorded` says whether the target writes a record, and
-    `step_s` is the length of a step in seconds.
-    """
-    if isinstance(models, list):
-        hazards = tuple(Hazard(name=name) for name in models)
-    else:
-        hazards = tuple(_hazard(name, model, known, source, step_s) for name, model in models.items())
-    if not recorded and (left := [hazard.name for hazard in hazards if hazard.recorded]):
-        keys: Keys = ("hazards", left[0]) if isinstance(models, dict) else ("hazards",)
-        raise source.error(
-            keys,
-            f"hazard '{left[0]}' without `when`, in a manifest without `record`",
-            expected="the condition of the hazard, or a record in which the target reports it",
-            remedy="add `when`, or name the record",
-        )
-    return hazards
-
-
-def _hazard(name: str, model: HazardModel, known: Collection[str], source: Source, step_s: float) -> Hazard:
-    keys: Keys = ("hazards", name)
-    if model.when is not None and model.stl is not None:
-        raise source.error((*keys, "stl"), "`when` and `stl`", expected="one of them", remedy="remove one")
-    judged_by = "stl" if model.stl is not None else "the record"
-    useless = () if model.when is not None else ("for_s", "margin")
-    for key in useless:
-        if key in model.model_fields_set:
-            raise source.error(
-                (*keys, key),
-                f"`{key}` of a hazard that is judged by {judged_by}",
-                expected="this key only with `when`",
-                remedy="remove it",
-            )
-    when = condition(model.when, known, source, (*keys, "when"))
-    if model.stl:
-        with source.placing((*keys, "stl")):
-            stl.check(model.stl, known, step_s)
-    terminal = model.terminal
-    return Hazard(
-        name=name,
-        about=model.about,
-        when=when,
-        stl=model.stl or "",
-        for_s=model.for_s,
-        margin=formula(model.margin, known, source, (*keys, "margin")) or _margin_of(when),
-        unit=model.unit,
-        terminal=condition(terminal, known, source, (*keys, "terminal"))
-        if isinstance(terminal, str)
-        else ("True" if terminal else ""),
-    )
-
-
-def _margin_of(when: str) -> str:
-    """Return the margin of a single comparison: the difference of its two sides, positive while it does not
-    hold.
-    """
-    node = parse(when) if when else None
-    if not isinstance(node, ast.Compare) or len(node.ops) != 1:
-        return ""
-    low, high = ast.unparse(node.left), ast.unparse(node.comparators[0])
-    if isinstance(node.ops[0], ast.Gt | ast.GtE):
-        low, high = high, low
-    elif not isinstance(node.ops[0], ast.Lt | ast.LtE):
-        return ""
-    return f"({low} - {high})"
-
-
-def read_metrics(
-    models: dict[str, MetricModel], known: Collection[str], source: Source
-) -> tuple[Metric, ...]:
-    """Read a manifest's metrics; the arguments and errors are those of `read_hazards`."""
-    known = (*known, *(GOLDEN + name for name in known if name != TIME))
-    return tuple(_metric(name, model, known, source) for name, model in models.items())
-
-
-def _metric(name: str, model: MetricModel, known: Collection[str], source: Source) -> Metric:
-    keys: Keys = ("metrics", name)
-    if not name.isidentifier():
-        raise source.error(keys, f"'{name}'", expected="a name of letters, digits and _", remedy="rename it")
-    given = [key for key in _AGGREGATES if getattr(model, key) is not None]
-    if len(given) != 1:
-        raise source.error(
-            keys,
-            f"metric '{name}' with {' and '.join(given) or 'no aggregate'}",
-            expected=f"one of {', '.join(_AGGREGATES)}",
-            remedy="give each metric exactly one aggregate",
-        )
-    (aggregate,) = given
-    check = condition if aggregate == "duration" else formula
-    return Metric(
-        name=name,
-        aggregate=aggregate,
-        formula=check(getattr(model, aggregate), known, source, (*keys, aggregate)),
-        where=condition(model.where, known, source, (*keys, "where")),
-        unit=model.unit,
-        worse=model.worse,
-        about=model.about,
-        source=model.source,
-    )

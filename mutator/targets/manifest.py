@@ -10,7 +10,7 @@ from packaging.requirements import Requirement
 from mutator._common import caches
 from mutator._common.bounded import read_bounded
 from mutator._common.hashing import digest
-from mutator.config.yaml_files import Source
+from mutator.config.sources import Source
 from mutator.errors import MutatorError
 from mutator.targets.channels import Channel, Role
 from mutator.targets.judging import Hazard, Metric

@@ -7,18 +7,19 @@ from pydantic import Field
 
 from mutator._common.below import check_name
 from mutator._common.shipped import SHIPPED_TARGET
-from mutator.config.yaml_files import Source, StrictModel, read
-from mutator.targets.channels import ChannelModel, TraceModel, read_channels
+from mutator.config.sources import Source
+from mutator.config.yaml_files import StrictModel, read
+from mutator.targets.channel_model import ChannelModel, TraceModel, read_channels
 from mutator.targets.commands import ChangeModel, EntryModel, FilmModel, check_commands, read_film
 from mutator.targets.environment import check_environment
-from mutator.targets.judging import HazardModel, MetricModel, read_hazards, read_metrics
+from mutator.targets.judging_model import HazardModel, MetricModel, read_hazards, read_metrics
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.observation import ObservationModel, read_observation
+from mutator.targets.observation_model import ObservationModel, read_observation
 from mutator.targets.paths import inside
 from mutator.targets.requirements import read_requirements
 from mutator.targets.roots import INSTALLED, check_installed, find_overlay, find_root, read_packages
-from mutator.targets.scene import SceneModel, read_scene
-from mutator.targets.severity import SeverityModel, read_contact
+from mutator.targets.scene_model import SceneModel, read_scene
+from mutator.targets.severity_model import SeverityModel, read_contact
 from mutator.triggers import stl
 
 SCHEMA = "target/2"

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from packaging.requirements import InvalidRequirement, Requirement
 
-from mutator.config.yaml_files import Source
+from mutator.config.sources import Source
 
 if TYPE_CHECKING:
     from mutator.targets.manifest import TargetManifest

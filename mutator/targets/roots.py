@@ -9,7 +9,7 @@ from packaging.requirements import Requirement
 from mutator._common.below import is_inside
 from mutator._common.shipped import SHIPPED_TARGET, shipped_folder
 from mutator.config.locations import PROBE_NAME
-from mutator.config.yaml_files import Source
+from mutator.config.sources import Source
 from mutator.targets.requirements import pip_install
 
 INSTALLED = "installed:"  # prefix of an import package's name, as `root` of a manifest

@@ -1,20 +1,11 @@
 """The severity of a contact: delta-v of the ego car, and its class on a scale."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-from pydantic import Field
-
-from mutator.config.units import UNITS
-from mutator.config.yaml_files import Source, StrictModel, read
-from mutator.targets.judging import Hazard, Metric
-
-SCHEMA = "severity/1"
 CLASSES = ("S0", "S1", "S2", "S3")  # from ISO 26262-3, the mildest first
 DELTA_V = "delta_v"  # name of the metric
-_KPH = UNITS["kph"].factor
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,94 +50,3 @@ class Scale:
     def class_of(self, delta_v: float) -> str:
         """Return the class of a delta-v in m/s, 0 or more; a value on a bound is in the upper class."""
         return [name for name, least, _ in self.classes if delta_v >= least][-1]
-
-
-class SeverityModel(StrictModel, title="Severity"):
-    """How severe a contact is. The metric `delta_v` is the delta-v of the ego car, `contact_speed *
-    other_mass_kg / (mass_kg + other_mass_kg)`; the scale assigns its class.
-    """
-
-    contact: str = Field(description="The terminal hazard that is a contact with another vehicle.")
-    contact_speed: str = Field(
-        description="The metric that holds the closing speed at the contact: one with `at_end`, in m/s. If "
-        "it is negative, the cars separate, and delta-v is 0."
-    )
-    mass_kg: float = Field(gt=0.0, allow_inf_nan=False, description="The mass of the ego car.")
-    other_mass_kg: float = Field(gt=0.0, allow_inf_nan=False, description="The mass of the other vehicle.")
-    scale: str = Field(
-        description="The name of a file in the library's `severity/`, without `.yaml`; or `collision`, "
-        "which ships with mutator."
-    )
-
-
-class _ClassModel(StrictModel, title="A class"):
-    from_kph: float = Field(
-        ge=0.0, allow_inf_nan=False, description="The smallest delta-v in the class; 0 for S0."
-    )
-    about: str = Field(description="The harm in this class.")
-
-
-class ScaleModel(StrictModel, title="severity/*.yaml"):
-    """The bounds of each class. A library can contain several scales."""
-
-    about: str = Field("", description="The purpose of the scale.")
-    source: str = Field(description="The source of the bounds.")
-    classes: dict[str, _ClassModel] = Field(
-        description="The classes S0, S1, S2 and S3; each begins at a higher delta-v than the one before."
-    )
-
-
-def read_contact(
-    model: SeverityModel, hazards: Sequence[Hazard], metrics: Sequence[Metric], source: Source
-) -> Contact:
-    """Read a manifest's severity; MutatorError, with the line, for an unsuitable hazard or metric."""
-    terminal = [hazard.name for hazard in hazards if hazard.terminal]
-    if model.contact not in terminal:
-        raise source.error(
-            ("severity", "contact"),
-            f"'{model.contact}'",
-            expected=f"a hazard with `terminal`: {', '.join(terminal) or 'there is none'}",
-            remedy="correct the name, or add `terminal: true` to the hazard",
-        )
-    speeds = [m.name for m in metrics if m.aggregate == "at_end" and m.unit == "m/s"]
-    if model.contact_speed not in speeds:
-        raise source.error(
-            ("severity", "contact_speed"),
-            f"'{model.contact_speed}'",
-            expected=f"a metric with `at_end` and the unit m/s: {', '.join(speeds) or 'there is none'}",
-            remedy="correct the name, or add the metric",
-        )
-    return Contact(
-        hazard=model.contact,
-        speed=model.contact_speed,
-        mass=model.mass_kg,
-        other_mass=model.other_mass_kg,
-        scale=model.scale,
-    )
-
-
-def load_scale(path: Path) -> Scale:
-    """Read a scale of a library; MutatorError, with the line, unless the classes are S0 to S3 in order."""
-    model, source = read(path, ScaleModel, SCHEMA)
-    if tuple(model.classes) != CLASSES:
-        raise source.error(
-            ("classes",),
-            f"the classes {', '.join(model.classes)}" if model.classes else "no classes",
-            expected=f"{', '.join(CLASSES)}, in this order",
-            remedy="define each of these classes once",
-        )
-    least = [one.from_kph for one in model.classes.values()]
-    for i, name in enumerate(CLASSES):
-        if (i == 0 and least[0] != 0.0) or (i and least[i] <= least[i - 1]):
-            raise source.error(
-                ("classes", name, "from_kph"),
-                f"{least[i]:g}",
-                expected="0 for S0, and for each other class more than for the one before it",
-                remedy="correct the bound",
-            )
-    return Scale(
-        name=path.stem,
-        about=model.about,
-        source=model.source,
-        classes=tuple((name, one.from_kph * _KPH, one.about) for name, one in model.classes.items()),
-    )

@@ -3,7 +3,7 @@
 import ast
 from inspect import getsource
 
-from mutator.config.yaml_files import Keys
+from mutator.config.sources import Keys
 from mutator.errors import MutatorError
 from mutator.targets.judging import Hazard
 from mutator.targets.manifest import TargetManifest

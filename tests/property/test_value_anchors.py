@@ -12,7 +12,8 @@ import pytest
 
 from mutator._common.doors import OPERATORS
 from mutator.errors import MutatorError
-from mutator.faults.fault_models import FaultModels, load_fault_models
+from mutator.faults.fault_model_files import load_fault_models
+from mutator.faults.fault_models import FaultModels
 from mutator.model import Anchor, AnchorKind, FaultLocation, Injection
 from mutator.mutants.anchors import ParsedFile, parse_file
 from mutator.mutants.expressions import Expression

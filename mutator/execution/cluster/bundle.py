@@ -25,7 +25,8 @@ from mutator._common.version import VERSION
 from mutator.engines import sandbox
 from mutator.errors import MutatorError, Outside
 from mutator.execution.cluster.parcel import pack, unpack
-from mutator.faults.fault_models import FILES, FaultModels, load_fault_models
+from mutator.faults.fault_model_files import load_fault_models
+from mutator.faults.fault_models import FILES, FaultModels
 from mutator.model import Limits
 from mutator.results.column_facts import check_names
 from mutator.store.check_results import FILE as CHECKS

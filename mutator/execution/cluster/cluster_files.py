@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field
 
-from mutator.config.yaml_files import Source, StrictModel, read
+from mutator.config.sources import Source
+from mutator.config.yaml_files import StrictModel, read
 from mutator.errors import MutatorError
 from mutator.execution.cluster.connecting import (
     certificates,

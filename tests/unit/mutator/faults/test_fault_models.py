@@ -7,7 +7,8 @@ import pytest
 
 from mutator.checks.library_check import check_examples, run_example
 from mutator.errors import MutatorError
-from mutator.faults.fault_models import SnippetKind, load_fault_models
+from mutator.faults.fault_model_files import load_fault_models
+from mutator.faults.fault_models import SnippetKind
 from mutator.workspace import Workspace
 
 NAMES = [

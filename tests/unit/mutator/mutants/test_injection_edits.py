@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.faults.fault_models import FaultModels, load_fault_models
+from mutator.faults.fault_model_files import load_fault_models
+from mutator.faults.fault_models import FaultModels
 from mutator.model import Anchor, AnchorKind, FaultLocation, Injection, Value
 from mutator.mutants.anchors import parse_file
 from mutator.mutants.injection_edits import injection_edit

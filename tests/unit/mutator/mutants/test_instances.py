@@ -7,9 +7,10 @@ from typing import Any
 import pytest
 
 from mutator.config.instances import instance_condition
-from mutator.config.yaml_files import Source
+from mutator.config.sources import Source
 from mutator.errors import MutatorError
-from mutator.faults.injections import InjectionModel, InjectionSpec
+from mutator.faults.injection_model import InjectionModel
+from mutator.faults.injections import InjectionSpec
 from mutator.model import Anchor, AnchorKind, FaultLocation, Hold, Injection, Trigger
 from mutator.mutants import injected_lines
 from mutator.mutants import probe as contract

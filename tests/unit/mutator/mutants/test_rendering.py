@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mutator.config.yaml_files import Source
+from mutator.config.sources import Source
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel, ParamSchema, SnippetKind
 from mutator.model import Hold, Value

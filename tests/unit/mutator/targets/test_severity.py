@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.targets.severity import load_scale
+from mutator.targets.severity_model import load_scale
 from mutator.workspace import Workspace
 
 KPH = 1 / 3.6

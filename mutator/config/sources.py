@@ -1,0 +1,41 @@
+"""A parsed file, with the line of every value for error messages."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mutator.errors import MutatorError
+
+Keys = tuple[str | int, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Source:
+    """A parsed file. `lines` maps a path of keys to its line (from 1)."""
+
+    path: Path
+    data: Any
+    lines: dict[Keys, int]
+
+    def line(self, keys: Keys) -> int | None:
+        """Return the line of the value at `keys`, or of the nearest enclosing value."""
+        for end in range(len(keys), -1, -1):
+            if keys[:end] in self.lines:
+                return self.lines[keys[:end]]
+        return None
+
+    def error(
+        self, keys: Keys, got: str, *, expected: str | None = None, remedy: str | None = None
+    ) -> MutatorError:
+        """Return an error that points at the value at `keys`."""
+        return MutatorError(got, where=self.path, line=self.line(keys), expected=expected, remedy=remedy)
+
+    @contextmanager
+    def placing(self, keys: Keys) -> Iterator[None]:
+        """Make every MutatorError raised in the block point at the value at `keys`."""
+        try:
+            yield
+        except MutatorError as error:
+            raise self.error(keys, error.got, expected=error.expected, remedy=error.remedy) from None

@@ -1,0 +1,116 @@
+"""The trace and the channels of a manifest."""
+
+from pathlib import Path
+
+from pydantic import Field
+
+from mutator._common.doors import IMPORTERS
+from mutator.config.sources import Source
+from mutator.config.yaml_files import StrictModel
+from mutator.targets.channels import ROUNDING, Channel, Role
+from mutator.triggers.conditions import RESERVED
+
+
+class ChannelModel(StrictModel, title="A channel"):
+    """A channel. Conditions, tables and plots use its name."""
+
+    unit: str = Field(description="The unit, for tables and axes; `-` for none.")
+    role: Role = Field(
+        Role.INTERNAL,
+        strict=False,
+        description="`actuator`: what the controller commands; if it differs from the golden run, the fault "
+        "has manifested. `truth`: the state of the world. `internal`: what the controller "
+        "assumes.",
+    )
+    component: str = Field(
+        "",
+        description="The component of the controller to which the channel belongs; it must be in the "
+        "control structure, if there is one.",
+    )
+    tolerance: float | None = Field(
+        None,
+        ge=0.0,
+        allow_inf_nan=False,
+        description="Differences from the golden run up to this value are ignored. If an actuator differs by "
+        "more, the fault has manifested; if a component's channel does, the fault has reached the component. "
+        f"Default: 0 for actuators; for other channels {ROUNDING:g} of the unit, to ignore rounding.",
+    )
+    about: str = Field("", description="What the channel contains.")
+    time: str = Field(
+        "",
+        description="For a channel that is not recorded in each step: the channel that holds its times. If "
+        "the trace is a table (`.csv`, `.parquet`), its empty cells are skipped.",
+    )
+    from_: str = Field(
+        "",
+        alias="from",
+        description="The name in the trace, if it differs. In an `.mcap` file: the topic and the field of "
+        "its JSON messages, `/car/state:speed`.",
+    )
+
+
+class TraceModel(StrictModel, title="The trace"):
+    """The numbers that a run records."""
+
+    file: str = Field(
+        "trace.npz",
+        description="The file name in `{out}`: an `.npz` with an array for each channel, a `.csv` or "
+        "`.parquet` with a column for each, or an `.mcap` with JSON messages (`pip install "
+        "mcap`). Other packages can add more.",
+    )
+    time: str = Field(
+        "t",
+        description="The channel that holds the time in s of each step. In an `.mcap` file: the topic that "
+        "has a message for each step; its log times are simulated time.",
+    )
+
+
+def read_channels(models: dict[str, ChannelModel], trace: TraceModel, source: Source) -> tuple[Channel, ...]:
+    """Read a manifest's channels, in order; MutatorError for an invalid trace or channel."""
+    suffix = Path(trace.file).suffix.removeprefix(".")
+    if Path(trace.file).name != trace.file or not (suffix and IMPORTERS.has(suffix)):
+        suffixes = ", ".join(f".{name}" for name in IMPORTERS.names())
+        raise source.error(
+            ("trace", "file"),
+            f"'{trace.file}'",
+            expected=f"a bare file name (of a file in {{out}}) that ends in {suffixes}",
+            remedy="have the run write such a file, and name it here",
+        )
+    if not any(model.role is Role.ACTUATOR for model in models.values()):
+        raise source.error(
+            ("channels",),
+            "no channel with `role: actuator`",
+            expected="a channel that holds what the controller commands; verdicts depend on it",
+            remedy="give a channel the role actuator",
+        )
+    return tuple(_channel(name, model, trace, source) for name, model in models.items())
+
+
+def _channel(name: str, model: ChannelModel, trace: TraceModel, source: Source) -> Channel:
+    keys = ("channels", name)
+    if name == trace.time:
+        raise source.error(keys, f"'{name}'", expected="a channel other than the time", remedy="leave it out")
+    if name in RESERVED:
+        raise source.error(
+            keys,
+            f"'{name}'",
+            expected=f"a name other than these, which formulas already use: {', '.join(RESERVED)}",
+            remedy=f"choose another name, with `from: {name}`",
+        )
+    in_topics = trace.file.endswith(".mcap")
+    if in_topics and not all(model.from_.partition(":")):
+        raise source.error(
+            (*keys, "from"),
+            f"'{model.from_}'",
+            expected="the topic and the field of its messages: `/car/state:speed`",
+        )
+    if in_topics and model.time:
+        raise source.error(
+            (*keys, "time"),
+            f"'{model.time}'",
+            expected="no `time` for an .mcap file, in which each message has its own",
+            remedy="leave it out",
+        )
+    plain = model.model_dump(exclude={"from_", "tolerance"})
+    tolerance = model.role.tolerance if model.tolerance is None else model.tolerance
+    return Channel(name=name, source=model.from_, tolerance=tolerance, **plain)
