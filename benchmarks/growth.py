@@ -18,7 +18,7 @@ from pathlib import Path
 from time import process_time
 
 from mutator._common.hashing import digest
-from mutator.audit.seal import seal_of
+from mutator.audit.seal import seals_of
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plans import Plan, make_plan
 from mutator.model import Activation, Experiment, Outcome, Record, Status
@@ -160,7 +160,7 @@ def opening(size: int, out: Path) -> dict[str, float]:
         found = RunFolder.open(out)
         opened.append(process_time() - start)
         start = process_time()
-        seal_of(found)
+        seals_of(found)
         sealed.append(process_time() - start)
     return {"open_s": min(opened), "seal_s": min(sealed)}
 

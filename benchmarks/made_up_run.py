@@ -22,7 +22,7 @@ import numpy as np
 from growth import record
 
 from mutator._common.hashing import canonical, digest
-from mutator.audit.seal import seal_of
+from mutator.audit.seal import seals_of
 from mutator.campaigns import machine
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plans import Planning
@@ -83,7 +83,7 @@ def make(size: int, out: Path) -> str:
         ),
     )
     digests.close_segments(out, finished=True)
-    return seal_of(RunFolder(out)) or ""
+    return seals_of(RunFolder(out)).seal or ""
 
 
 def campaign(folder: Path, size: int) -> Path:

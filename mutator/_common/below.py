@@ -19,7 +19,7 @@ from io import BufferedReader
 from pathlib import Path
 from typing import BinaryIO
 
-from mutator._common.bounded import MOST_WHOLE, read_open
+from mutator._common.bounded import read_open
 from mutator._common.files import clear_place, let_in, raising_disk_full
 from mutator.errors import MutatorError, Outside
 
@@ -86,10 +86,10 @@ def open_descriptor(root: Path, name: str, flags: int) -> int:
         return os.open(last, flags | _CAREFULLY, 0o644, dir_fd=parent)
 
 
-def read_below(root: Path, name: str, most: int = MOST_WHOLE) -> bytes:
-    """Return the content of a file; errors as in `open_below`, and TooLarge for more than `most` bytes."""
+def read_below(root: Path, name: str) -> bytes:
+    """Return the content of a file; errors as in `open_below` and `read_open`."""
     with open_below(root, name) as file:
-        return read_open(file, root / name, most)
+        return read_open(file, root / name)
 
 
 def write_below(root: Path, name: str, data: bytes) -> None:
@@ -233,9 +233,9 @@ def _kind(folder: int, name: str) -> int:
     return stat.S_IFMT(os.stat(name, dir_fd=folder, follow_symlinks=False).st_mode)
 
 
-def is_deep(name: str, most: int = _DEEPEST) -> bool:
+def is_deep(name: str) -> bool:
     """Whether a path has more folders than anything that belongs there; readers would recurse too deeply."""
-    return name.count("/") >= most
+    return name.count("/") >= _DEEPEST
 
 
 def is_plain(entry: os.DirEntry[str]) -> bool:

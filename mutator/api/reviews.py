@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from mutator._common.below import inside
+from mutator._common.files import make_folder, write_atomic
 from mutator.api.selection import WorkspaceLike, open_workspace
 from mutator.campaigns.clones import user_name
 from mutator.campaigns.filters import compile_filter
@@ -15,7 +17,10 @@ from mutator.review.columns import COLUMNS
 from mutator.review.decisions import Change, Kind, Review, State, record
 from mutator.review.decisions import load_review as load_decisions
 from mutator.review.page import write_page
+from mutator.review.pictures import of_groups
 from mutator.workspace import Workspace
+
+Written = dict[str, dict[str, str]]  # by group: the file of each picture, by name
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -161,3 +166,26 @@ def facts(review: Review, group: Group) -> dict[str, object]:
 def reviewer_name(workspace: WorkspaceLike = None) -> str | None:
     """Return `user.name` of the user's own git configuration; None if it is not set."""
     return user_name(open_workspace(workspace).library)
+
+
+def write_pictures(
+    groups: Sequence[Group], target: str, folder: Path, *, workspace: WorkspaceLike = None
+) -> tuple[Written, dict[str, str]]:
+    """Write `<group>-before.jpg` and one frame for each level, for each group that is an image effect. Return
+    the files by group, and the value that each file shows.
+    """
+    found = open_workspace(workspace)
+    drawn = of_groups(found, found.manifest(target), groups)
+    written: Written = {}
+    values: dict[str, str] = {}
+    if drawn:
+        make_folder(folder)
+    for name, pictures in drawn.items():
+        shown = {"before": ("", pictures.before)}
+        shown |= {level.name: (level.label, level.after) for level in pictures.levels}
+        for level, (value, data) in shown.items():
+            path = inside(folder, f"{name}-{level}.jpg")
+            write_atomic(path, data)
+            written.setdefault(name, {})[level] = str(path)
+            values[str(path)] = value
+    return written, values

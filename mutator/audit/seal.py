@@ -89,10 +89,6 @@ def seals_of(folder: RunFolder) -> Seals:
     return Seals(seal=digest([SCHEMA, runs, facts]), results_digest=results, review_digest=review)
 
 
-def seal_of(folder: RunFolder) -> str | None:
-    return seals_of(folder).seal
-
-
 def seal_or_why_not(folder: RunFolder) -> dict[str, str]:
     """Return the texts of `seals_of`; the seal of a run without one is the reason."""
     return {"seal": "none: the run is not finished"} | seals_of(folder).texts()

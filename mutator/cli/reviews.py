@@ -129,7 +129,7 @@ def show(
 def _write_pictures(
     terminal: Terminal, place: Place, target: str, groups: "Sequence[Group]", folder: Path
 ) -> dict[str, dict[str, str]]:
-    from mutator.api.review_pictures import write_pictures
+    from mutator.api.reviews import write_pictures
 
     with terminal.wait("drawing"):
         written, values = write_pictures(groups, target, folder, workspace=place.workspace())

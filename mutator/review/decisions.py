@@ -174,11 +174,6 @@ def record(workspace: Workspace, target: str, changes: Sequence[Change], seen: M
         return _written(workspace, review, made)
 
 
-def _text_of(kind: Kind) -> str:
-    """Return the API argument that holds the text of a change."""
-    return "text" if kind is Kind.REMARK else "remark"
-
-
 def _check(change: Change) -> None:
     if not change.by:
         raise MutatorError("no name", argument="by", expected="the reviewer's name", remedy="give a name")

@@ -51,7 +51,6 @@ class Pooled:
     odds_ratio: float
     low: float
     high: float
-    risk_ratio: float
     p: float
     p_equal: float
     strata: int  # fault types with runs of both methods
@@ -94,9 +93,7 @@ def mantel_haenszel(parts: Sequence[Stratum]) -> Pooled:
     telling = [s for s in parts if 0 < s.guided_hazards + s.random_hazards < s.guided + s.random]
     if not telling:  # in each type all or none were hazards, so there are no odds to compare
         nan = math.nan
-        return Pooled(
-            odds_ratio=nan, low=nan, high=nan, risk_ratio=nan, p=nan, p_equal=nan, strata=len(parts)
-        )
+        return Pooled(odds_ratio=nan, low=nan, high=nan, p=nan, p_equal=nan, strata=len(parts))
     table = StratifiedTable([np.array(stratum.table) for stratum in telling])
     with np.errstate(all="ignore"):  # an odds ratio of 0 or infinity has no finite interval
         low, high = table.oddsratio_pooled_confint(alpha=1 - CONFIDENCE)
@@ -104,7 +101,6 @@ def mantel_haenszel(parts: Sequence[Stratum]) -> Pooled:
             odds_ratio=float(table.oddsratio_pooled),
             low=float(low),
             high=float(high),
-            risk_ratio=float(table.riskratio_pooled),
             p=float(table.test_null_odds(correction=False).pvalue),
             p_equal=float(table.test_equal_odds().pvalue) if len(telling) > 1 else math.nan,
             strata=len(parts),

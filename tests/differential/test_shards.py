@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from mutator.audit.seal import seal_of
+from mutator.audit.seal import seals_of
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plans import Choices, make_plan
 from mutator.engines import registry
@@ -89,7 +89,7 @@ def test_a_killed_merge_loses_no_series(runs: Runs, tmp_path: Path, monkeypatch:
 
 def test_merged_shards_have_the_seal_of_the_single_run(runs: Runs, tmp_path: Path) -> None:
     merge([runs["2/2"], runs["1/2"]], tmp_path / "out")
-    seals = [seal_of(RunFolder.open(path)) for path in (runs["whole"], tmp_path / "out", runs["1/2"])]
+    seals = [seals_of(RunFolder.open(path)).seal for path in (runs["whole"], tmp_path / "out", runs["1/2"])]
     assert seals[0] is not None and seals[0] == seals[1] != seals[2]
 
 
@@ -231,7 +231,7 @@ def test_the_same_command_completes_a_killed_merge(runs: Runs, tmp_path: Path) -
     (out / ".run.json.1").touch()
     (out / "records").mkdir()
     merge(shards, out)
-    assert seal_of(RunFolder.open(out)) == seal_of(RunFolder.open(runs["whole"]))
+    assert seals_of(RunFolder.open(out)).seal == seals_of(RunFolder.open(runs["whole"])).seal
     assert not list(out.glob(".*"))
 
 

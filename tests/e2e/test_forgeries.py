@@ -14,7 +14,7 @@ import pytest
 
 import mutator
 from mutator._common.hashing import canonical, digest
-from mutator.audit.seal import golden_digests, seal_of
+from mutator.audit.seal import golden_digests, seals_of
 from mutator.campaigns.freezing import plan_csv
 from mutator.campaigns.plan_parts import plan_digest
 from mutator.campaigns.plans import load_plan
@@ -301,7 +301,7 @@ def test_the_api_finds_a_plain_forgery(
 
 
 def test_the_genuine_run_passes(genuine: tuple[Workspace, Path], run: Path, cli: Cli, tmp_path: Path) -> None:
-    known = seal_of(RunFolder.open(genuine[1]))
+    known = seals_of(RunFolder.open(genuine[1])).seal
     for path in [run, *run.rglob("*")]:
         path.chmod(0o555 if path.is_dir() else 0o444)
     try:
@@ -321,7 +321,7 @@ def test_the_seal_reveals_a_forgery_with_consistent_digests(
     forge: Callable[[Path, bool], None],
 ) -> None:
     """An edited table does not change the seal, but it does not match the records."""
-    known = seal_of(RunFolder.open(genuine[1]))
+    known = seals_of(RunFolder.open(genuine[1])).seal
     forge(run, True)
     if forge is not the_table:
         reseal(run)

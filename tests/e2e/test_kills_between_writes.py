@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from mutator.audit.seal import seal_of
+from mutator.audit.seal import seals_of
 from mutator.campaigns.plans import Choices
 from mutator.execution.running import run_campaign
 from mutator.store.run_folder import RunFolder
@@ -66,7 +66,7 @@ def check_kill(workspace: Workspace, out: Path, after: int, expected: tuple[str 
 def undisturbed(toy: Workspace, tmp_path: Path) -> tuple[str | None, bytes]:
     out = tmp_path / "undisturbed"
     found = run(toy, out)
-    assert found == seal_of(RunFolder.open(out)) is not None
+    assert found == seals_of(RunFolder.open(out)).seal is not None
     return found, (out / "results.csv").read_bytes()
 
 

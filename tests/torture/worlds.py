@@ -11,7 +11,7 @@ from itertools import chain
 from pathlib import Path
 from types import FrameType
 
-from mutator.audit.seal import seal_of
+from mutator.audit.seal import seals_of
 from mutator.errors import MutatorError
 from mutator.store.run_folder import RunFolder
 
@@ -60,7 +60,7 @@ class World:
         told = self._tell(reader)
         if told.code == 0 and told.result != self.right[reader].result:
             known = RunFolder.open(self.place.genuine)
-            return expect(self.place, str(seal_of(known)))
+            return expect(self.place, str(seals_of(known).seal))
         return told
 
     def _right(self, reader: str) -> Told:

@@ -131,5 +131,5 @@ const Path = (() => {
     }
   }
 
-  return { strip, at };
+  return { strip };
 })();

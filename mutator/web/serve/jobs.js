@@ -153,5 +153,5 @@ const Jobs = (() => {
   }
 
   install();
-  return { ask, start, watch, isActive };
+  return { ask, start, watch };
 })();

@@ -149,7 +149,7 @@ const Diff = (() => {
     })).filter((file) => file.lines.length);
   }
 
-  return { parse, render, coloured, injected };
+  return { render, coloured, injected };
 })();
 
 const renderDiff = Diff.render;

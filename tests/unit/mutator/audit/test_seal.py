@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from mutator._common.hashing import canonical
-from mutator.audit.seal import seal_of, seal_or_why_not, seals_of, unsealed_facts
+from mutator.audit.seal import seal_or_why_not, seals_of, unsealed_facts
 from mutator.store import digests
 from mutator.store.approvals import write_approvals
 from mutator.store.lines import written
@@ -36,7 +36,7 @@ def run(made: Path, tmp_path: Path) -> Path:
 
 
 def sealed(run: Path) -> str | None:
-    return seal_of(RunFolder.unverified(run))
+    return seals_of(RunFolder.unverified(run)).seal
 
 
 def test_the_seal_does_not_depend_on_workers_or_order(made: Path, run: Path, reseal: Reseal) -> None:
@@ -141,7 +141,7 @@ def test_an_unfinished_run_has_no_seal(run: Path) -> None:
     digests.close_segments(run, finished=False)
     folder = RunFolder.open(run)
     none = {"seal": "none: the run is not finished"}
-    assert (seal_of(folder), seal_or_why_not(folder)) == (None, none)
+    assert (seals_of(folder).seal, seal_or_why_not(folder)) == (None, none)
 
 
 def test_the_seal_covers_records_as_they_were_written(made: Path, run: Path) -> None:
