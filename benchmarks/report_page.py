@@ -143,7 +143,7 @@ def write(size: int, out: Path) -> dict[str, float]:
     run = ReportedRun.open(RunFolder.open(out), None)
     table = embedded(report_browse.table(rows, lines, run.paths), "table")
     assert run.paths is not None
-    ways = embedded(run.paths.data([row.experiment_id for row in rows]), "paths")
+    paths = embedded(run.paths.data([row.experiment_id for row in rows]), "paths")
     table_s = process_time() - began
     shown = [experiments[row.experiment_id] for row in rows]
     records = [record(e, n) for n, e in enumerate(shown)]
@@ -153,7 +153,7 @@ def write(size: int, out: Path) -> dict[str, float]:
     index_kb = write_series(workspace, records, out)
     browse = Browse(
         facts=Markup(json.dumps({"filmed": True, "series": {"packed": True, "kept": []}})),
-        scripts=tuple(map(Markup, (table, detail, ways, embedded({}, "media")))),
+        scripts=tuple(map(Markup, (table, detail, paths, embedded({}, "media")))),
     )
     content = Content(
         name=f"{size} experiments",
@@ -169,7 +169,7 @@ def write(size: int, out: Path) -> dict[str, float]:
     page = report_page.page_html(content)
     (out / "report").mkdir()
     (out / "report" / "index.html").write_text(page)
-    sizes = {"page_kb": page, "table_kb": table, "details_kb": detail, "paths_kb": ways}
+    sizes = {"page_kb": page, "table_kb": table, "details_kb": detail, "paths_kb": paths}
     kb = {name: len(text.encode()) / 1000 for name, text in sizes.items()}
     return {"table_s": table_s, **kb, "index_kb": index_kb}
 

@@ -1,5 +1,5 @@
 """Draws the control structure of a run, with the number of faults that passed each link or stopped in each
-box. ways.js updates the numbers.
+box. path_counts.js updates the numbers.
 """
 
 from collections.abc import Collection, Iterator
@@ -15,13 +15,13 @@ _WIDEST = 7.0  # px, width of a link that passed all its faults
 _THIN = 1.8
 
 
-def draw_ways(structure: StructureModel, counts: PathCounts, links: Collection[str]) -> str:
+def draw_path_counts(structure: StructureModel, counts: PathCounts, links: Collection[str]) -> str:
     """Return the control structure as SVG. `links` are those that a fault can take."""
     plain = {n: c.model_copy(update={"process_model": {}}) for n, c in structure.components.items()}
     layout = lay_out(structure.model_copy(update={"components": plain}), lines=2)
     size = f"{layout.width:.0f} {layout.height:.0f}"
     lines = [
-        f'<svg class="ways-figure" xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {size}" '
+        f'<svg class="path-figure" xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {size}" '
         f'width="{layout.width:.0f}" height="{layout.height:.0f}" role="group" '
         'aria-label="Control structure with the share of faults that got through each link">',
         "<defs>",
@@ -33,7 +33,7 @@ def draw_ways(structure: StructureModel, counts: PathCounts, links: Collection[s
             lines += _idle(layout.arrows[name], link)
     for name, link in structure.links.items():
         if name in links:
-            lines += _way(name, layout.arrows[name], link, counts)
+            lines += _link(name, layout.arrows[name], link, counts)
     for name, component in plain.items():
         lines += _box(name, layout.boxes[name], component.label, component.about, counts)
     return "\n".join((*lines, "</svg>"))
@@ -46,7 +46,7 @@ def share_text(through: int, came: int) -> str:
 
 def _tip(name: str) -> str:
     return (
-        f'<marker id="ways-{name}" viewBox="0 0 10 10" refX="9" refY="5" markerWidth="14" '
+        f'<marker id="path-tip-{name}" viewBox="0 0 10 10" refX="9" refY="5" markerWidth="14" '
         'markerHeight="14" markerUnits="userSpaceOnUse" orient="auto">'
         f'<path class="tip {name}" d="M0,0 L10,5 L0,10 z"/></marker>'
     )
@@ -69,23 +69,23 @@ def _is_short(arrow: Arrow) -> bool:
 
 def _idle(arrow: Arrow, link: LinkModel) -> Iterator[str]:
     yield (
-        f'<g class="idle"><path d="{_line(arrow)}" stroke-dasharray="3 4" marker-end="url(#ways-quiet)"/>'
+        f'<g class="idle"><path d="{_line(arrow)}" stroke-dasharray="3 4" marker-end="url(#path-tip-quiet)"/>'
         f'<text class="label" {_place(arrow)}>{escape(link.label)}</text></g>'
     )
 
 
-def _way(name: str, arrow: Arrow, link: LinkModel, counts: PathCounts) -> Iterator[str]:
+def _link(name: str, arrow: Arrow, link: LinkModel, counts: PathCounts) -> Iterator[str]:
     through, came = counts.through[name], counts.came[name]
     kind = "through" if through else "stopped" if came else "quiet"
     share, short = share_text(through, came), _is_short(arrow)
     first, _, last = share.partition(", ") if short else (share, "", "")
     width = _THIN + (_WIDEST - _THIN) * (through / came if came else 0.0)
     yield (
-        f'<a class="way is-{kind}" data-link="{escape(name)}"{" data-short" if short else ""} '
+        f'<a class="link is-{kind}" data-link="{escape(name)}"{" data-short" if short else ""} '
         f'href="#through={quote(link_text(link.from_, link.to))}">'
         f"<title>{escape(f'{link.label}: from {link.from_} to {link.to}')}</title>"
         f'<path class="hit" d="{_line(arrow)}"/><path class="line" d="{_line(arrow)}" '
-        f'style="stroke-width: {width:.1f}px" marker-end="url(#ways-{kind})"/>'
+        f'style="stroke-width: {width:.1f}px" marker-end="url(#path-tip-{kind})"/>'
         f'<text class="label" {_place(arrow)}>{escape(link.label)}</text>'
         f'<text class="count" {_place(arrow, 1)}>{first}</text>'
         f'<text class="count" {_place(arrow, 2)}>{last}</text></a>'

@@ -171,13 +171,13 @@ class PathCounts:
     def add(self, path: FaultPath | UntimedPath, count: int = 1) -> None:
         self.active += count
         link_states = [(c.name, c.tip, c.state) for c in path.links]
-        stopped = {tip for _, tip, passage in link_states if passage is LinkState.STOPPED}
+        stopped = {tip for _, tip, state in link_states if state is LinkState.STOPPED}
         for counter, names in (
             (
                 self.came,
-                [n for n, _, passage in link_states if passage in (LinkState.THROUGH, LinkState.STOPPED)],
+                [n for n, _, state in link_states if state in (LinkState.THROUGH, LinkState.STOPPED)],
             ),
-            (self.through, [name for name, _, passage in link_states if passage is LinkState.THROUGH]),
+            (self.through, [name for name, _, state in link_states if state is LinkState.THROUGH]),
             (self.injected, path.injected),
             (self.stopped, stopped.union(path.stopped_at)),
             (self.masked, path.stopped_at),

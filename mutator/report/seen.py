@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 _PIECE = 5_000  # number of experiments in a batch
-PLACE, UNTIMED_PATH = "#place", "#course"  # extra columns of a frame of results; no metric has such a name
+# extra columns of a frame of results; no metric has such a name
+PLACE, UNTIMED_PATH = "#place", "#untimed_path"
 _Alerts = tuple[tuple[str, float], ...]  # the alerts of one experiment
 
 

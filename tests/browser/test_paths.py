@@ -104,7 +104,7 @@ def test_the_path_names_the_component_that_stopped_a_masked_fault(opened: "Page"
 
 
 def test_the_control_structure_shows_counts_and_filters_the_list(opened: "Page") -> None:
-    count = "#ways [data-link='commands'] .count"
+    count = "#path-counts [data-link='commands'] .count"
     opened.choose("kind", "sensor/lane")
     lanes = int(opened.found.split()[0])
     opened.open("kind=sensor%2Fdistance")
@@ -112,18 +112,18 @@ def test_the_control_structure_shows_counts_and_filters_the_list(opened: "Page")
     opened.open()
     share = f"{lanes} of {lanes + held}, {100 * lanes / (lanes + held):.0f} %"
     assert opened.page.text_content(count) == share
-    assert opened.page.locator("#ways [data-component='pedals'] .count").all_text_contents() == [
+    assert opened.page.locator("#path-counts [data-component='pedals'] .count").all_text_contents() == [
         f"{held} stopped",
         f"{held} masked",
     ]
-    assert opened.page.text_content("#ways-table [data-link='commands'] td:last-child") == share
-    opened.page.select_option("#ways-kind", "sensor/distance")
+    assert opened.page.text_content("#path-counts-table [data-link='commands'] td:last-child") == share
+    opened.page.select_option("#path-counts-kind", "sensor/distance")
     assert opened.page.text_content(count) == f"0 of {held}, 0 %"
-    opened.page.click("#ways [data-component='pedals']")
+    opened.page.click("#path-counts [data-component='pedals']")
     assert opened.fragment == "stopped_at=pedals&kind=sensor%2Fdistance"
     assert "Stopped at: Pedals" in opened.page.inner_text("body").replace("stopped at", "Stopped at")
     assert opened.found.startswith(f"{held} of ")
-    opened.page.select_option("#ways-kind", "all fault types")
-    opened.page.click("#ways [data-link='force'] .count")
+    opened.page.select_option("#path-counts-kind", "all fault types")
+    opened.page.click("#path-counts [data-link='force'] .count")
     assert opened.fragment == "through=pedals%E2%86%92world"
     assert opened.found.startswith(f"{lanes} of ")

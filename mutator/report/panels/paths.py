@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from mutator._common.tables import Table
 from mutator.report.panel import Panel, rendered
-from mutator.report.path_drawing import draw_ways, share_text
+from mutator.report.path_drawing import draw_path_counts, share_text
 from mutator.report.paths import ALL, PathCounts, RunPaths, counts_by_fault_type
 from mutator.report.studies import ReportedRun
 from mutator.results.counting import kinds
@@ -25,17 +25,19 @@ faults were <strong>injected</strong> here; green if faults were <strong>stopped
 no further through this component. A fault that two components stopped is counted at both. A
 <strong>masked</strong> fault changed no actuator at all. Select a link to list the experiments whose faults
 got through it, or a box to list those whose faults were masked there.</p>
-<div class="row"><label for="ways-kind">Faults:</label> <select id="ways-kind" disabled>
+<div class="row"><label for="path-counts-kind">Faults:</label> <select id="path-counts-kind" disabled>
 {% for kind in kinds %}
 <option>{{ kind }}</option>
 {% endfor %}
-</select> <span class="quiet" id="ways-active" role="status">{{ counts[all].active }} active</span></div>
-<div class="scroll" id="ways" tabindex="0" role="group" aria-label="Control structure">{{ figure }}</div>
+</select>
+<span class="quiet" id="path-counts-active" role="status">{{ counts[all].active }} active</span></div>
+<div class="scroll" id="path-counts" tabindex="0" role="group"
+aria-label="Control structure">{{ figure }}</div>
 {{ data }}
 {% endif %}
 <details{{ "" if figure else " open" }}>
 <summary>{{ "The same numbers as a table" if figure else "Links" }}</summary>
-<div class="scroll"><table id="ways-table"><thead><tr><th scope="col">from</th><th scope="col">to</th>
+<div class="scroll"><table id="path-counts-table"><thead><tr><th scope="col">from</th><th scope="col">to</th>
 <th scope="col">what it carries</th><th scope="col">got through, of those that reached it</th></tr></thead>
 <tbody>
 {% for name, (tail, tip, carries) in links.items() %}
@@ -69,11 +71,11 @@ def paths_panel(run: ReportedRun) -> Panel | None:
     html = rendered(
         _HTML,
         about=_ABOUT,
-        figure=_markup(draw_ways(structure, counts[ALL], links.keys())) if structure else None,
+        figure=_markup(draw_path_counts(structure, counts[ALL], links.keys())) if structure else None,
         kinds=list(counts),
         all=ALL,
         counts=counts,
-        data=_markup(plainly_embedded({kind: c.plain() for kind, c in counts.items()}, "ways-data")),
+        data=_markup(plainly_embedded({kind: c.plain() for kind, c in counts.items()}, "path-counts-data")),
         links=links,
         label=paths.label,
         share=lambda through, came: share_text(through, came) or "none reached it",

@@ -38,13 +38,13 @@ const Path = (() => {
     if (!place.isConnected) return; // another experiment was opened in the meantime
     const shape = paths ? paths.shapes[paths.shape[results.row]] : null;
     if (!shape) {
-      place.replaceChildren(Dom.el("p.quiet", {}, paths ? none(results) : "This run has no paths: an earlier version of mutator recorded it, or no channel of the manifest names a component."));
+      place.replaceChildren(Dom.el("p.quiet", {}, paths ? none(results) : "This run has no paths: no channel of the manifest names a component."));
       return;
     }
     const left = departures(paths, results.row), begin = results.number("t_activation");
-    const stages = shape.map(([name, state, column]) => stage(name, state, column, left.get(name) || [], paths.by[results.row]?.[name], begin));
+    const components = shape.map(([name, state, column]) => pathComponent(name, state, column, left.get(name) || [], paths.by[results.row]?.[name], begin));
     const boxes = [];
-    place.replaceChildren(said(results, paths), drawn(stages, paths, boxes), late(stages, paths), table(paths, left, begin));
+    place.replaceChildren(said(results, paths), drawn(components, paths, boxes), late(components, paths), table(paths, left, begin));
     shown = { boxes };
     listen(place);
   }
@@ -65,16 +65,16 @@ const Path = (() => {
   }
 
   /** A component of the path. `t` is when it changed or, with `by`, the latest possible time, inferred from components that only it feeds. */
-  function stage(name, state, column, channels, by, begin) {
+  function pathComponent(name, state, column, channels, by, begin) {
     const own = first(channels), t = state === "injected" ? begin : by ?? own;
     return { name, state, column, channels, own, t: Number.isNaN(t) ? Infinity : t, by: state !== "injected" && by !== undefined, begin };
   }
 
   /** The boxes. Components at the same distance along the path share a column. */
-  function drawn(stages, paths, boxes) {
+  function drawn(components, paths, boxes) {
     const { el } = Dom;
     const columns = [];
-    for (const one of stages) (columns[one.column] ??= []).push(one);
+    for (const one of components) (columns[one.column] ??= []).push(one);
     return el("div.scroll", { tabindex: 0, role: "group", "aria-label": "Path of the fault" }, el("ol.path-strip", {}, columns.map((together) =>
       el("li", {}, together.map((one) => {
         const made = box(one, paths);
@@ -96,9 +96,9 @@ const Path = (() => {
   }
 
   /** The reason why a component can change after one further along the path. */
-  function late(stages, paths) {
+  function late(components, paths) {
     const { el } = Dom;
-    const all = stages.filter((one) => one.state === "reached" && stages.some((other) => other.state === "reached" && other.column > one.column && other.t < one.t));
+    const all = components.filter((one) => one.state === "reached" && components.some((other) => other.state === "reached" && other.column > one.column && other.t < one.t));
     const names = all.map((one) => paths.components[one.name]?.label || one.name).join(" and ");
     return names ? el("p.quiet", {}, `Recorded channels of ${names} changed only after those of a component further along the path. The fault reached that component by another path.`) : "";
   }

@@ -2,16 +2,16 @@
 "use strict";
 // Shows the counts of the chosen fault type in the control structure, which report/path_drawing.py draws.
 
-const Ways = (() => {
+const PathCounts = (() => {
   const ALL = "all fault types", THIN = 1.8, WIDEST = 7;
   const share = ([through, came]) => (came ? `${through} of ${came}, ${Math.round((100 * through) / came)} %` : "");
   const boxLines = ([injected, stopped, masked]) => [
     [injected && `${injected} injected`, stopped && `${stopped} stopped`].filter(Boolean).join(", "), masked ? `${masked} masked` : ""];
 
   function start() {
-    const place = document.getElementById("ways"), data = document.getElementById("ways-data");
+    const place = document.getElementById("path-counts"), data = document.getElementById("path-counts-data");
     if (!place || !data) return;
-    const counts = JSON.parse(data.textContent), picker = document.getElementById("ways-kind");
+    const counts = JSON.parse(data.textContent), picker = document.getElementById("path-counts-kind");
     picker.disabled = false;
     picker.addEventListener("change", () => show(place, picker.value, counts[picker.value]));
   }
@@ -19,17 +19,17 @@ const Ways = (() => {
   function show(place, kind, { active, links, components }) {
     const only = kind === ALL ? "" : `&kind=${encodeURIComponent(kind)}`;
     const filter = (element) => element.setAttribute("href", element.getAttribute("href").split("&")[0] + only);
-    document.getElementById("ways-active").textContent = `${active} active`;
-    for (const way of place.querySelectorAll("[data-link]")) {
-      const numbers = links[way.dataset.link] || [0, 0], [through, came] = numbers;
-      const state = through ? "through" : came ? "stopped" : "quiet", line = way.querySelector(".line");
-      way.setAttribute("class", `way is-${state}`);
-      line.setAttribute("marker-end", `url(#ways-${state})`);
+    document.getElementById("path-counts-active").textContent = `${active} active`;
+    for (const link of place.querySelectorAll("[data-link]")) {
+      const numbers = links[link.dataset.link] || [0, 0], [through, came] = numbers;
+      const state = through ? "through" : came ? "stopped" : "quiet", line = link.querySelector(".line");
+      link.setAttribute("class", `link is-${state}`);
+      line.setAttribute("marker-end", `url(#path-tip-${state})`);
       line.style.strokeWidth = `${THIN + (came ? ((WIDEST - THIN) * through) / came : 0)}px`;
-      const [first, last = ""] = "short" in way.dataset ? share(numbers).split(", ") : [share(numbers)];
-      way.querySelectorAll(".count").forEach((line, i) => { line.textContent = i ? last : first; });
-      document.querySelector(`#ways-table [data-link="${CSS.escape(way.dataset.link)}"] td:last-child`).textContent = share(numbers) || "none reached it";
-      filter(way);
+      const [first, last = ""] = "short" in link.dataset ? share(numbers).split(", ") : [share(numbers)];
+      link.querySelectorAll(".count").forEach((line, i) => { line.textContent = i ? last : first; });
+      document.querySelector(`#path-counts-table [data-link="${CSS.escape(link.dataset.link)}"] td:last-child`).textContent = share(numbers) || "none reached it";
+      filter(link);
     }
     for (const box of place.querySelectorAll("[data-component]")) {
       const numbers = components[box.dataset.component] || [0, 0, 0];
@@ -43,4 +43,4 @@ const Ways = (() => {
   return { start };
 })();
 
-Ways.start();
+PathCounts.start();
