@@ -6,10 +6,10 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
 from mutator.errors import GroupsChanged, JobEnded, MutatorError
-from mutator.serve.answers import error_facts
 from mutator.serve.jobs import Jobs
 from mutator.serve.orders import Desk, Work
 from mutator.serve.page_tokens import HEADER, HOME, PageTokens, review_page, run_page
+from mutator.serve.responses import error_facts
 from mutator.serve.reviews import Decisions, Reviews, Selection
 from mutator.serve.runs import Runs
 

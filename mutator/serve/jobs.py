@@ -18,9 +18,9 @@ from typing import IO, Any
 from mutator._common.events import EVENTS_FD
 from mutator.errors import Absent, JobEnded, MutatorError
 from mutator.execution.phases import endings
-from mutator.serve.answers import without_places
 from mutator.serve.job_events import Event, EventReader, Link, Phase
 from mutator.serve.orders import TRIES, Work
+from mutator.serve.responses import without_places
 
 _KEEPER = "mutator.serve.keeper"
 _COLUMNS = "200"  # line width of a job's output; pages wrap the lines

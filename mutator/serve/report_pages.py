@@ -18,9 +18,9 @@ from mutator.report import building
 from mutator.report.panel import FOLDER
 from mutator.report.stamp import made_from
 from mutator.results.table_reader import Results
-from mutator.serve.answers import STORED, OpenFile, kind_of
 from mutator.serve.page_tokens import PageTokens, run_page
 from mutator.serve.report_cache import ReportCache
+from mutator.serve.responses import STORED, OpenFile, kind_of
 from mutator.serve.runs import Runs, open_in_run
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_script import read_script, script_of

@@ -13,10 +13,10 @@ from mutator.errors import MutatorError
 from mutator.report import building
 from mutator.report.stamp import made_from, write_files
 from mutator.results import table_building
-from mutator.serve.answers import without_places
 from mutator.serve.page_tokens import PageTokens
 from mutator.serve.report_cache import ReportCache
 from mutator.serve.report_pages import Shown
+from mutator.serve.responses import without_places
 from mutator.serve.runs import Runs
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_script import script_of
