@@ -31,7 +31,7 @@ from mutator.execution.single_run import run_golden
 from mutator.model import Experiment, Record
 from mutator.mutants.building import build
 from mutator.outcomes.golden import load_trace
-from mutator.outcomes.sampling import Sampler
+from mutator.outcomes.series_sampling import Sampler
 from mutator.preflight import equivalence
 from mutator.preflight.preflight_rules import digest_of
 from mutator.store import digests, plan_file

@@ -26,7 +26,7 @@ from mutator.campaigns.plans import make_plan
 from mutator.model import Experiment, Record, Trigger
 from mutator.mutants.building import build
 from mutator.mutants.readable_diffs import readable
-from mutator.outcomes.sampling import Sampler
+from mutator.outcomes.series_sampling import Sampler
 from mutator.report import browse as report_browse
 from mutator.report import page as report_page
 from mutator.report.browse import Browse

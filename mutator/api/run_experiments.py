@@ -12,7 +12,7 @@ from mutator.api.trials import Trial, trial_of
 from mutator.errors import MutatorError
 from mutator.execution.single_run import rerun
 from mutator.outcomes.golden import Trace, load_trace
-from mutator.outcomes.sampling import keep_series
+from mutator.outcomes.series_sampling import keep_series
 from mutator.report.film import Filming, Shot
 
 

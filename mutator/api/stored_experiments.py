@@ -15,7 +15,7 @@ from mutator.errors import MutatorError
 from mutator.model import Experiment, Fault, Record
 from mutator.outcomes.fault_paths import FaultPath, FaultPaths, fault_paths_of
 from mutator.outcomes.golden import Trace
-from mutator.outcomes.sampling import sampled_traces
+from mutator.outcomes.series_sampling import sampled_traces
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.store.series import SeriesFolder, making_again

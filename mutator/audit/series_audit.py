@@ -7,7 +7,7 @@ import numpy as np
 from mutator._common.below import inside
 from mutator.errors import MutatorError
 from mutator.outcomes.judging import load_channels
-from mutator.outcomes.sampling import Sampler
+from mutator.outcomes.series_sampling import Sampler
 from mutator.store import plan_file
 from mutator.store.blocks import read_blocks
 from mutator.store.run_folder import RunFolder

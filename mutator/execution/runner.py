@@ -23,7 +23,7 @@ from mutator.outcomes.blame import assign_blame, error_of
 from mutator.outcomes.channel_departures import departures
 from mutator.outcomes.golden import Trace
 from mutator.outcomes.judging import Judged, load_channels, load_judged
-from mutator.outcomes.sampling import Sampler
+from mutator.outcomes.series_sampling import Sampler
 from mutator.outcomes.verdicts import first_events, judge
 from mutator.preflight.preflight_rules import digest_of
 from mutator.store.run_folder import GoldenRun

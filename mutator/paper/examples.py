@@ -11,7 +11,7 @@ from mutator.execution.traces import Traces
 from mutator.figures.figures import Drawing
 from mutator.figures.run_plot import marks_of
 from mutator.model import fault_label
-from mutator.outcomes.sampling import RATE
+from mutator.outcomes.series_sampling import RATE
 from mutator.paper.actions import WANTED, Pair, Wanted
 from mutator.paper.run_pair import draw
 from mutator.store.run_folder import RunFolder

@@ -19,7 +19,7 @@ from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plans import make_plan
 from mutator.model import Activation, Experiment, Outcome, Record, Status
 from mutator.mutants.building import build
-from mutator.outcomes.sampling import Sampler, keep_series
+from mutator.outcomes.series_sampling import Sampler, keep_series
 from mutator.report import building
 from mutator.report.panels import figures
 from mutator.results import table_building

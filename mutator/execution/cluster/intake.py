@@ -9,7 +9,7 @@ from mutator.execution.runner import without_outcome
 from mutator.execution.written_files import Sums
 from mutator.model import Status
 from mutator.outcomes.judging import load_channels
-from mutator.outcomes.sampling import Sampler
+from mutator.outcomes.series_sampling import Sampler
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_writer import RunWriter
 from mutator.targets.manifest import TargetManifest
