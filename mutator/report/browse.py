@@ -19,9 +19,9 @@ from mutator.errors import MutatorError
 from mutator.model import Experiment, Fault
 from mutator.mutants.readable_diffs import readable
 from mutator.report.answer_parts import warning
+from mutator.report.page_series import series_facts
 from mutator.report.panel import FOLDER
 from mutator.report.paths import RunPaths
-from mutator.report.series import series_facts
 from mutator.report.source_lines import SourceLines
 from mutator.report.studies import ReportedRun
 from mutator.report.whole_map import map_of

@@ -12,10 +12,10 @@ from mutator._common.tables import Table
 from mutator._common.text import counted
 from mutator.report.browse import Browse, browse_data
 from mutator.report.page import Content, markdown, page_html, study_html, study_markdown
+from mutator.report.page_series import sample_kept_traces
 from mutator.report.panel import FOLDER
 from mutator.report.panels import PANELS, study_panels
 from mutator.report.panels.answers import answers_panel
-from mutator.report.series import sample_kept_traces
 from mutator.report.stamp import is_current, made_from, write_files
 from mutator.report.studies import ReportedRun
 from mutator.report.words import words_of

@@ -10,8 +10,8 @@ from mutator._common.files import json_bytes, json_object
 from mutator._common.hashing import digest
 from mutator._common.version import VERSION
 from mutator.errors import MutatorError
+from mutator.report.page_series import series_facts
 from mutator.report.panel import FOLDER
-from mutator.report.series import series_facts
 from mutator.store import digests
 from mutator.store import series as series_store
 from mutator.store.opening import ASIDE, SCRATCH, SIGNATURE, TRACES, belongs
