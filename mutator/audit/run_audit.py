@@ -24,7 +24,7 @@ from mutator.audit.table_audit import tables
 from mutator.campaigns.freezing import CSV, plan_csv
 from mutator.campaigns.plan_parts import plan_digest
 from mutator.campaigns.plans import load_plan
-from mutator.campaigns.provenance import sources
+from mutator.campaigns.run_inputs import RunInputs
 from mutator.errors import MutatorError
 from mutator.store import digests, plan_file
 from mutator.store.blocks import read_blocks
@@ -189,7 +189,7 @@ def _sources(folder: RunFolder, workspace: Workspace | None) -> Problems:
         )
         return
     manifest = workspace.manifest(head["target"])
-    now = sources(workspace, manifest, folder.scenarios)
+    now = RunInputs.of(workspace, manifest, folder.scenarios).digests()
     for name, known in head["sources"].items():
         if now.get(name) != known:
             yield MutatorError(

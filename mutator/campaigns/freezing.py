@@ -22,7 +22,8 @@ from mutator._common.locks import owned
 from mutator._common.version import VERSION
 from mutator.campaigns.plan_parts import Part, PlanDigest, Tally
 from mutator.campaigns.plans import Plan, Planning
-from mutator.campaigns.provenance import check_sources, check_version, sources
+from mutator.campaigns.provenance import check_sources, check_version
+from mutator.campaigns.run_inputs import RunInputs
 from mutator.errors import MutatorError
 from mutator.model import Experiment
 from mutator.results.column_facts import PLAN_COLUMNS, plan_row
@@ -139,7 +140,7 @@ def _written(plan: Plan | Planning, out: Path) -> tuple[Tally, str, list[plan_fi
 
 def _sources(tally: Tally, plan: Plan | Planning, workspace: Workspace) -> dict[str, str]:
     scenarios = {one.scenario for one in tally.needed()}
-    return sources(workspace, workspace.manifest(plan.campaign.target), scenarios)
+    return RunInputs.of(workspace, workspace.manifest(plan.campaign.target), scenarios).digests()
 
 
 def _head(

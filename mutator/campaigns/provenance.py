@@ -3,13 +3,12 @@
 import platform
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from packaging.utils import canonicalize_name
 
-from mutator._common.bounded import read_bounded
 from mutator._common.files import json_bytes
-from mutator._common.hashing import digest, plain
+from mutator._common.hashing import plain
 from mutator._common.version import VERSION
 from mutator.campaigns import machine
 from mutator.campaigns.clones import clone_state
@@ -19,21 +18,12 @@ from mutator.store.check_results import loaded_packages
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import HEAD, SCHEMA
 from mutator.store.stretches import Stretch, differences
-from mutator.targets.manifest import TargetManifest
-from mutator.workspace import Workspace
+
+if TYPE_CHECKING:
+    from mutator.workspace import Workspace
 
 _REMEDY = "undo the change, or use another run folder"
 _OWN = Path(__file__).parents[1]  # the harness
-
-
-def sources(workspace: Workspace, manifest: TargetManifest, scenarios: set[str]) -> dict[str, str]:
-    """Return the digests, by name, of all files outside the plan that affect results."""
-    return {
-        "target": manifest.tree.digest,
-        "manifest": digest(read_bounded(manifest.path)),
-        "templates": workspace.fault_models().digest,
-        **{f"scenario {s}": digest(read_bounded(workspace.scenario(s))) for s in sorted(scenarios)},
-    }
 
 
 def check_sources(run: Path, frozen: dict[str, str], now: dict[str, str]) -> None:
@@ -91,7 +81,7 @@ def _packages(folder: RunFolder, more: Iterable[str] = ()) -> dict[str, str | No
     return machine.versions({*machine.required(), *loaded_packages(folder), *before, *more})
 
 
-def begin_stretch(folder: RunFolder, workspace: Workspace, *, records: str, accept: bool) -> None:
+def begin_stretch(folder: RunFolder, workspace: "Workspace", *, records: str, accept: bool) -> None:
     """Record this session's software and machine in run.json, before its first experiment.
 
     `records` is the glob of the session's files. MutatorError as in `check_versions`.

@@ -60,6 +60,11 @@ def pytest_configure(config: pytest.Config) -> None:
         return
     if out is None:
         raise pytest.UsageError("--campaign needs --campaign-out DIR, the folder for its results")
+    if hasattr(config, "workerinput"):
+        from mutator.execution.pytest_worker import WorkerSide
+
+        config.pluginmanager.register(WorkerSide(config, config.workerinput))
+        return
     from mutator.errors import MutatorError
     from mutator.execution.distribution import distributor
     from mutator.execution.pytest_session import configure

@@ -1,10 +1,9 @@
-"""Campaigns as pytest sessions: controller, xdist workers, and items (chunks)."""
+"""Campaigns as pytest sessions: the controller, whose xdist workers have `pytest_worker`."""
 
 import os
 import shlex
 import signal
 import sys
-import traceback
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -12,64 +11,21 @@ from typing import Any, Protocol
 
 import pytest
 
-from mutator._common.files import raising_disk_full
-from mutator._common.locks import living_workers, register_worker
+from mutator._common.locks import living_workers
 from mutator._common.shortages import shortage
-from mutator.campaigns.chunks import Pending
 from mutator.campaigns.plans import Choices
-from mutator.errors import DiskFull, HarnessErrors, MutatorError, Shortage
+from mutator.errors import HarnessErrors, MutatorError
 from mutator.execution.following import followed
 from mutator.execution.phases import Lines
+from mutator.execution.pytest_worker import INPUT, PROBLEM, WRITTEN, CampaignItem, LazyWorker, collect
 from mutator.execution.session import Notify, Session, Summary, open_session
-from mutator.execution.stopped_workers import Continuing, on_stop
-from mutator.execution.worker import Assignment, Worker, bind_to_parent, dying_python
-from mutator.execution.written_files import Sums
-from mutator.preflight.equivalence import Sample
+from mutator.execution.stopped_workers import Continuing
+from mutator.execution.worker import Assignment, dying_python
 from mutator.workspace import Workspace
-
-_INPUT = "mutator_campaign"
-_PROBLEM = "mutator_problem"
-_WRITTEN = "mutator_written"
 
 
 class Deals(Protocol):
     def run(self, session: Session) -> None: ...
-
-
-class CampaignItem(pytest.Item):
-    """An item that does part of a campaign's work. It fails only for harness errors."""
-
-    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
-        if isinstance(excinfo.value, HarnessErrors | MutatorError):
-            return str(excinfo.value)
-        return super().repr_failure(excinfo, style)
-
-    def reportinfo(self) -> tuple[Path, None, str]:
-        return self.config.rootpath, None, self.name
-
-
-class WorkItem(CampaignItem):
-    """One chunk of the plan, or one experiment of the proof. A hazard is a result, not a failure."""
-
-    def __init__(self, *, work: Pending | Sample, worker: "LazyWorker", **keywords: Any) -> None:
-        super().__init__(**keywords)
-        self.work = work
-        self.worker = worker
-
-    def runtest(self) -> None:
-        try:
-            with raising_disk_full(self.config.rootpath):
-                worker, work = self.worker.get(), self.work
-                errors = worker.run(work) if isinstance(work, Pending) else worker.prove(work)
-        except Exception as err:
-            known = err if isinstance(err, MutatorError) else shortage(err)
-            problem = str(known) if known else _defect(err, self.name)
-            self.user_properties.append((_PROBLEM, problem))
-            if isinstance(known, DiskFull | Shortage):
-                self.session.shouldstop = problem
-            raise
-        if errors:
-            raise HarnessErrors("\n".join(f"{name}: {detail}" for name, detail in errors))
 
 
 class DealItem(CampaignItem):
@@ -88,40 +44,6 @@ class DealItem(CampaignItem):
             raise HarnessErrors(self._begun.problem)
 
 
-def _defect(err: Exception, chunk: str) -> str:
-    lines = "".join(traceback.format_exception(err))
-    return (
-        f"{chunk} failed because of a defect in mutator; please report it with these lines:\n{lines}".rstrip()
-    )
-
-
-class LazyWorker:
-    """The worker of this process, made when the first chunk runs, because collection does not need it."""
-
-    def __init__(self, workspace: Workspace, assignment: Assignment) -> None:
-        self._workspace = workspace
-        self._assignment = assignment
-        self._worker: Worker | None = None
-
-    def get(self) -> Worker:
-        if self._worker is None:
-            self._worker = Worker(self._workspace, self._assignment)
-        return self._worker
-
-    def note_stop(self) -> None:
-        """Note that this process was stopped and continued."""
-        if self._worker is not None:
-            self._worker.was_stopped = True
-
-    def close(self) -> Sums:
-        """Close the worker's files; return their digests."""
-        worker, self._worker = self._worker, None
-        if worker is None:
-            return {}
-        worker.close()
-        return worker.written
-
-
 def configure(
     config: pytest.Config,
     campaign: str,
@@ -132,17 +54,14 @@ def configure(
     sandbox: bool,
     distributor: "Deals | None" = None,
 ) -> None:
-    """Register the plugin for this process's role.
+    """Register the plugin of the process that is no worker.
 
     Workers take items one by one, even if the user's configuration groups tests, for example by file. With a
     `distributor`, pytest itself distributes nothing.
     """
     if getattr(config.option, "dist", "no") != "no":
         config.option.dist = "load"
-    given = getattr(config, "workerinput", {}).get(_INPUT)
-    if given is not None:
-        config.pluginmanager.register(WorkerSide(config, given, config.workerinput["workerid"]))  # type: ignore[attr-defined]
-    elif not any(isinstance(plugin, Controller) for plugin in config.pluginmanager.get_plugins()):
+    if not any(isinstance(plugin, Controller) for plugin in config.pluginmanager.get_plugins()):
         config.pluginmanager.register(
             PlainController(
                 campaign,
@@ -153,63 +72,6 @@ def configure(
                 distributor=distributor,
             )
         )
-
-
-def _collect(session: pytest.Session, works: Sequence[Pending | Sample], worker: LazyWorker) -> bool:
-    """Make the session's items: chunks, then experiments of the proof.
-
-    The proof has the smallest items and comes last, so that the workers finish at about the same time.
-    """
-    session.items = []
-    for work in works:
-        name = f"chunk-{work.chunk:05d}" if isinstance(work, Pending) else f"proof-{work.number:05d}"
-        session.items.append(
-            WorkItem.from_parent(session, name=name, nodeid=f"campaign::{name}", work=work, worker=worker)
-        )
-    session.testscollected = len(session.items)
-    session.config.hook.pytest_collection_finish(session=session)
-    return True
-
-
-class WorkerSide:
-    """Plugin of an xdist worker: collects the pending work, and runs the items that it receives."""
-
-    def __init__(self, config: pytest.Config, given: dict[str, Any], worker_id: str) -> None:
-        bind_to_parent(given["parent"])
-        run, places = Path(given["run"]), given["workspace"]
-        workspace = Workspace(
-            library=Path(places["library"]),
-            templates=Path(places["templates"]),
-            target=Path(places["target"]) if places["target"] else None,
-            sandbox=bool(places["sandbox"]),
-        )
-        assignment = Assignment(
-            run=run,
-            name=given["session"] + worker_id,
-            engine=given["engine"],
-            goldens=given["goldens"],
-            secret=given["secret"],
-            parent=given["parent"],
-        )
-        self._config = config
-        self._registration = register_worker(run)
-        self._work: list[Pending | Sample] = [
-            *(Pending(chunk, tuple(places)) for chunk, places in given["pending"]),
-            *(Sample(number, name) for number, name in given["proof"]),
-        ]
-        self._worker = LazyWorker(workspace, assignment)
-        on_stop(self._worker.note_stop)
-
-    def pytest_collection(self, session: pytest.Session) -> bool:
-        return _collect(session, self._work, self._worker)
-
-    def pytest_sessionfinish(self) -> None:
-        try:
-            written = self._worker.close()
-            self._config.workeroutput[_WRITTEN] = dict(written)  # type: ignore[attr-defined]
-        except MutatorError as err:
-            self._config.workeroutput[_PROBLEM] = str(err)  # type: ignore[attr-defined]
-        os.close(self._registration)
 
 
 class Controller:
@@ -230,7 +92,7 @@ class Controller:
     @pytest.hookimpl(optionalhook=True)
     def pytest_configure_node(self, node: Any) -> None:
         assert self.begun is not None
-        worker_input = node.workerinput[_INPUT] = self.begun.worker_input()
+        worker_input = node.workerinput[INPUT] = self.begun.worker_input()
         self.begun.written.begin(worker_input["session"] + node.gateway.id)
 
     @pytest.hookimpl(optionalhook=True)
@@ -238,10 +100,10 @@ class Controller:
         if error:
             self._note(f"worker {node.gateway.id} died: {error}")
         assert self.begun is not None
-        output, given = getattr(node, "workeroutput", {}), node.workerinput[_INPUT]
-        self._note(output.get(_PROBLEM, ""))
-        if _WRITTEN in output:
-            self.begun.written.report(output[_WRITTEN], given["session"] + node.gateway.id)
+        output, given = getattr(node, "workeroutput", {}), node.workerinput[INPUT]
+        self._note(output.get(PROBLEM, ""))
+        if WRITTEN in output:
+            self.begun.written.report(output[WRITTEN], given["session"] + node.gateway.id)
 
     def pytest_collection(self, session: pytest.Session) -> bool | None:
         if session.config.pluginmanager.hasplugin("dsession"):
@@ -256,11 +118,11 @@ class Controller:
             goldens=begun.golden_digests,
             secret=begun.secret,
         )
-        self._worker = LazyWorker(begun.workspace, assignment)
-        return _collect(session, (*begun.pending, *begun.proof), self._worker)
+        self._worker = LazyWorker(lambda: begun.inputs, assignment)
+        return collect(session, (*begun.pending, *begun.proof), self._worker)
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        self._note(str(dict(report.user_properties).get(_PROBLEM, "")))
+        self._note(str(dict(report.user_properties).get(PROBLEM, "")))
 
     def pytest_keyboard_interrupt(self, excinfo: pytest.ExceptionInfo[BaseException]) -> None:
         if self.begun is None:

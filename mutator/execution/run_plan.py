@@ -7,7 +7,8 @@ from mutator._common.hashing import digest
 from mutator.campaigns.campaign_files import load_campaign
 from mutator.campaigns.freezing import freeze_owned
 from mutator.campaigns.plans import Choices, Planning, load_plan, make_plan
-from mutator.campaigns.provenance import check_sources, check_version, sources
+from mutator.campaigns.provenance import check_sources, check_version
+from mutator.campaigns.run_inputs import RunInputs
 from mutator.errors import MutatorError
 from mutator.review import gate
 from mutator.store.approvals import write_approvals
@@ -60,6 +61,6 @@ def _found(workspace: Workspace, campaign: str | Path, out: Path, choices: Choic
                 argument=name,
                 remedy=f"leave out `{name}`, or use another folder",
             )
-    now = sources(workspace, workspace.manifest(head["target"]), folder.scenarios)
+    now = RunInputs.of(workspace, workspace.manifest(head["target"]), folder.scenarios).digests()
     check_sources(out, head["sources"], now)
     return folder

@@ -11,7 +11,8 @@ import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import chain
 from pathlib import Path
 from secrets import token_bytes
@@ -25,6 +26,7 @@ from mutator.campaigns.chunks import Pending, pending
 from mutator.campaigns.freezing import make_run_folder
 from mutator.campaigns.plans import Choices
 from mutator.campaigns.provenance import add_machine, begin_stretch, check_versions
+from mutator.campaigns.run_inputs import RunInputs
 from mutator.engines.kinds import REFERENCE
 from mutator.engines.registry import choose_engine, not_worth_forking
 from mutator.engines.run_home import make_work
@@ -173,12 +175,16 @@ class Session:
         taken = [int(number[0]) for path in files if (number := re.match(r"\d+", path.name))]
         return f"{max(taken, default=0) + 1:04d}-{name}"
 
+    @cached_property
+    def inputs(self) -> RunInputs:
+        return RunInputs.of(self.workspace, self.manifest, self.folder.scenarios)
+
     def worker_input(self) -> dict[str, Any]:
         return {
             "parent": os.getpid(),
             "run": str(self.folder.path),
             "session": self.worker_name(""),
-            "workspace": {k: str(v) if v else None for k, v in asdict(self.workspace).items()},
+            "inputs": self.inputs.packed(),
             "engine": self.engine,
             "goldens": dict(self.golden_digests),
             "secret": self.secret,

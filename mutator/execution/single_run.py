@@ -10,7 +10,8 @@ from tempfile import mkdtemp
 from mutator._common.below import inside
 from mutator._common.files import make_folder, raising_disk_full, remove_folder, write_atomic
 from mutator._common.locks import alone_in
-from mutator.campaigns.provenance import check_sources, sources
+from mutator.campaigns.provenance import check_sources
+from mutator.campaigns.run_inputs import RunInputs
 from mutator.engines.jobs import Job
 from mutator.engines.reference import ReferenceEngine
 from mutator.errors import CheckFailed
@@ -112,7 +113,8 @@ def is_same(folder: RunFolder, known: Record | None, found: Record) -> bool:
 def manifest_of(workspace: Workspace, folder: RunFolder) -> TargetManifest:
     """Return the target of a run; MutatorError if its sources have changed since the run."""
     manifest = workspace.manifest(folder.head["target"])
-    check_sources(folder.path, folder.head["sources"], sources(workspace, manifest, folder.scenarios))
+    now = RunInputs.of(workspace, manifest, folder.scenarios).digests()
+    check_sources(folder.path, folder.head["sources"], now)
     return manifest
 
 

@@ -12,7 +12,8 @@ from mutator._common import caches
 from mutator._common.below import inside
 from mutator._common.files import raising_disk_full
 from mutator.campaigns.chunks import Pending
-from mutator.campaigns.provenance import check_sources, sources
+from mutator.campaigns.provenance import check_sources
+from mutator.campaigns.run_inputs import RunInputs
 from mutator.engines.in_target import guard
 from mutator.engines.jobs import FAST, Engine, Setting
 from mutator.engines.reference import ReferenceEngine
@@ -26,7 +27,6 @@ from mutator.store import plan_file
 from mutator.store.planned import Planned
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_writer import RunWriter
-from mutator.workspace import Workspace
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,16 +49,13 @@ class Assignment:
 class Worker:
     """Runs chunks of a run folder and appends their results. Reads the plan chunk by chunk."""
 
-    def __init__(self, workspace: Workspace, assignment: Assignment) -> None:
+    def __init__(self, inputs: RunInputs, assignment: Assignment) -> None:
         self.was_stopped = False  # a signal handler sets it
         self.folder = RunFolder.open(assignment.run)
-        head = self.folder.head
-        manifest = workspace.manifest(head["target"])
-        now = sources(workspace, manifest, self.folder.scenarios)
-        check_sources(self.folder.path, head["sources"], now)
+        check_sources(self.folder.path, self.folder.head["sources"], inputs.digests())
         with raising_disk_full(self.folder.work):
             self.folder.work.mkdir(exist_ok=True)
-        self._workspace, self._manifest, self._assignment = workspace, manifest, assignment
+        self._inputs, self._manifest, self._assignment = inputs, inputs.manifest, assignment
         self._runner = self._make_runner(
             self._engine(assignment.engine), with_series=bool(self.folder.series_mb)
         )
@@ -133,16 +130,21 @@ class Worker:
                 inside(folder.path / "golden", key): one for key, one in self._assignment.goldens.items()
             },
         )
-        models = self._workspace.fault_models()
+        inputs = self._inputs
         return Runner(
-            self._manifest, models, engine, goldens, self._workspace.scenario, with_series=with_series
+            self._manifest,
+            inputs.models,
+            engine,
+            goldens,
+            inputs.scenarios.__getitem__,
+            with_series=with_series,
         )
 
     def _engine(self, name: str) -> Engine:
         folder = self.folder
         setting = Setting(
             manifest=self._manifest,
-            models=self._workspace.fault_models(),
+            models=self._inputs.models,
             work=folder.work,
             limits=folder.limits,
             parent=self._assignment.parent,

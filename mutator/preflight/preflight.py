@@ -12,7 +12,7 @@ from mutator._common.bounded import read_bounded
 from mutator._common.files import json_bytes, raising_disk_full, read_json, write_atomic
 from mutator._common.hashing import digest
 from mutator.campaigns import machine
-from mutator.campaigns.provenance import sources
+from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.shared_runs import same_in
 from mutator.errors import CheckFailed, DiskFull, InvalidMutant, MutatorError
 from mutator.mutants.building import build
@@ -93,7 +93,7 @@ class _Checks:
         self.manifest: TargetManifest = workspace.manifest(head["target"])
         self.models = workspace.fault_models()
         self.keys = folder.goldens
-        now = sources(workspace, self.manifest, folder.scenarios)
+        now = RunInputs.of(workspace, self.manifest, folder.scenarios).digests()
         self.variants = {fault.spec: fault for fault in plan_file.read_faults(folder.path).values()}
         places = sorted((name, [i.location for i in f.injections]) for name, f in self.variants.items())
         content = [

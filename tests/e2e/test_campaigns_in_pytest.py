@@ -115,7 +115,6 @@ def test_collecting_50000_experiments_is_fast(toy: Workspace, tmp_path: Path) ->
     """Collecting 2,500 chunks opens neither plan nor target nor library."""
     begun: Any = SimpleNamespace(
         folder=SimpleNamespace(path=tmp_path / "nowhere"),
-        workspace=Workspace(library=tmp_path / "nowhere", templates=tmp_path / "nowhere"),
         pending=tuple(Pending(chunk, tuple(range(20))) for chunk in range(2500)),
         proof=(),
         engine="reference",

@@ -42,7 +42,7 @@ class OnePiece:
             goldens=session.golden_digests,
             secret=session.secret,
         )
-        worker = Worker(session.workspace, assignment)
+        worker = Worker(session.inputs, assignment)
         worker.run(session.pending[0])
         worker.close()
         session.written.report(worker.written)

@@ -1,0 +1,53 @@
+"""The inputs of a run besides its plan."""
+
+import pickle
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mutator._common.bounded import read_bounded
+from mutator._common.hashing import digest
+from mutator.faults.fault_models import FaultModels
+from mutator.targets.manifest import TargetManifest
+
+if TYPE_CHECKING:
+    from mutator.workspace import Workspace
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunInputs:
+    """A target, the fault models, and the file of each scenario by name.
+
+    The command that reads the library's YAML passes them to its workers, which need no reader of YAML.
+    """
+
+    manifest: TargetManifest
+    models: FaultModels
+    scenarios: Mapping[str, Path]
+
+    @classmethod
+    def of(cls, workspace: "Workspace", manifest: TargetManifest, scenarios: Iterable[str]) -> "RunInputs":
+        """Return the inputs in a workspace; MutatorError for a missing scenario or a mistake in a model."""
+        files = {name: workspace.scenario(name) for name in sorted(scenarios)}
+        return cls(manifest=manifest, models=workspace.fault_models(), scenarios=files)
+
+    @classmethod
+    def unpacked(cls, data: bytes) -> "RunInputs":
+        """Return what `packed` packed. The data must come from the process that started this one."""
+        inputs = pickle.loads(data)
+        assert isinstance(inputs, cls)
+        return inputs
+
+    def packed(self) -> bytes:
+        """Return the inputs for another process, which reads the target's tree itself."""
+        return pickle.dumps(replace(self, manifest=replace(self.manifest)))
+
+    def digests(self) -> dict[str, str]:
+        """Return the digests, by name, of all files outside the plan that affect results."""
+        return {
+            "target": self.manifest.tree.digest,
+            "manifest": digest(read_bounded(self.manifest.path)),
+            "templates": self.models.digest,
+            **{f"scenario {name}": digest(read_bounded(path)) for name, path in self.scenarios.items()},
+        }

@@ -1,0 +1,147 @@
+"""A campaign's work as pytest items, and the plugin of xdist workers, which imports no reader of YAML."""
+
+import os
+import traceback
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mutator._common.files import raising_disk_full
+from mutator._common.locks import register_worker
+from mutator._common.shortages import shortage
+from mutator.campaigns.chunks import Pending
+from mutator.campaigns.run_inputs import RunInputs
+from mutator.errors import DiskFull, HarnessErrors, MutatorError, Shortage
+from mutator.execution.stopped_workers import on_stop
+from mutator.execution.worker import Assignment, Worker, bind_to_parent
+from mutator.execution.written_files import Sums
+from mutator.preflight.equivalence import Sample
+
+INPUT = "mutator_campaign"
+PROBLEM = "mutator_problem"
+WRITTEN = "mutator_written"
+
+
+class CampaignItem(pytest.Item):
+    """An item that does part of a campaign's work. It fails only for harness errors."""
+
+    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
+        if isinstance(excinfo.value, HarnessErrors | MutatorError):
+            return str(excinfo.value)
+        return super().repr_failure(excinfo, style)
+
+    def reportinfo(self) -> tuple[Path, None, str]:
+        return self.config.rootpath, None, self.name
+
+
+class WorkItem(CampaignItem):
+    """One chunk of the plan, or one experiment of the proof. A hazard is a result, not a failure."""
+
+    def __init__(self, *, work: Pending | Sample, worker: "LazyWorker", **keywords: Any) -> None:
+        super().__init__(**keywords)
+        self.work = work
+        self.worker = worker
+
+    def runtest(self) -> None:
+        try:
+            with raising_disk_full(self.config.rootpath):
+                worker, work = self.worker.get(), self.work
+                errors = worker.run(work) if isinstance(work, Pending) else worker.prove(work)
+        except Exception as err:
+            known = err if isinstance(err, MutatorError) else shortage(err)
+            problem = str(known) if known else _defect(err, self.name)
+            self.user_properties.append((PROBLEM, problem))
+            if isinstance(known, DiskFull | Shortage):
+                self.session.shouldstop = problem
+            raise
+        if errors:
+            raise HarnessErrors("\n".join(f"{name}: {detail}" for name, detail in errors))
+
+
+def _defect(err: Exception, chunk: str) -> str:
+    lines = "".join(traceback.format_exception(err))
+    return (
+        f"{chunk} failed because of a defect in mutator; please report it with these lines:\n{lines}".rstrip()
+    )
+
+
+class LazyWorker:
+    """The worker of this process, made when the first chunk runs, because collection does not need it."""
+
+    def __init__(self, inputs: Callable[[], RunInputs], assignment: Assignment) -> None:
+        self._inputs = inputs
+        self._assignment = assignment
+        self._worker: Worker | None = None
+
+    def get(self) -> Worker:
+        if self._worker is None:
+            self._worker = Worker(self._inputs(), self._assignment)
+        return self._worker
+
+    def note_stop(self) -> None:
+        """Note that this process was stopped and continued."""
+        if self._worker is not None:
+            self._worker.was_stopped = True
+
+    def close(self) -> Sums:
+        """Close the worker's files; return their digests."""
+        worker, self._worker = self._worker, None
+        if worker is None:
+            return {}
+        worker.close()
+        return worker.written
+
+
+def collect(session: pytest.Session, works: Sequence[Pending | Sample], worker: LazyWorker) -> bool:
+    """Make the session's items: chunks, then experiments of the proof.
+
+    The proof has the smallest items and comes last, so that the workers finish at about the same time.
+    """
+    session.items = []
+    for work in works:
+        name = f"chunk-{work.chunk:05d}" if isinstance(work, Pending) else f"proof-{work.number:05d}"
+        session.items.append(
+            WorkItem.from_parent(session, name=name, nodeid=f"campaign::{name}", work=work, worker=worker)
+        )
+    session.testscollected = len(session.items)
+    session.config.hook.pytest_collection_finish(session=session)
+    return True
+
+
+class WorkerSide:
+    """Plugin of an xdist worker: collects the pending work, and runs the items that it receives."""
+
+    def __init__(self, config: pytest.Config, worker_input: dict[str, Any]) -> None:
+        given = worker_input[INPUT]
+        bind_to_parent(given["parent"])
+        run = Path(given["run"])
+        assignment = Assignment(
+            run=run,
+            name=given["session"] + worker_input["workerid"],
+            engine=given["engine"],
+            goldens=given["goldens"],
+            secret=given["secret"],
+            parent=given["parent"],
+        )
+        self._config = config
+        self._registration = register_worker(run)
+        self._work: list[Pending | Sample] = [
+            *(Pending(chunk, tuple(places)) for chunk, places in given["pending"]),
+            *(Sample(number, name) for number, name in given["proof"]),
+        ]
+        self._worker = LazyWorker(partial(RunInputs.unpacked, given["inputs"]), assignment)
+        on_stop(self._worker.note_stop)
+
+    def pytest_collection(self, session: pytest.Session) -> bool:
+        return collect(session, self._work, self._worker)
+
+    def pytest_sessionfinish(self) -> None:
+        try:
+            written = self._worker.close()
+            self._config.workeroutput[WRITTEN] = dict(written)  # type: ignore[attr-defined]
+        except MutatorError as err:
+            self._config.workeroutput[PROBLEM] = str(err)  # type: ignore[attr-defined]
+        os.close(self._registration)
