@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
-from mutator.figures import hazards, heat_map, propagation
+from mutator.figures import hazards, heat_map, propagation_times
 from mutator.figures.run_plot import images
 from mutator.statistics.frame import slim
 
@@ -71,7 +71,7 @@ def _propagation(frame: pd.DataFrame) -> Drawing:
         title="Propagation times by scenario",
         note="Times between two events, in runs with both (number above). Alert to hazard: "
         "only if the alert came first. Runs that ended before the second event are not shown.",
-        figure=propagation.draw(frame),
+        figure=propagation_times.draw(frame),
     )
 
 

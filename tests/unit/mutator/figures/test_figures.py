@@ -5,7 +5,7 @@ import xml.etree.ElementTree as ET
 import pandas as pd
 import pytest
 
-from mutator.figures import hazards, heat_map, propagation
+from mutator.figures import hazards, heat_map, propagation_times
 from mutator.figures.figures import drawing_files, drawings
 
 from ..statistics.results_frame import results
@@ -54,7 +54,7 @@ def test_the_heat_map_shows_hazards_per_activated_fault(frame: pd.DataFrame) -> 
 
 
 def test_time_panels_include_only_runs_with_both_events(frame: pd.DataFrame) -> None:
-    panels = {axis.get_title(loc="left"): axis for axis in propagation.draw(frame).axes}
+    panels = {axis.get_title(loc="left"): axis for axis in propagation_times.draw(frame).axes}
     assert [t.get_text() for t in panels["activation to manifest"].texts] == ["3", "1"]
     assert [t.get_text() for t in panels["alert to hazard"].texts] == ["2", "1"]
     means = {line.get_label(): list(line.get_ydata()) for line in panels["alert to hazard"].lines}
