@@ -82,7 +82,7 @@ def paths_panel(run: ReportedRun) -> Panel | None:
         stops=stops,
         none_stopped=_NONE_STOPPED,
     )
-    return Panel(anchor="propagation", link="Fault paths", markdown="\n\n".join(parts), html=html)
+    return Panel(anchor="fault-paths", link="Fault paths", markdown="\n\n".join(parts), html=html)
 
 
 Links = Mapping[str, tuple[str, str, str]]  # tail, tip, and what the link carries
