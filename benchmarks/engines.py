@@ -54,7 +54,7 @@ class Bench:
         self.plan = plan
         work = folder / "work"
         work.mkdir()
-        null = build(self.manifest, self.models, None, always()).files
+        null = build(self.manifest, self.models, None, always())
         arguments = (self.manifest, work, plan.campaign.limits)
         self.engines: dict[str, Callable[[], Engine]] = {
             "reference": lambda: ReferenceEngine(*arguments),

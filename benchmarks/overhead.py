@@ -86,7 +86,7 @@ class Bench:
 
     def cost(self, experiments: Sequence[Experiment]) -> Cost:
         """Return the cost of the experiments without the first `FEW`. All must be forked."""
-        null = build(self.manifest, self.models, None, always()).files
+        null = build(self.manifest, self.models, None, always())
         engine = ForkEngine(*self.common, null=null)
         goldens = Goldens(self.manifest, lambda experiment: self.folder / "golden" / "out")
         runner = Runner(self.manifest, self.models, engine, goldens, self.workspace.scenario)

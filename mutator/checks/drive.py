@@ -222,7 +222,7 @@ class _Drive:
         return replace(told, places=tuple(places))
 
     def _refusal(self, scenario: str, golden: _Golden) -> NotForkable | None:
-        null = build(self.manifest, self.workspace.fault_models(), None, always()).files
+        null = build(self.manifest, self.workspace.fault_models(), None, always())
         work = self._scratch / "fork"
         work.mkdir()
         fork = ForkEngine(self.manifest, work, self.engine.limits, null=null)

@@ -9,6 +9,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from mutator._common.text import counted
 from mutator.campaigns.campaign_files import Campaign
 from mutator.campaigns.trigger_choice import listed_triggers
@@ -16,7 +18,7 @@ from mutator.checks.findings import Finding, Level, Place
 from mutator.faults.fault_models import FaultModel, FaultModels, SnippetKind
 from mutator.model import Fault, FaultLocation, Injection, Method, Trigger
 from mutator.mutants.building import Mutant, build
-from mutator.preflight.unreached import arming, holds
+from mutator.preflight.unreached import decision_of, holds
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.kinds import always, at_time
 from mutator.workspace import Workspace
@@ -54,7 +56,9 @@ class Reach:
         self.untriggered = list(_triggers(workspace, manifest, campaigns))
         self._triggers = len(self.untriggered)
         self._driven: list[str] = []  # scenarios with their changes
-        self._armings = {one.trigger: arming(workspace, manifest, one.trigger) for one in self.untriggered}
+        self._decisions = {
+            one.trigger: decision_of(workspace, manifest, one.trigger) for one in self.untriggered
+        }
 
     def take(
         self,
@@ -76,8 +80,8 @@ class Reach:
             for one in self.unexecuted
             if one.location not in executed or not set(one.changes) <= set(changes)
         ]
-        rows = list(seen)
-        self.untriggered = [one for one in self.untriggered if not holds(self._armings[one.trigger], rows)]
+        rows = np.array(list(seen), dtype=float)
+        self.untriggered = [one for one in self.untriggered if not holds(self._decisions[one.trigger], rows)]
 
     def findings(self) -> list[Finding]:
         return [

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from mutator.mutants.probe import decision_in
+from mutator.mutants.probe import Probe
 from mutator.triggers.over_time import ARITHMETIC, COMPARE
 
 
@@ -51,24 +51,16 @@ class Start:
     t: float | None
 
 
-def first_active(own: str, seen: Observed) -> Start | None:
-    """Return the point where a mutant leaves the golden run; None if its trigger never holds.
-
-    `own` is the source of the probe's own part (see `probe.parts_of`).
-    """
-    return _first_active(*decision_in(own), seen)
+def first_active(probe: Probe, seen: Observed) -> Start | None:
+    """Return the point where a mutant leaves the golden run; None if its trigger never holds."""
+    return _first_active(*probe.decision, seen)
 
 
 @lru_cache(maxsize=64)  # cached, because faults share triggers (contexts of the hazard analysis)
 def _first_active(armed_t: float, condition: str, seen: Observed) -> Start | None:
     if not seen.values:
         return None
-    (function,) = ast.parse(condition).body
-    assert isinstance(function, ast.FunctionDef)
-    names = [argument.arg for argument in function.args.args]
-    at = np.flatnonzero(
-        (seen.columns[0] >= armed_t) & _holds(function, dict(zip(names, seen.columns, strict=True)))
-    )
+    at = np.flatnonzero(active_at((armed_t, condition), seen.columns))
     if not at.size:
         return None
     step = seen.step_of(int(at[0]))
@@ -76,6 +68,20 @@ def _first_active(armed_t: float, condition: str, seen: Observed) -> Start | Non
     times = seen.columns[0, :done].tolist()  # `min`, because time starts again if the run restarts
     last = times[-1] if done else None
     return Start(step=step, observed=done, began=min(times, default=None), t=last)
+
+
+def active_at(decision: tuple[float, str], columns: np.ndarray) -> np.ndarray:
+    """Return for each observation whether a probe with this `Probe.decision` is active.
+
+    `columns` are the times (s) of all observations, then the observed values.
+    """
+    armed_t, condition = decision
+    (function,) = ast.parse(condition).body
+    assert isinstance(function, ast.FunctionDef)
+    names = [argument.arg for argument in function.args.args]
+    holds = _holds(function, dict(zip(names, columns, strict=True)))
+    active: np.ndarray = np.logical_and(columns[0] >= armed_t, holds)
+    return active
 
 
 def _holds(function: ast.FunctionDef, values: dict[str, Any]) -> Any:

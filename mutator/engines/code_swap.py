@@ -15,7 +15,7 @@ from types import CodeType
 from mutator.errors import NotSwappable
 from mutator.mutants.imported_names import module_name
 from mutator.mutants.injected_lines import sets_values, tag_of
-from mutator.mutants.probe import parts_of, probe_path
+from mutator.mutants.probe import Probe, probe_path
 from mutator.mutants.splicing import unsplice
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.source_tree import matches
@@ -38,20 +38,18 @@ class FunctionSwap:
 class CodeSwap:
     """Everything that turns a loaded pristine program into the mutant.
 
-    The parts of `probe` run in order; `own` is the source of the first (`probe.parts_of`). `imports` are the
-    modules that injected lines import. `settings` has, for each module, the code of its lines that set values
-    in the probe. These modules must already be loaded, because loading a module runs those lines with the
-    module's own constants.
+    The two parts of `probe` run in order. `imports` are the modules that injected lines import. `settings`
+    has, for each module, the code of its lines that set values in the probe. These modules must already be
+    loaded, because loading a module runs those lines with the module's own constants.
     """
 
     functions: tuple[FunctionSwap, ...]
     settings: tuple[tuple[str, CodeType], ...]
     probe: tuple[CodeType, CodeType]
-    own: str
     imports: tuple[str, ...]
 
 
-def plan_swap(manifest: TargetManifest, files: Mapping[str, bytes], tree: str) -> CodeSwap:
+def plan_swap(manifest: TargetManifest, files: Mapping[str, bytes], probe: Probe, tree: str) -> CodeSwap:
     """Return what turns the pristine program, loaded from the folder `tree`, into the mutant with `files`.
 
     Raises NotSwappable if the result could differ from that mutant in a fresh interpreter.
@@ -71,15 +69,11 @@ def plan_swap(manifest: TargetManifest, files: Mapping[str, bytes], tree: str) -
         functions += found
         settings += _settings(path, data, f"{tree}/{path}")
         imports |= dict.fromkeys(needed)
-    if probe_file not in files:
-        raise NotSwappable("there is no probe")
-    own, common = parts_of(files[probe_file].decode())
+    own, shared = probe.in_two
     name = f"{tree}/{probe_file}"
     # cached, because compiling the shared part takes ten times as long
-    probe = (compile(own, name, "exec", dont_inherit=True), _compiled(common.encode(), name))
-    return CodeSwap(
-        functions=tuple(functions), settings=tuple(settings), probe=probe, own=own, imports=tuple(imports)
-    )
+    code = (compile(own, name, "exec", dont_inherit=True), _compiled(shared.encode(), name))
+    return CodeSwap(functions=tuple(functions), settings=tuple(settings), probe=code, imports=tuple(imports))
 
 
 @lru_cache(maxsize=256)  # cached, because all mutants change the observation's file, mostly in the same way

@@ -35,8 +35,8 @@ from mutator.engines.run_home import OUTPUT, RunHome, is_disturbance, make_work
 from mutator.engines.threads import too_many, turned_off
 from mutator.errors import ForkServerLost, NotForkable, NotSwappable
 from mutator.model import Limits, Status
-from mutator.mutants.building import build
-from mutator.mutants.probe import probe_module, silent_report, state_after
+from mutator.mutants.building import Mutant, build
+from mutator.mutants.probe import Probe, probe_module, silent_report, state_after
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stopping import stop_source
 from mutator.triggers.kinds import always
@@ -45,8 +45,7 @@ _Key = tuple[str, int, tuple[str, ...]]
 
 
 class ForkEngine:
-    """Takes the arguments of ReferenceEngine; `null` has the files of the null mutant, `secret` is as in
-    `Setting`.
+    """Takes the arguments of ReferenceEngine; `null` is the null mutant, `secret` is as in `Setting`.
 
     In a sandbox, the fork server and its mutants can write only to the folder that `run` uses.
     """
@@ -58,7 +57,7 @@ class ForkEngine:
         limits: Limits,
         parent: int | None = None,
         *,
-        null: Mapping[str, bytes],
+        null: Mutant,
         warm: bool = False,
         secret: bytes = b"",
     ) -> None:
@@ -118,7 +117,7 @@ class ForkEngine:
             if self._unfit:
                 raise NotForkable(*self._unfit.args)
             steps = len(self._observed(job, job.golden).before)
-            swap = plan_swap(self._manifest, self._null, str(self._running(job).tree))
+            swap = self._swap(job, self._null.files, self._null.probe)
             waiting = self._at(job, steps - 1, swap)
             said, _ = waiting.ask({"do": "load", "modules": []}, self._patience_s)
             if said["threads"]:
@@ -138,18 +137,21 @@ class ForkEngine:
     def _execute(self, job: Job, folder: Path) -> Execution:
         if self._unfit:
             raise NotForkable(*self._unfit.args)
-        if job.mutant is None or job.golden is None or job.hash_seed:
+        if job.probe is None or job.golden is None or job.hash_seed:
             raise NotForkable("not an experiment")
-        swap = plan_swap(self._manifest, job.files, str(self._running(job).tree))
+        swap = self._swap(job, job.files, job.probe)
         if self._warm:
             return self._from_the_start(job, folder, swap)
         seen = self._observed(job, job.golden)
         if job.stop and job.golden_ends:  # the run can stop before the fault is active, and so before a fork
             return self._from_the_start(job, folder, swap)
-        start = first_active(swap.own, seen)
+        start = first_active(job.probe, seen)
         if start is None:
             return _golden(job, job.golden)
         return self._become(self._at(job, start.step, swap), job, folder, swap, start)
+
+    def _swap(self, job: Job, files: Mapping[str, bytes], probe: Probe) -> CodeSwap:
+        return plan_swap(self._manifest, files, probe, str(self._running(job).tree))
 
     def _from_the_start(self, job: Job, folder: Path, swap: CodeSwap) -> Execution:
         first = self._running(job).first
@@ -289,7 +291,7 @@ class ForkEngine:
             return Observed(values=values, before=before, libraries=libraries)
         folder = self._runs / f"watch-{content_id(_key(job))}"
         try:
-            swap = plan_swap(self._manifest, self._null, str(self._running(job).tree))
+            swap = self._swap(job, self._null.files, self._null.probe)
             null = replace(job, mutant=None, stop=False)
             self._at(job, 0, swap)  # NotForkable, with the reason, if the run cannot begin
             # Fork before the first step, because a later fork misses earlier observations.
@@ -362,7 +364,7 @@ def make_warm(setting: Setting) -> ForkEngine:
 
 
 def _make(setting: Setting, *, warm: bool) -> ForkEngine:
-    null = build(setting.manifest, setting.models, None, always()).files
+    null = build(setting.manifest, setting.models, None, always())
     return ForkEngine(
         setting.manifest,
         setting.work,

@@ -47,7 +47,8 @@ def not_forked(manifest: TargetManifest, models: FaultModels, faults: Iterable[F
     found = {}
     for name, fault in variants.items():
         try:
-            plan_swap(manifest, build(manifest, models, fault, always()).files, "")
+            mutant = build(manifest, models, fault, always())
+            plan_swap(manifest, mutant.files, mutant.probe, "")
         except NotSwappable as reason:
             found[name] = str(reason)
         except MutatorError:

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Limits, Status
-from mutator.mutants.probe import is_probe, report_problem
+from mutator.mutants.probe import Probe, is_probe, report_problem
 from mutator.targets.manifest import TargetManifest
 
 
@@ -37,6 +37,7 @@ class Job:
     changes: tuple[str, ...] = ()
     files: Mapping[str, bytes] = field(default_factory=dict)
     mutant: str | None = None  # the id that the probe must report; None for a tree without a probe
+    probe: Probe | None = None  # the probe in `files`; engines that fork need it
     injections: tuple[str, ...] = ()  # all ids that the probe must report on
     hash_seed: int = 0
     golden: Path | None = None  # output folder of the fault-free run, if known

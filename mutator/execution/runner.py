@@ -173,6 +173,7 @@ class Runner:
             changes=experiment.changes,
             files=built.files,
             mutant=built.id,
+            probe=built.probe,
             injections=built.injections,
             golden=self.goldens.folder(experiment),
             stop=stop,

@@ -13,9 +13,9 @@ from mutator.config import units
 from mutator.config.sources import Source
 from mutator.config.yaml_files import MAX_BYTES, StrictModel, read
 from mutator.errors import MutatorError
+from mutator.faults import probe_templates
 from mutator.faults.fault_models import (
     FILES,
-    PROBE_TEMPLATE,
     TARGET_UNIT,
     Example,
     FaultModel,
@@ -26,6 +26,7 @@ from mutator.faults.fault_models import (
     SnippetKind,
 )
 from mutator.faults.injection_model import InjectionModel
+from mutator.faults.probe_templates import ProbeTemplates
 
 SCHEMA = "fault_model/1"
 _GIVEN = ("fi", "original", "left", "right", "called", "arguments", "statement", "next_statement")
@@ -128,13 +129,14 @@ def _load_all(folder: Path) -> FaultModels:
         models[model.name] = model
     if not models:
         raise MutatorError("no fault model", where=folder, expected="<model>.yaml next to <model>.py.j2")
-    probe = _text(folder / PROBE_TEMPLATE)
+    code, settings = (_text(folder / name) for name in probe_templates.FILES)
+    probe = ProbeTemplates.of(folder, code, settings)
     texts = {
         name: [model.template, model.expression] if model.expression else model.template
         for name, model in models.items()
     }
     raising = [name for name, model in models.items() if model.raises]
-    digest = hashing.digest([texts, probe, *([raising] if raising else [])])
+    digest = hashing.digest([texts, probe.text, *([raising] if raising else [])])
     return FaultModels(folder=folder, models=models, probe=probe, digest=digest)
 
 

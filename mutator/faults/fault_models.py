@@ -8,13 +8,12 @@ from pathlib import Path
 from typing import Literal
 
 from mutator._common.text import suggestion
-from mutator.config.locations import PROBE_NAME
 from mutator.config.sources import Source
 from mutator.errors import MutatorError
 from mutator.faults.injections import InjectionSpec
+from mutator.faults.probe_templates import ProbeTemplates
 
 FILES = ("*.yaml", "*.j2")  # what a templates folder consists of
-PROBE_TEMPLATE = f"{PROBE_NAME}.py.j2"
 TARGET_UNIT = "target"
 # `variable`: a name known at the anchor; `import`: the dotted name of something in a module of the target;
 # `constant`: a number, truth value, text or None; `choice`: one of a few terms; `unit`: the suffix of a unit.
@@ -113,11 +112,11 @@ class FaultModel:
 
 @dataclass(frozen=True)
 class FaultModels:
-    """All fault models of a templates folder by name, and the probe's template."""
+    """All fault models of a templates folder by name, and the probe's templates."""
 
     folder: Path
     models: Mapping[str, FaultModel]
-    probe: str
+    probe: ProbeTemplates
     digest: str  # of everything that determines a mutant's text, and of which models raise
 
     def __iter__(self) -> Iterator[FaultModel]:

@@ -8,7 +8,8 @@ from pathlib import Path
 from mutator._common.below import inside
 from mutator._common.hashing import content_id
 from mutator.errors import InvalidMutant, MutatorError
-from mutator.faults.fault_models import PROBE_TEMPLATE, FaultModels
+from mutator.faults.fault_models import FaultModels
+from mutator.faults.probe_templates import CODE as PROBE_CODE
 from mutator.model import FIXED_ANCHORS, Fault, Hold, Injection, Trigger
 from mutator.mutants.anchors import ParsedFile, parsed
 from mutator.mutants.changed_functions import compile_changed
@@ -16,8 +17,7 @@ from mutator.mutants.injected_lines import OBSERVE_TAG, observe_call
 from mutator.mutants.injection_edits import injection_edit
 from mutator.mutants.normalized_source import compiles, normalized
 from mutator.mutants.patches import changed_file, new_file
-from mutator.mutants.probe import injection_id, probe_path, template_values
-from mutator.mutants.rendering import render
+from mutator.mutants.probe import Probe, injection_id, probe_of, probe_path, settings_of
 from mutator.mutants.reusable_changes import (
     Change,
     ReusableChange,
@@ -52,6 +52,7 @@ class Mutant:
     files: dict[str, bytes]  # full new content by path, including the probe
     patch: str  # git style, a/ and b/ prefixes; applies with `patch -p1` at the root
     tree_digest: str  # of the whole mutated tree
+    probe: Probe
     injections: tuple[str, ...]  # ids used in tags and in the probe's report, in the fault's order
 
     @cached_property
@@ -87,9 +88,10 @@ def _build(
     probe_file = probe_path(manifest.package)
     sets = any(one.location.anchor.kind in FIXED_ANCHORS for one in injections)
     probe = _probe(manifest, models, mutant_id, trigger, hold, ids, sets)
-    splicer.check_probe(probe, (mutant_id, *ids), models.folder / PROBE_TEMPLATE)
-    files = {probe_file: probe.encode()}
-    patches = {probe_file: new_file(probe_file, probe)}
+    text = probe.text
+    splicer.check_probe(text, (mutant_id, *ids), models.folder / PROBE_CODE)
+    files = {probe_file: text.encode()}
+    patches = {probe_file: new_file(probe_file, text)}
     for path, file_edits in edits.items():
         file = parsed(manifest.tree, path)
         change = splicer.change(file, [probe_import(file, manifest.package), *file_edits], ids)
@@ -99,6 +101,7 @@ def _build(
         files=dict(sorted(files.items())),
         patch="".join(text for _, text in sorted(patches.items())),
         tree_digest=manifest.tree.digest_with(files),
+        probe=probe,
         injections=ids,
     )
 
@@ -129,7 +132,7 @@ def _probe(
     hold: Hold,
     ids: tuple[str, ...],
     sets: bool,
-) -> str:
+) -> Probe:
     own = probe_path(manifest.package).removesuffix("py")
     if taken := [path for path in manifest.tree.files if path.startswith((own, f"{own[:-1]}/"))]:
         raise MutatorError(
@@ -139,8 +142,8 @@ def _probe(
             remedy="rename the target's file, or point the manifest at the original tree",
         )
     observation, step_s = manifest.observation, manifest.step_s
-    values = template_values(mutant_id, trigger, hold, ids, observation, step_s, sets=sets)
-    return render(models.probe, values, models.folder / PROBE_TEMPLATE)
+    settings = settings_of(mutant_id, trigger, hold, ids, observation, step_s, sets=sets)
+    return probe_of(models.probe, settings)
 
 
 def _compile(data: bytes, where: Path) -> None:

@@ -1,26 +1,81 @@
-"""The contract of the probe `_fi`, rendered from `templates/_fi.py.j2`: its path, template values and report.
+"""The contract of the probe `_fi`: its path, settings, source and report.
 
 Code inside a target's process cannot import this module, so engines pass the needed values to that code.
 """
 
+import ast
 import math
-import re
-from collections.abc import Callable, Mapping, Sequence
-from types import CodeType
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import chain
 from typing import Any
 
 from mutator._common.hashing import content_id
 from mutator.config.locations import PROBE_NAME
 from mutator.errors import MutatorError
+from mutator.faults.probe_templates import ProbeTemplates, TemplatePart
 from mutator.model import Activation, Hold, Injection, Trigger
+from mutator.mutants.rendering import render
 from mutator.targets.observation import Observation
 from mutator.triggers.conditions import TIME, check_condition, to_code
 
-# the part of a probe that differs between mutants: docstring, settings, condition
-_OWN = re.compile(
-    r'\A"""(?s:.*?)"""\n|^MUTANT = (?s:.*?)^_TINY = .*\n|^def _condition\((?s:.*?)^(?=\n)', re.MULTILINE
-)
-_ARMED = re.compile(r"^ARMED_AFTER_S = (.+)$(?s:.*)^_TINY = (.+)$", re.MULTILINE)
+_IN_CODE = ("observed", "values", "counted", "sets")  # settings that the template of the code uses
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProbeSettings:
+    """The values in the probe's templates.
+
+    `variables` are the arguments of the condition, and `values` those without the time; `observed` are the
+    arguments of `observe`. `derived` are computed from them (name, expression). `counted`: the time is the
+    number of observations times `step_s`. `sets`: the probe sets constants or defaults.
+    """
+
+    mutant: str
+    injections: tuple[str, ...]
+    hold: str
+    hold_s: float
+    armed_after_s: float
+    condition: str
+    variables: tuple[str, ...]
+    values: tuple[str, ...]
+    observed: tuple[str, ...]
+    derived: tuple[tuple[str, str], ...]
+    counted: bool
+    step_s: float
+    sets: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class Probe:
+    """A probe's source: its own parts, and those that it shares with the other probes of a target.
+
+    In its file, they alternate.
+    """
+
+    own: tuple[str, ...]
+    shared: tuple[str, ...]
+    armed_after_s: float
+
+    @property
+    def text(self) -> str:
+        return "".join(chain.from_iterable(zip(self.own, self.shared, strict=True)))
+
+    @property
+    def in_two(self) -> tuple[str, str]:
+        """Its own part, and the shared one. Run one after the other, they do the same as the whole.
+
+        Blank lines keep the line numbers unchanged.
+        """
+        pairs = list(zip(self.own, self.shared, strict=True))
+        own = (one + "\n" * other.count("\n") for one, other in pairs)
+        return "".join(own), "".join("\n" * one.count("\n") + other for one, other in pairs)
+
+    @property
+    def decision(self) -> tuple[float, str]:
+        """The time (s) from which it is armed, and the source of its condition on observed values."""
+        return self.armed_after_s - _tolerance_s(self.shared), self.own[-1]
 
 
 def probe_path(package: str | None) -> str:
@@ -41,7 +96,7 @@ def injection_id(index: int, injection: Injection) -> str:
     return content_id([index, injection])[:8]
 
 
-def template_values(
+def settings_of(
     mutant: str,
     trigger: Trigger,
     hold: Hold,
@@ -50,63 +105,58 @@ def template_values(
     step_s: float,
     *,
     sets: bool = False,
-) -> dict[str, object]:
-    """Return the values for the probe's template; with `sets`, the probe sets constants or defaults.
+) -> ProbeSettings:
+    """Return the settings of a mutant's probe; with `sets`, the probe sets constants or defaults.
 
     MutatorError for a missing hold time, and for a condition on unobserved values.
     """
     if hold is Hold.FOR and trigger.hold_s is None:
         raise MutatorError(f"trigger '{trigger.name}' has the hold `for` without a time", expected="`hold_s`")
-    names = [value.name for value in observation.values]
-    return {
-        "mutant": mutant,
-        "condition": to_code(check_condition(trigger.condition, variables=observation.variables)),
-        "values": names,
-        "variables": [TIME, *names],
-        "observed": [name for name, _ in observation.expressions],
-        "derived": [(value.name, to_code(value.text, number=True)) for value in observation.derived],
-        "counted": observation.time is None,
-        "step_s": float(step_s),
-        "hold": hold.value,
-        "hold_s": float(trigger.hold_s or 0.0),
-        "armed_after_s": float(trigger.armed_after_s),
-        "injections": injections,
-        "sets": sets,
-    }
+    names = tuple(value.name for value in observation.values)
+    return ProbeSettings(
+        mutant=mutant,
+        injections=tuple(injections),
+        hold=hold.value,
+        hold_s=float(trigger.hold_s or 0.0),
+        armed_after_s=float(trigger.armed_after_s),
+        condition=to_code(check_condition(trigger.condition, variables=observation.variables)),
+        variables=(TIME, *names),
+        values=names,
+        observed=tuple(name for name, _ in observation.expressions),
+        derived=tuple((value.name, to_code(value.text, number=True)) for value in observation.derived),
+        counted=observation.time is None,
+        step_s=float(step_s),
+        sets=sets,
+    )
+
+
+def probe_of(templates: ProbeTemplates, settings: ProbeSettings) -> Probe:
+    """Render the templates with these settings."""
+    own = _rendered(templates.settings, vars(settings))
+    code = {name: getattr(settings, name) for name in _IN_CODE}
+    shared = _shared(templates.code, tuple(code.items()))
+    return Probe(own=own, shared=shared, armed_after_s=settings.armed_after_s)
+
+
+@lru_cache(maxsize=16)  # all mutants of a target share one or two
+def _shared(parts: tuple[TemplatePart, ...], names: tuple[tuple[str, object], ...]) -> tuple[str, ...]:
+    return _rendered(parts, dict(names))
+
+
+def _rendered(parts: Sequence[TemplatePart], names: Mapping[str, object]) -> tuple[str, ...]:
+    return tuple(render(part.text, names, part.path, part.line) for part in parts)
+
+
+@lru_cache(maxsize=16)
+def _tolerance_s(shared: tuple[str, ...]) -> float:
+    """Return the tolerance of comparisons of times, which the template of the code sets."""
+    for node in ast.walk(ast.parse("".join(shared))):
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "_TINY":
+            return float(ast.literal_eval(node.value))
+    raise AssertionError("a probe without _TINY")
 
 
 # A running probe
-
-
-def parts_of(probe: str) -> tuple[str, str]:
-    """Split a probe's source into its own part and the part that all probes of a target share.
-
-    Run one after the other, the parts do the same as the whole. Blank lines keep the line numbers unchanged.
-    """
-    own, common, at = [], [], 0
-    for found in _OWN.finditer(probe):
-        between = probe[at : found.start()]
-        own += ["\n" * between.count("\n"), found[0]]
-        common += [between, "\n" * found[0].count("\n")]
-        at = found.end()
-    return ("".join(own), "".join([*common, probe[at:]])) if at else (probe, "")
-
-
-def decision(probe: CodeType) -> tuple[float, Callable[..., bool]]:
-    """Return the time (s) from which a probe is armed, and its condition as a function of observed values.
-
-    Calling `observe` for every value instead takes almost four times as long.
-    """
-    module: dict[str, Any] = {"__name__": PROBE_NAME}
-    exec(probe, module)
-    return module["ARMED_AFTER_S"] - module["_TINY"], module["_condition"]
-
-
-def decision_in(own: str) -> tuple[float, str]:
-    """Like `decision`, but from the source of a probe's own part, and with the condition as source."""
-    armed = _ARMED.search(own)
-    assert armed is not None
-    return float(armed[1]) - float(armed[2]), own[own.index("def _condition(") :]
 
 
 def state_after(observed: int, began: float | None, t: float | None) -> tuple[str, dict[str, object]]:

@@ -204,23 +204,25 @@ def _checked(param: ParamSchema, params: Mapping[str, Value]) -> Value:
     return value
 
 
-def render(template: str, names: Mapping[str, object], where: Path) -> str:
-    """Render one template; MutatorError with the template's line, if known."""
+def render(template: str, names: Mapping[str, object], where: Path, first_line: int = 1) -> str:
+    """Render a template, or its part from `first_line` on; MutatorError with the line, if known."""
     try:
         return _ENVIRONMENT.compiled(template).render(names)
     except TemplateSyntaxError as error:
-        raise _template_error(str(error.message), where, error.lineno) from None
+        raise _template_error(str(error.message), where, error.lineno, first_line) from None
     except TemplateError as error:
-        raise _template_error(str(error.message or error), where, _line_in(error)) from None
+        raise _template_error(str(error.message or error), where, _line_in(error), first_line) from None
     except _FAILURES as error:
-        raise _template_error(f"{type(error).__name__}: {error}", where, _line_in(error)) from None
+        raise _template_error(
+            f"{type(error).__name__}: {error}", where, _line_in(error), first_line
+        ) from None
 
 
-def _template_error(what: str, where: Path, line: int | None) -> MutatorError:
+def _template_error(what: str, where: Path, line: int | None, first_line: int) -> MutatorError:
     return MutatorError(
         f"the template fails: {what}",
         where=where,
-        line=line,
+        line=line + first_line - 1 if line else None,
         expected="names of the model's parameters, `fi`, a loop over a list, a condition, arithmetic, or one "
         f"of the filters {', '.join(sorted(_ENVIRONMENT.filter_names))}",
         remedy="correct the template, or let the code that it writes do the work",

@@ -6,8 +6,7 @@ never fires. The run of a null mutant equals its golden run, and it records the 
 
 import io
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from inspect import signature
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -16,9 +15,9 @@ import numpy as np
 from mutator._common.below import inside
 from mutator._common.bounded import read_bounded
 from mutator._common.text import counted
+from mutator.engines.activation import active_at
 from mutator.model import Experiment, Trigger
 from mutator.mutants.building import build
-from mutator.mutants.probe import decision, probe_path
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.kinds import time_of
 from mutator.workspace import Workspace
@@ -28,7 +27,7 @@ _NAMED = 4  # triggers that a warning names
 
 # a row for each observation: the time (s), then the values
 Observed: TypeAlias = "np.ndarray[Any, np.dtype[np.float64]]"
-Arming = tuple[float, Callable[..., bool]]  # arming time of a trigger (s), and its condition
+Decision = tuple[float, str]  # of a trigger's probe
 
 
 def write_observed(folder: Path, key: str, seen: Iterable[Sequence[float]]) -> None:
@@ -45,22 +44,12 @@ def read_observed(folder: Path) -> dict[str, Observed]:
     }
 
 
-def arming(workspace: Workspace, manifest: TargetManifest, trigger: Trigger) -> Arming:
-    path = probe_path(manifest.package)
-    built = build(manifest, workspace.fault_models(), None, trigger)
-    return decision(compile(built.files[path], path, "exec"))
+def decision_of(workspace: Workspace, manifest: TargetManifest, trigger: Trigger) -> Decision:
+    return build(manifest, workspace.fault_models(), None, trigger).probe.decision
 
 
-def holds(trigger: Arming, rows: Iterable[Sequence[float]]) -> bool:
-    armed_t, condition = trigger
-    return any(row[0] >= armed_t and condition(*row) for row in rows)
-
-
-def _fits(trigger: Arming, observed: Observed) -> bool:
-    """Whether the condition has one argument for each observed column; in older templates it also takes the
-    derived values.
-    """
-    return len(signature(trigger[1]).parameters) == len(observed.T)
+def holds(decision: Decision, observed: Observed) -> bool:
+    return bool(len(observed) and active_at(decision, observed.T).any())
 
 
 def remarks(
@@ -71,7 +60,7 @@ def remarks(
 ) -> list[str]:
     """Remarks on triggers that never hold. Each experiment comes with its golden run's key."""
     late, never = Counter[str](), Counter[str]()
-    armings: dict[Trigger, Arming] = {}
+    decisions: dict[Trigger, Decision] = {}
     known: dict[tuple[str, Trigger], bool] = {}
     total = 0
     for key, experiment in experiments:
@@ -84,11 +73,9 @@ def remarks(
                 late[f"{experiment.scenario}, which ends at {end:g} s"] += 1
             continue
         if (key, trigger) not in known:
-            if trigger not in armings:
-                armings[trigger] = arming(workspace, manifest, trigger)
-            known[key, trigger] = not _fits(armings[trigger], observed[key]) or holds(
-                armings[trigger], observed[key].tolist()
-            )
+            if trigger not in decisions:
+                decisions[trigger] = decision_of(workspace, manifest, trigger)
+            known[key, trigger] = holds(decisions[trigger], observed[key])
         if not known[key, trigger]:
             never[f"{trigger.name} in {experiment.scenario}"] += 1
     return list(_sentences(total, late, never))

@@ -13,8 +13,10 @@ from pathlib import Path
 
 from mutator._common.hashing import content_id
 from mutator.campaigns.plans import Plan
+from mutator.config.locations import PROBE_NAME
+from mutator.faults import probe_templates
 from mutator.faults.expansion import expand
-from mutator.faults.fault_models import PROBE_TEMPLATE, FaultModels
+from mutator.faults.fault_models import FaultModels
 from mutator.faults.specs import FaultSpec
 from mutator.model import Fault, Injection, Trigger
 from mutator.mutants.anchors import parsed
@@ -234,7 +236,7 @@ class _Catalogue:
         material = Material(
             diff=diffs_of([patch]),
             functions=functions_of(self.manifest.tree, [location]),
-            templates={PROBE_TEMPLATE: self.models.probe},
+            templates={probe_templates.CODE: self.models.probe.text},
             calls={},
         )
         return Group(
@@ -243,7 +245,7 @@ class _Catalogue:
             injections=(what,),
             files=(location.path,),
             functions=(location.function,),
-            models=(PROBE_TEMPLATE.partition(".")[0],),
+            models=(PROBE_NAME,),
             trigger="",
             hold="",
             shapes=tuple(groups.shapes([("", what, patch)])),
@@ -252,7 +254,7 @@ class _Catalogue:
             runs=None if runs is None else sum(runs.values()),
             bound=material.bound,
             seen=text_of(material.bound, {}, material.sections),
-            made_from=(self.models.folder / PROBE_TEMPLATE, self.manifest.path),
+            made_from=(*(self.models.folder / name for name in probe_templates.FILES), self.manifest.path),
         )
 
     def _id(self, what: str) -> str:

@@ -140,6 +140,7 @@ class Engines:
             seed=7,
             files=built.files,
             mutant=built.id,
+            probe=built.probe,
             injections=built.injections,
             golden=self.golden(scenario),
         )

@@ -14,8 +14,7 @@ from mutator.model import Anchor, AnchorKind, FaultLocation, Hold, Injection, Tr
 from mutator.mutants.anchors import ParsedFile
 from mutator.mutants.fixed_values import FixedValue
 from mutator.mutants.injection_edits import injection_edit
-from mutator.mutants.probe import template_values
-from mutator.mutants.rendering import render
+from mutator.mutants.probe import probe_of, settings_of
 from mutator.mutants.splicing import apply_edits, in_lines, joined, probe_import, unsplice
 from mutator.targets.observation import Observation
 
@@ -59,9 +58,9 @@ def probe(ids: Sequence[str]) -> Any:
     nowhere = FaultLocation(path="", function="f", anchor=Anchor(kind=AnchorKind.ENTRY))
     observation = Observation(location=nowhere, time="t", values=(), derived=())
     trigger = Trigger(name="test", condition="t >= 1 and t < 2")
-    values = template_values("m", trigger, Hold.WHILE, ids, observation, 1.0, sets=True)
+    settings = settings_of("m", trigger, Hold.WHILE, ids, observation, 1.0, sets=True)
     made = types.ModuleType("_fi")
-    exec(render(models().probe, values, models().folder / "_fi.py.j2"), vars(made))
+    exec(probe_of(models().probe, settings).text, vars(made))
     return made
 
 

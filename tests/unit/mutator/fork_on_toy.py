@@ -33,7 +33,7 @@ class Fork:
             self.models = self.toy.fault_models()
             work = self.folder / "work"
             work.mkdir()
-            null = build(self.manifest, self.models, None, always()).files
+            null = build(self.manifest, self.models, None, always())
             self._engine = ForkEngine(self.manifest, work, self.limits, null=null)
             golden = Job(name="golden", scenario=self.toy.scenario("A"), seed=7)
             self.golden = self._engine.reference.execute(golden, self.folder / "golden").out
@@ -58,6 +58,7 @@ class Fork:
             seed=7,
             files=built.files,
             mutant=built.id,
+            probe=built.probe,
             injections=built.injections,
             golden=self.golden,
         )

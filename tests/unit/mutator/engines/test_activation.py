@@ -2,13 +2,14 @@
 
 import math
 import random
+from dataclasses import replace
 
 import pytest
 
 from mutator.engines.activation import Observed, Start, first_active
 from mutator.model import Hold, Trigger
 from mutator.mutants.building import build
-from mutator.mutants.probe import parts_of, probe_path, state_after
+from mutator.mutants.probe import Probe, state_after
 from mutator.triggers.kinds import always, at_time
 from mutator.workspace import Workspace
 
@@ -17,8 +18,8 @@ from mutator.workspace import Workspace
 def probe(toycar: Workspace):
     manifest, models = toycar.manifest("toycar"), toycar.fault_models()
 
-    def make(trigger: Trigger) -> str:
-        return build(manifest, models, None, trigger).files[probe_path(manifest.package)].decode()
+    def make(trigger: Trigger) -> Probe:
+        return build(manifest, models, None, trigger).probe
 
     return make
 
@@ -27,10 +28,6 @@ GAPS = (50.0, 40.0, 30.0, 20.0, 30.0, 40.0)
 SEEN = Observed(
     values=tuple((0.05 * i, gap, 10.0, 10.0) for i, gap in enumerate(GAPS)), before=(0, 1, 2, 3, 4, 5)
 )
-
-
-def start_of(probe: str, seen: Observed) -> Start | None:
-    return first_active(parts_of(probe)[0], seen)
 
 
 @pytest.mark.parametrize(
@@ -47,7 +44,7 @@ def start_of(probe: str, seen: Observed) -> Start | None:
     ],
 )
 def test_a_fork_starts_at_the_first_active_step(probe, trigger: Trigger, step: int | None) -> None:
-    start = start_of(probe(trigger), SEEN)
+    start = first_active(probe(trigger), SEEN)
     assert (start.step if start else None) == step
     if start:
         assert start.observed == step
@@ -82,26 +79,29 @@ def test_the_predicted_activation_step_agrees_with_the_probe(
         ]
         values = tuple((0.05 * i, *others) for i, others in enumerate(truth))
         module: dict = {}
-        exec(code, module)
+        exec(code.text, module)
         active = []
         for one in values:
             module["observe"](*one)
             active.append(module["_run"].active)
-        start = start_of(code, Observed(values=values, before=tuple(range(40))))
+        start = first_active(code, Observed(values=values, before=tuple(range(40))))
         assert (start.step if start else None) == (active.index(True) if True in active else None)
 
 
 def test_the_probes_template_determines_the_precision_of_the_arming_time(probe) -> None:
-    code = probe(Trigger(name="x", condition="True", armed_after_s=SEEN.values[3][0] + 0.001))
-    close, far = (code.replace("\n_TINY = 1e-9\n", f"\n_TINY = {tiny}\n") for tiny in (0.0, 0.002))
-    assert [start_of(one, SEEN).step for one in (close, far)] == [4, 3]
+    one = probe(Trigger(name="x", condition="True", armed_after_s=SEEN.values[3][0] + 0.001))
+    changed = [
+        tuple(text.replace("_TINY = 1e-9\n", f"_TINY = {tiny}\n") for text in one.shared)
+        for tiny in (0.0, 0.002)
+    ]
+    assert [first_active(replace(one, shared=shared), SEEN).step for shared in changed] == [4, 3]
 
 
 def test_the_two_parts_of_a_probe_equal_the_whole_probe(probe) -> None:
     trigger = Trigger(name="x", condition="hwt < 2.0", hold=Hold.FOR, hold_s=0.1)
     whole, parts = {}, {}
-    exec(compile(probe(trigger), "_fi", "exec"), whole)
-    for part in parts_of(probe(trigger)):
+    exec(compile(probe(trigger).text, "_fi", "exec"), whole)
+    for part in probe(trigger).in_two:
         exec(compile(part, "_fi", "exec"), parts)
     assert parts.keys() == whole.keys()
     for name, thing in whole.items():
@@ -109,24 +109,24 @@ def test_the_two_parts_of_a_probe_equal_the_whole_probe(probe) -> None:
             assert parts[name].__code__ == thing.__code__
         elif isinstance(thing, str | float | list):
             assert parts[name] == thing
-    assert parts_of(probe(trigger))[1] == parts_of(probe(always()))[1]
+    assert probe(trigger).in_two[1] == probe(always()).in_two[1]
 
 
 def test_a_step_can_have_several_observations_or_none(probe) -> None:
     """The fork starts before the step in which the activating observation is made."""
     seen = Observed(values=SEEN.values, before=(0, 1, 3, 3, 6))
-    starts = [start_of(probe(at_time(0.05 * i)), seen) for i in range(6)]
+    starts = [first_active(probe(at_time(0.05 * i)), seen) for i in range(6)]
     assert [start.step for start in starts if start] == [0, 1, 1, 3, 3, 3]
     assert starts[4] == Start(step=3, observed=3, began=SEEN.values[0][0], t=SEEN.values[2][0])
 
 
 @pytest.mark.parametrize("trigger", [at_time(0.2), Trigger(name="x", condition="d_rel <= 20.0")])
 def test_a_probe_with_restored_state_equals_one_that_observed_the_steps(probe, trigger: Trigger) -> None:
-    start = start_of(probe(trigger), SEEN)
+    start = first_active(probe(trigger), SEEN)
     saw: dict = {}
     given: dict = {}
     for module in (saw, given):
-        exec(probe(trigger), module)
+        exec(probe(trigger).text, module)
     for values in SEEN.values[: start.observed]:
         saw["observe"](*values)
     holder, state = state_after(start.observed, start.began, start.t)
@@ -142,5 +142,7 @@ def test_a_probe_with_restored_state_equals_one_that_observed_the_steps(probe, t
 def test_the_first_active_step_is_computed_once_per_trigger(probe) -> None:
     one, other = (probe(Trigger(name=name, condition="d_rel <= 30.0")) for name in ("one", "other"))
     assert one != other
-    assert start_of(one, SEEN) is start_of(other, SEEN)
-    assert start_of(probe(Trigger(name="one", condition="d_rel <= 20.0")), SEEN) != start_of(one, SEEN)
+    assert first_active(one, SEEN) is first_active(other, SEEN)
+    assert first_active(probe(Trigger(name="one", condition="d_rel <= 20.0")), SEEN) != first_active(
+        one, SEEN
+    )

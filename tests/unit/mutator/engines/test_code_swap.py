@@ -8,9 +8,10 @@ import pytest
 
 from mutator.engines.code_swap import CodeSwap, plan_swap
 from mutator.errors import NotSwappable
+from mutator.mutants.probe import Probe
 from mutator.targets.source_tree import SourceTree
 
-PROBE = b"def observe(): pass\n"
+PROBE = Probe(own=("",), shared=("def observe(): pass\n",), armed_after_s=0.0)
 PRISTINE = """
 import math
 from functools import wraps
@@ -50,7 +51,7 @@ def changes() -> Changes:
             text = text.replace(line, new + line)
         tree = SourceTree(None, {"car/car.py": PRISTINE.encode()}, "", {})  # type: ignore[arg-type]
         manifest = SimpleNamespace(package="car", reads_itself=reads_itself, tree=tree)
-        return plan_swap(manifest, {"car/car.py": text.encode(), "car/_fi.py": PROBE}, "/tree")  # type: ignore[arg-type]
+        return plan_swap(manifest, {"car/car.py": text.encode(), "car/_fi.py": b""}, PROBE, "/tree")  # type: ignore[arg-type]
 
     return make
 
@@ -109,12 +110,12 @@ def test_a_guard_must_keep_the_original_statement_in_its_else_branch(kept: int, 
     text = "from car import _fi  # fi:probe\n" + PRISTINE.replace(line, f"{guarded}{added}    {line}")
     tree = SourceTree(None, {"car/car.py": PRISTINE.encode()}, "", {})  # type: ignore[arg-type]
     manifest = SimpleNamespace(package="car", reads_itself=(), tree=tree)
-    files = {"car/car.py": text.encode(), "car/_fi.py": PROBE}
+    files = {"car/car.py": text.encode(), "car/_fi.py": b""}
     if swappable:
-        assert [f.path for f in plan_swap(manifest, files, "/tree").functions] == [("Car", "go")]  # type: ignore[arg-type]
+        assert [f.path for f in plan_swap(manifest, files, PROBE, "/tree").functions] == [("Car", "go")]  # type: ignore[arg-type]
         return
     with pytest.raises(NotSwappable):
-        plan_swap(manifest, files, "/tree")  # type: ignore[arg-type]
+        plan_swap(manifest, files, PROBE, "/tree")  # type: ignore[arg-type]
 
 
 def test_a_file_that_the_run_reads_itself_is_not_swapped(changes: Changes) -> None:
@@ -129,8 +130,6 @@ def test_a_change_beyond_inserted_lines_is_not_swapped(changes: Changes) -> None
         tree=SimpleNamespace(files={"car/car.py": b"x = 1\n"}),
     )
     with pytest.raises(NotSwappable, match="more than inserted lines"):
-        plan_swap(manifest, {"car/car.py": b"x = 2\n", "car/_fi.py": PROBE}, "/tree")  # type: ignore[arg-type]
+        plan_swap(manifest, {"car/car.py": b"x = 2\n"}, PROBE, "/tree")  # type: ignore[arg-type]
     with pytest.raises(NotSwappable, match="new file"):
-        plan_swap(manifest, {"car/new.py": b"x = 2\n", "car/_fi.py": PROBE}, "/tree")  # type: ignore[arg-type]
-    with pytest.raises(NotSwappable, match="no probe"):
-        plan_swap(manifest, {"car/car.py": b"x = 1\n"}, "/tree")  # type: ignore[arg-type]
+        plan_swap(manifest, {"car/new.py": b"x = 2\n"}, PROBE, "/tree")  # type: ignore[arg-type]

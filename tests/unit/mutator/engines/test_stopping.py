@@ -77,7 +77,7 @@ def drive(fork: Fork, engine: Engine, after: AfterHazard, at: float = 2.0) -> Re
 
 def test_a_stopped_run_equals_the_beginning_of_the_complete_run(stopping: Fork) -> None:
     fork = stopping.engine
-    null = build(stopping.manifest, stopping.models, None, always()).files
+    null = build(stopping.manifest, stopping.models, None, always())
     work = stopping.folder / "warm"
     work.mkdir()
     warm = ForkEngine(stopping.manifest, work, stopping.limits, null=null, warm=True)

@@ -14,7 +14,6 @@ from mutator.mutants import probe as contract
 from mutator.mutants.anchors import parse_file
 from mutator.mutants.imported_names import importers
 from mutator.mutants.injection_edits import injection_edit
-from mutator.mutants.rendering import render
 from mutator.mutants.splicing import apply_edits, in_lines, joined, probe_import, unsplice
 from mutator.targets.observation import Observation
 from mutator.targets.source_tree import read_tree
@@ -118,10 +117,10 @@ def load(clone: Workspace) -> Iterator[Callable[..., tuple[Any, Any]]]:
         nowhere = FaultLocation(path="", function="f", anchor=Anchor(kind=AnchorKind.ENTRY))
         observation = Observation(location=nowhere, time="t", values=(), derived=())
         trigger = Trigger(name="test", condition="t >= 1 and t < 3")
-        values = contract.template_values("m", trigger, Hold.WHILE, ("a", "b"), observation, 1.0, sets=True)
+        settings = contract.settings_of("m", trigger, Hold.WHILE, ("a", "b"), observation, 1.0, sets=True)
         probe, module = (types.ModuleType(name) for name in names)
         models = clone.fault_models()
-        exec(render(models.probe, values, models.folder / "_fi.py.j2"), vars(probe))
+        exec(contract.probe_of(models.probe, settings).text, vars(probe))
         sys.modules |= {"_fi": probe, names[1]: module}
         exec(compile(mutant(clone, *locations), "m.py", "exec", dont_inherit=True), vars(module))
         return module, probe

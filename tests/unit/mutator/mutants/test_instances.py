@@ -16,7 +16,6 @@ from mutator.mutants import injected_lines
 from mutator.mutants import probe as contract
 from mutator.mutants.anchors import parse_file
 from mutator.mutants.injection_edits import injection_edit
-from mutator.mutants.rendering import render
 from mutator.mutants.splicing import apply_edits, in_lines, joined, probe_import, unsplice
 from mutator.targets.observation import Observation
 from mutator.workspace import Workspace
@@ -50,9 +49,9 @@ def drive(clone: Workspace, data: bytes, times: tuple[float, ...]) -> tuple[list
     nowhere = FaultLocation(path="", function="f", anchor=Anchor(kind=AnchorKind.ENTRY))
     observation = Observation(location=nowhere, time="t", values=(), derived=())
     trigger = Trigger(name="test", condition="t >= 1 and t < 3")
-    values = contract.template_values("m", trigger, Hold.WHILE, ("a",), observation, 1.0)
+    settings = contract.settings_of("m", trigger, Hold.WHILE, ("a",), observation, 1.0)
     fi, models = types.ModuleType("_fi"), clone.fault_models()
-    exec(render(models.probe, values, models.folder / "_fi.py.j2"), vars(fi))
+    exec(contract.probe_of(models.probe, settings).text, vars(fi))
     names: dict[str, Any] = {"_fi": fi}
     exec(data.replace(b"import _fi", b"pass"), names)
     seen = []

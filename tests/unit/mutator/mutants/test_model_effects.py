@@ -11,8 +11,7 @@ from mutator.errors import MutatorError
 from mutator.model import Anchor, AnchorKind, FaultLocation, Hold, Injection, Trigger, Value
 from mutator.mutants.anchors import parse_file
 from mutator.mutants.injection_edits import injection_edit
-from mutator.mutants.probe import template_values
-from mutator.mutants.rendering import render
+from mutator.mutants.probe import probe_of, settings_of
 from mutator.mutants.splicing import apply_edits, in_lines, joined, unsplice
 from mutator.triggers.conditions import check_condition
 from mutator.workspace import Workspace
@@ -33,10 +32,10 @@ class Toy:
         assert unsplice(data) == file.data
         trigger = Trigger(name="test", condition=check_condition("rs > 0"))
         observation = clone.manifest("openpilot").observation
-        values = template_values("m", trigger, Hold.WHILE, ("ab12",), observation, STEP_S)
+        settings = settings_of("m", trigger, Hold.WHILE, ("ab12",), observation, STEP_S)
         self.text = data.decode()
         self.probe: Any = types.ModuleType("_fi")
-        exec(render(models.probe, values, models.folder / "_fi.py.j2"), vars(self.probe))
+        exec(probe_of(models.probe, settings).text, vars(self.probe))
         self.names: dict[str, Any] = {"_fi": self.probe}
         exec(self.text, self.names)
         self.steps = 0

@@ -13,7 +13,6 @@ import pytest
 
 from mutator.model import Hold, Trigger
 from mutator.mutants import probe as contract
-from mutator.mutants.rendering import render
 from mutator.targets.observation import Observation, Value
 from mutator.triggers.conditions import check_condition, evaluate
 from mutator.workspace import Workspace
@@ -25,10 +24,10 @@ def probe(
     """Return a new probe module with two injections, `a` and `b`."""
     observation = observation or clone.manifest("openpilot").observation
     trigger = Trigger(name="test", condition=check_condition(condition))
-    values = contract.template_values("m1", trigger, Hold.WHILE, ("a", "b"), observation, 0.1) | more
+    settings = contract.settings_of("m1", trigger, Hold.WHILE, ("a", "b"), observation, 0.1)
     module = types.ModuleType("_fi")
     models = clone.fault_models()
-    exec(render(models.probe, values, models.folder / "_fi.py.j2"), module.__dict__)
+    exec(contract.probe_of(models.probe, replace(settings, **more)).text, module.__dict__)
     return module
 
 

@@ -4,13 +4,20 @@ import json
 import math
 import random
 import types
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
+from mutator._common.hashing import digest
+from mutator.engines.activation import active_at
 from mutator.errors import MutatorError
+from mutator.faults.fault_model_files import load_fault_models
+from mutator.faults.probe_templates import CODE, SETTINGS
 from mutator.model import Activation, Hold, Trigger
 from mutator.mutants import probe as contract
+from mutator.mutants.building import build
 from mutator.mutants.injected_lines import settings
 from mutator.mutants.rendering import render
 from mutator.workspace import Workspace
@@ -21,15 +28,15 @@ TRIGGER = Trigger(name="near", condition="hwt < 2.0 and rs > 0.0", armed_after_s
 MUTANT, IDS = "0123456789abcdef", ("0a1b2c3d", "4e5f6071")
 
 
-def source(clone: Workspace, trigger: Trigger = TRIGGER) -> str:
+def probe(clone: Workspace, trigger: Trigger = TRIGGER) -> contract.Probe:
     models, observation = clone.fault_models(), clone.manifest("openpilot").observation
-    values = contract.template_values(MUTANT, trigger, trigger.hold, IDS, observation, 0.1)
-    return render(models.probe, values, models.folder / "_fi.py.j2")
+    settings = contract.settings_of(MUTANT, trigger, trigger.hold, IDS, observation, 0.1)
+    return contract.probe_of(models.probe, settings)
 
 
 def module(clone: Workspace) -> Any:
     made = types.ModuleType("_fi")
-    exec(source(clone), made.__dict__)
+    exec(probe(clone).text, made.__dict__)
     return made
 
 
@@ -39,23 +46,62 @@ def see(fi: Any, *, near: bool) -> None:
 
 
 def test_the_decision_of_the_harness_agrees_with_the_probe(clone: Workspace) -> None:
-    code = compile(source(clone), "_fi", "exec")
-    armed_t, holds = contract.decision(code)
+    made = probe(clone)
     module: dict[str, Any] = {}
-    exec(code, module)
+    exec(made.text, module)
     draw = random.Random(7)
-    for _ in range(200):
-        values = (draw.uniform(0.0, 0.5), draw.uniform(0.0, 50.0), draw.choice((0.0, 20.0)), 15.0)
+    rows = [
+        (draw.uniform(0.0, 0.5), draw.uniform(0.0, 50.0), draw.choice((0.0, 20.0)), 15.0) for _ in range(200)
+    ]
+    for values, is_active in zip(rows, active_at(made.decision, np.array(rows).T), strict=True):
         module["_run"] = module["_Run"]()
         module["observe"](*values)
-        assert module["_run"].active == (values[0] >= armed_t and holds(*values))
+        assert module["_run"].active == is_active
+
+
+def test_the_templates_of_settings_and_code_make_one_template(clone: Workspace) -> None:
+    """The ids of all mutants depend on its text, so whoever changes the probe changes this digest, too."""
+    text = clone.fault_models().probe.text
+    assert digest(text.encode()) == "9870b87eb1d7a0cfc3f87928ba21888e140cfeeb9dc33194268d951f11aa0c08"
+
+
+@pytest.mark.parametrize("counted", [False, True])
+@pytest.mark.parametrize("sets", [False, True])
+def test_parts_rendered_alone_equal_the_whole_template_rendered(
+    clone: Workspace, sets: bool, counted: bool
+) -> None:
+    models, observation = clone.fault_models(), clone.manifest("openpilot").observation
+    if counted:
+        observation = replace(observation, time=None)
+    settings = contract.settings_of(MUTANT, TRIGGER, TRIGGER.hold, IDS, observation, 0.1, sets=sets)
+    assert contract.probe_of(models.probe, settings).text == render(
+        models.probe.text, vars(settings), models.folder
+    )
+
+
+def test_templates_whose_marks_do_not_fit_are_refused(toycar: Workspace) -> None:
+    path = toycar.templates / CODE
+    path.write_text(path.read_text().replace("{# settings #}\n", "", 1))
+    with pytest.raises(MutatorError, match=rf"{SETTINGS}: 3 parts of settings; expected 2, .* in {CODE}"):
+        load_fault_models(toycar.templates)
+
+
+@pytest.mark.parametrize(("name", "text"), [(CODE, "class _Run:"), (SETTINGS, "def _condition(")])
+def test_an_error_in_a_part_names_the_line_of_its_file(toycar: Workspace, name: str, text: str) -> None:
+    path = toycar.templates / name
+    before = path.read_text()
+    path.write_text(before.replace(text, "{{ missing }}\n" + text))
+    with pytest.raises(
+        MutatorError, match=f"{name}:{before[: before.index(text)].count(chr(10)) + 1}: .*missing"
+    ):
+        build(toycar.manifest("toycar"), toycar.fault_models(), None, TRIGGER)
 
 
 def test_probes_of_two_triggers_differ_only_in_their_settings(clone: Workspace) -> None:
     other = Trigger(name="x", condition="t >= 3.0", hold=Hold.FOR, hold_s=2.5, armed_after_s=1.0)
     rests, found = [], []
     for trigger in (TRIGGER, other):
-        patch = "".join(f"+{line}\n" for line in source(clone, trigger).splitlines())
+        patch = "".join(f"+{line}\n" for line in probe(clone, trigger).text.splitlines())
         spans = list(settings(patch, 0, len(patch)))
         found.append({name: patch[begin:end] for begin, end, name in spans})
         for begin, end, _ in reversed(spans):
@@ -75,13 +121,13 @@ def test_probes_of_two_triggers_differ_only_in_their_settings(clone: Workspace) 
 def test_holding_a_fault_for_a_time_requires_a_duration(clone: Workspace) -> None:
     observation = clone.manifest("openpilot").observation
     with pytest.raises(MutatorError, match="without a time"):
-        contract.template_values("m", Trigger(name="x", condition="True"), Hold.FOR, (), observation, 0.1)
+        contract.settings_of("m", Trigger(name="x", condition="True"), Hold.FOR, (), observation, 0.1)
 
 
 def test_a_condition_with_an_unknown_name_is_refused(clone: Workspace) -> None:
     observation, trigger = clone.manifest("openpilot").observation, Trigger(name="x", condition="speed > 1.0")
     with pytest.raises(MutatorError, match=r"unknown name 'speed' in 'speed > 1.0'; .* d_rel, v_ego, v_lead"):
-        contract.template_values("m", trigger, Hold.WHILE, (), observation, 0.1)
+        contract.settings_of("m", trigger, Hold.WHILE, (), observation, 0.1)
 
 
 NEVER = {"first": None, "last": None, "count": 0}

@@ -14,8 +14,8 @@ from mutator.config.sources import Source
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel, ParamSchema, SnippetKind
 from mutator.model import Hold, Value
-from mutator.mutants.probe import template_values
-from mutator.mutants.rendering import changed_value, render, snippet
+from mutator.mutants.probe import probe_of, settings_of
+from mutator.mutants.rendering import changed_value, snippet
 from mutator.triggers.kinds import always
 from mutator.workspace import Workspace
 
@@ -255,9 +255,9 @@ def test_a_models_result_has_the_expected_value_and_type(
     before = copy.deepcopy(value)
     lines = snippet(models.get(name), given, "ab12")
     observation = clone.manifest("openpilot").observation
-    settings = template_values("m", always(), Hold.WHILE, ("ab12",), observation, 0.1)
+    settings = settings_of("m", always(), Hold.WHILE, ("ab12",), observation, 0.1)
     probe = types.ModuleType("_fi")
-    exec(render(models.probe, settings, models.folder / "_fi.py.j2"), vars(probe))
+    exec(probe_of(models.probe, settings).text, vars(probe))
     probe.observe(t=0.0, d_rel=1.0, v_ego=1.0, v_lead=1.0)
     names = {"_fi": probe, "x": value}
     exec("\n".join(lines), names)
