@@ -190,6 +190,22 @@ def test_a_metric_of_both_runs_covers_the_steps_that_both_have(
     assert found == {name: value for name, value in expected.items() if value is not None}
 
 
+def test_a_run_that_stops_at_its_terminal_hazard_has_the_same_metrics(write: Write) -> None:
+    aggregates = ("min", "max", "mean", "last", "integral", "at_end")
+    manifest = write(
+        'hazards: {HIT: {when: "gap <= 0", terminal: true}}\nmetrics:\n'
+        + "".join(
+            f"  {name}_: {{{name}: gap - golden.gap, unit: m, worse: lower, about: x}}\n"
+            for name in aggregates
+        )
+    )
+    golden = {"time": T, "gap": GOLDEN, "speed": SPEED}
+    whole = judged(manifest, golden).metrics
+    stopped = judged(manifest, golden, time=T[:4], gap=GAP[:4], speed=SPEED[:4], force=SPEED[:4]).metrics
+    assert len(whole) == 1 + len(aggregates)
+    assert stopped == whole
+
+
 def test_a_run_without_a_channel_that_a_metric_reads_of_the_golden_run_is_refused(
     write: Write, tmp_path: Path
 ) -> None:
