@@ -33,11 +33,11 @@ from mutator.report.browse import Browse
 from mutator.report.page import Content
 from mutator.report.panels.answers import answers_panel
 from mutator.report.panels.paths import paths_panel
+from mutator.report.seen import PLACE, UNTIMED_PATH
 from mutator.report.studies import ReportedRun
 from mutator.report.words import words_of
 from mutator.results import table_building
 from mutator.results.counting import outcome_counts
-from mutator.results.table_reader import Results
 from mutator.review.groups import shapes
 from mutator.store.lines import LineWriter
 from mutator.store.records import SCHEMA
@@ -138,17 +138,17 @@ def write(size: int, out: Path) -> dict[str, float]:
     workspace = Workspace.find(root=ROOT)
     experiments = {e.id: e for e in written_run(workspace, size, out)}
     began = process_time()
-    found = Results.of_run(out)
-    rows, lines = found.rows(), list(found.lines())
     run = ReportedRun.open(RunFolder.open(out), None)
-    table = embedded(report_browse.table(rows, lines, run.paths), "table")
+    more = {PLACE: run.seen.places, UNTIMED_PATH: run.seen.path_numbers}
+    table = embedded(report_browse.table(run.results.assign(**more), run.faults, run.paths), "table")
     assert run.paths is not None
-    paths = embedded(run.paths.data([row.experiment_id for row in rows]), "paths")
+    ids = run.results["experiment_id"].tolist()
+    paths = embedded(run.paths.data(ids), "paths")
     table_s = process_time() - began
-    shown = [experiments[row.experiment_id] for row in rows]
+    shown = [experiments[name] for name in ids]
     records = [record(e, n) for n, e in enumerate(shown)]
     traces = [one.trace_digest for one in records]
-    details = report_browse.details(shown, shapes(patches(workspace, shown)), rows, traces)
+    details = report_browse.details(shown, shapes(patches(workspace, shown)), ids, traces)
     detail = embedded(details, "details")
     index_kb = write_series(workspace, records, out)
     browse = Browse(
@@ -158,7 +158,7 @@ def write(size: int, out: Path) -> dict[str, float]:
     content = Content(
         name=f"{size} experiments",
         alarm="",
-        outcomes=outcome_counts(run.texts),
+        outcomes=outcome_counts(run.results),
         planned="",
         words=words_of(run),
         study="",

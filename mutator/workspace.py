@@ -22,7 +22,7 @@ from mutator.faults.fault_models import FaultModels
 from mutator.faults.readings import Readings, load_readings
 from mutator.faults.specs import FaultSpec, load_spec
 from mutator.model import Fault
-from mutator.results.column_facts import check_names
+from mutator.results.table_columns import check_names
 from mutator.stpa.analysis import Analysis, StructureModel, load_analysis, load_structure
 from mutator.stpa.context_tables import ContextTable, HazardList, load_context_table, load_hazards
 from mutator.targets.manifest import TargetManifest

@@ -38,7 +38,7 @@ class RunContents(StoredRun):
     @cached_property
     def results(self) -> "pd.DataFrame":
         """One row per experiment with a record, indexed by its id, with the columns of results.csv, typed."""
-        return Results.up_to_date(self.path).frame()
+        return Results.up_to_date(self.path).indexed_frame()
 
     def propagation(self) -> "pd.DataFrame":
         """Return, for each experiment, one row for each channel that differs from the golden run, with the
@@ -49,18 +49,18 @@ class RunContents(StoredRun):
     @property
     def endings(self) -> dict[str, int]:
         """Number of experiments by ending: the outcome of runs that ended normally, the status of others."""
-        return counting.outcome_counts(self._texts)
+        return counting.outcome_counts(self._frame)
 
     @property
     def harness_errors(self) -> dict[str, str]:
         """Experiments in which the harness failed, with the reasons; `mutator.run` retries them."""
-        texts = self._texts
-        failed = texts[texts["status"] == Status.HARNESS_ERROR.value]
+        frame = self._frame
+        failed = frame[frame["status"] == Status.HARNESS_ERROR.value]
         return dict(zip(failed["experiment_id"], failed["detail"], strict=True))
 
     @cached_property
-    def _texts(self) -> "pd.DataFrame":
-        return Results.up_to_date(self.path).texts()
+    def _frame(self) -> "pd.DataFrame":
+        return Results.up_to_date(self.path).frame()
 
     @cached_property
     def traces(self) -> Traces:

@@ -29,7 +29,6 @@ from mutator.report import building
 from mutator.report.stills import take_stills
 from mutator.results import counting
 from mutator.results import table_building as results_table
-from mutator.results.rows import count_table
 from mutator.statistics.frame import prepare
 from mutator.statistics.mutation_score import score_sheet, totals
 from mutator.statistics.sheet import Sheet
@@ -94,24 +93,24 @@ class Run(RunContents):
 
     def counts(self) -> Table:
         """Count how the experiments of each fault type ended."""
-        texts = self._texts
-        hazards, counts = counting.hazard_names(texts), counting.counts_by(texts, counting.kinds(texts))
-        heads, rows = count_table(counts, "fault type", hazards, alerts=self.folder.has_alerts)
+        frame = self._frame
+        hazards, counts = counting.hazard_names(frame), counting.counts_by(frame, counting.kinds(frame))
+        heads, rows = counting.count_table(counts, "fault type", hazards, alerts=self.folder.has_alerts)
         return Table(heads=heads, rows=rows, right=range(1, len(heads)))
 
     def mutation_score(self) -> Sheet:
         """Return the mutation score: the shares of operator mutants that changed an actuator, raised a new
         alert or caused a hazard, in total, by operator and by function. Empty without such mutants.
         """
-        texts = self._texts
-        if not (texts["module"] == OPERATORS).any():
-            return score_sheet(prepare(texts), {}, None)
+        frame = self._frame
+        if not (frame["module"] == OPERATORS).any():
+            return score_sheet(prepare(frame), {}, None)
         try:
             alerts = alerts_by_drive(self.fault_free())
         except (MutatorError, KeyError):  # without target or golden runs, alerts cannot be compared
             alerts = None
         told = self.folder.head.get("operators", ())
-        return score_sheet(prepare(texts), self.faults, alerts, told)
+        return score_sheet(prepare(frame), self.faults, alerts, told)
 
     def mutation_totals(self) -> Table:
         """Return the total mutation score. Empty without operator mutants."""

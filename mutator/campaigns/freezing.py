@@ -26,7 +26,7 @@ from mutator.campaigns.provenance import check_sources, check_version
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.errors import MutatorError
 from mutator.model import Experiment
-from mutator.results.column_facts import PLAN_COLUMNS, plan_row
+from mutator.results.plan_columns import PLAN_COLUMNS, plan_row
 from mutator.store import digests, plan_file
 from mutator.store.digests import Digest, DigestingFile, Ledger
 from mutator.store.opening import check_contents

@@ -22,7 +22,7 @@ from mutator.campaigns.sampling import pick, pick_in_proportion, pick_pairs
 from mutator.campaigns.shared_runs import in_turn, runs
 from mutator.errors import MutatorError
 from mutator.model import AfterHazard, Experiment
-from mutator.results.column_facts import PLAN_COLUMNS, plan_row
+from mutator.results.plan_columns import PLAN_COLUMNS, plan_row
 from mutator.store import plan_file
 from mutator.store.check_results import measured_cpu_s
 from mutator.store.run_folder import GoldenRun, RunFolder

@@ -8,7 +8,6 @@ import pandas as pd
 from mutator.comparison.pairs import Pair
 from mutator.comparison.sheets import Names, adjusted, whole_and_parts
 from mutator.comparison.sides import Side
-from mutator.results.rows import by_fault_type
 from mutator.statistics.medians import median_difference
 from mutator.statistics.paired import wilcoxon
 from mutator.statistics.sheet import Cell, P, Sheet
@@ -44,8 +43,7 @@ def _values(pairs: Sequence[Pair], a: Side, b: Side, name: str) -> pd.DataFrame:
     `second`.
     """
     rows = [
-        (by_fault_type(p.row_a), p.row_a.fault, a.metrics[p.a.id].get(name), b.metrics[p.b.id].get(name))
-        for p in pairs
+        (p.row_a.kind, p.row_a.fault, a.metrics[p.a.id].get(name), b.metrics[p.b.id].get(name)) for p in pairs
     ]
     return pd.DataFrame(rows, columns=["kind", "fault", "first", "second"]).dropna()
 

@@ -14,6 +14,7 @@ from mutator._common.text import counted
 from mutator.comparison.comparison import Comparison, Gate, ending_change
 from mutator.comparison.differences import Fact
 from mutator.comparison.pairs import Change, Pair, time_to_hazard
+from mutator.results.plan_columns import plan_row
 from mutator.results.rows import Row
 from mutator.web import asset, load_order
 
@@ -194,12 +195,13 @@ def _hazard_time(row: Row) -> str:
 
 def pair_line(pair: Pair) -> dict[str, object]:
     """Return a pair's line in pairs.csv. Times are in simulated seconds."""
-    row = pair.row_b
+    planned = plan_row(pair.b)
     line: dict[str, object] = {
         "experiment_a": pair.a.id,
         "experiment_b": pair.b.id,
-        **{name: getattr(row, name) for name in ("module", "fault_type", "variant", "value", "unit")},
-        **{name: getattr(row, name) for name in ("scenario", "method", "trigger")},
+        **{name: planned[name] for name in ("module", "fault_type", "variant")},
+        "value": "" if planned["value"] is None else str(planned["value"]),
+        **{name: planned[name] for name in ("unit", "scenario", "method", "trigger")},
         "changes": ";".join(change.value for change in Change if change in pair.changes),
     }
     sides = [dict(_side_cells(row)) for row in (pair.row_a, pair.row_b)]

@@ -9,7 +9,7 @@ import pandas as pd
 
 from mutator.comparison.pairs import Change, Pair, time_to_hazard
 from mutator.model import Outcome, Status
-from mutator.results.rows import Row, by_fault_type
+from mutator.results.rows import Row
 from mutator.statistics.contrasts import holm
 from mutator.statistics.paired import mcnemar, rate_difference, times
 from mutator.statistics.shares import share
@@ -28,7 +28,7 @@ def frame_of(pairs: Sequence[Pair]) -> pd.DataFrame:
     """
     rows = [
         {
-            "kind": by_fault_type(p.row_a),
+            "kind": p.row_a.kind,
             "fault": p.row_a.fault,
             **_cells(p.row_a, "a"),
             **_cells(p.row_b, "b"),
@@ -147,8 +147,8 @@ def whole_and_parts(
 
 def changes_sheet(pairs: Sequence[Pair]) -> Sheet:
     seen = [change for change in Change if any(change in p.changes for p in pairs)]
-    kinds = sorted({by_fault_type(p.row_a) for p in pairs})
-    parts = {kind: [p for p in pairs if by_fault_type(p.row_a) == kind] for kind in kinds}
+    kinds = sorted({p.row_a.kind for p in pairs})
+    parts = {kind: [p for p in pairs if p.row_a.kind == kind] for kind in kinds}
     lines = tuple(_count_line(kind, part, seen) for kind, part in parts.items())
     return Sheet(
         name="changes",

@@ -7,9 +7,9 @@ from typing import NamedTuple
 from mutator.campaigns.filters import compile_filter
 from mutator.model import Experiment, Record, Value
 from mutator.preflight import equivalence
-from mutator.results.column_facts import PLAN_COLUMNS, plan_row
-from mutator.results.rows import Row
-from mutator.results.table_reader import row_of
+from mutator.results.plan_columns import PLAN_COLUMNS, plan_row
+from mutator.results.rows import Row, rows_of
+from mutator.results.table_reader import frame_of
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.targets.severity import Scale
@@ -64,13 +64,12 @@ def read_side(run: Path, only: str | None = None) -> Side:
     equivalence.judge(folder, records)
     accepts = compile_filter(only, PLAN_COLUMNS) if only else None
     experiments = tuple(e for e in plan_file.read_all(folder.path) if accepts is None or accepts(plan_row(e)))
-    hazards = folder.head["hazards"]
-    done = {e.id: (e, records[e.id]) for e in experiments if e.id in records}
+    faults = {e.fault.id: e.fault for e in experiments}
     return Side(
         folder=folder,
         experiments=experiments,
-        rows={name: row_of(e, record, hazards, folder.scale) for name, (e, record) in done.items()},
-        metrics={name: _metrics(record) for name, (_, record) in done.items()},
+        rows={row.experiment_id: row for row in rows_of(frame_of(folder, experiments), faults)},
+        metrics={e.id: _metrics(records[e.id]) for e in experiments if e.id in records},
     )
 
 

@@ -5,7 +5,6 @@ import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +20,7 @@ from mutator.errors import CheckFailed, MutatorError
 from mutator.preflight import equivalence
 from mutator.results import table_building
 from mutator.results.ranking import worth
-from mutator.results.rows import Row
-from mutator.results.table_reader import row_of
+from mutator.results.table_reader import frame_of
 from mutator.store import cleaning, digests, integrity, plan_file
 from mutator.store.approvals import FILE as REVIEWED
 from mutator.store.check_results import FILE as CHECKS
@@ -243,12 +241,9 @@ def _pack_series(folders: Sequence[RunFolder], out: Path) -> None:
     """Pack the series of all shards before the head is written, because nothing packs them later."""
     shards = tuple(folder.path for folder in folders)
     if any((shard / SERIES).is_dir() for shard in shards):
-        first, rows = folders[0], chain.from_iterable(map(_rows, folders))
-        pack(out, first.head["plan"], worth(rows), first.series_mb, others=shards)
+        import pandas as pd
 
-
-def _rows(folder: RunFolder) -> Iterator[Row]:
-    records, hazards, scale = folder.records(), folder.head["hazards"], folder.scale
-    for experiment in plan_file.iterate(folder.path):
-        if (record := records.get(experiment.id)) is not None:
-            yield row_of(experiment, record, hazards, scale)
+        first = folders[0]
+        frames = [frame_of(folder, plan_file.iterate(folder.path)) for folder in folders]
+        ranks = worth(pd.concat(frames, ignore_index=True))
+        pack(out, first.head["plan"], ranks, first.series_mb, others=shards)

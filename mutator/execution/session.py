@@ -38,7 +38,7 @@ from mutator.model import Record
 from mutator.preflight import equivalence
 from mutator.preflight.preflight import are_there, run_checks, unreached_triggers
 from mutator.results import table_building
-from mutator.results.ranking import worth_of
+from mutator.results.ranking import worth
 from mutator.results.table_reader import Results
 from mutator.store import digests
 from mutator.store.check_results import golden_digests
@@ -291,8 +291,8 @@ class Session:
         """Pack the workers' series. While a worker is still running, leave this to the next session."""
         folder = self.folder
         if segments(folder.path) and not wait_for_workers(folder.path):
-            texts = Results.of_run(folder.path).texts()
-            pack(folder.path, folder.head["plan"], worth_of(texts), folder.series_mb)
+            ranks = worth(Results(folder.path).frame())
+            pack(folder.path, folder.head["plan"], ranks, folder.series_mb)
 
 
 @contextmanager

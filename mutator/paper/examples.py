@@ -10,10 +10,10 @@ from mutator.errors import MutatorError
 from mutator.execution.traces import Traces
 from mutator.figures.figures import Drawing
 from mutator.figures.run_plot import marks_of
-from mutator.model import fault_label
 from mutator.outcomes.series_sampling import RATE
 from mutator.paper.actions import WANTED, Pair, Wanted
 from mutator.paper.run_pair import draw
+from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -46,13 +46,12 @@ def candidates(frame: pd.DataFrame, wanted: Wanted) -> pd.DataFrame:
 
     Empty if the target lacks the hazard or channel.
     """
-    numbers = frame.assign(**{n: pd.to_numeric(frame[n]) for n in frame.columns if n.startswith("max_dev_")})
     try:
-        found = numbers.query(wanted.query, engine="python")
+        found = frame.query(wanted.query, engine="python")
     except pd.errors.UndefinedVariableError:
-        return numbers.iloc[:0]
-    if wanted.order not in numbers:
-        return numbers.iloc[:0]
+        return frame.iloc[:0]
+    if wanted.order not in frame:
+        return frame.iloc[:0]
     return found.sort_values([wanted.order, "experiment_id"], ascending=[False, True])
 
 
@@ -66,6 +65,7 @@ def _drawing(frame: pd.DataFrame, traces: Traces | None, wanted: Wanted) -> Draw
     recorded = {channel.name for channel in (*manifest.compared, *manifest.plotted)}
     if missing := [name for name in wanted.actions if name not in recorded]:
         return _none(wanted, f"the target records no {missing[0]}")
+    faults = plan_file.read_faults(traces.folder.path)
     looked_at = found.head(LOOKED_AT).to_dict("records")
     for number, row in enumerate(looked_at, start=1):
         record = traces.record(row["experiment_id"])
@@ -77,7 +77,7 @@ def _drawing(frame: pd.DataFrame, traces: Traces | None, wanted: Wanted) -> Draw
             return Drawing(
                 name=wanted.name,
                 title=wanted.title,
-                note=_note(wanted, row, number, len(found)),
+                note=_note(wanted, row, faults[row["fault_id"]].label, number, len(found)),
                 figure=draw(pair, steps, wanted, marks_of(record), manifest),
                 codes=(
                     (QUERY, wanted.query),
@@ -103,8 +103,7 @@ def _none(wanted: Wanted, why: str) -> Drawing:
     )
 
 
-def _note(wanted: Wanted, row: Mapping[Hashable, Any], number: int, of: int) -> str:
-    fault = fault_label(f"{row['kind']}/{row['variant']}", row["value"], row["unit"])
+def _note(wanted: Wanted, row: Mapping[Hashable, Any], fault: str, number: int, of: int) -> str:
     return (
         f"{fault} in {row['scenario']}, {row['method']}, trigger "
         f"{row['trigger']}: experiment {row['experiment_id']}. The query finds {counted(of, 'experiment')}. "

@@ -21,7 +21,7 @@ def published(run: ReportedRun) -> Published | None:
 
 def drawings(run: ReportedRun) -> tuple[Drawing, ...]:
     """Return the figures of unsafe control actions, only for finished runs with published fault types."""
-    if published(run) is None or len(run.texts) != run.folder.planned:
+    if published(run) is None or len(run.results) != run.folder.planned:
         return ()
     return example_drawings(run.folder, run.frame, run.workspace)
 

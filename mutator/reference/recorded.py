@@ -4,14 +4,10 @@ from collections.abc import Iterable, Iterator
 
 from mutator._common.tables import Table
 from mutator.reference.tables import generated
-from mutator.results.column_facts import (
-    PLAN_COLUMNS,
-    TIMINGS,
-    Column,
-    result_columns,
-    severity_columns,
-)
+from mutator.results.plan_columns import PLAN_COLUMNS
 from mutator.results.propagation import COLUMNS as PROPAGATION
+from mutator.results.table_columns import TIMINGS, result_columns, severity_columns
+from mutator.results.table_files import ARROW_TYPES, Column
 from mutator.targets.channels import Channel
 from mutator.targets.judging import Hazard, Metric
 from mutator.targets.manifest import TargetManifest
@@ -19,8 +15,6 @@ from mutator.targets.observation import variable_units
 from mutator.targets.severity import DELTA_V
 from mutator.targets.target_facts import metric_facts
 from mutator.workspace import Workspace
-
-_ARROW = {"text": "string", "flag": "int8", "count": "int64", "number": "double"}
 
 
 def results(workspace: Workspace) -> str:
@@ -65,7 +59,7 @@ def _table_of(manifest: TargetManifest) -> Iterator[str]:
 
 def _columns(columns: Iterable[Column]) -> Iterator[str]:
     heads = ("column", "type", "Parquet", "unit", "meaning")
-    rows = [(f"`{c.name}`", c.type, _ARROW[c.type], c.unit or "-", c.about) for c in columns]
+    rows = [(f"`{c.name}`", c.type, ARROW_TYPES[c.type], c.unit or "-", c.about) for c in columns]
     yield Table(heads=heads, rows=rows).as_markdown(escape=False)
     yield ""
 

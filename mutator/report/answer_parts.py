@@ -9,7 +9,7 @@ from urllib.parse import quote
 import numpy as np
 import pandas as pd
 
-from mutator.results.rows import Row
+from mutator.results.counting import hazard_times
 
 FIRST = "alert before the hazard"
 NO_ALERT, LATE = "no alert at all", "alert only after the hazard"
@@ -87,17 +87,10 @@ def bar(part: int, of: int) -> Part:
     return Part(part, of, f"{part:,} of {of:,}")
 
 
-def warning(row: Row) -> str:
-    """Return the value of the page's filter `warning`; '' without a hazard."""
-    if not row.hazards:
-        return ""
-    if not row.alerts:
-        return NO_ALERT
-    return LATE if row.reaction_time is None else FIRST
-
-
 def warnings_of(frame: pd.DataFrame) -> np.ndarray:
-    """Return the value of `warning` for each row of a frame from `statistics.frame`."""
-    late = np.where(frame["reaction_time"] == "", LATE, FIRST)
+    """Return the value of the page's filter `warning` for each row of a frame of results; '' without a
+    hazard.
+    """
+    late = np.where(frame["reaction_time"].isna(), LATE, FIRST)
     hazard = np.where(frame["alerts"] == "", NO_ALERT, late)
-    return np.where(frame["is_hazard"], hazard, "")
+    return np.where(hazard_times(frame).notna().any(axis=1), hazard, "")

@@ -48,12 +48,12 @@ def answers_of(run: ReportedRun) -> tuple[Answer, ...]:
 
 def _told(run: ReportedRun) -> pd.DataFrame:
     """Return the usable experiments with rank, path and warning. Those that answers can list also have
-    texts.
+    words.
     """
     frame = run.frame
     told = frame.assign(place=frame[PLACE], untimed_path=frame[UNTIMED_PATH], warning=warnings_of(frame))
     shown = worst_of(told)
-    rows = rows_of(run.texts[run.texts["experiment_id"].isin(shown)])
+    rows = rows_of(run.results[run.results["experiment_id"].isin(shown)], run.faults)
     words = {
         "fault": {row.experiment_id: row.fault for row in rows},
         "hazard_names": {row.experiment_id: ", ".join(name for name, _ in row.hazards) for row in rows},

@@ -5,7 +5,7 @@ import json
 import math
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,17 +18,17 @@ from mutator.config.locations import as_written_at
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Fault
 from mutator.mutants.readable_diffs import readable
-from mutator.report.answer_parts import warning
+from mutator.report.answer_parts import warnings_of
 from mutator.report.page_series import series_facts
 from mutator.report.panel import FOLDER
 from mutator.report.paths import RunPaths
+from mutator.report.seen import PLACE, UNTIMED_PATH
 from mutator.report.source_lines import SourceLines
 from mutator.report.studies import ReportedRun
 from mutator.report.whole_map import map_of
 from mutator.report.words import meanings_of
-from mutator.results.column_facts import is_text
-from mutator.results.ranking import worst
-from mutator.results.rows import Row, lines_of, rows_of
+from mutator.results.counting import endings, hazard_names, hazard_times, hazards_joined, kinds
+from mutator.results.rows import Row, rows_of
 from mutator.review.groups import Shape, shapes
 from mutator.statistics.mutation_score import PERMANENT, TRANSIENT
 from mutator.store.run_folder import RunFolder
@@ -38,9 +38,12 @@ from mutator.triggers.trees import Tree, tree
 from mutator.web import embedded
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
+
     from mutator.workspace import Workspace
 
 SCHEMA = "report-table/1"
+READING_ORDER = ["module", "fault_type", "scenario", "method", "trigger", "experiment_id"]
 DETAILS_SCHEMA = "report-details/1"
 _OF_ALERTS = ("alerts", "t_alert", "reaction_time")  # columns that need a target with alerts
 STILLS_BYTES = 1_000_000  # limit of the stills embedded in the page; the others become links
@@ -62,12 +65,12 @@ class Browse:
 def browse_data(run: ReportedRun) -> Browse:
     """Return the page data of a run. Paths in it are relative to the report's folder."""
     folder, workspace = run.folder, run.workspace
-    rows, lines = _listed(run)
-    table_, details_ = _tables(run, rows, lines)
-    data: dict[str, Any] = {"table": table_, "details": details_}
+    listed = _listed(run)
+    ids = listed["experiment_id"].tolist()
+    data: dict[str, Any] = {"table": _table(run, listed), "details": _details(run, ids)}
     data["media"] = media(folder, folder.path / FOLDER, STILLS_BYTES)
     if run.paths:
-        data["paths"] = run.paths.data([row.experiment_id for row in rows])
+        data["paths"] = run.paths.data(ids)
     facts = {
         **_of_target(folder, workspace),
         "series": series_facts(folder),
@@ -84,7 +87,7 @@ def browse_data(run: ReportedRun) -> Browse:
 
 
 def _which(run: ReportedRun) -> str:
-    count, path = len(run.texts), run.folder.path.name
+    count, path = len(run.results), run.folder.path.name
     if count <= LISTED:
         return ""
     return (
@@ -105,115 +108,105 @@ def _of_target(folder: RunFolder, workspace: "Workspace | None") -> dict[str, An
     return {"filmed": filmed, "scene": scene_facts(manifest) if manifest else None}
 
 
-def _listed(run: ReportedRun) -> tuple[list[Row], list[dict[str, str]]]:
-    """Return the rows that the page lists, in reading order, and their cells."""
-    listed = run.texts[run.seen.places < LISTED]
-    rows, lines = rows_of(listed), lines_of(listed)
-    order = sorted(range(len(rows)), key=lambda i: reading_order(rows[i]))
-    return [rows[i] for i in order], [lines[i] for i in order]
+def _listed(run: ReportedRun) -> "DataFrame":
+    """Return the results that the page lists, in reading order, with rank and path."""
+    chosen = run.seen.places < LISTED
+    more = {PLACE: run.seen.places[chosen], UNTIMED_PATH: run.seen.path_numbers[chosen]}
+    return run.results[chosen].assign(**more).sort_values(READING_ORDER)
 
 
-def _tables(
-    run: ReportedRun, rows: Sequence[Row], lines: Sequence[Mapping[str, str]]
-) -> tuple[dict[str, Any], dict[str, Any]]:
-    planned = [run.experiments.get(row.experiment_id) for row in rows]
-    paths = run.paths
-    if paths:
-        ids, places = run.texts["experiment_id"], run.seen.path_numbers
-        some = (run.seen.places < LISTED) & (places >= 0)
-        paths = replace(paths, untimed_path_of=dict(zip(ids[some], places[some].tolist(), strict=True)))
-    made = table(rows, lines, paths, alerts=run.folder.has_alerts, source=run.source)
-    if len(rows) < len(run.texts):
-        made |= {"of": len(run.texts), "map": map_of(run)}
-    records = map(run.records.get, (row.experiment_id for row in rows))
+def _table(run: ReportedRun, listed: "DataFrame") -> dict[str, Any]:
+    made = table(listed, run.faults, run.paths, alerts=run.folder.has_alerts, source=run.source)
+    if len(listed) < len(run.results):
+        made |= {"of": len(run.results), "map": map_of(run)}
+    return made
+
+
+def _details(run: ReportedRun, ids: Sequence[str]) -> dict[str, Any]:
+    records = map(run.records.get, ids)
     traces = [record.trace_digest[:_TRACE] if record else "" for record in records]
-    return made, details(planned, shapes(_patches(run, rows)), rows, traces)
-
-
-def reading_order(row: Row) -> tuple[str, ...]:
-    return (row.module, row.fault_type, row.scenario, row.method, row.trigger, row.experiment_id)
+    return details(list(map(run.experiments.get, ids)), shapes(_patches(run, ids)), ids, traces)
 
 
 def table(
-    rows: Sequence[Row],
-    lines: Sequence[Mapping[str, str]],
+    results: "DataFrame",
+    faults: Mapping[str, Fault],
     paths: RunPaths | None = None,
     *,
     alerts: bool = True,
     source: SourceLines | None = None,
 ) -> dict[str, Any]:
     """Return the results by column, with derived columns such as `rank` (1: the worst). Alert columns need a
-    target with `alerts`; `line` (of the fault) and `lasting` need a `source`.
+    target with `alerts`; `line` (of the fault) and `lasting` need a `source`. `faults` are those of the plan.
     """
-    left_out = () if alerts else _OF_ALERTS
-    columns: dict[str, list[str]] = {
-        name: [line[name] for line in lines] for name in (lines[0] if lines else ()) if name not in left_out
+    left_out = {PLACE, UNTIMED_PATH, *(() if alerts else _OF_ALERTS)}
+    columns: dict[str, Iterable[Any]] = {
+        str(name): results[name] for name in results.columns if name not in left_out
     }
-    columns["kind"] = [f"{r.module}/{r.fault_type}" for r in rows]
-    columns["fault"] = [r.fault for r in rows]
-    columns["ending"] = [r.ending for r in rows]
-    columns["hazards"] = [";".join(sorted(name for name, _ in r.hazards)) for r in rows]
+    columns["kind"] = kinds(results)
+    rows = rows_of(results, faults)
+    columns["fault"] = [row.fault for row in rows]
+    columns["ending"] = endings(results)
+    columns["hazards"] = hazards_joined(results)
     if alerts:
-        columns["warning"] = [warning(r) for r in rows]
-    place = {row.experiment_id: i for i, row in enumerate(worst(rows), 1)}
-    columns["rank"] = [str(place[r.experiment_id]) for r in rows]
-    columns["t_hazard"] = [repr(r.hazards[0][1]) if r.hazards else "" for r in rows]
+        columns["warning"] = warnings_of(results)
+    columns["rank"] = results[PLACE] + 1
+    columns["t_hazard"] = hazard_times(results).min(axis=1)
     if paths:
-        columns["through"] = [paths.through(r.experiment_id) for r in rows]
+        columns["through"] = paths.through(results[UNTIMED_PATH])
     if source:
-        columns |= _of_operators(source, lines)
-    checked = sorted({name for r in rows for name in r.checked})
+        columns |= _of_operators(source, results, rows)
     made = [{"name": name, **column(name, values)} for name, values in columns.items()]
     labels = {name: facts["label"] for name, facts in paths.components.items()} if paths else {}
-    return {"schema": SCHEMA, "count": len(rows), "checked": checked, "labels": labels, "columns": made}
+    checked = list(hazard_names(results))
+    return {"schema": SCHEMA, "count": len(results), "checked": checked, "labels": labels, "columns": made}
 
 
-def _of_operators(source: SourceLines, lines: Sequence[Mapping[str, str]]) -> dict[str, list[str]]:
+def _of_operators(source: SourceLines, results: "DataFrame", rows: Sequence[Row]) -> dict[str, list[str]]:
     """Return the columns that differ for mutants of operators. Their `value` is the change in the source."""
-    changes = [source.changes.get(line["fault_id"], "") for line in lines]
-    both = list(zip(lines, changes, strict=True))
+    faults = results["fault_id"].tolist()
+    changes = [source.changes.get(name, "") for name in faults]
+    both = list(zip(rows, changes, strict=True))
     return {
-        "value": [change or line["value"] for line, change in both],
-        "variant": [line["variant"].removesuffix(f" {change}" if change else "") for line, change in both],
-        "line": [source.places.get(line["fault_id"], "") for line in lines],
-        "lasting": [PERMANENT if line["trigger"] == ALWAYS else TRANSIENT for line in lines],
+        "value": [change or ("" if row.value is None else str(row.value)) for row, change in both],
+        "variant": [row.variant.removesuffix(f" {change}" if change else "") for row, change in both],
+        "line": [source.places.get(name, "") for name in faults],
+        "lasting": [PERMANENT if row.trigger == ALWAYS else TRANSIENT for row in rows],
     }
 
 
-def column(name: str, values: Sequence[str]) -> dict[str, Any]:
-    """Return a column's data: numbers (None: empty), ids as texts, otherwise codes of the distinct values.
-    Names are never parsed as numbers, because a variant can be called `nan`.
+def column(name: str, values: Iterable[Any]) -> dict[str, Any]:
+    """Return a column's data: numbers (None: no value), ids as texts, otherwise codes of the distinct
+    texts.
     """
-    if not is_text(name) and any(values):
-        try:
-            return {"numbers": [_number(text) for text in values]}
-        except ValueError:
-            pass
+    cells = list(values)
+    if any(not isinstance(cell, str) for cell in cells):
+        numbers = list(map(_number, cells))
+        if any(number is not None for number in numbers):
+            return {"numbers": numbers}
+        cells = [""] * len(cells)
     if name == "experiment_id":  # all values are distinct, so codes would save nothing
-        return {"texts": list(values)}
-    words = sorted(set(values))
+        return {"texts": cells}
+    words = sorted(set(cells))
     code = {word: i for i, word in enumerate(words)}
-    return {"words": words, "codes": [code[text] for text in values]}
+    return {"words": words, "codes": [code[text] for text in cells]}
 
 
-def _number(text: str) -> float | int | str | None:
-    """Return the value for JSON, which has no infinities or NaN."""
-    if not text:
+def _number(value: float) -> float | int | str | None:
+    """Return the value for JSON, which has no infinities; None for NaN."""
+    if math.isnan(value):
         return None
-    value = float(text)
     if math.isinf(value):
         return "Infinity" if value > 0 else "-Infinity"
-    if math.isnan(value):
-        return "NaN"
-    return int(value) if value.is_integer() and abs(value) < 2**53 else value
+    return int(value) if abs(value) < 2**53 and value == int(value) else float(value)
 
 
 def details(
-    experiments: Sequence[Experiment | None], found: Sequence[Shape], rows: Sequence[Row], traces: list[str]
+    experiments: Sequence[Experiment | None], found: Sequence[Shape], ids: Sequence[str], traces: list[str]
 ) -> dict[str, Any]:
-    """For each row, the codes of its spec and trigger setting (-1: not in the plan), the index of its diff's
-    shape (-1: no diff), and the start of its trace's digest, which its series must name. A shape has a list
-    of values for each hole in its text, in row order.
+    """For each of the `ids`, the codes of its spec and trigger setting (-1: not in the plan), the index of
+    its diff's shape (-1: no diff), and the start of its trace's digest, which its series must name. A shape
+    has a list of values for each hole in its text, in row order.
     """
     specs, settings = _Codes(), _Codes()
     faults = {e.fault.id: e.fault for e in experiments if e}
@@ -223,7 +216,7 @@ def details(
         "schema": DETAILS_SCHEMA,
         "spec": [specs.code(spec[e.fault.id]) if e else -1 for e in experiments],
         "setting": [settings.code(_setting(e)) if e else -1 for e in experiments],
-        "shape": [shape_of.get(row.experiment_id, -1) for row in rows],
+        "shape": [shape_of.get(name, -1) for name in ids],
         "trace": traces,
         "specs": specs.known,
         "settings": [json.loads(text) for text in settings.known],
@@ -267,12 +260,12 @@ def _setting(experiment: Experiment) -> str:
     return json.dumps({"hold": hold.value, **told, "changes": experiment.changes})
 
 
-def _patches(run: ReportedRun, rows: Iterable[Row]) -> Iterator[tuple[str, str, str]]:
+def _patches(run: ReportedRun, ids: Iterable[str]) -> Iterator[tuple[str, str, str]]:
     """Yield each experiment's id, an empty grouping key, and the patch without the probe."""
-    for row in rows:
-        data = run.folder.read_patch(row.experiment_id, run.records.get(row.experiment_id))
+    for name in ids:
+        data = run.folder.read_patch(name, run.records.get(name))
         if data is not None:
-            yield row.experiment_id, "", readable(data.decode("utf-8", "replace"))[0]
+            yield name, "", readable(data.decode("utf-8", "replace"))[0]
 
 
 def media(folder: RunFolder, seen_from: Path, budget: int) -> dict[str, dict[str, Any]]:

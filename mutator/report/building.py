@@ -54,11 +54,11 @@ def ensure(run: Path, workspace: Workspace | None) -> Report:
     """Write the report of a run folder unless it is up to date."""
     if not is_current(run, made_from(RunFolder.open(run), workspace)):
         return write(run, workspace)
-    return _report(run, Results.of_run(run).count())
+    return _report(run, Results(run).count())
 
 
 def write(run: Path, workspace: Workspace | None) -> Report:
-    """Write the report of a run folder whose results.csv is up to date, and missing series of kept traces.
+    """Write the report of a run folder whose tables are up to date, and missing series of kept traces.
 
     Without a workspace, no experiments are rerun and no published numbers are shown.
     """
@@ -72,9 +72,9 @@ def write(run: Path, workspace: Workspace | None) -> Report:
 
 
 def build(folder: RunFolder, workspace: Workspace | None) -> Built:
-    """Build the report of a run folder whose results.csv is up to date, without writing anything."""
+    """Build the report of a run folder whose tables are up to date, without writing anything."""
     reported = ReportedRun.open(folder, workspace)
-    with beside(lambda: browse_data(reported), processes_for(len(reported.texts))) as browse:
+    with beside(lambda: browse_data(reported), processes_for(len(reported.results))) as browse:
         study = study_panels(reported)
         content = _content(replace(reported, compared=bool(study)), browse)
     panels = (*content.panels, *study)
@@ -84,7 +84,7 @@ def build(folder: RunFolder, workspace: Workspace | None) -> Built:
         files |= {"STUDY.md": study_markdown(content, study).encode()}
         files |= {"study.html": study_html(content, study).encode()}
     summaries = tuple(panel.summary for panel in panels if panel.summary)
-    return Built(files=files, rows=len(reported.texts), summaries=summaries)
+    return Built(files=files, rows=len(reported.results), summaries=summaries)
 
 
 def _report(run: Path, rows: int, summaries: tuple[Table, ...] = ()) -> Report:
@@ -97,7 +97,7 @@ def _content(run: ReportedRun, browse: Callable[[], Browse]) -> Content:
     return Content(
         name=str(run.folder.head["campaign"]),
         alarm=run.engines.proof if run.engines and run.engines.failed else "",
-        outcomes=outcome_counts(run.texts),
+        outcomes=outcome_counts(run.results),
         planned=_planned(run.folder),
         words=words_of(run),
         study=run.study.about if run.study and run.compared else "",

@@ -1,6 +1,7 @@
 """The most dangerous results: the worst experiments, and the fault types with the most hazards."""
 
 from collections.abc import Mapping, Sequence
+from math import isnan
 from typing import Any
 
 import pandas as pd
@@ -25,7 +26,7 @@ def dangerous(frame: pd.DataFrame, metrics: Sequence[MetricFacts], *, has_alerts
     if SEVERITY in frame and len(ranked):
         says = f"{says.removesuffix('.')}: {_classes(ranked)}."
     elif contact:
-        hits = int((pd.to_numeric(ranked[contact]) > 0).sum())
+        hits = int((ranked[contact] > 0).sum())
         says += f" {share(hits, len(ranked), 'hazards')} involved contact."
     units = {metric.name: metric.unit for metric in metrics}
     kinds = by_kind(ranked, active)
@@ -131,9 +132,9 @@ def _how_bad(row: Mapping[Any, Any], contact: str, units: Mapping[str, str]) -> 
     """For a contact, its speed, for example `delta-v 6.70 m/s`; otherwise the smallest margin to hazards that
     occurred, or `-`.
     """
-    if contact and row[contact] not in ("", "0.0"):
+    if contact and row[contact] and not isnan(row[contact]):
         words = "delta-v" if contact == "delta_v" else "contact at"
-        return f"{words} {float(row[contact]):.2f} {units.get(contact, '')}"
+        return f"{words} {row[contact]:.2f} {units.get(contact, '')}"
     names = [f"{MARGIN}{name.lower()}" for name in row["hazard_names"].split(", ")]
-    margins = [(float(row[name]), units[name]) for name in names if name in units and row[name] != ""]
+    margins = [(row[name], units[name]) for name in names if name in units and not isnan(row[name])]
     return "margin {:.2f} {}".format(*min(margins)) if margins else "-"

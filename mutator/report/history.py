@@ -95,8 +95,8 @@ def write_history(folder: Path) -> History:
 
 def _past_run(path: Path) -> PastRun:
     folder = RunFolder.unverified(path)
-    rows = {row.experiment_id: row for row in Results.of_run(path).rows()}
-    files = [*(path / "records").glob("*.jsonl"), path / "results.csv"]
+    rows = {row.experiment_id: row for row in Results(path).rows()}
+    files = [*(path / "records").glob("*.jsonl"), Results(path).path]
     last = max(file.stat().st_mtime for file in files if file.exists())
     git = folder.stretches[-1].git or {}
     state = git.get("target")

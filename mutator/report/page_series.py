@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from mutator.errors import MutatorError
 from mutator.execution.traces import Traces
 from mutator.outcomes.series_sampling import keep_series
-from mutator.results.column_facts import deviation_columns
+from mutator.results.table_columns import deviation_columns
 from mutator.store.run_folder import RunFolder
 from mutator.store.series import SeriesFolder
 

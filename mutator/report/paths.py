@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -54,7 +54,6 @@ class RunPaths:
     by_id: Mapping[str, FaultPath]
     records: Mapping[str, Record]
     untimed_paths: Sequence[UntimedPath] = ()
-    untimed_path_of: Mapping[str, int] = field(default_factory=dict)  # by experiment id, for some experiments
 
     @classmethod
     def of(
@@ -74,14 +73,13 @@ class RunPaths:
             untimed_paths=untimed_paths,
         )
 
-    def through(self, experiment_id: str) -> str:
-        """Return the links that a fault got through, joined by `;`. The page filters by them."""
-        if experiment_id in self.untimed_path_of:
-            links = self.untimed_paths[self.untimed_path_of[experiment_id]].links
-        else:
-            path = self.by_id.get(experiment_id)
-            links = path.links if path else ()
-        return ";".join(link_text(c.tail, c.tip) for c in links if c.state is LinkState.THROUGH)
+    def through(self, path_numbers: Iterable[int]) -> list[str]:
+        """Return the links that each fault got through, joined by `;`. The page filters by them."""
+        texts = [
+            ";".join(link_text(c.tail, c.tip) for c in path.links if c.state is LinkState.THROUGH)
+            for path in self.untimed_paths
+        ]
+        return [texts[number] if number >= 0 else "" for number in path_numbers]
 
     def data(self, ids: Sequence[str]) -> dict[str, Any]:
         """Return the page's data for the experiments `ids`: the shape of each path (-1: none), and for each

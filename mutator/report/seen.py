@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mutator._common.processes import processes_for, shared
-from mutator.model import Record
+from mutator.model import Fault, Record
 from mutator.outcomes.fault_paths import FaultPaths, PathInputs, UntimedPath
 from mutator.results.ranking import places
 from mutator.statistics.times import Alerts
-from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 
 if TYPE_CHECKING:
@@ -40,15 +39,16 @@ class Seen:
     def of(
         cls,
         folder: RunFolder,
-        texts: "DataFrame",
+        results: "DataFrame",
         records: Mapping[str, Record],
+        faults: Mapping[str, Fault],
         fault_paths: FaultPaths | None,
     ) -> "Seen":
         codes: dict[int, int] = {}  # compared by identity, because equal untimed paths are one object
         untimed_paths: list[UntimedPath] = []
-        path_numbers = np.full(len(texts), -1, dtype=np.int32)
+        path_numbers = np.full(len(results), -1, dtype=np.int32)
         alerts: dict[str, _Alerts] = {}
-        for number, (all_inputs, told) in enumerate(_looks(folder, texts, records, fault_paths)):
+        for number, (all_inputs, told) in enumerate(_looks(results, records, faults, fault_paths)):
             alerts |= told
             for row, inputs in enumerate(all_inputs, start=number * _PIECE):
                 untimed_path = fault_paths.untimed_path_of(inputs) if fault_paths and inputs else None
@@ -57,7 +57,7 @@ class Seen:
                     if code == len(untimed_paths):
                         untimed_paths.append(untimed_path)
         return cls(
-            places=places(texts),
+            places=places(results),
             path_numbers=path_numbers,
             untimed_paths=tuple(untimed_paths),
             alerts=alerts,
@@ -66,10 +66,13 @@ class Seen:
 
 
 def _looks(
-    folder: RunFolder, texts: "DataFrame", records: Mapping[str, Record], fault_paths: FaultPaths | None
+    results: "DataFrame",
+    records: Mapping[str, Record],
+    faults: Mapping[str, Fault],
+    fault_paths: FaultPaths | None,
 ) -> Iterator[tuple[list[PathInputs | None], dict[str, _Alerts]]]:
     """Yield, for each batch of experiments, their `PathInputs`, and the alerts of those with a hazard."""
-    faults, pairs = plan_file.read_faults(folder.path), texts[["experiment_id", "fault_id"]]
+    pairs = results[["experiment_id", "fault_id"]]
 
     def looked_at(piece: "DataFrame") -> tuple[list[PathInputs | None], dict[str, _Alerts]]:
         all_inputs: list[PathInputs | None] = []

@@ -11,7 +11,6 @@ from mutator.model import OPERATORS, Fault, Outcome, Status
 from mutator.mutants.anchors import ParsedFile, parsed
 from mutator.results.counting import endings
 from mutator.statistics.mutation_score import PERMANENT, TRANSIENT
-from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.kinds import ALWAYS
@@ -75,12 +74,17 @@ class SourceLines:
     why: str = ""
 
     @classmethod
-    def of(cls, folder: RunFolder, workspace: Workspace | None, texts: "DataFrame") -> "SourceLines | None":
-        """Return the source of a run with the results `texts`; None if the run has no operators."""
-        if not (texts["module"] == OPERATORS).any():
+    def of(
+        cls,
+        folder: RunFolder,
+        workspace: Workspace | None,
+        results: "DataFrame",
+        faults: Mapping[str, Fault],
+    ) -> "SourceLines | None":
+        """Return the source of a run; None if it has no operators. `faults` are those of the plan."""
+        if not (results["module"] == OPERATORS).any():
             return None
-        faults = plan_file.read_faults(folder.path)
-        known = {name: faults[name] for name in texts["fault_id"].unique() if name in faults}
+        known = {name: faults[name] for name in results["fault_id"].unique() if name in faults}
         changes = {name: str(fault.value) for name, fault in known.items() if fault.module == OPERATORS}
         try:
             manifest = workspace.manifest(folder.head["target"]) if workspace else None
@@ -94,19 +98,19 @@ class SourceLines:
                 why="The target has changed since this run was planned, so line numbers do not match and its "
                 "source is not shown. Restore the target and rebuild the report (`mutator report`).",
             )
-        return cls._marked(manifest, known, texts, changes)
+        return cls._marked(manifest, known, results, changes)
 
     @classmethod
     def _marked(
         cls,
         manifest: TargetManifest,
         faults: Mapping[str, Fault],
-        texts: "DataFrame",
+        results: "DataFrame",
         changes: Mapping[str, str],
     ) -> "SourceLines":
         at = {name: _place(manifest, fault) for name, fault in faults.items()}
         marks: dict[str, dict[int, dict[str, Mark]]] = {path: {} for path, _ in at.values()}
-        for (path, line), lasting, mark in _marks(at, texts):
+        for (path, line), lasting, mark in _marks(at, results):
             marks[path].setdefault(line, {})[lasting] = mark
         files = (_file(parsed(manifest.tree, path), found) for path, found in marks.items() if found)
         return cls(
@@ -122,13 +126,13 @@ def _place(manifest: TargetManifest, fault: Fault) -> tuple[str, int]:
 
 
 def _marks(
-    at: Mapping[str, tuple[str, int]], texts: "DataFrame"
+    at: Mapping[str, tuple[str, int]], results: "DataFrame"
 ) -> Iterator[tuple[tuple[str, int], str, Mark]]:
     """Yield the marks of each line, for permanent and transient faults. Each fault is counted once, with its
     worst experiment.
     """
     found: dict[tuple[tuple[str, int], str], dict[str, int]] = {}
-    for name, trigger, ending in zip(texts["fault_id"], texts["trigger"], endings(texts), strict=True):
+    for name, trigger, ending in zip(results["fault_id"], results["trigger"], endings(results), strict=True):
         if name in at and ending in ENDINGS:
             ranks = found.setdefault((at[name], PERMANENT if trigger == ALWAYS else TRANSIENT), {})
             ranks[name] = min(ENDINGS.index(ending), ranks.get(name, len(ENDINGS)))

@@ -79,10 +79,10 @@ def _due(
 ) -> dict[str, list[Shot]]:
     """Return the missing stills of the worst experiments with one of the changes `pictures`, worst first."""
     seeing = set(pictures)
-    texts = Results.of_run(folder.path).texts()
-    moved = ((texts["status"] == Status.OK.value) & (texts["t_manifest"] != "")).to_numpy()
-    order = [row for row in places(texts).argsort() if moved[row]]
-    ids = (str(texts["experiment_id"].iloc[row]) for row in order)
+    frame = Results(folder.path).frame()
+    moved = ((frame["status"] == Status.OK.value) & frame["t_manifest"].notna()).to_numpy()
+    order = [row for row in places(frame).argsort() if moved[row]]
+    ids = (str(frame["experiment_id"].iloc[row]) for row in order)
     wanted = (name for name in ids if seeing & set(experiments[name].changes))
     chosen = islice(wanted, min(MOST, folder.planned // ONE_IN))
     due = {name: _missing(folder, name, records[name]) for name in chosen}

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, cast
 from mutator.campaigns.studies import find_study
 from mutator.errors import MutatorError
 from mutator.figures.figures import Drawing
-from mutator.model import Experiment, Record, Status
+from mutator.model import Experiment, Fault, Record, Status
 from mutator.outcomes.fault_free import FaultFreeRun, fault_free_runs
 from mutator.outcomes.fault_paths import fault_paths_of
 from mutator.outcomes.golden import load_trace
@@ -16,10 +16,11 @@ from mutator.report.panel import Panel
 from mutator.report.paths import RunPaths
 from mutator.report.seen import PLACE, UNTIMED_PATH, Seen
 from mutator.report.source_lines import SourceLines
-from mutator.results.rows import Row
+from mutator.results.rows import Row, rows_of
 from mutator.results.table_reader import Results
 from mutator.statistics.frame import prepare
 from mutator.statistics.published import Published
+from mutator.store import plan_file
 from mutator.store.planned import Planned
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -30,14 +31,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReportedRun:
-    """The data that a report is made from. `texts` are all experiments of results.csv, `frame` the usable
-    ones. `experiments` (the plan) and `records` are read on access. Without a workspace, no experiment can
-    be rerun, and there is no study. `compared`: the study has its own page on these results.
+    """The data that a report is made from. `results` are all experiments with a record, `frame` the usable
+    ones. `faults` are those of the plan; `experiments` (the plan) and `records` are read on access. Without a
+    workspace, no experiment can be rerun, and there is no study. `compared`: the study has its own page on
+    these results.
     """
 
     folder: RunFolder
     workspace: Workspace | None
-    texts: "DataFrame"
+    results: "DataFrame"
     frame: "DataFrame"
     study: "Study | None"
     seen: Seen
@@ -45,40 +47,43 @@ class ReportedRun:
     compared: bool = False
     paths: RunPaths | None = None
     source: SourceLines | None = None
+    faults: Mapping[str, Fault] = field(default_factory=dict)
     experiments: Mapping[str, Experiment] = field(default_factory=dict)
     records: Mapping[str, Record] = field(default_factory=dict)
 
     @classmethod
     def open(cls, folder: RunFolder, workspace: Workspace | None) -> "ReportedRun":
-        """Open a run folder whose results.csv is up to date."""
+        """Open a run folder whose tables are up to date."""
         experiments, records = Planned(folder.path), folder.records()
-        texts, fault_paths = Results.of_run(folder.path).texts(), fault_paths_of(folder.head)
-        seen = Seen.of(folder, texts, records, fault_paths)
+        faults, fault_paths = plan_file.read_faults(folder.path), fault_paths_of(folder.head)
+        results = Results(folder.path).frame()
+        seen = Seen.of(folder, results, records, faults, fault_paths)
         return cls(
             folder=folder,
             workspace=workspace,
-            texts=texts,
-            frame=prepare(texts.assign(**{PLACE: seen.places, UNTIMED_PATH: seen.path_numbers})),
+            results=results,
+            frame=prepare(results.assign(**{PLACE: seen.places, UNTIMED_PATH: seen.path_numbers})),
             engines=engine_summary(folder, records, seen.timings),
             study=_study(folder) if workspace else None,
             seen=seen,
+            faults=faults,
             paths=RunPaths.of(folder, fault_paths, experiments, records, seen.untimed_paths)
             if fault_paths
             else None,
-            source=SourceLines.of(folder, workspace, texts),
+            source=SourceLines.of(folder, workspace, results, faults),
             experiments=experiments,
             records=records,
         )
 
     @property
     def rows(self) -> tuple[Row, ...]:
-        """All rows of results.csv. For large runs use `frame`."""
-        return Results.of_run(self.folder.path).rows()
+        """The results as objects. For large runs use `results` or `frame`."""
+        return tuple(rows_of(self.results, self.faults))
 
     @property
     def done(self) -> int:
         """The number of planned experiments that ran."""
-        return int((self.texts["status"] != Status.HARNESS_ERROR.value).sum())
+        return int((self.results["status"] != Status.HARNESS_ERROR.value).sum())
 
     def fault_free(self) -> tuple[FaultFreeRun, ...]:
         """Return the alerts, hazards and ranges of the golden runs; empty if these cannot be read."""

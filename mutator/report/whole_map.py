@@ -27,7 +27,7 @@ def map_of(run: ReportedRun) -> dict[str, Any]:
         cells[name] = _pairs(_counted(y, x, part & of, shape), _counted(y, x, of, shape))
     active = frame["is_activated"].to_numpy(dtype=bool)
     for metric in run.folder.head.metrics:
-        values = pd.to_numeric(frame[metric.name]).to_numpy(dtype=float)
+        values = frame[metric.name].to_numpy(dtype=float)
         known = active & ~np.isnan(values)
         cells |= _summaries(metric.name, metric.worse, values[known], y[known], x[known], shape)
     return {"kinds": kinds, "scenarios": scenarios, "cells": cells}
@@ -48,7 +48,7 @@ def _shares(frame: pd.DataFrame, *, alerts: bool) -> Iterator[tuple[str, np.ndar
     if alerts:
         alert = (frame["alerts"] != "").to_numpy()
         yield "alerts", alert, active
-        yield "silent", (frame["reaction_time"] == "").to_numpy(), hazard
+        yield "silent", frame["reaction_time"].isna().to_numpy(), hazard
         yield "no-alert", ~alert, hazard
     for name in hazard_names(frame):
         yield name, frame[f"t_{name.lower()}"].notna().to_numpy(), active

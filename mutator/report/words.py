@@ -58,7 +58,7 @@ def meanings_of(run: ReportedRun) -> Words:
     """Return the meanings of the codes in the list of experiments: column -> code -> meaning."""
     words = words_of(run)
     triggers = words.get("Triggers", {})
-    drawn = run.texts[run.texts["method"] == Method.RANDOM.value]["trigger"].unique()
+    drawn = run.results[run.results["method"] == Method.RANDOM.value]["trigger"].unique()
     at_random = {
         name: "a time drawn at random" + (f", as the counterpart of {of}" if of else "")
         for name, of in ((name, name.partition("/")[2]) for name in sorted(drawn))
@@ -89,7 +89,7 @@ def _severity(scale: Mapping[str, object] | None) -> dict[str, str]:
 
 
 def _scenarios(run: ReportedRun) -> dict[str, str]:
-    names = sorted(run.texts["scenario"].unique())
+    names = sorted(run.results["scenario"].unique())
     return {name: about for name in names if (about := _title(run, name))}
 
 
@@ -107,7 +107,7 @@ def _title(run: ReportedRun, name: str) -> str:
 
 def _triggers(run: ReportedRun) -> dict[str, str]:
     """Return the trigger methods, then the condition of each guided trigger."""
-    methods = set(run.texts["method"].unique())
+    methods = set(run.results["method"].unique())
     told = {name: about for name, about in _METHODS.items() if name in methods}
     abouts = _contexts(run)
     guided = run.frame[run.frame["method"] == Method.GUIDED.value] if "condition" in run.frame else None

@@ -1,64 +1,95 @@
 """Counts activated, manifested and hazardous faults in the results table.
 
-`texts` comes from `Results.texts`. Harness errors and invalid mutants are counted only as such.
+`frame` comes from `Results.frame`. Harness errors and invalid mutants are counted only as such.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import compress
 from typing import TYPE_CHECKING, Any
 
 from mutator.model import Outcome, Status
-from mutator.results.column_facts import hazards_of
-from mutator.results.rows import UNUSABLE, Count
+from mutator.results.table_columns import hazards_of
 
 if TYPE_CHECKING:
     import pandas as pd
 
+UNUSABLE = (Status.HARNESS_ERROR, Status.INVALID_MUTANT)
 
-def endings(texts: "pd.DataFrame") -> "pd.Series[str]":
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Count:
+    """Counts over the usable experiments of one group. `unusable` counts the other experiments."""
+
+    group: str
+    injected: int
+    activated: int
+    manifested: int
+    hazards: tuple[int, ...]  # one number for each hazard in the results
+    any_hazard: int
+    alerts: int
+    hazards_without_alert: int
+    crashed: int
+    timeout: int
+    unusable: int
+
+
+def endings(frame: "pd.DataFrame") -> "pd.Series[str]":
     """Return the outcome of each row, or the status if the run failed."""
-    worked = (texts["status"] == Status.OK.value) & (texts["outcome"] != "")
-    return texts["outcome"].where(worked, texts["status"])
+    worked = (frame["status"] == Status.OK.value) & (frame["outcome"] != "")
+    return frame["outcome"].where(worked, frame["status"])
 
 
-def outcome_counts(texts: "pd.DataFrame") -> dict[str, int]:
-    seen = endings(texts).value_counts()
+def outcome_counts(frame: "pd.DataFrame") -> dict[str, int]:
+    seen = endings(frame).value_counts()
     order = [o.value for o in Outcome] + [s.value for s in Status if s is not Status.OK]
     return {name: int(seen[name]) for name in order if name in seen}
 
 
-def hazard_names(texts: "pd.DataFrame") -> tuple[str, ...]:
+def hazard_names(frame: "pd.DataFrame") -> tuple[str, ...]:
     """Return the hazards that were checked, including those that never occurred."""
-    return tuple(sorted(name for name in hazards_of(texts) if (texts[name.lower()] != "").any()))
+    return tuple(sorted(name for name in hazards_of(frame) if frame[name.lower()].notna().any()))
 
 
-def came(texts: "pd.DataFrame", hazard: str) -> "pd.Series[bool]":
-    name = hazard.lower()
-    return (texts[name] != "") & (texts[f"t_{name}"] != "")
+def hazard_times(frame: "pd.DataFrame") -> "pd.DataFrame":
+    """Return the first time of each hazard, a column for each. NaN if it did not occur or the run failed."""
+    import pandas as pd
+
+    columns = {name: (frame[f"t_{name.lower()}"], frame[name.lower()].notna()) for name in hazards_of(frame)}
+    times = {name: time.where(is_checked) for name, (time, is_checked) in columns.items()}
+    return pd.DataFrame(times, index=frame.index, dtype=float)
 
 
-def kinds(texts: "pd.DataFrame") -> "pd.Series[str]":
+def hazards_joined(frame: "pd.DataFrame") -> list[str]:
+    """Return the names of the hazards that occurred in each row, sorted and joined by `;`."""
+    had = hazard_times(frame).notna()
+    names = sorted(hazards_of(frame))
+    return [";".join(compress(names, row)) for row in had[names].to_numpy()]
+
+
+def kinds(frame: "pd.DataFrame") -> "pd.Series[str]":
     """Return the fault type of each row: `sensor/bias`."""
-    return texts["module"] + "/" + texts["fault_type"]
+    return frame["module"] + "/" + frame["fault_type"]
 
 
-def counts_by(texts: "pd.DataFrame", groups: "pd.Series[str]") -> tuple[Count, ...]:
+def counts_by(frame: "pd.DataFrame", groups: "pd.Series[str]") -> tuple[Count, ...]:
     """Return a count for each of the `groups`, sorted by name, then the total."""
     import pandas as pd
 
-    hazards = hazard_names(texts)
-    usable = ~texts["status"].isin([status.value for status in UNUSABLE])
-    had = {name: came(texts, name) for name in hazards}
-    any_hazard, alert = pd.DataFrame(had, index=texts.index).any(axis=1), texts["alerts"] != ""
+    hazards = hazard_names(frame)
+    usable = ~frame["status"].isin([status.value for status in UNUSABLE])
+    had = hazard_times(frame).notna()
+    any_hazard, alert = had.any(axis=1), frame["alerts"] != ""
     flags = {
         "injected": usable,
-        "activated": texts["t_activation"] != "",
-        "manifested": texts["t_manifest"] != "",
-        **{f"hazard {name}": flag for name, flag in had.items()},
+        "activated": frame["t_activation"].notna(),
+        "manifested": frame["t_manifest"].notna(),
+        **{f"hazard {name}": had[name] for name in hazards},
         "any_hazard": any_hazard,
         "alerts": alert,
         "hazards_without_alert": any_hazard & ~alert,
-        "crashed": texts["status"] == Status.CRASHED.value,
-        "timeout": texts["status"] == Status.TIMEOUT.value,
+        "crashed": frame["status"] == Status.CRASHED.value,
+        "timeout": frame["status"] == Status.TIMEOUT.value,
     }
     found = pd.DataFrame({name: flag & usable for name, flag in flags.items()} | {"unusable": ~usable})
     sums = found.groupby(groups.to_numpy(), sort=True).sum()
@@ -69,3 +100,21 @@ def counts_by(texts: "pd.DataFrame", groups: "pd.Series[str]") -> tuple[Count, .
 def _count(group: str, line: Mapping[Any, int], hazards: tuple[str, ...]) -> Count:
     plain = {name: int(number) for name, number in line.items() if not name.startswith("hazard ")}
     return Count(group=group, hazards=tuple(int(line[f"hazard {name}"]) for name in hazards), **plain)
+
+
+def count_table(
+    counts: Sequence[Count], head: str, hazards: Sequence[str], *, alerts: bool = True
+) -> tuple[list[str], list[list[str]]]:
+    """Return a table of counts. It has columns for crashes, timeouts and unusable runs only if any exist."""
+    heads = [head, "injected", "activated", "manifested", *hazards]
+    heads += ["any hazard", "alerts", "hazard, no alert"] if alerts else ["any hazard"]
+    table = [[c.group, c.injected, c.activated, c.manifested, *c.hazards, c.any_hazard] for c in counts]
+    for line, c in zip(table, counts, strict=True):
+        line += [c.alerts, c.hazards_without_alert] if alerts else []
+    for name in ("crashed", "timeout", "unusable"):
+        column = [getattr(c, name) for c in counts]
+        if any(column):
+            heads.append(name)
+            for line, number in zip(table, column, strict=True):
+                line.append(number)
+    return heads, [[str(cell) for cell in line] for line in table]

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from mutator.model import Record
-from mutator.results.column_facts import Column
+from mutator.results.table_files import Column
 from mutator.targets.target_facts import ChannelFacts
 
 COLUMNS = (
@@ -13,7 +13,7 @@ COLUMNS = (
     Column("component", "text", "", "the component of the channel, from the manifest"),
     Column("role", "text", "", "`actuator`, `truth` or `internal`"),
     Column("t_first", "number", "s", "when the channel first left golden"),
-    Column("max_dev", "number", "the channel's", "the largest difference from golden up to the drive's end"),
+    Column("max_dev", "number", "as its channel", "the largest difference from golden up to the drive's end"),
 )
 
 

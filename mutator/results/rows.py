@@ -1,34 +1,33 @@
-"""Typed rows of the results table, and the table of counts."""
+"""The rows of a frame of results as objects."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from mutator.model import Outcome, Status, fault_label
-from mutator.results.column_facts import hazards_of
+from mutator.model import Fault, Outcome, Status, Value, fault_label
+from mutator.results.counting import UNUSABLE, endings, kinds
+from mutator.results.plan_columns import number_of
+from mutator.results.table_columns import hazards_of
 from mutator.targets.severity import DELTA_V
 
 if TYPE_CHECKING:
     import pandas as pd
 
-UNUSABLE = (Status.HARNESS_ERROR, Status.INVALID_MUTANT)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
-    """One line of results.csv. Times are in simulated seconds; None: the event did not happen."""
+    """One row of the results table. Times are in simulated seconds; None: the event did not happen."""
 
     experiment_id: str
-    module: str
-    fault_type: str
+    kind: str  # fault type: `sensor/bias`
     variant: str
-    value: str
+    value: Value  # with the digits of the plan; None without a value, and if it is text
     unit: str
     scenario: str
-    method: str
     trigger: str
     status: Status
     outcome: Outcome | None
+    ending: str  # the outcome, or the status if the run failed
     t_activation: float | None
     t_manifest: float | None
     checked: tuple[str, ...]  # hazards that the target checks
@@ -47,106 +46,57 @@ class Row:
         return min((margin for _, margin in self.margins), default=None)
 
     @property
-    def ending(self) -> str:
-        """The outcome, or the status if the run failed."""
-        return self.outcome.value if self.status is Status.OK and self.outcome else self.status.value
-
-    @property
     def usable(self) -> bool:
         return self.status not in UNUSABLE
 
     @property
     def fault(self) -> str:
-        return fault_label(f"{self.module}/{self.fault_type}/{self.variant}", self.value, self.unit)
+        return fault_label(f"{self.kind}/{self.variant}", self.value, self.unit)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Count:
-    """Counts over the usable experiments of one group. `unusable` counts the other experiments."""
-
-    group: str
-    injected: int
-    activated: int
-    manifested: int
-    hazards: tuple[int, ...]  # one number for each hazard in the results
-    any_hazard: int
-    alerts: int
-    hazards_without_alert: int
-    crashed: int
-    timeout: int
-    unusable: int
+def cells_by_row(frame: "pd.DataFrame") -> list[dict[str, Any]]:
+    """Return the cells of each row of a frame of results, by column. A number without a value is None."""
+    columns = {str(name): frame[name].tolist() for name in frame}
+    for name, cells in columns.items():
+        if frame[name].dtype.kind == "f":
+            columns[name] = [None if cell != cell else cell for cell in cells]
+    return [dict(zip(columns, cells, strict=True)) for cells in zip(*columns.values(), strict=True)]
 
 
-def by_fault_type(row: Row) -> str:
-    return f"{row.module}/{row.fault_type}"
-
-
-def count_table(
-    counts: Sequence[Count], head: str, hazards: Sequence[str], *, alerts: bool = True
-) -> tuple[list[str], list[list[str]]]:
-    """Return a table of counts. It has columns for crashes, timeouts and unusable runs only if any exist."""
-    heads = [head, "injected", "activated", "manifested", *hazards]
-    heads += ["any hazard", "alerts", "hazard, no alert"] if alerts else ["any hazard"]
-    table = [[c.group, c.injected, c.activated, c.manifested, *c.hazards, c.any_hazard] for c in counts]
-    for line, c in zip(table, counts, strict=True):
-        line += [c.alerts, c.hazards_without_alert] if alerts else []
-    for name in ("crashed", "timeout", "unusable"):
-        column = [getattr(c, name) for c in counts]
-        if any(column):
-            heads.append(name)
-            for line, number in zip(table, column, strict=True):
-                line.append(number)
-    return heads, [[str(cell) for cell in line] for line in table]
-
-
-def lines_of(texts: "pd.DataFrame") -> list[dict[str, str]]:
-    names = list(map(str, texts.columns))
-    columns = [texts[name].tolist() for name in names]
-    return [dict(zip(names, cells, strict=True)) for cells in zip(*columns, strict=True)]
-
-
-def rows_of(texts: "pd.DataFrame") -> list[Row]:
-    hazards = hazards_of(texts)
-    return [row_from(line, hazards) for line in lines_of(texts)]
-
-
-def row_from(line: Mapping[str, str], hazards: Sequence[str]) -> Row:
-    """Parse a line of results.csv, given by column, of a target with these hazards. KeyError or ValueError if
-    it is invalid.
+def rows_of(frame: "pd.DataFrame", faults: Mapping[str, Fault]) -> list[Row]:
+    """Return the rows of a frame of results. `faults` are those of the plan, by id, which has the digits of
+    each value (35), while the table has a float. ValueError for an unknown status or outcome.
     """
-    checked = [name for name in hazards if line[name.lower()]]
-    times = {name: line[f"t_{name.lower()}"] for name in checked}
-    came = [(name, float(time)) for name, time in times.items() if time]
+    hazards = hazards_of(frame)
+    lines = cells_by_row(frame.assign(kind=kinds(frame), ending=endings(frame)))
+    return [_row(cells, hazards, faults.get(cells["fault_id"])) for cells in lines]
+
+
+def _row(cells: Mapping[str, Any], hazards: Sequence[str], fault: Fault | None) -> Row:
+    checked = [name for name in hazards if cells[name.lower()] is not None]
+    times = [(name, cells[f"t_{name.lower()}"]) for name in checked]
+    came = [(name, time) for name, time in times if time is not None]
+    margins = [(name, cells.get(f"margin_{name.lower()}")) for name in [name for name, _ in came] or checked]
     return Row(
-        experiment_id=line["experiment_id"],
-        module=line["module"],
-        fault_type=line["fault_type"],
-        variant=line["variant"],
-        value=line["value"],
-        unit=line["unit"],
-        scenario=line["scenario"],
-        method=line["method"],
-        trigger=line["trigger"],
-        status=Status(line["status"]),
-        outcome=Outcome(line["outcome"]) if line["outcome"] else None,
-        t_activation=_number(line["t_activation"]),
-        t_manifest=_number(line["t_manifest"]),
+        experiment_id=cells["experiment_id"],
+        kind=cells["kind"],
+        variant=cells["variant"],
+        value=number_of(fault) if fault else cells["value"],
+        unit=cells["unit"],
+        scenario=cells["scenario"],
+        trigger=cells["trigger"],
+        status=Status(cells["status"]),
+        outcome=Outcome(cells["outcome"]) if cells["outcome"] else None,
+        ending=cells["ending"],
+        t_activation=cells["t_activation"],
+        t_manifest=cells["t_manifest"],
         checked=tuple(checked),
-        hazards=tuple(sorted(came, key=lambda h: h[1])),
-        alerts=tuple(a for a in line["alerts"].split(";") if a),
-        t_alert=_number(line["t_alert"]),
-        reaction_time=_number(line["reaction_time"]),
-        detail=line["detail"],
-        severity=line.get("severity", ""),
-        delta_v=_number(line.get(DELTA_V, "")),
-        margins=_margins(line, [name for name, _ in came] or checked),
+        hazards=tuple(sorted(came, key=lambda hazard: hazard[1])),
+        alerts=tuple(filter(None, cells["alerts"].split(";"))),
+        t_alert=cells["t_alert"],
+        reaction_time=cells["reaction_time"],
+        detail=cells["detail"],
+        severity=cells.get("severity", ""),
+        delta_v=cells.get(DELTA_V),
+        margins=tuple((name, margin) for name, margin in margins if margin is not None),
     )
-
-
-def _margins(line: Mapping[str, str], hazards: Sequence[str]) -> tuple[tuple[str, float], ...]:
-    texts = [(name, line.get(f"margin_{name.lower()}", "")) for name in hazards]
-    return tuple((name, float(text)) for name, text in texts if text)
-
-
-def _number(text: str) -> float | None:
-    return float(text) if text else None

@@ -13,10 +13,9 @@ from mutator._common.hashing import digest
 from mutator._common.processes import beside, processes_for, shared
 from mutator._common.version import VERSION
 from mutator.errors import MutatorError, MutatorWarning
+from mutator.outcomes.fault_paths import fault_paths_of
 from mutator.results import propagation
-from mutator.results.column_facts import TIMINGS
-from mutator.results.propagation import columns_of
-from mutator.results.table_cells import ResultRows
+from mutator.results.table_columns import TIMINGS, Finished, cells_of, columns_of
 from mutator.results.table_files import CsvTable, ParquetTable, csv_lines, record_batch
 from mutator.store import digests, plan_file
 from mutator.store.digests import Digest
@@ -77,22 +76,23 @@ def write(folder: RunFolder, paths: Mapping[str, Path]) -> None:
 
 
 def _write_results(folder: RunFolder, paths: Mapping[str, Path]) -> None:
-    records, planned, rows = folder.records(), Planned(folder.path), ResultRows(folder)
+    records, planned, columns = folder.records(), Planned(folder.path), columns_of(folder.head)
+    scale, fault_paths = folder.scale, fault_paths_of(folder.head)
     tells_propagation = PROPAGATION in paths
 
     def made(batch: Sequence[str]) -> tuple[bytes, Any, Any]:
-        done = [(planned[name], records[name]) for name in batch]
-        cells = [rows.cells(*one) for one in done]
-        table = record_batch(rows.columns, list(zip(*cells, strict=True)))
+        finished = [Finished(planned[name], records[name], scale, fault_paths) for name in batch]
+        cells = cells_of(columns, finished)
+        lines, table = csv_lines(zip(*cells, strict=True)), record_batch(columns, cells)
         if not tells_propagation:
-            return csv_lines(cells), table, None
-        found = columns_of((record for _, record in done), folder.head.channels)
-        return csv_lines(cells), table, record_batch(propagation.COLUMNS, list(found.values()))
+            return lines, table, None
+        found = propagation.columns_of((one.record for one in finished), folder.head.channels)
+        return lines, table, record_batch(propagation.COLUMNS, list(found.values()))
 
     with ExitStack() as stack:
         stack.enter_context(_without_collection())
-        csv = stack.enter_context(CsvTable(paths[CSV], rows.columns))
-        parquet = stack.enter_context(ParquetTable(paths[PARQUET], rows.columns))
+        csv = stack.enter_context(CsvTable(paths[CSV], columns))
+        parquet = stack.enter_context(ParquetTable(paths[PARQUET], columns))
         propagated = None
         if tells_propagation:
             propagated = stack.enter_context(ParquetTable(paths[PROPAGATION], propagation.COLUMNS))

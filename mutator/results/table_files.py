@@ -1,17 +1,30 @@
-"""Writes tables in batches of rows: CSV for people, Parquet for programs."""
+"""What a column of a table is, and files of tables, written in batches of rows: CSV for people, Parquet for
+programs.
+"""
 
 import csv
 import io
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any
-
-from mutator.results.column_facts import Column
+from typing import Any, Literal
 
 _ROWS = 1 << 20  # maximum number of rows in a row group (pyarrow's default)
 _CELLS = 1 << 23  # maximum number of cells in a row group, because a whole group is in memory
-_TYPES = {"text": "string", "flag": "int8", "count": "int64", "number": "float64"}
+
+ColumnType = Literal["text", "flag", "count", "number"]
+ARROW_TYPES = {"text": "string", "flag": "int8", "count": "int64", "number": "double"}
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A column of a table. A `flag` is 0 or 1."""
+
+    name: str
+    type: ColumnType
+    unit: str
+    about: str
 
 
 def csv_lines(rows: Iterable[Sequence[object]]) -> bytes:
@@ -25,15 +38,16 @@ def record_batch(columns: Sequence[Column], values: Sequence[Sequence[object]]) 
     """Return Parquet rows, given the values of each column."""
     import pyarrow as pa  # type: ignore[import-untyped]
 
-    schema = _schema(columns)
+    schema = schema_of(columns)
     arrays = [pa.array(some, field.type) for some, field in zip(values, schema, strict=True)]
     return pa.record_batch(arrays, schema=schema)
 
 
-def _schema(columns: Sequence[Column]) -> Any:
+def schema_of(columns: Sequence[Column]) -> Any:
+    """Return the Parquet schema of columns."""
     import pyarrow as pa
 
-    return pa.schema([(c.name, pa.type_for_alias(_TYPES[c.type])) for c in columns])
+    return pa.schema([(c.name, pa.type_for_alias(ARROW_TYPES[c.type])) for c in columns])
 
 
 class CsvTable:
@@ -61,7 +75,7 @@ class ParquetTable:
         from pyarrow import parquet
 
         self._pa = pa
-        self._schema = _schema(columns)
+        self._schema = schema_of(columns)
         self._writer = parquet.ParquetWriter(path, self._schema, compression="zstd")
         self._group = min(_ROWS, _CELLS // len(columns))
         self._held: list[Any] = []

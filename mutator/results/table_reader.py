@@ -1,150 +1,98 @@
-"""Reads a run's results as rows, pandas frames, or bytes.
+"""Reads a run's results as frames, rows, or bytes.
 
-Only functions that return frames import pandas.
+Only functions that return frames or rows import pandas.
 """
 
-import csv
 import io
-from collections.abc import Iterator
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import zip_longest
+from itertools import islice, zip_longest
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any
 
-from mutator._common.bounded import MOST_DATA, check_open, open_regular, read_bounded
+from mutator._common.bounded import MOST_DATA, read_bounded
 from mutator.errors import MutatorError
-from mutator.model import Experiment, Outcome, Record, Status
-from mutator.results import table_building, table_cells
-from mutator.results.column_facts import SINCE, hazard_columns
-from mutator.results.rows import Row, row_from
-from mutator.store.run_head import Head, read_head
-from mutator.targets.severity import Scale
+from mutator.model import Experiment, Outcome, Status
+from mutator.results import table_building
+from mutator.results.rows import Row, rows_of
+from mutator.results.table_columns import Finished, cells_of, columns_of
+from mutator.results.table_files import Column, record_batch, schema_of
+from mutator.store import plan_file
+from mutator.store.run_folder import RunFolder
+from mutator.store.run_head import read_head
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
     import pandas as pd
 
-_NEEDED = (
-    "experiment_id",
-    "fault_id",
-    "module",
-    "fault_type",
-    "scenario",
-    "method",
-    "trigger",
-    "seed",
-    "status",
-    "t_activation",
-    "t_manifest",
-    "t_alert",
-)
 _NAMES = ("module", "fault_type", "reading", "unit", "scenario", "method", "trigger", "variant", "aim")
 _SCALES = {"status": [s.value for s in Status], "outcome": [o.value for o in Outcome]}
 MOST_CELLS, MOST_TEXT = 10_000_000, 100_000_000  # cells and bytes of text of a small Parquet file
 _PACKED = 20  # further ones for each byte of a large file
 _ROWS, _SPARE = 1000, 100_000  # rows to compare at a time; bytes that other versions of pyarrow may add
+_BATCH = 2_000  # experiments computed at a time
 _REMEDY = "rebuild it: `mutator report DIR`"
 
 
 @dataclass(frozen=True, slots=True)
 class Results:
-    """A results table: the results.csv at `path`, and the results.parquet and run.json next to it.
+    """The results table of the run folder `run`, as it was last built: its results.parquet, which all readers
+    use, and its results.csv, which is only exported.
 
     Every access reads the files. MutatorError if a file is missing or not a results table.
     """
 
-    path: Path
-
-    @classmethod
-    def of_run(cls, run: Path) -> "Results":
-        """Return the table of a run folder as it was last built."""
-        return cls(run / table_building.CSV)
+    run: Path
 
     @classmethod
     def up_to_date(cls, run: Path) -> "Results":
         """Return the table of a run folder, rebuilt if it is missing or older than the records."""
-        return cls(table_building.ensure(run))
+        return cls(table_building.ensure(run).parent)
+
+    @property
+    def path(self) -> Path:
+        return self.run / table_building.PARQUET
 
     def csv(self) -> bytes:
-        return self._read(self.path)
+        return self._read(table_building.CSV)
 
     def parquet(self) -> bytes:
-        return self._read(self.path.with_name(table_building.PARQUET))
+        return self._read(table_building.PARQUET)
 
-    def _read(self, path: Path) -> bytes:
+    def _read(self, name: str) -> bytes:
         try:
-            return read_bounded(path, MOST_DATA)
+            return read_bounded(self.run / name, MOST_DATA)
         except FileNotFoundError:
             raise MutatorError(
-                f"no results here (no {path.name})",
-                where=path.parent,
+                f"no results here (no {name})",
+                where=self.run,
                 expected="a run folder, made by `mutator run`",
                 remedy="correct the path, or build the results: `mutator report DIR`",
             ) from None
         except OSError as err:
-            raise MutatorError(f"the results cannot be read ({err.strerror})", where=path) from None
-
-    def lines(self) -> Iterator[dict[str, str]]:
-        reader = csv.DictReader(io.TextIOWrapper(io.BytesIO(self.csv()), encoding="utf-8", newline=""))
-        try:
-            self._check_header(reader.fieldnames or ())
-            for line in reader:
-                if None in line or None in line.values():
-                    raise self._no_table(f"line {reader.line_num} does not have as many cells as the header")
-                yield line
-        except (ValueError, csv.Error) as err:
-            raise self._no_table(str(err)) from None
+            raise MutatorError(
+                f"the results cannot be read ({err.strerror})", where=self.run / name
+            ) from None
 
     def count(self) -> int:
-        return len(self.texts())
+        return len(self.frame("experiment_id"))
 
     def rows(self) -> tuple[Row, ...]:
+        frame = self.frame()
         try:
-            lines = list(self.lines())
-            hazards = self._hazards(lines[0]) if lines else ()
-            return tuple(row_from(line, hazards) for line in lines)
-        except (KeyError, TypeError, ValueError) as err:
-            raise self._no_table(str(err)) from None
-
-    def texts(self) -> "pd.DataFrame":
-        """Return a frame of the cells as text ('' if empty); its `attrs["hazards"]` are the target's."""
-        import pandas as pd
-        import pyarrow as pa  # type: ignore[import-untyped]
-        from pyarrow import csv as arrow_csv
-
-        try:
-            with self._opened() as file:
-                names = next(csv.reader(io.TextIOWrapper(file, encoding="utf-8", newline="")), [])
-            self._check_header(names)
-            with self._opened() as file:
-                table = arrow_csv.read_csv(
-                    file,
-                    arrow_csv.ReadOptions(use_threads=False),  # for the reason given in `_table`
-                    arrow_csv.ParseOptions(newlines_in_values=True),
-                    arrow_csv.ConvertOptions(column_types=dict.fromkeys(names, pa.string())),
-                )
+            return tuple(rows_of(frame, plan_file.read_faults(self.run)))
         except ValueError as err:
             raise self._no_table(str(err)) from None
-        columns = {}
-        for name in names:  # one column at a time, to avoid two copies in memory
-            columns[name] = table.select([name]).combine_chunks().to_pandas(use_threads=False)[name]
-            table = table.drop_columns([name])
-        texts = pd.DataFrame(columns)
-        texts.attrs["hazards"] = self._hazards(names)
-        return texts
 
-    def _opened(self) -> BinaryIO:
-        try:
-            file = open_regular(self.path)
-            check_open(file, self.path)
-            return file
-        except OSError:
-            self._read(self.path)  # raises the precise error
-            raise
+    def frame(self, *only: str) -> "pd.DataFrame":
+        """Return a frame with the types of results.parquet, of all columns or only those named. Without a
+        value, texts are '' and numbers NaN. `attrs["hazards"]` are the target's hazards.
+        """
+        data, head = self.parquet(), read_head(self.run)
+        columns = [column for column in columns_of(head) if not only or column.name in only]
+        return typed(self._table(data, columns), head["hazards"])
 
-    def frame(self) -> "pd.DataFrame":
-        """Return a frame of all columns, typed and indexed by experiment id.
+    def indexed_frame(self) -> "pd.DataFrame":
+        """Return a frame of all columns for notebooks, indexed by experiment id.
 
         Names are categories; `outcome` and `status` are ordered. Flags are nullable booleans (NA: the run
         failed). Times are floats in simulated seconds (NaN: no such event). Added columns are `kind`
@@ -153,11 +101,11 @@ class Results:
         """
         import pandas as pd
 
-        frame = _frame(self.parquet()).set_index("experiment_id")
-        frame.attrs["hazards"] = self._hazards(frame.columns)
-        hazards = [name.lower() for name in frame.attrs["hazards"]]
+        data, head = self.parquet(), read_head(self.run)
+        columns, hazards = columns_of(head), [name.lower() for name in head["hazards"]]
+        frame: pd.DataFrame = _to_pandas(_plain(self._table(data, columns))).set_index("experiment_id")
         frame["kind"] = (frame["module"] + "/" + frame["fault_type"]).astype("category")
-        for name in ("activated", "manifested", *hazards):
+        for name in (column.name for column in columns if column.type == "flag"):
             frame[name] = frame[name].astype("boolean")
         for name in _NAMES:
             frame[name] = frame[name].astype("category")
@@ -166,49 +114,91 @@ class Results:
         came = frame[hazards].any(axis=1).astype("boolean")
         frame["hazard"] = came.mask(frame["status"] != Status.OK.value)
         frame["t_hazard"] = frame[[f"t_{name}" for name in hazards]].min(axis=1).astype(float)
-        metrics = {metric.name: metric.unit for metric in self._head().metrics if metric.name in frame}
-        frame.attrs["units"] = _units(frame) | metrics
+        numbers = {
+            column.name: column.unit or "-" for column in columns if column.type in ("count", "number")
+        }
+        frame.attrs |= {"hazards": tuple(head["hazards"]), "units": numbers | {"t_hazard": "s"}}
         return frame
 
-    def _hazards(self, columns: "Iterable[str]") -> tuple[str, ...]:
-        """Return the hazards that the run's target checks; MutatorError if the table lacks one."""
-        hazards, known = tuple(self._head()["hazards"]), set(columns)
-        needed = (column.name for hazard in hazards for column in hazard_columns(hazard))
-        if missing := next((name for name in needed if name not in known), None):
-            raise self._no_table(f"no column '{missing}', although run.json names that hazard")
-        return hazards
+    def _table(self, data: bytes, columns: Sequence[Column]) -> Any:
+        """Return these columns; MutatorError if one is missing or has another type."""
+        import pyarrow as pa  # type: ignore[import-untyped]
+        from pyarrow import parquet
 
-    def _head(self) -> Head:
-        return read_head(self.path.parent)
+        source = io.BytesIO(data)
+        try:
+            schema = parquet.read_schema(source)
+            for field in schema_of(columns):
+                if schema.names.count(field.name) != 1:
+                    raise self._no_table(f"no column '{field.name}'")
+                if (found := schema.field(field.name).type) != field.type:
+                    raise self._no_table(f"column '{field.name}' has the type {found}, not {field.type}")
+            return _table(source, [column.name for column in columns])
+        except (pa.ArrowException, OSError) as err:
+            raise self._no_table(str(err)) from None
 
     def propagation(self) -> "pd.DataFrame":
         """Return a frame of propagation.parquet, with a row for each channel that left golden."""
-        return _frame(self.propagation_parquet())
+        return _to_pandas(_plain(_table(io.BytesIO(self.propagation_parquet()))))
 
     def propagation_parquet(self) -> bytes:
-        return self._read(self.path.with_name(table_building.PROPAGATION))
+        return self._read(table_building.PROPAGATION)
 
     def timings(self) -> "pd.DataFrame":
         """Return a frame of timings.parquet, with a row for each experiment that ran."""
-        return _frame(self.timings_parquet())
+        return _to_pandas(_plain(_table(io.BytesIO(self.timings_parquet()))))
 
     def timings_parquet(self) -> bytes:
-        return self._read(self.path.with_name(table_building.TIMINGS_PARQUET))
-
-    def _check_header(self, columns: "Sequence[str] | pd.Index[str]") -> None:
-        known = set(columns)
-        if missing := [name for name in _NEEDED if name not in known]:
-            raise self._no_table(f"no column '{missing[0]}'")
+        return self._read(table_building.TIMINGS_PARQUET)
 
     def _no_table(self, why: str) -> MutatorError:
         return MutatorError(f"not a results table: {why}", where=self.path, remedy=_REMEDY)
 
 
-def row_of(
-    experiment: Experiment, record: Record, hazards: "Sequence[str]", scale: Scale | None = None
-) -> Row:
-    cells = table_cells.row(experiment, record, hazards, scale=scale)
-    return row_from({name: "" if value is None else str(value) for name, value in cells.items()}, hazards)
+def frame_of(folder: RunFolder, experiments: Iterable[Experiment]) -> "pd.DataFrame":
+    """Return the frame of the `experiments` with a record, computed from plan and records. It is as from
+    `Results.frame`, but the columns of the fault's path are empty.
+    """
+    import pyarrow as pa
+
+    columns, records, scale = columns_of(folder.head), folder.records(), folder.scale
+    finished = (Finished(one, records[one.id], scale) for one in experiments if one.id in records)
+    pieces = iter(lambda: list(islice(finished, _BATCH)), [])
+    batches = [record_batch(columns, cells_of(columns, piece)) for piece in pieces]
+    return typed(pa.Table.from_batches(batches, schema_of(columns)), folder.head["hazards"])
+
+
+def typed(table: Any, hazards: Iterable[str]) -> "pd.DataFrame":
+    """Return a frame of a table with the types of results.parquet, as from `Results.frame`."""
+    import pandas as pd
+    import pyarrow as pa
+
+    columns = {}
+    for name in table.column_names:  # one column at a time, to avoid two copies in memory
+        column, table = _plain(table.select([name])), table.drop_columns([name])
+        if pa.types.is_string(column.schema.types[0]):
+            column = pa.table([column[name].fill_null("")], [name])
+        columns[name] = _to_pandas(column.combine_chunks())[name]
+    frame = pd.DataFrame(columns)
+    frame.attrs["hazards"] = tuple(hazards)
+    return frame
+
+
+def _plain(table: Any) -> Any:
+    """Return a table with each text in its row, instead of the number of a text that is stored once."""
+    import pyarrow as pa
+
+    fields = [
+        field.with_type(pa.string()) if pa.types.is_dictionary(field.type) else field
+        for field in table.schema
+    ]
+    return table.cast(pa.schema(fields))
+
+
+def _to_pandas(table: Any) -> "pd.DataFrame":
+    # a run's tables have no metadata; in a forged one, it could give columns each other's names
+    frame: pd.DataFrame = table.to_pandas(use_threads=False, ignore_metadata=True)
+    return frame
 
 
 def same_parquet(path: Path, made: Path) -> bool:
@@ -248,15 +238,10 @@ def _same_columns(first: Any, second: Any, group: int) -> bool:
     return True
 
 
-def _frame(data: bytes) -> "pd.DataFrame":
-    # a run's tables have no metadata; in a forged one, it could give columns each other's names
-    table = _table(io.BytesIO(data))
-    frame: pd.DataFrame = table.to_pandas(use_threads=False, ignore_metadata=True)
-    return frame
-
-
-def _table(source: Path | io.BytesIO) -> Any:
-    """Read a Parquet file in this thread: pyarrow aborts the process if its threads free memory at exit."""
+def _table(source: Path | io.BytesIO, names: Sequence[str] | None = None) -> Any:
+    """Read columns of a Parquet file (None: all); each text is stored once. All is done in this thread:
+    pyarrow aborts the process if its threads free memory at exit.
+    """
     import pyarrow as pa
     from pyarrow import parquet
 
@@ -266,9 +251,10 @@ def _table(source: Path | io.BytesIO) -> Any:
     size = source.stat().st_size if isinstance(source, Path) else source.getbuffer().nbytes
     _check_claim(file.metadata.num_rows * file.metadata.num_columns, "cells", size, MOST_CELLS)
     _check_claim(sum(unpacked for _, unpacked in _row_groups(file.metadata)), "bytes", size, MOST_TEXT)
-    table = file.read(use_threads=False)
+    table = file.read(columns=names, use_threads=False)
+    texts = [name for name in texts if name in table.column_names]
     _check_claim(sum(_text_bytes(table[name]) for name in texts), "bytes of text", size, MOST_TEXT)
-    return table.cast(schema)
+    return table
 
 
 def _check_claim(count: int, what: str, size: int, most: int) -> None:
@@ -286,13 +272,3 @@ def _text_bytes(column: Any) -> int:
 
     lengths = (pc.binary_length(part.dictionary).take(part.indices) for part in column.chunks)
     return sum(pc.sum(pc.cast(part, "int64")).as_py() or 0 for part in lengths)
-
-
-def _units(frame: "pd.DataFrame") -> dict[str, str]:
-    """Return the unit of each numeric column. The unit of `value` is in the column `unit` of each row."""
-    numbers = frame.select_dtypes("number").columns
-    times = {name for name in numbers if name.startswith("t_")} | {"reaction_time"}
-    times |= {column.name for column in SINCE}
-    known = {name: "s" if name in times else "-" for name in numbers}
-    known |= {name: "as its channel" for name in numbers if name.startswith(("max_dev_", "dev_"))}
-    return known | {"value": "as the column `unit` says"}

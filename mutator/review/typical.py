@@ -7,10 +7,10 @@ from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING
 
-from mutator.model import Outcome, Status
-from mutator.results.counting import endings
+from mutator.model import Fault, Outcome, Status
+from mutator.results.counting import UNUSABLE, endings
 from mutator.results.ranking import places
-from mutator.results.rows import UNUSABLE, Row, rows_of
+from mutator.results.rows import Row, rows_of
 from mutator.results.table_reader import Results
 from mutator.review.catalogue import Group
 from mutator.review.groups import group_label
@@ -51,7 +51,7 @@ def of_group(run: RunFolder, group: Group) -> Typical | None:
     """Return the group's results in a run; None if the results table has no experiment of the group.
     MutatorError if the run has no table.
     """
-    table = Results.of_run(run.path)
+    table = Results(run.path)
     try:
         written = table.path.stat().st_mtime_ns
     except OSError:
@@ -65,19 +65,24 @@ def _of_run(path: Path, written: int) -> dict[str, Typical]:
     """Return the results of each group by label; `written`, the time of the table, is only a cache key."""
     import numpy as np
 
-    texts = Results.of_run(path).texts()
+    frame = Results(path).frame()
     about = {one["name"]: one["about"] for one in RunFolder.open(path).head.get("about_hazards") or ()}
-    labels = {name: group_label(fault) for name, fault in plan_file.read_faults(path).items()}
-    known = [labels.get(name, "") for name in texts["fault_id"]]
+    faults = plan_file.read_faults(path)
+    labels = {name: group_label(fault) for name, fault in faults.items()}
+    known = [labels.get(name, "") for name in frame["fault_id"]]
     rows: dict[str, list[int]] = {}
-    for row in np.argsort(places(texts)).tolist():  # worst first
+    for row in np.argsort(places(frame)).tolist():  # worst first
         rows.setdefault(known[row], []).append(row)
-    ended = endings(texts).tolist()
-    return {label: _typical(texts, ended, own, about) for label, own in rows.items() if label}
+    ended = endings(frame).tolist()
+    return {label: _typical(frame, ended, own, about, faults) for label, own in rows.items() if label}
 
 
 def _typical(
-    texts: "pd.DataFrame", ended: Sequence[str], rows: Sequence[int], about: Mapping[str, str]
+    frame: "pd.DataFrame",
+    ended: Sequence[str],
+    rows: Sequence[int],
+    about: Mapping[str, str],
+    faults: Mapping[str, Fault],
 ) -> Typical:
     """Return the result for `rows`, sorted from worst to best. Of two equally frequent outcomes, the worse
     one is typical.
@@ -89,12 +94,12 @@ def _typical(
     most = max(usable.values(), key=len)
     order = [*Outcome, *Status]
     counts = {name.value: len(by_ending[name.value]) for name in order if name.value in by_ending}
-    typical, worst = (_case(texts, row, about) for row in (most[len(most) // 2], rows[0]))
+    chosen = rows_of(frame.iloc[[most[len(most) // 2], rows[0]]], faults)
+    typical, worst = (_case(row, about) for row in chosen)
     return Typical(experiments=len(rows), outcomes=counts, typical=typical, worst=worst)
 
 
-def _case(texts: "pd.DataFrame", number: int, about: Mapping[str, str]) -> Case:
-    [row] = rows_of(texts.iloc[[number]])
+def _case(row: Row, about: Mapping[str, str]) -> Case:
     return Case(
         id=row.experiment_id,
         label=f"{row.fault}, {row.scenario}, {row.trigger}",

@@ -17,7 +17,7 @@ from mutator._common.text import one_of, suggestion
 from mutator.campaigns.filters import compile_filter
 from mutator.config.yaml_files import StrictModel
 from mutator.errors import MutatorError
-from mutator.results.column_facts import PLAN_COLUMNS
+from mutator.results.plan_columns import PLAN_COLUMNS
 from mutator.serve.runs import Runs, report_of
 from mutator.store import plan_file
 from mutator.triggers.conditions import check_condition

@@ -59,7 +59,7 @@ class Shown:
         for folder in folders:
             check_plain(folder)  # because outdated tables are written
         with self._making:
-            first, second = (digest(Results.up_to_date(folder).csv()) for folder in folders)
+            first, second = (digest(Results.up_to_date(folder).parquet()) for folder in folders)
             made = self._compared.pop((first, second), None) or self._comparison(*folders)
             self._compared[first, second] = made
             for old in list(self._compared)[:-_MOST_COMPARED]:

@@ -85,7 +85,7 @@ def told(key: str, path: Path) -> dict[str, Any]:
         facts |= {"campaign": str(folder.head["campaign"]), "target": str(folder.head["target"])}
         facts |= {"planned": folder.planned, "state": "finished" if folder.finished else "unfinished"}
         with suppress(FileNotFoundError):
-            table = Results.of_run(path).path.stat()
+            table = Results(path).path.stat()
             outcomes = _outcomes(path, table.st_mtime_ns, table.st_size)
             facts |= {"outcomes": outcomes, "done": sum(outcomes.values())}
     except MutatorError as err:
@@ -98,7 +98,7 @@ def told(key: str, path: Path) -> dict[str, Any]:
 @lru_cache(maxsize=1000)
 def _outcomes(run: Path, mtime_ns: int, size: int) -> dict[str, int]:
     """Count how the experiments ended. `mtime_ns` and `size` of the table are only keys of the cache."""
-    return outcome_counts(Results.of_run(run).texts())
+    return outcome_counts(Results(run).frame("status", "outcome"))
 
 
 def open_in_run(run: Path, name: str) -> BinaryIO:

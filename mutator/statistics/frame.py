@@ -10,34 +10,31 @@ from pathlib import Path
 
 import pandas as pd
 
-from mutator.results.column_facts import hazards_of
-from mutator.results.rows import UNUSABLE
+from mutator.results.counting import UNUSABLE
+from mutator.results.table_columns import hazards_of
 from mutator.results.table_reader import Results
 
-_TIMES = ("t_activation", "t_manifest", "t_alert")
 _RANDOM = "random/"  # prefix of a random run's trigger: random/C1
 
 
 def load(results: Path) -> pd.DataFrame:
-    """Load the usable experiments of a run folder's results.csv, in order. MutatorError if it is invalid.
+    """Load the usable experiments of a run folder, in order, given its results.csv. MutatorError if the
+    results.parquet next to it is invalid.
 
     Harness errors and invalid mutants are left out; crashes and timeouts are kept.
     """
-    return prepare(Results(results).texts())
+    return prepare(Results(results.parent).frame())
 
 
 def prepare(frame: pd.DataFrame) -> pd.DataFrame:
-    """Convert a frame of `Results.texts` to types, and add the derived columns."""
+    """Select the usable experiments of a frame from `Results.frame`, and add the derived columns."""
     unusable = frame["status"].isin([str(status) for status in UNUSABLE])
     if unusable.any():
         frame = frame[~unusable]
     frame = frame.reset_index(drop=True)
-    hazards = hazard_names(frame)
-    for name in (*_TIMES, *(f"t_{hazard.lower()}" for hazard in hazards)):
-        frame[name] = pd.to_numeric(frame[name])
     frame["kind"] = frame["module"] + "/" + frame["fault_type"]
     frame["row"] = frame["trigger"].str.removeprefix(_RANDOM)
-    frame["t_hazard"] = frame[[f"t_{hazard.lower()}" for hazard in hazards]].min(axis=1)
+    frame["t_hazard"] = frame[[f"t_{hazard.lower()}" for hazard in hazard_names(frame)]].min(axis=1)
     for flag, time in (
         ("is_activated", "t_activation"),
         ("is_manifested", "t_manifest"),

@@ -26,7 +26,7 @@ def metrics_sheet(frame: pd.DataFrame, metrics: Sequence[MetricFacts]) -> Sheet:
     activated = frame.loc[frame["is_activated"], ["kind", "fault_id", *(metric.name for metric in metrics)]]
     for metric in metrics:
         column = (metric.name, metric.unit, metric.worse)
-        for kind, values, faults in _groups(activated, pd.to_numeric(activated[metric.name])):
+        for kind, values, faults in _groups(activated, activated[metric.name]):
             is_higher = metric.worse == HIGHER
             bad = float(values.quantile(0.75 if is_higher else 0.25))
             worst = float(values.max() if is_higher else values.min())

@@ -30,8 +30,8 @@ _BY_KIND = ((_ACTIVATED, _INJECTED), (_HAZARDS, _ACTIVATED), (_HAZARDS, _INJECTE
 
 
 def seeds_of(frame: pd.DataFrame) -> list[str]:
-    """Return the seeds of a frame in numeric order. Rows without a seed ('') are ignored."""
-    return sorted(filter(None, map(str, frame["seed"].unique())), key=int)
+    """Return the seeds of a frame in numeric order."""
+    return list(map(str, sorted(frame["seed"].unique())))
 
 
 def seeds_sheet(frame: pd.DataFrame, *, alerts: bool = True) -> Sheet:

@@ -18,6 +18,7 @@ from mutator.serve.jobs import Jobs
 from mutator.store import digests
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
+from tests.made_up_results import edit_results
 
 pytestmark = pytest.mark.slow
 
@@ -59,8 +60,7 @@ def runs(run: Path, workspace: Workspace) -> Path:
     for component in (head["structure"] or {}).get("components", {}).values():
         component["about"] = component["label"] = HTML
     digests.rewrite(night, "run.json", json.dumps(head).encode())
-    results = (night / "results.csv").read_text()
-    (night / "results.csv").write_text(results.replace("longer", HTML))
+    edit_results(night, "longer", HTML)
     (night / "plots").mkdir(exist_ok=True)
     lines = (night / "plan/experiments.jsonl").read_text().splitlines()
     first = json.loads(lines[1])["id"]

@@ -138,7 +138,7 @@ def test_a_lost_series_is_restored_by_a_rerun(cli: Cli, cut: Path) -> None:
     path.write_bytes(data[: last_block(path) + 30])
     ran = cli(*WORDS)
     assert ran.code == 0, ran.err
-    assert [one for one in worth(Results.of_run(cut).rows()) if not SeriesFolder(cut).has(one)] == names[-1:]
+    assert [one for one in worth(Results(cut).frame()) if not SeriesFolder(cut).has(one)] == names[-1:]
     assert cli("verify", "run").code == 0
     assert cli("rerun", names[-1], "--trace", "--run", "run").code == 0
     assert SeriesFolder(cut).is_readable(names[-1], records[names[-1]])

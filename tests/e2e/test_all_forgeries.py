@@ -25,6 +25,7 @@ from mutator.store.approvals import write_approvals
 from mutator.store.digests import Digest
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
+from tests.made_up_results import edit_results
 
 SAMPLE = 10  # the ordinary suite tries every nth forgery
 OUTSIDE = {"run.json: stretches", "run.json: choices.shard", "run.json: choices.series_mb"}
@@ -174,6 +175,7 @@ def forgeries(run: Path) -> Iterator[Forgery]:
     yield Forgery("golden", "a file more", written("golden/A/more.txt", lambda data: b"more"))
     yield Forgery("proof", "no proof", gone("proof"))
     yield Forgery("table", "results.csv", written("results.csv", harmless))
+    yield Forgery("table", "both tables", lambda run: edit_results(run, "hazard", "sdc"))
     for name in ("index.html", "REPORT.md", "more.html"):
         yield Forgery("report", name, written(f"report/{name}", lambda data: data + b"All is well."))
 

@@ -28,6 +28,7 @@ from mutator.store.patches import Patches
 from mutator.store.patches import rewrite as rewrite_patches
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
+from tests.made_up_results import edit_results
 
 CLONE = Path(__file__).parents[2]
 Reseal = Callable[..., None]
@@ -203,11 +204,11 @@ def a_proof_entry(run: Path, deep: bool) -> None:
 
 
 def the_table(run: Path, deep: bool) -> None:
-    path = run / "results.csv"
-    path.write_text(path.read_text().replace("hazard", "masked", 1))
+    edit_results(run, "hazard", "masked")
     if deep:
         stamp = json.loads((run / "results.json").read_text())
-        stamp["tables"]["results.csv"] = digest(path.read_bytes())
+        for name in ("results.csv", "results.parquet"):
+            stamp["tables"][name] = digest((run / name).read_bytes())
         (run / "results.json").write_text(json.dumps(stamp))
 
 

@@ -28,11 +28,13 @@ def rows(draw: st.DrawFn) -> Row:
     names = draw(st.lists(st.sampled_from(["H1", "H2"]), unique=True))
     hazards = tuple(sorted(((name, draw(TIME)) for name in names), key=lambda h: h[1]))
     status = draw(st.sampled_from(Status))
+    outcome = draw(st.sampled_from(Outcome)) if status is Status.OK else None
     return Row(
-        **dict.fromkeys(("experiment_id", "module", "fault_type", "variant", "value", "unit"), "x"),
-        **dict.fromkeys(("scenario", "method", "trigger", "detail"), "x"),
+        **dict.fromkeys(("experiment_id", "kind", "variant", "value", "unit"), "x"),
+        **dict.fromkeys(("scenario", "trigger", "detail"), "x"),
         status=status,
-        outcome=draw(st.sampled_from(Outcome)) if status is Status.OK else None,
+        outcome=outcome,
+        ending=(outcome or status).value,
         t_activation=draw(st.none() | st.just(1.5)),
         t_manifest=None,
         checked=("H1", "H2"),

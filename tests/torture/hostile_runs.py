@@ -15,6 +15,7 @@ from mutator._common.hashing import digest
 from mutator.store import digests
 from mutator.store.digests import Digest
 from mutator.store.series import Index, write_index
+from tests.made_up_results import edit_results
 
 UP = "../../home/mine"  # from a run folder to the user's files
 
@@ -286,11 +287,12 @@ def _an_experiment_with_a_name_outside(sent: Sent) -> None:
 
 
 def _results_with_a_name_outside(sent: Sent) -> None:
-    """The table is not in the ledger; its stamp says that it is up to date."""
-    path, stamp = sent.run / "results.csv", sent.run / "results.json"
-    path.write_bytes(path.read_bytes().replace(sent.experiment.encode(), f"../{UP}".encode()))
+    """The tables are not in the ledger; their stamp says that they are up to date."""
+    edit_results(sent.run, sent.experiment, f"../{UP}")
+    stamp = sent.run / "results.json"
     data = json.loads(stamp.read_bytes())
-    data["tables"]["results.csv"] = digest(path.read_bytes())
+    for name in ("results.csv", "results.parquet"):
+        data["tables"][name] = digest((sent.run / name).read_bytes())
     stamp.write_bytes(json_bytes(data))
 
 

@@ -28,7 +28,7 @@ from mutator.execution.cluster.parcel import pack, unpack
 from mutator.faults.fault_model_files import load_fault_models
 from mutator.faults.fault_models import FILES, FaultModels
 from mutator.model import Limits
-from mutator.results.column_facts import check_names
+from mutator.results.table_columns import check_names
 from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.run_folder import GoldenRun, RunFolder

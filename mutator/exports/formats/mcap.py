@@ -228,7 +228,7 @@ class _Written:
 
 
 def _chosen(folder: RunFolder, only: str | None) -> list[str]:
-    frame = Results.up_to_date(folder.path).frame().reset_index()
+    frame = Results.up_to_date(folder.path).indexed_frame().reset_index()
     if only is None:
         return list(frame["experiment_id"])
     accepts = compile_filter(only, tuple(map(str, frame.columns)))

@@ -24,18 +24,18 @@ _HTML = """\
 
 def failed_panel(run: ReportedRun) -> Panel | None:
     """Return the panel of failed runs with their messages; None if no run failed."""
-    texts = run.texts[run.texts["status"] != Status.OK.value]
-    if texts.empty:
+    results = run.results[run.results["status"] != Status.OK.value]
+    if results.empty:
         return None
-    by = {"other": texts["status"] != Status.HARNESS_ERROR.value, **texts[["status", "experiment_id"]]}
+    by = {"other": results["status"] != Status.HARNESS_ERROR.value, **results[["status", "experiment_id"]]}
     order = DataFrame(by).sort_values([*by]).index[: max(LISTED, PAGE_LISTED)]
-    failed = rows_of(texts.loc[order])
+    failed = rows_of(results.loc[order], run.faults)
     failings = [status.value for status in Status if status is not Status.OK]
     return Panel(
         anchor="failed",
         link="Failed runs",
-        markdown=f"## Runs that did not finish normally\n\n{_markdown(failed, len(texts))}",
-        html=rendered(_HTML, table=_linked(failed), more=len(texts) - PAGE_LISTED, failings=failings),
+        markdown=f"## Runs that did not finish normally\n\n{_markdown(failed, len(results))}",
+        html=rendered(_HTML, table=_linked(failed), more=len(results) - PAGE_LISTED, failings=failings),
     )
 
 

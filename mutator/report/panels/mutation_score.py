@@ -26,7 +26,7 @@ _HTML = """\
 
 def score_panel(run: ReportedRun) -> Panel | None:
     """Return the panel with the shares in total and by operator."""
-    if not (run.texts["module"] == OPERATORS).any():
+    if not (run.results["module"] == OPERATORS).any():
         return None
     runs = run.fault_free()
     score = score_sheet(

@@ -50,7 +50,7 @@ def _facts(run: ReportedRun) -> list[tuple[str, str]]:
     head, packages = folder.head, package_versions(folder.stretches)
     chosen = without(head, OUTSIDE[HEAD])["choices"]
     facts = {
-        "experiments": f"{len(run.texts)} of {folder.planned} planned",
+        "experiments": f"{len(run.results)} of {folder.planned} planned",
         **({"proof": run.engines.state} if run.engines else {}),
         **({"reviewed": reviewed} if reviewed else {}),
         **seal_or_why_not(folder),

@@ -60,7 +60,7 @@ names all components that stopped it.</p>
 def paths_panel(run: ReportedRun) -> Panel | None:
     """Return the panel with the counts of links and components; None if no path is known."""
     paths = run.paths
-    counts = counts_by_fault_type(kinds(run.texts), run.seen.path_numbers, paths) if paths else {}
+    counts = counts_by_fault_type(kinds(run.results), run.seen.path_numbers, paths) if paths else {}
     if paths is None or not counts:
         return None
     links = _links(paths)

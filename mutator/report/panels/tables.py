@@ -8,8 +8,7 @@ from mutator._common.tables import Table
 from mutator.outcomes.fault_free import fault_free_table, own_alerts
 from mutator.report.panel import Panel, rendered
 from mutator.report.studies import ReportedRun
-from mutator.results.counting import counts_by, hazard_names, kinds
-from mutator.results.rows import count_table
+from mutator.results.counting import count_table, counts_by, hazard_names, kinds
 from mutator.statistics.metric_tables import metrics_sheet, severity_sheet, tolerant_times_sheet
 from mutator.statistics.published import Published
 from mutator.statistics.sheet import Sheet
@@ -111,10 +110,10 @@ def published_panel(run: ReportedRun) -> Panel | None:
 
 
 def _counts(run: ReportedRun) -> list[tuple[str, Table]]:
-    hazards = hazard_names(run.texts)
+    hazards = hazard_names(run.results)
     made = []
     for title, head, groups in _GROUPS:
-        counts = counts_by(run.texts, groups(run.texts))
+        counts = counts_by(run.results, groups(run.results))
         heads, lines = count_table(counts, head, hazards, alerts=run.folder.has_alerts)
         made.append((title, Table(heads=heads, rows=lines, right=range(1, len(heads)))))
     return made

@@ -3,11 +3,15 @@
 from collections.abc import Callable
 from pathlib import Path
 
+import pyarrow as pa
 import pytest
 
 import mutator
-from mutator.model import Experiment, Method, Value, fault_label
-from mutator.results.table_reader import row_of
+from mutator.model import Experiment, Method, Record, Value, fault_label
+from mutator.results.rows import rows_of
+from mutator.results.table_columns import Finished, cells_of, result_columns
+from mutator.results.table_files import record_batch
+from mutator.results.table_reader import typed
 
 SOURCES = Path(mutator.__file__).parent
 
@@ -33,10 +37,14 @@ def test_the_label_of_a_fault_contains_its_value_and_unit(value: Value, unit: st
 
 @pytest.mark.parametrize("value", [35, 35.5, -0.0])
 def test_a_fault_and_its_row_of_the_results_have_the_same_label(
-    experiment: Callable[..., Experiment], record: Callable[..., object], value: float
+    experiment: Callable[..., Experiment], record: Callable[..., Record], value: float
 ) -> None:
+    """The table has 35.0 for both 35 and 35.0."""
     one = experiment(value=value)
-    assert row_of(one, record(one.id), ("H1",)).fault == one.fault.label  # type: ignore[arg-type]
+    columns = result_columns((), ())
+    cells = record_batch(columns, cells_of(columns, [Finished(one, record(one.id))]))
+    frame = typed(pa.Table.from_batches([cells]), ())
+    assert [row.fault for row in rows_of(frame, {one.fault.id: one.fault})] == [one.fault.label]
 
 
 def test_the_label_of_an_experiment_names_its_fault_scenario_and_trigger(

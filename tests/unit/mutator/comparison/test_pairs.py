@@ -19,8 +19,7 @@ Make = Callable[..., Experiment]
 def row(experiment_id: str = "e", **given: Any) -> Row:
     fields: dict[str, Any] = {
         "experiment_id": experiment_id,
-        **dict.fromkeys(("module", "fault_type", "variant", "value", "unit", "scenario"), "x"),
-        **dict.fromkeys(("method", "trigger"), "x"),
+        **dict.fromkeys(("kind", "variant", "value", "unit", "scenario", "trigger"), "x"),
         "status": Status.OK,
         "outcome": Outcome.MASKED,
         "t_activation": 2.0,
@@ -32,7 +31,8 @@ def row(experiment_id: str = "e", **given: Any) -> Row:
         "reaction_time": None,
         "detail": "",
     }
-    return Row(**fields | given)
+    fields |= given
+    return Row(ending=(fields["outcome"] or fields["status"]).value, **fields)
 
 
 def side(*experiments: Experiment, without: tuple[Experiment, ...] = ()) -> Side:

@@ -47,8 +47,10 @@ def test_claims_about_all_faults_need_the_whole_plan(
     of_all = (REFERENCES / "paper_observations.yaml").read_text().count("mixture: true")
     assert of_all
     for done in (folder.planned - 1, folder.planned):
-        texts = pd.DataFrame({"status": ["ok"] * done})
-        run = ReportedRun(folder=folder, workspace=toycar, texts=texts, frame=frame, study=None, seen=SEEN)
+        done_results = pd.DataFrame({"status": ["ok"] * done})
+        run = ReportedRun(
+            folder=folder, workspace=toycar, results=done_results, frame=frame, study=None, seen=SEEN
+        )
         panel = observations_panel(run)
         assert panel is not None
         text = panel.files["observations.md"].decode()
@@ -63,5 +65,5 @@ def test_a_report_without_activated_faults_of_the_paper_has_no_observations(
     freeze(make_plan(toycar, "small"), tmp_path / "run", toycar)
     folder = RunFolder.open(tmp_path / "run")
     frame = results({"module": "radar", "fault_type": "chaff"})
-    run = ReportedRun(folder=folder, workspace=toycar, texts=frame, frame=frame, study=None, seen=SEEN)
+    run = ReportedRun(folder=folder, workspace=toycar, results=frame, frame=frame, study=None, seen=SEEN)
     assert observations_panel(run) is None

@@ -60,6 +60,6 @@ def test_seeds_that_show_each_observation_are_counted(tmp_path: Path) -> None:
 def test_a_claim_about_all_faults_is_undecided_for_a_seed_without_all_fault_types(tmp_path: Path) -> None:
     file = tmp_path / "observations.yaml"
     file.write_text(OBSERVATIONS)
-    found = judge_by_seed(file, frame(), lambda runs: ["a type"] if set(runs["seed"]) == {"3"} else [])
+    found = judge_by_seed(file, frame(), lambda runs: ["a type"] if set(runs["seed"]) == {3} else [])
     assert [found[name][1].verdict for name in ("1", "3")] == [Verdict.HOLDS, Verdict.UNDECIDED]
     assert judge_by_seed(file, results(*seed(1, 5)), lambda runs: []) == {}

@@ -7,8 +7,9 @@ import pytest
 
 from mutator.report import building
 from mutator.workspace import Workspace
+from tests.made_up_results import write_results
 
-from ..report.made_run import COLUMNS, OK, Page, make_run
+from ..report.made_run import COLUMNS, LINES, OK, Page, make_run
 
 HERE = Workspace.find(Path(__file__).parents[4])
 
@@ -17,9 +18,8 @@ HERE = Workspace.find(Path(__file__).parents[4])
 def run(tmp_path: Path) -> Path:
     """A made-up run of a campaign that requests the study. One hazard contradicts the second observation."""
     made = make_run(tmp_path, study="driving_agent_resilience", experiments=4)
-    with (made / "results.csv").open("a", newline="") as file:
-        kind = {"module": "vision_output", "fault_type": "relative_distance"}
-        csv.DictWriter(file, COLUMNS, restval="").writerow(OK | kind | {"experiment_id": "4" * 16})
+    kind = {"module": "vision_output", "fault_type": "relative_distance", "fault_id": "f4"}
+    write_results(made, COLUMNS, [*LINES, OK | kind | {"experiment_id": "4" * 16}])
     return made
 
 
@@ -60,8 +60,7 @@ def test_the_report_links_to_the_page_of_the_study(run: Path) -> None:
     written = building.write(run, HERE)
     assert "[STUDY.md](STUDY.md)" in written.markdown.read_text()
     assert "study.html" in Page(written.page.read_text()).links
-    lines = (run / "results.csv").read_text().splitlines(keepends=True)
-    (run / "results.csv").write_text("".join(lines[:-1]))
+    write_results(run, COLUMNS, LINES)
     written = building.write(run, HERE)
     assert "STUDY.md" not in written.markdown.read_text()
     assert "study.html" not in Page(written.page.read_text()).links

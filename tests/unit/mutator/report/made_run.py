@@ -1,23 +1,24 @@
 """Made-up run folders for the tests of reports, and a parser of their pages."""
 
-import csv
 import json
 from html.parser import HTMLParser
 from pathlib import Path
 
 from mutator._common.hashing import plain
-from mutator.results.column_facts import result_columns
+from mutator.results.table_columns import result_columns
 from mutator.store import digests, plan_file
 from mutator.store.digests import Ledger
 from mutator.store.stretches import Stretch
+from tests.made_up_results import write_results
 
-COLUMNS = [c.name for c in result_columns(("H1", "H2", "H3"), ("gas", "brake", "steer_torque"))]
+COMPARED = ("gas", "brake", "steer_torque")
+COLUMNS = result_columns(("H1", "H2", "H3"), COMPARED)
 HEAD = {
     "schema": "run/3",
     "campaign": "night_<b>drive</b>",
     "plan": "ab" * 32,
     "hazards": ["H1", "H2", "H3"],
-    "compared": [],
+    "compared": [*COMPARED],
     "seed": 7,
     "reading": "as_described",
     "choices": {"seed": None, "limit": 3},
@@ -39,6 +40,7 @@ OK = {
     "scenario": "S1",
     "method": "guided",
     "trigger": "C2",
+    "seed": "7",
     "status": "ok",
     "outcome": "hazard",
     "t_activation": "7.0",
@@ -66,17 +68,16 @@ diff --git a/pkg/radar.py b/pkg/radar.py
 """
 BAD = OK | NONE | {"status": "harness_error", "detail": "the disk | is <gone>"}
 CRASHED = OK | NONE | {"status": "crashed", "detail": "IndexError"}
+LINES = [
+    {"experiment_id": f"{i}" * 16, "fault_id": f"f{i}"} | line for i, line in enumerate((OK, BAD, CRASHED))
+]
 
 
 def make_run(folder: Path, **head: object) -> Path:
     """Write a run folder whose results are only a table: a hazard, a crash and a harness error. `head` is
     added to run.json."""
     (folder / "run.json").write_text(json.dumps(HEAD | head))
-    with (folder / "results.csv").open("w", newline="") as file:
-        table = csv.DictWriter(file, COLUMNS, restval="")
-        table.writeheader()
-        for i, line in enumerate((OK, BAD, CRASHED)):
-            table.writerow({"experiment_id": f"{i}" * 16, "fault_id": f"f{i}"} | line)
+    write_results(folder, COLUMNS, LINES)
     plan_file.write(folder, [], [])
     digests.write(folder, Ledger(files={}))
     (folder / "plots").mkdir()

@@ -1,6 +1,6 @@
 """The first answers of a report, compared with counts by hand."""
 
-import csv
+import math
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -17,12 +17,12 @@ from mutator.report.fix_order import first_to_fix
 from mutator.report.panels.answers import answers_panel
 from mutator.report.paths import RunPaths
 from mutator.report.studies import ReportedRun
-from mutator.results.column_facts import result_columns
-from mutator.results.rows import lines_of
+from mutator.results.table_columns import result_columns
 from mutator.store.lines import written
 from mutator.store.records import TIMINGS_SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.targets.target_facts import MetricFacts
+from tests.made_up_results import write_results
 
 from .made_run import HEAD, make_run
 
@@ -45,20 +45,18 @@ RUNS = [
 
 @pytest.fixture
 def run(tmp_path: Path) -> ReportedRun:
-    make_run(tmp_path, hazards=["H1"], metrics=[metric.plain() for metric in METRICS])
-    columns = [c.name for c in result_columns(("H1",), ("gas",), METRICS)]
-    with (tmp_path / "results.csv").open("w", newline="") as file:
-        table = csv.DictWriter(file, columns, restval="")
-        table.writeheader()
-        for i, (kind, outcome, active, hazard, alerts, alert, speed, margin) in enumerate(RUNS):
-            module, fault_type = kind.split("/")
-            line = {"module": module, "fault_type": fault_type, "outcome": outcome, "status": "ok"}
-            line |= {"t_activation": active, "h1": int(hazard != ""), "t_h1": hazard, "alerts": alerts}
-            line |= {"t_alert": alert, "contact_speed": speed, "margin_h1": margin, "scenario": "S1"}
-            line |= {"experiment_id": f"{i}" * 16, "fault_id": f"f{i}", "method": "guided", "trigger": "C1"}
-            line |= {"t_manifest": 2.5 if outcome in ("hazard", "sdc") else "", "variant": "x"}
-            line |= {"reaction_time": hazard - alert if alerts and alert < hazard else ""}
-            table.writerow(line)
+    make_run(tmp_path, hazards=["H1"], compared=["gas"], metrics=[metric.plain() for metric in METRICS])
+    lines = []
+    for i, (kind, outcome, active, hazard, alerts, alert, speed, margin) in enumerate(RUNS):
+        module, fault_type = kind.split("/")
+        line = {"module": module, "fault_type": fault_type, "outcome": outcome, "status": "ok"}
+        line |= {"t_activation": active, "h1": int(hazard != ""), "t_h1": hazard, "alerts": alerts}
+        line |= {"t_alert": alert, "contact_speed": speed, "margin_h1": margin, "scenario": "S1"}
+        line |= {"experiment_id": f"{i}" * 16, "fault_id": f"f{i}", "method": "guided", "trigger": "C1"}
+        line |= {"seed": 1, "t_manifest": 2.5 if outcome in ("hazard", "sdc") else "", "variant": "x"}
+        line |= {"reaction_time": hazard - alert if alerts and alert < hazard else ""}
+        lines.append(line)
+    write_results(tmp_path, result_columns(("H1",), ("gas",), METRICS), lines)
     costs = [
         {"experiment_id": f"{i}" * 16, "cpu_s": 2.0**i, "wall_s": 1.0, "worker": f"w{i % 2}"}
         for i in range(7)
@@ -138,7 +136,7 @@ def hazards(*rows: tuple[str, str, float]) -> pd.DataFrame:
     frame["t_hazard"] = 2 + frame["after"]
     frame["experiment_id"] = [f"e{i}" for i in frame.index]
     same = {"outcome": "hazard", "is_activated": True, "t_activation": 2.0, "warning": NO_ALERT}
-    told = {"scenario": "S1", "hazard_names": "H1", "warned": "none", "delta_v": "", "margin_h1": "-1"}
+    told = {"scenario": "S1", "hazard_names": "H1", "warned": "none", "delta_v": math.nan, "margin_h1": -1.0}
     return frame.assign(fault=frame["kind"], place=frame.index, **same, **told)
 
 
@@ -214,13 +212,13 @@ def test_cpu_time_is_added_up_by_fault_type(answer_by_name: dict[str, Answer]) -
 def part_of(run: ReportedRun, names: set[str]) -> ReportedRun:
     return replace(
         run,
-        texts=run.texts[run.texts["experiment_id"].isin(names)].reset_index(drop=True),
+        results=run.results[run.results["experiment_id"].isin(names)].reset_index(drop=True),
         frame=run.frame[run.frame["experiment_id"].isin(names)].reset_index(drop=True),
     )
 
 
 def names_of(run: ReportedRun, empty: str) -> set[str]:
-    return {row["experiment_id"] for row in lines_of(run.texts) if not row[empty]}
+    return set(run.results["experiment_id"][run.results[empty].isna()])
 
 
 def test_a_report_without_hazards_has_no_empty_table(run: ReportedRun) -> None:

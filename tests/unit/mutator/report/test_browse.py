@@ -1,17 +1,20 @@
 """The data on experiments in a page: columns, details and images."""
 
 from collections.abc import Callable
+from math import inf, nan
 from pathlib import Path
 
 import pytest
 
 from mutator._common.files import write_json
-from mutator.model import Experiment, Outcome, Status
+from mutator.model import Experiment
 from mutator.report import browse
 from mutator.report.browse import column, details, media, table
-from mutator.results.rows import Row
+from mutator.report.seen import PLACE
 from mutator.review.groups import shapes
 from mutator.store.run_folder import RunFolder
+
+from ..statistics.results_frame import results
 
 PATCH = """\
 diff --git a/pkg/radar.py b/pkg/radar.py
@@ -24,61 +27,39 @@ diff --git a/pkg/radar.py b/pkg/radar.py
 """
 
 
-def row(name: str) -> Row:
-    return Row(
-        experiment_id=name,
-        module="radar",
-        fault_type="chaff",
-        variant="distance",
-        value="35",
-        unit="m",
-        scenario="S1",
-        method="guided",
-        trigger="C1",
-        status=Status.OK,
-        outcome=Outcome.SDC,
-        t_activation=2.0,
-        t_manifest=2.1,
-        checked=("H1",),
-        hazards=(),
-        alerts=(),
-        t_alert=None,
-        reaction_time=None,
-        detail="",
-    )
-
-
 @pytest.mark.parametrize(
     ("name", "values", "made"),
     [
-        ("t_h1", ["2.5", "", "3.0"], {"numbers": [2.5, None, 3]}),
-        ("max_dev_gas", ["inf", "nan", "-inf"], {"numbers": ["Infinity", "NaN", "-Infinity"]}),
+        ("t_h1", [2.5, nan, 3.0], {"numbers": [2.5, None, 3]}),
+        ("max_dev_gas", [inf, nan, -inf], {"numbers": ["Infinity", None, "-Infinity"]}),
         ("scenario", ["S2", "S1", "S2"], {"words": ["S1", "S2"], "codes": [1, 0, 1]}),
         ("experiment_id", ["12", "34"], {"texts": ["12", "34"]}),
         ("alerts", ["", ""], {"words": [""], "codes": [0, 0]}),
+        ("t_alert", [nan, nan], {"words": [""], "codes": [0, 0]}),
+        ("seed", [7, 2**60], {"numbers": [7, 2.0**60]}),
         ("value", ["3", "left"], {"words": ["3", "left"], "codes": [0, 1]}),
         ("scenario", ["S2", "S1"], {"words": ["S1", "S2"], "codes": [1, 0]}),
         ("variant", ["nan"], {"words": ["nan"], "codes": [0]}),
     ],
 )
-def test_columns_are_numbers_dictionaries_or_texts(name: str, values: list[str], made: object) -> None:
+def test_columns_are_numbers_dictionaries_or_texts(name: str, values: list[object], made: object) -> None:
     assert column(name, values) == made
 
 
 def test_a_target_without_alerts_has_no_alert_columns() -> None:
-    line = {"experiment_id": "a", "alerts": "", "t_alert": "", "reaction_time": "", "detail": ""}
-    names = [
-        {made["name"] for made in table([row("a")], [line], alerts=has)["columns"]} for has in (True, False)
-    ]
+    line = {"fault_type": "chaff"}
+    frame = results(line).assign(reading="", variant="", value=nan, unit="", detail="", outcome="")
+    frame = frame.assign(reaction_time=nan, **{PLACE: 0})
+    names = [{made["name"] for made in table(frame, {}, alerts=has)["columns"]} for has in (True, False)]
     assert names[0] - names[1] == {"alerts", "t_alert", "reaction_time", "warning"}
     assert "detail" in names[1]
 
 
 def test_diffs_are_stored_as_shapes_and_values(experiment: Callable[..., Experiment]) -> None:
     one, two = experiment(3.0), experiment(4.0)
-    rows = [row(two.id), row("none"), row(one.id)]
+    ids = [two.id, "none", one.id]
     patches = [(two.id, "", PATCH.format(4)), (one.id, "", PATCH.format(3))]
-    made = details([two, None, one], shapes(patches), rows, ["2" * 16, "", "1" * 16])
+    made = details([two, None, one], shapes(patches), ids, ["2" * 16, "", "1" * 16])
     assert made["shape"] == [0, -1, 0] and made["trace"] == ["2" * 16, "", "1" * 16]
     [shape] = made["shapes"]
     values = list(zip(*shape["values"], strict=True))
@@ -107,6 +88,7 @@ def test_pictures_beyond_the_budget_are_links(tmp_path: Path) -> None:
     }
 
 
-def test_rows_do_not_depend_on_the_order_of_results() -> None:
-    rows = [row("b"), row("a")]
-    assert sorted(rows, key=browse.reading_order) == [rows[1], rows[0]]
+def test_the_list_does_not_depend_on_the_order_of_results() -> None:
+    frame = results({"experiment_id": "b"}, {"experiment_id": "a"}, {"module": "car"})
+    listed = frame.sort_values(browse.READING_ORDER)
+    assert list(listed["experiment_id"]) == ["2", "a", "b"]

@@ -1,7 +1,6 @@
 """Building the report of a run folder."""
 
 import base64
-import csv
 import gzip
 import json
 import re
@@ -20,8 +19,9 @@ from mutator.report.stamp import made_from
 from mutator.store import approvals
 from mutator.store.run_folder import STOP_NOTE, RunFolder
 from mutator.workspace import Workspace
+from tests.made_up_results import write_results
 
-from .made_run import COLUMNS, HEAD, OK, PATCH, Page, make_run
+from .made_run import COLUMNS, HEAD, LINES, OK, PATCH, Page, make_run
 
 STAMPS = ('{"schema": "report/1", "files": 1}', '{"schema": "report/1", "files": {"../run.json": ""}}')
 HERE = Workspace.find(Path(__file__).parents[4])
@@ -73,7 +73,7 @@ def test_the_page_contains_results_diff_and_still_of_an_experiment(
     table = carried(page, "table")
     columns = {column["name"]: column for column in table["columns"]}
     assert table["count"] == 3
-    assert {*COLUMNS} < columns.keys()
+    assert {column.name for column in COLUMNS} < columns.keys()
     ids = columns["experiment_id"]["texts"]
     at = ids.index("0" * 16)
     assert columns["t_h1"]["numbers"][at] == 18.25
@@ -121,9 +121,8 @@ def test_a_folder_without_a_run_gets_no_report(tmp_path: Path) -> None:
 
 
 def test_figures_are_in_the_markdown_and_in_the_page(run: Path) -> None:
-    with (run / "results.csv").open("a", newline="") as file:
-        other = OK | {"experiment_id": "3" * 16, "fault_id": "f3", "fault_type": "jamming", "scenario": "S2"}
-        csv.DictWriter(file, COLUMNS, restval="").writerow(other)
+    other = OK | {"experiment_id": "3" * 16, "fault_id": "f3", "fault_type": "jamming", "scenario": "S2"}
+    write_results(run, COLUMNS, [*LINES, other])
     written = building.write(run, None)
     shown = [link for link in Page(written.page.read_text()).links if link.startswith("data:image/svg")]
     files = sorted((run / "report" / "figures").glob("*.svg"))
@@ -167,8 +166,7 @@ def test_an_up_to_date_report_is_not_written_again(run: Path) -> None:
     (run / "series/kept" / ("2" * 16 + ".js")).touch()
     assert drawn_again(run, None)
     assert not drawn_again(run, None)
-    results = run / "results.csv"
-    results.write_text(results.read_text().replace("18.25", "18.26"))
+    write_results(run, COLUMNS, [LINES[0] | {"t_h1": "18.26"}, *LINES[1:]])
     assert drawn_again(run, HERE)
 
 
@@ -198,8 +196,7 @@ def test_files_of_an_earlier_report_are_deleted(run: Path) -> None:
     out = run / "report"
     building.write(run, None)
     (out / "tables" / "mine.csv").touch()
-    results = run / "results.csv"
-    results.write_text("".join(results.read_text().splitlines(keepends=True)[:1]))
+    write_results(run, COLUMNS, [])
     building.write(run, None)
     assert [path.name for path in (out / "tables").iterdir()] == ["mine.csv"]
 
@@ -265,13 +262,8 @@ def test_a_study_that_cannot_be_evaluated_is_left_out_with_the_reason(
 
 def test_the_report_shows_the_spread_of_several_seeds(run: Path) -> None:
     assert building.write(run, None).summaries == ()
-    path = run / "results.csv"
-    lines = list(csv.DictReader(path.read_text().splitlines()))
-    more = [line | {"experiment_id": f"{i}a" * 8, "seed": str(9 + i)} for i, line in enumerate(lines)]
-    with path.open("w", newline="") as file:
-        table = csv.DictWriter(file, COLUMNS, lineterminator="\n")
-        table.writeheader()
-        table.writerows([line | {"seed": "2"} for line in lines] + more)
+    more = [line | {"experiment_id": f"{i}a" * 8, "seed": str(9 + i)} for i, line in enumerate(LINES)]
+    write_results(run, COLUMNS, [line | {"seed": "2"} for line in LINES] + more)
     written = building.write(run, None)
     assert "## Seeds\n\n3 seeds (2 to 11). Each seed repeats" in written.markdown.read_text()
     assert '<section class="part" id="seeds">' in written.page.read_text()

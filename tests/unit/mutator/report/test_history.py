@@ -1,6 +1,5 @@
 """The history of the runs in a folder."""
 
-import csv
 import os
 import shutil
 from pathlib import Path
@@ -9,6 +8,7 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.report.history import write_history
+from tests.made_up_results import write_results
 
 from .made_run import COLUMNS, NONE, OK, Page, make_run
 
@@ -18,13 +18,10 @@ def folder(tmp_path: Path) -> Path:
     calm = OK | NONE | {"outcome": "masked"}
     for hour, (name, lines) in enumerate((("before", (OK, calm, calm)), ("after", (calm, OK, calm))), 1):
         (tmp_path / name).mkdir()
-        results = make_run(tmp_path / name) / "results.csv"
-        with results.open("w", newline="") as file:
-            table = csv.DictWriter(file, COLUMNS, restval="")
-            table.writeheader()
-            for i, line in enumerate(lines):
-                table.writerow({"experiment_id": f"{i}" * 16, "fault_id": "f"} | line)
-        os.utime(results, (3600 * hour, 3600 * hour))
+        run = make_run(tmp_path / name)
+        named = [{"experiment_id": f"{i}" * 16, "fault_id": "f"} | line for i, line in enumerate(lines)]
+        write_results(run, COLUMNS, named)
+        os.utime(run / "results.parquet", (3600 * hour, 3600 * hour))
     (tmp_path / "broken").mkdir()
     shutil.copy(tmp_path / "before" / "run.json", tmp_path / "broken")
     return tmp_path

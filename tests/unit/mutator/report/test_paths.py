@@ -11,6 +11,7 @@ from mutator.outcomes.fault_paths import (
     LinkState,
     PathComponent,
     PathLink,
+    UntimedPath,
 )
 from mutator.report.paths import PathCounts, RunPaths
 from mutator.targets.target_facts import ChannelFacts
@@ -56,8 +57,25 @@ def test_paths_become_shapes_and_columns_of_the_page(record: Callable[..., Recor
     assert data["shapes"][0] == [["eyes", "reached", 0], ["pedals", "reached", 1], ["car", "reached", 2]]
     assert data["first"] == [[1.2346, None, 1.0, None], [None] * 4, [2.0, None, None, None]]
     assert data["largest"] == [[0.123, None, 2.0, None], [None] * 4, ["Infinity", None, None, None]]
-    assert found.through("a") == "eyes→pedals;pedals→car"
-    assert found.through("b") == found.through("c")[:0] == ""
+
+
+def test_the_page_filters_by_the_links_that_a_fault_got_through() -> None:
+    far, held = (
+        path(*[ComponentState.REACHED] * 3),
+        path(ComponentState.REACHED, ComponentState.HELD, ComponentState.HELD),
+    )
+    untimed_paths = [
+        UntimedPath(states={}, late={}, links=one.links, reached="", stopped_at=(), entered=None)
+        for one in (held, far)
+    ]
+    found = RunPaths(
+        fault_paths=FaultPaths(CHANNELS, None),
+        channels=CHANNELS,
+        by_id={},
+        records={},
+        untimed_paths=untimed_paths,
+    )
+    assert found.through([1, -1, 0]) == ["eyes→pedals;pedals→car", "", ""]
 
 
 def test_faults_are_counted_by_link_and_component() -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from mutator.api.runs import load_run
 from mutator.model import Experiment, Outcome, Status
-from mutator.report.browse import _listed, _tables
+from mutator.report.browse import _listed, _table
 from mutator.report.panels.mutation_score import score_panel
 from mutator.report.panels.source import source_panel
 from mutator.report.source_lines import Mark
@@ -76,8 +76,7 @@ def test_a_line_leads_to_its_experiments(toycar: Workspace, run: Path) -> None:
     assert {wanted, f"{wanted}%20lasting%3Dpermanent", f"{wanted}%20lasting%3Dtransient"} <= set(page.links)
     assert "H 5/6" in page.texts
     assert f"| {DRIVER}:{line} |" in panel.markdown
-    rows, lines = _listed(reported)
-    columns = {c["name"]: c for c in _tables(reported, rows, lines)[0]["columns"]}
+    columns = {c["name"]: c for c in _table(reported, _listed(reported))["columns"]}
     assert f"{DRIVER}:{line}" in columns["line"]["words"]
     assert columns["lasting"]["words"] == ["permanent", "transient"]
     assert "1.2 * closing -> -(1.2 * closing)" in columns["value"]["words"]
@@ -120,5 +119,4 @@ def test_a_run_without_operators_has_no_source_view_and_no_score(
     table_building.build(out)
     reported = ReportedRun.open(RunFolder.open(out), toycar)
     assert source_panel(reported) is None and score_panel(reported) is None
-    rows, lines = _listed(reported)
-    assert not {"line", "lasting"} & {c["name"] for c in _tables(reported, rows, lines)[0]["columns"]}
+    assert not {"line", "lasting"} & {c["name"] for c in _table(reported, _listed(reported))["columns"]}

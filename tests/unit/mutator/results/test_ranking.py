@@ -1,18 +1,33 @@
 """The order of results, worst first."""
 
-import csv
+import json
+import math
 import random
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from mutator.results.column_facts import SEVERITY, result_columns
-from mutator.results.ranking import places, worst, worth, worth_of
+import pandas as pd
+
+from mutator.model import Status
+from mutator.results.ranking import places, worth
+from mutator.results.rows import Row, rows_of
+from mutator.results.table_columns import SEVERITY, SINCE, result_columns
 from mutator.results.table_reader import Results
+from mutator.targets.severity import CLASSES
 from mutator.targets.target_facts import MetricFacts
+from tests.made_up_results import write_results
 
 METRICS = [MetricFacts(name, "-", "", "lower") for name in ("margin_h1", "margin_h2", "margin_h3", "delta_v")]
-COLUMNS = [column.name for column in result_columns(("H1", "H2", "H3"), ("gas",), METRICS, (SEVERITY,))]
+COLUMNS = result_columns(("H1", "H2", "H3"), ("gas",), METRICS, (SEVERITY, *SINCE))
+HEAD = {
+    "schema": "run/3",
+    "hazards": ["H1", "H2", "H3"],
+    "compared": ["gas"],
+    "metrics": [metric.plain() for metric in METRICS],
+    "severity": {"name": "x", "about": "", "source": "", "classes": [["S0", 0.0, ""]]},
+}
 OK = {
+    "fault_id": "f",
     "module": "m",
     "fault_type": "f",
     "scenario": "S1",
@@ -49,26 +64,56 @@ WORST_FIRST = {
 }
 
 
-def results(run: Path, lines: Iterable[dict[str, str]]) -> Results:
+def frame_of(run: Path, lines: Iterable[dict[str, str]]) -> pd.DataFrame:
     """Return the results of a made-up run folder, with these lines in its table."""
-    (run / "run.json").write_text('{"schema": "run/3", "hazards": ["H1", "H2", "H3"]}')
-    with (run / "results.csv").open("w", newline="", encoding="utf-8") as file:
-        table = csv.DictWriter(file, COLUMNS, restval="")
-        table.writeheader()
-        table.writerows(lines)
-    return Results.of_run(run)
+    (run / "run.json").write_text(json.dumps(HEAD))
+    write_results(run, COLUMNS, lines)
+    return Results(run).frame()
 
 
 def test_the_worst_results_come_first(tmp_path: Path) -> None:
     """The order is by severity class, then by delta-v. Without a class, it is by ending, then by the margin
     of each hazard. Ids decide ties."""
-    table = results(tmp_path, [line | {"experiment_id": name} for name, line in WORST_FIRST.items()])
-    rows = list(table.rows())
-    random.Random(1).shuffle(rows)
-    assert [row.experiment_id for row in worst(rows)] == list(WORST_FIRST)
+    lines = [line | {"experiment_id": name} for name, line in WORST_FIRST.items()]
+    random.Random(1).shuffle(lines)
+    frame = frame_of(tmp_path, lines)
+    assert list(frame["experiment_id"].to_numpy()[places(frame).argsort()]) == list(WORST_FIRST)
 
 
-def test_columns_and_rows_are_ranked_in_the_same_order(tmp_path: Path) -> None:
+_ENDINGS = [
+    "hazard",
+    "crashed",
+    "timeout",
+    "sdc",
+    "masked",
+    "not_activated",
+    "invalid_mutant",
+    "harness_error",
+]
+
+
+def ranked_one_by_one(rows: Sequence[Row]) -> list[Row]:
+    """Rank rows by the same rules, without columns."""
+    lines: dict[tuple[str, str], list[tuple[float, str]]] = {}
+    for row in rows:
+        for hazard, margin in () if row.severity in CLASSES else row.margins:
+            lines.setdefault((row.ending, hazard), []).append((margin, row.experiment_id))
+    turns: dict[str, int] = {}
+    for line in lines.values():
+        for turn, (_, name) in enumerate(sorted(line)):
+            turns[name] = min(turn, turns.get(name, turn))
+
+    def badness(row: Row) -> tuple[float | str, ...]:
+        ending = _ENDINGS.index(row.ending)
+        if row.severity not in CLASSES:
+            return (1, 0.0, 0.0, ending, turns.get(row.experiment_id, math.inf), row.experiment_id)
+        delta_v = -1.0 if row.delta_v is None else row.delta_v
+        return (0, -CLASSES.index(row.severity), -delta_v, ending, 0, row.experiment_id)
+
+    return sorted(rows, key=badness)
+
+
+def test_many_results_are_ranked_by_the_same_rules(tmp_path: Path) -> None:
     draw = random.Random(3)
     choices = list(WORST_FIRST.values())
     lines = [dict(draw.choice(choices)) for _ in range(400)]
@@ -77,8 +122,8 @@ def test_columns_and_rows_are_ranked_in_the_same_order(tmp_path: Path) -> None:
         for name in ("margin_h1", "margin_h2", "margin_h3"):
             if draw.random() < 0.3:
                 line[name] = str(draw.randint(-3, 3))
-    found = results(tmp_path, lines)
-    texts = found.texts()
-    order = texts["experiment_id"].to_numpy()[places(texts).argsort()]
-    assert list(order) == [row.experiment_id for row in worst(found.rows())]
-    assert worth_of(texts) == worth(found.rows())
+    frame = frame_of(tmp_path, lines)
+    order = frame["experiment_id"].to_numpy()[places(frame).argsort()]
+    ranked = ranked_one_by_one(rows_of(frame, {}))
+    assert list(order) == [row.experiment_id for row in ranked]
+    assert worth(frame) == {r.experiment_id: i for i, r in enumerate(ranked) if r.status is Status.OK}

@@ -1,17 +1,17 @@
 """Counts of the experiments in the results table."""
 
-import csv
 from pathlib import Path
 
 import pytest
 
 from mutator.model import Outcome, Status
-from mutator.results.column_facts import result_columns
-from mutator.results.counting import counts_by, hazard_names, kinds, outcome_counts
-from mutator.results.rows import count_table
+from mutator.results.counting import count_table, counts_by, hazard_names, kinds, outcome_counts
+from mutator.results.table_columns import result_columns
 from mutator.results.table_reader import Results
+from mutator.store import plan_file
+from tests.made_up_results import write_results
 
-COLUMNS = [column.name for column in result_columns(("H1", "H2", "H3"), ("gas",))]
+COLUMNS = result_columns(("H1", "H2", "H3"), ("gas",))
 SEEN = {
     "module": "radar",
     "fault_type": "chaff",
@@ -27,14 +27,12 @@ SEEN = {
 }
 
 
-def write_table(path: Path, *lines: dict[str, str]) -> Path:
-    path.with_name("run.json").write_text('{"schema": "run/3", "hazards": ["H1", "H2", "H3"]}')
-    with path.open("w", newline="", encoding="utf-8") as file:
-        table = csv.DictWriter(file, COLUMNS, restval="")
-        table.writeheader()
-        for i, line in enumerate(lines):
-            table.writerow({"experiment_id": f"{i:016x}"} | line)
-    return path
+def results(run: Path, *lines: dict[str, str]) -> Results:
+    (run / "run.json").write_text('{"schema": "run/3", "hazards": ["H1", "H2", "H3"], "compared": ["gas"]}')
+    plan_file.write(run, [], [])
+    named = ({"experiment_id": f"{i:016x}", "fault_id": "f"} | line for i, line in enumerate(lines))
+    write_results(run, COLUMNS, named)
+    return Results(run)
 
 
 def test_one_row_of_each_kind_is_counted_once(tmp_path: Path) -> None:
@@ -42,7 +40,7 @@ def test_one_row_of_each_kind_is_counted_once(tmp_path: Path) -> None:
     warned = hazard | {"alerts": "can_error;fcw", "t_alert": "7.2", "h3": "1", "t_h3": "19.0"}
     idle = {k: v for k, v in SEEN.items() if not k.startswith("t_")} | {"outcome": "not_activated"}
     masked = SEEN | {"outcome": "masked", "t_manifest": ""}
-    rows = Results(write_table(tmp_path / "results.csv", SEEN, hazard, warned, idle, masked)).texts()
+    rows = results(tmp_path, SEEN, hazard, warned, idle, masked).frame()
 
     [chaff, total] = counts_by(rows, kinds(rows))
 
@@ -56,7 +54,7 @@ def test_one_row_of_each_kind_is_counted_once(tmp_path: Path) -> None:
 @pytest.mark.parametrize("status", [Status.HARNESS_ERROR, Status.INVALID_MUTANT])
 def test_unusable_experiments_are_counted_separately(tmp_path: Path, status: Status) -> None:
     bad = SEEN | {"status": status.value, "outcome": "", "t_h1": "3.0", "alerts": "fcw"}
-    rows = Results(write_table(tmp_path / "results.csv", SEEN, bad)).texts()
+    rows = results(tmp_path, SEEN, bad).frame()
 
     [count, _] = counts_by(rows, kinds(rows))
 
@@ -68,7 +66,7 @@ def test_unusable_experiments_are_counted_separately(tmp_path: Path, status: Sta
 @pytest.mark.parametrize("status", [Status.CRASHED, Status.TIMEOUT])
 def test_a_crash_is_counted_as_injected_and_in_its_own_column(tmp_path: Path, status: Status) -> None:
     bad = SEEN | {"status": status.value, "outcome": "", "t_manifest": ""}
-    rows = Results(write_table(tmp_path / "results.csv", SEEN, bad)).texts()
+    rows = results(tmp_path, SEEN, bad).frame()
 
     heads, lines = count_table(counts_by(rows, kinds(rows)), "fault type", hazard_names(rows))
 
@@ -78,14 +76,14 @@ def test_a_crash_is_counted_as_injected_and_in_its_own_column(tmp_path: Path, st
 
 
 def test_failure_columns_appear_only_if_a_run_failed(tmp_path: Path) -> None:
-    rows = Results(write_table(tmp_path / "results.csv", SEEN)).texts()
+    rows = results(tmp_path, SEEN).frame()
     heads, _ = count_table(counts_by(rows, kinds(rows)), "fault type", hazard_names(rows))
     assert heads[-1] == "hazard, no alert"
 
 
 def test_hazards_that_a_target_does_not_check_are_left_out(tmp_path: Path) -> None:
     seen = SEEN | {"h1": "", "h2": "0", "h3": ""}
-    assert hazard_names(Results(write_table(tmp_path / "results.csv", seen, seen)).texts()) == ("H2",)
+    assert hazard_names(results(tmp_path, seen, seen).frame()) == ("H2",)
 
 
 def test_cells_are_converted_to_typed_values(tmp_path: Path) -> None:
@@ -97,7 +95,7 @@ def test_cells_are_converted_to_typed_values(tmp_path: Path) -> None:
         "t_h3": "11.25",
         "alerts": "fcw;can_error",
     }
-    [row] = Results(write_table(tmp_path / "results.csv", line)).rows()
+    [row] = results(tmp_path, line).rows()
     assert row.outcome is Outcome.HAZARD
     assert row.hazards == (("H3", 11.25), ("H1", 18.5))
     assert row.alerts == ("fcw", "can_error")

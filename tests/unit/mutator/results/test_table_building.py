@@ -19,8 +19,19 @@ from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plans import make_plan
 from mutator.errors import MutatorWarning
 from mutator.model import Experiment, Method, Outcome, Record, Status
-from mutator.results import propagation, table_building, table_cells, table_files
-from mutator.results.column_facts import TIMINGS, Column, result_columns, severity_columns
+from mutator.outcomes.fault_paths import fault_paths_of
+from mutator.results import propagation, table_building, table_files
+from mutator.results.table_columns import (
+    SEVERITY,
+    SINCE,
+    TIMINGS,
+    Finished,
+    cells_of,
+    columns_of,
+    result_columns,
+    severity_columns,
+)
+from mutator.results.table_files import Column
 from mutator.store import plan_file
 from mutator.store.lines import LineWriter
 from mutator.store.records import SCHEMA, TIMINGS_SCHEMA
@@ -29,7 +40,13 @@ from mutator.targets.severity import Scale
 from mutator.workspace import Workspace
 
 HAZARDS = ("H1", "H2", "H3")
+COLUMNS = result_columns(HAZARDS, ("gas", "brake", "steer_torque"), (), (SEVERITY, *SINCE))
 MakeRecord = Callable[..., Record]
+
+
+def row_of(experiment: Experiment, record: Record, scale: Scale | None = None) -> dict[str, object]:
+    cells = cells_of(COLUMNS, [Finished(experiment, record, scale)])
+    return {column.name: cell for column, (cell,) in zip(COLUMNS, cells, strict=True)}
 
 
 def test_the_row_of_a_run_with_a_hazard_has_the_expected_cells(
@@ -44,7 +61,7 @@ def test_the_row_of_a_run_with_a_hazard_has_the_expected_cells(
         alerts=(("steer_saturated", 3.02), ("fcw", 6.0)),
         max_dev=(("gas", 0.1), ("brake", 0.0), ("steer_torque", 1.5)),
     )
-    cells = table_cells.row(one, kept, HAZARDS)
+    cells = row_of(one, kept)
     expected = {
         "value": 24,
         "unit": "m",
@@ -109,10 +126,10 @@ def test_a_row_has_the_severity_and_the_times_to_the_hazard(
     """The fault is activated at 2 s."""
     hit = {"outcome": Outcome.HAZARD, "t_manifest": 2.25, "t_end": 5.5, "metrics": (("delta_v", 5.5),)}
     kept = record(**hit | {"hazards": (("H1", 5.5), ("H2", 7.0))} | given)
-    cells = table_cells.row(experiment(), kept, HAZARDS, scale=SCALE)
+    cells = row_of(experiment(), kept, SCALE)
     told = (cells["severity"], cells["fault_tolerant_time"], cells["manifest_to_hazard"])
     assert told == (severity, tolerant, after_manifest)
-    assert table_cells.row(experiment(), kept, HAZARDS)["severity"] is None  # without a scale
+    assert row_of(experiment(), kept)["severity"] is None  # without a scale
 
 
 def test_run_json_determines_the_columns_of_severity(experiment: Callable[..., Experiment]) -> None:
@@ -147,9 +164,8 @@ def test_unknown_values_of_a_failed_run_are_empty(
     activated: int | None,
 ) -> None:
     given = {} if activation else {"activation": None}
-    cells = table_cells.row(
-        experiment(), record(status=status, outcome=None, detail="why", max_dev=(), **given), HAZARDS
-    )
+    failed = record(status=status, outcome=None, detail="why", max_dev=(), **given)
+    cells = row_of(experiment(), failed)
     assert (cells["status"], cells["activated"], cells["detail"]) == (status.value, activated, "why")
     for name in ("outcome", "manifested", "t_manifest", "h1", "h2", "h3", "alerts", "reaction_time"):
         assert cells[name] is None
@@ -158,7 +174,7 @@ def test_unknown_values_of_a_failed_run_are_empty(
 def test_flags_and_counts_of_a_run_without_activation_are_zero(
     experiment: Callable[..., Experiment], record: MakeRecord
 ) -> None:
-    cells = table_cells.row(experiment(), record(outcome=Outcome.NOT_ACTIVATED, activation=None), HAZARDS)
+    cells = row_of(experiment(), record(outcome=Outcome.NOT_ACTIVATED, activation=None))
     assert (cells["activated"], cells["activations"], cells["manifested"], cells["h1"]) == (0, 0, 0, 0)
     assert cells["t_activation"] is None
 
@@ -224,9 +240,10 @@ def made_at_once(folder: RunFolder) -> dict[str, bytes]:
     records = folder.records()
     planned = sorted(plan_file.read_all(folder.path), key=lambda e: e.id)
     done = [(e, records[e.id]) for e in planned if e.id in records]
-    columns = table_cells.ResultRows(folder).columns
+    columns = columns_of(folder.head)
     names = [column.name for column in columns]
-    rows = [dict(zip(names, table_cells.ResultRows(folder).cells(*one), strict=True)) for one in done]
+    made = [cells_of(columns, [Finished(*one, folder.scale, fault_paths_of(folder.head))]) for one in done]
+    rows = [{name: cell for name, (cell,) in zip(names, cells, strict=True)} for cells in made]
     text = io.StringIO()
     writer = csv.DictWriter(text, names, lineterminator="\n", restval="")
     writer.writeheader()

@@ -22,11 +22,21 @@ from mutator.exports import Format
 from mutator.exports.write import export
 from mutator.model import Experiment, Outcome, Status
 from mutator.report import building
-from mutator.results import table_building, table_cells
-from mutator.results.column_facts import SEVERITY, SINCE, hazards_of, result_columns
-from mutator.results.table_reader import Results, _table, same_parquet
+from mutator.results import table_building
+from mutator.results.table_columns import (
+    SEVERITY,
+    SINCE,
+    Finished,
+    cells_of,
+    columns_of,
+    hazards_of,
+    result_columns,
+)
+from mutator.results.table_reader import Results, _table, frame_of, same_parquet
 from mutator.statistics.frame import hazard_names, load, prepare
 from mutator.store import plan_file
+from mutator.store.run_folder import RunFolder
+from mutator.store.run_head import read_head
 from mutator.targets.environment import THREADS
 from mutator.targets.target_facts import metric_facts
 from mutator.workspace import Workspace
@@ -66,9 +76,9 @@ ALONE = """
 import sys
 from pathlib import Path
 from mutator.results.table_reader import Results, same_parquet
-table = Results.of_run(Path(sys.argv[1]))
-assert same_parquet(*[table.path.with_name("results.parquet")] * 2)
-table.frame(), table.timings(), table.propagation()
+table = Results(Path(sys.argv[1]))
+assert same_parquet(table.path, table.path)
+table.frame(), table.indexed_frame(), table.timings(), table.propagation()
 print(*(path.read_text().strip() for path in Path("/proc/self/task").glob("*/comm")))
 """
 
@@ -84,7 +94,7 @@ def test_reading_tables_leaves_no_thread(run: Path) -> None:
 
 def test_columns_follow_the_targets_hazards_and_channels(run: Path) -> None:
     table = Results.up_to_date(run)
-    columns = list(next(table.lines()))
+    columns = table.csv().decode().partition("\n")[0].split(",")
     at = columns.index("t_manifest")
     assert columns[at + 1 : at + 7] == [
         "crushed",
@@ -97,8 +107,8 @@ def test_columns_follow_the_targets_hazards_and_channels(run: Path) -> None:
     at = columns.index("reaction_time")
     assert columns[at + 1 : at + 4] == ["max_dev_winch", "max_dev_clamp", "max_dev_wheel"]
     assert not [name for name in columns if re.search(r"h[123]\b|gas|brake|steer", name)]
-    assert list(table.texts().columns) == columns
-    frame = table.frame()
+    assert list(table.frame().columns) == columns
+    frame = table.indexed_frame()
     assert [frame.index.name, *frame.columns][: len(columns)] == columns
     assert frame.attrs["units"]["max_dev_winch"] == "as its channel"
 
@@ -112,7 +122,7 @@ def test_numbers_have_the_units_of_their_metric_or_channel(
     metrics = "metrics: {way: {integral: speed, unit: m, worse: lower, about: x}}\n"
     path.write_text(re.sub("hazards: .*\n", hazards + metrics, path.read_text()))
     run = write_run(crane, tmp_path / "run", lambda e: {"hazards": ()})
-    units = Results.up_to_date(run).frame().attrs["units"]
+    units = Results.up_to_date(run).indexed_frame().attrs["units"]
     assert (units["way"], units["margin_dropped"], units["t_end"]) == ("m", "m/s", "s")
     assert units["max_dev_winch"] == units["dev_winch"] == "as its channel"
 
@@ -120,7 +130,7 @@ def test_numbers_have_the_units_of_their_metric_or_channel(
 def test_every_way_of_reading_gives_the_same_hazards(run: Path) -> None:
     table = Results.up_to_date(run)
     rows = table.rows()
-    frame, statistics = table.frame(), load(run / "results.csv").set_index("experiment_id")
+    frame, statistics = table.indexed_frame(), load(run / "results.csv").set_index("experiment_id")
     assert [row.experiment_id for row in rows] == list(frame.index)
     assert read_side(run).rows == {row.experiment_id: row for row in rows}
     assert {row.hazards for row in rows} == {(), (("DROPPED", 4.0), ("CRUSHED", 4.5))}
@@ -132,7 +142,7 @@ def test_every_way_of_reading_gives_the_same_hazards(run: Path) -> None:
 
 
 def test_the_column_hazard_is_unknown_for_crashes(run: Path) -> None:
-    frame = Results.up_to_date(run).frame()
+    frame = Results.up_to_date(run).indexed_frame()
     assert list(frame["hazard"].isna()) == list(frame["status"] == "crashed")
     assert frame["hazard"].isna().any()
 
@@ -142,8 +152,8 @@ def test_a_target_without_hazards_has_no_hazard_in_any_row(run: Path, reseal: Ca
     head.write_text(re.sub(r'"hazards":\s*\[[^]]*\]', '"hazards": []', head.read_text()))
     reseal(run)
     table_building.build(run)
-    table = Results.of_run(run)
-    frame = table.frame()
+    table = Results(run)
+    frame = table.indexed_frame()
     assert frame["hazard"].dropna().eq(False).all()
     assert frame["hazard"].notna().any()
     assert frame["t_hazard"].dtype == float
@@ -172,34 +182,89 @@ def test_a_real_run_fills_each_column(crane: Workspace, tmp_path: Path, write_ru
     assert record.status is Status.OK
     compared = [channel.name for channel in manifest.compared]
     columns = result_columns(manifest.hazards, compared, metric_facts(manifest), (SEVERITY, *SINCE))
-    cells = table_cells.row(experiment, record, manifest.hazards)
-    assert {*cells} == {column.name for column in columns}
-    assert cells["max_dev_wheel"]
+    cells = cells_of(columns, [Finished(experiment, record, crane.scale_of(manifest))])
+    row = {column.name: cell for column, (cell,) in zip(columns, cells, strict=True)}
+    assert row["max_dev_wheel"]
 
 
 def test_a_missing_table_is_reported(tmp_path: Path) -> None:
-    table = Results.of_run(tmp_path)
-    for read in (table.rows, table.texts, table.csv, table.frame):
+    table = Results(tmp_path)
+    for read in (table.rows, table.csv, table.frame, table.indexed_frame):
         with pytest.raises(MutatorError, match=f"{tmp_path}: no results here"):
             read()
 
 
-@pytest.mark.parametrize("text", ["a,b\n1,2\n", "", "\xff"])
-def test_a_file_that_is_not_a_results_table_is_refused(tmp_path: Path, text: str) -> None:
-    table = Results.of_run(tmp_path)
-    table.path.write_bytes(text.encode("latin-1"))
-    for read in (table.rows, table.texts):
+@pytest.mark.parametrize("data", [b"a,b\n1,2\n", b"", b"PAR1", b"PAR1\xffPAR1"])
+def test_a_file_that_is_not_a_results_table_is_refused(run: Path, data: bytes) -> None:
+    table = Results(run)
+    table.path.write_bytes(data)
+    for read in (table.rows, table.frame, table.indexed_frame):
         with pytest.raises(MutatorError, match="not a results table"):
             read()
 
 
-def test_an_unknown_status_or_incomplete_line_is_refused(run: Path) -> None:
+@pytest.mark.parametrize("cut", [0.1, 0.5, 0.9])
+def test_an_incomplete_table_is_refused(run: Path, cut: float) -> None:
     table = Results.up_to_date(run)
-    whole = table.csv()
-    for damaged in (whole.replace(b",crashed,", b",melted,"), whole[: whole.rindex(b",")]):
+    whole = table.parquet()
+    for damaged in (whole[: int(cut * len(whole))], whole[int(cut * len(whole)) :]):
         table.path.write_bytes(damaged)
         with pytest.raises(MutatorError, match="not a results table"):
-            table.rows()
+            table.frame()
+
+
+def test_an_unknown_status_is_refused(run: Path) -> None:
+    table = Results.up_to_date(run)
+    cells = parquet.read_table(table.path)
+    melted = pa.array(["melted"] * len(cells), pa.string())
+    parquet.write_table(cells.set_column(cells.column_names.index("status"), "status", melted), table.path)
+    with pytest.raises(MutatorError, match="not a results table: 'melted'"):
+        table.rows()
+
+
+@pytest.mark.parametrize(
+    ("name", "cells", "why"),
+    [
+        ("status", pa.array([7]), "column 'status' has the type int64, not string"),
+        ("t_alert", pa.array(["soon"]), "column 't_alert' has the type string, not double"),
+        ("t_alert", pa.array([[1.0]]), "column 't_alert' has the type list<"),
+        ("crushed", None, "no column 'crushed'"),
+    ],
+)
+def test_a_column_of_another_type_is_refused(run: Path, name: str, cells: pa.Array | None, why: str) -> None:
+    """The types are those of the columns of the run's target."""
+    table = Results.up_to_date(run)
+    found = parquet.read_table(table.path).slice(0, 1)
+    at = found.column_names.index(name)
+    parquet.write_table(
+        found.remove_column(at) if cells is None else found.set_column(at, name, cells), table.path
+    )
+    for read in (table.rows, table.frame, table.indexed_frame):
+        with pytest.raises(MutatorError, match=re.escape(why)):
+            read()
+
+
+def test_the_types_of_a_frame_are_those_of_the_table(run: Path) -> None:
+    """A text without a value is ''; nothing is parsed from results.csv, which can be missing."""
+    table = Results.up_to_date(run)
+    (run / "results.csv").unlink()
+    frame = table.frame()
+    kinds = {c.name: frame[c.name].dtype for c in columns_of(read_head(run))}
+    texts = {c.name for c in columns_of(read_head(run)) if c.type == "text"}
+    assert {name for name, kind in kinds.items() if kind == "str"} == texts
+    assert all(kind.kind in "if" for name, kind in kinds.items() if name not in texts)
+    assert set(frame["alerts"]) == {""} and frame["t_alert"].isna().all()
+    assert list(table.frame("status", "outcome").columns) == ["status", "outcome"]
+
+
+def test_a_frame_computed_from_records_equals_the_stored_one(run: Path) -> None:
+    """Without the columns of the fault's path, which take longest."""
+    folder = RunFolder.open(run)
+    stored, computed = Results.up_to_date(run).frame(), frame_of(folder, plan_file.read_all(run))
+    names = [name for name in stored if name not in ("reached", "stopped_at")]
+    computed = computed.sort_values("experiment_id", ignore_index=True)
+    pd.testing.assert_frame_equal(computed[names], stored[names])
+    assert hazards_of(computed) == hazards_of(stored)
 
 
 def test_no_other_module_opens_the_tables() -> None:
@@ -218,7 +283,7 @@ def test_metadata_of_a_table_give_no_column_another_name(run: Path) -> None:
     """The cells of the forged table are the genuine ones."""
     table_building.build(run)
     path = run / "results.parquet"
-    genuine, table = Results.of_run(run).frame(), parquet.read_table(path)
+    genuine, table = Results(run).frame(), parquet.read_table(path)
     swap = {"DROPPED": "CRUSHED", "CRUSHED": "DROPPED"}
     columns = [
         {"name": swap.get(n, n), "field_name": n, "pandas_type": "", "numpy_type": "", "metadata": None}
@@ -229,7 +294,7 @@ def test_metadata_of_a_table_give_no_column_another_name(run: Path) -> None:
     parquet.write_table(table.replace_schema_metadata({"pandas": json.dumps(about)}), forged)
     assert not same_parquet(forged, path)
     forged.replace(path)
-    assert Results.of_run(run).frame().equals(genuine)
+    assert Results(run).frame().equals(genuine)
 
 
 def _bomb(path: Path, rows: int, length: int) -> None:
@@ -256,25 +321,25 @@ def test_hazards_have_the_names_of_run_json(run: Path, reseal: Callable[[Path], 
     head.write_text(json.dumps(facts | {"hazards": ["Dropped", "CRUSHED"], "metrics": metrics}))
     reseal(run)
     table_building.build(run)
-    table = Results.of_run(run)
+    table = Results(run)
     assert {row.checked for row in table.rows() if row.status is Status.OK} == {("Dropped", "CRUSHED")}
-    assert hazards_of(table.texts()) == hazards_of(table.frame()) == ("Dropped", "CRUSHED")
+    assert hazards_of(table.frame()) == hazards_of(table.indexed_frame()) == ("Dropped", "CRUSHED")
     assert hazard_names(load(table.path)) == ("CRUSHED", "Dropped")
-    assert "way" in table.texts()
+    assert "way" in table.frame()
 
 
 def test_a_table_without_a_hazard_of_run_json_is_refused(run: Path) -> None:
     table = Results.up_to_date(run)
     head = run / "run.json"
     head.write_text(head.read_text().replace("CRUSHED", "BROKEN"))
-    for read in (table.rows, table.texts, table.frame):
+    for read in (table.rows, table.frame, table.indexed_frame):
         with pytest.raises(MutatorError, match="no column 'broken'"):
             read()
 
 
 def test_a_frame_without_its_hazards_is_refused(run: Path) -> None:
     """Pandas keeps them in frames made from a frame of a run, but another frame has none."""
-    texts = Results.up_to_date(run).texts()
-    assert hazards_of(texts[texts["status"] == "ok"].reset_index(drop=True)) == hazards_of(texts)
+    frame = Results.up_to_date(run).frame()
+    assert hazards_of(frame[frame["status"] == "ok"].reset_index(drop=True)) == hazards_of(frame)
     with pytest.raises(MutatorError, match="without the names of its hazards"):
-        prepare(pd.DataFrame(texts.to_dict("list")))
+        prepare(pd.DataFrame(frame.to_dict("list")))

@@ -76,14 +76,14 @@ def test_the_results_are_read_once_for_many_groups(
     table_building.ensure(run.path)
     groups = of_plan(toycar, make_plan(toycar, "toy", Choices()))
     read: list[Results] = []
-    texts = Results.texts
+    frame = Results.frame
 
     def slowly(table: Results) -> Any:
         read.append(table)
         sleep(0.05)
-        return texts(table)
+        return frame(table)
 
-    monkeypatch.setattr(Results, "texts", slowly)
+    monkeypatch.setattr(Results, "frame", slowly)
     with ThreadPoolExecutor(4) as pool:
         found = list(pool.map(lambda group: of_group(run, group), groups))
     assert len(read) == 1 < len([one for one in found if one])
@@ -91,12 +91,13 @@ def test_the_results_are_read_once_for_many_groups(
 
 def row(**given: Any) -> Row:
     fields: dict[str, Any] = {
-        "experiment_id": "e", "module": "m", "fault_type": "f", "variant": "v", "value": "", "unit": "",
-        "scenario": "A", "method": "guided", "trigger": "C1", "status": Status.OK, "outcome": None,
+        "experiment_id": "e", "kind": "m/f", "variant": "v", "value": "", "unit": "",
+        "scenario": "A", "trigger": "C1", "status": Status.OK, "outcome": None,
         "t_activation": 2.0, "t_manifest": 2.5, "checked": (), "hazards": (), "alerts": (), "t_alert": None,
         "reaction_time": None, "detail": "",
     }  # fmt: skip
-    return Row(**fields | given)
+    fields |= given
+    return Row(ending=(fields["outcome"] or fields["status"]).value, **fields)
 
 
 @pytest.mark.parametrize(

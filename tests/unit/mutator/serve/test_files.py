@@ -21,8 +21,9 @@ from mutator.serve.runs import Runs
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_script import script_of
 from mutator.workspace import Workspace
+from tests.made_up_results import write_results
 
-from ..report.made_run import make_run
+from ..report.made_run import COLUMNS, LINES, make_run
 from .conftest import SECRET, Client
 
 STEPS = ("..", "%2e%2e", "..%2f..", "%252e%252e", "....//..", "..%5c..", "%00", ".", "")
@@ -229,8 +230,7 @@ def test_a_report_is_built_once(client: Client, linked: Path, monkeypatch: pytes
 
 def test_a_changed_run_gets_a_new_report(client: Client, linked: Path) -> None:
     before = client.get("/runs/linked/report/index.html").data
-    results = linked / "results.csv"
-    results.write_text(results.read_text().replace("18.25", "18.26"))
+    write_results(linked, COLUMNS, [LINES[0] | {"t_h1": "18.26"}, *LINES[1:]])
     assert client.get("/runs/linked/report/index.html").data != before
 
 

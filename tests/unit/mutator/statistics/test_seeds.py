@@ -1,6 +1,7 @@
 """The spread between seeds, for frames made by hand."""
 
 import math
+from math import nan
 from typing import Any
 
 import numpy as np
@@ -53,7 +54,7 @@ def test_the_interval_is_made_of_percentiles_of_resampled_seeds() -> None:
 
 
 def test_seeds_that_agree_have_no_interval() -> None:
-    frame = results(*seed(1, 4), *seed(2, 4), *seed(3, 0, t_activation=""))
+    frame = results(*seed(1, 4), *seed(2, 4), *seed(3, 0, t_activation=nan))
     found = cells(seeds_sheet(frame), "all", "hazards", "activated")
     assert math.isnan(found["low"]) and math.isnan(found["high"])
     assert (found["seeds"], found["least"], found["largest"]) == (2, 0.4, 0.4)

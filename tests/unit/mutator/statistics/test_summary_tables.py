@@ -5,10 +5,12 @@ from pathlib import Path
 import pytest
 
 from mutator.errors import MutatorError
+from mutator.results.table_columns import result_columns
 from mutator.statistics.frame import load
 from mutator.statistics.shares import share
 from mutator.statistics.summary_tables import coverage_sheet, summary_sheet
 from mutator.statistics.tallies import Tally, by_kind, by_scenario
+from tests.made_up_results import write_results
 
 from .results_frame import results
 
@@ -44,8 +46,10 @@ def test_crashes_count_as_injected_and_harness_errors_do_not() -> None:
 
 
 def test_a_missing_file_or_column_is_reported(tmp_path: Path) -> None:
-    with pytest.raises(MutatorError, match=r"results\.csv"):
+    with pytest.raises(MutatorError, match=r"results\.parquet"):
         load(tmp_path / "results.csv")
-    (tmp_path / "results.csv").write_text("experiment_id,fault_id\n1,2\n")
+    (tmp_path / "run.json").write_text('{"schema": "run/3", "hazards": [], "compared": []}')
+    columns = result_columns((), ())
+    write_results(tmp_path, [column for column in columns if column.name != "module"], [])
     with pytest.raises(MutatorError, match="no column 'module'"):
         load(tmp_path / "results.csv")

@@ -10,24 +10,40 @@ from markupsafe import escape
 from mutator.report.panel import Panel
 from mutator.report.panels.tables import tables_panel
 from mutator.report.studies import ReportedRun
+from mutator.results.table_columns import result_columns
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
+from tests.made_up_results import write_results
 
 HERE = Workspace.find(Path(__file__).parents[5])
-HEADER = (
-    "experiment_id,fault_id,module,fault_type,variant,value,unit,scenario,method,trigger,seed,status,outcome,"
-    "t_activation,t_manifest,h1,t_h1,alerts,t_alert,reaction_time,detail"
-)
+HAZARD = {
+    "fault_id": "a",
+    "module": "radar",
+    "fault_type": "chaff",
+    "scenario": "S1",
+    "trigger": "C2",
+    "seed": 1,
+    "status": "ok",
+    "outcome": "hazard",
+    "t_activation": 5,
+    "t_manifest": 6,
+    "h1": 1,
+    "t_h1": 9,
+    "alerts": "fcw",
+    "t_alert": 8,
+    "reaction_time": 1,
+}
 
 
 @pytest.fixture
 def run(tmp_path: Path) -> RunFolder:
     head = {"schema": "run/3", "target": "openpilot", "goldens": [["S1", []]], "hazards": ["H1"]}
+    head["compared"] = []
     (tmp_path / "run.json").write_text(json.dumps(head))
     plan_file.write(tmp_path, [], [])
-    line = "{0},a,radar,chaff,distance,35,m,S1,{0},C2,1,ok,hazard,5,6,1,9,fcw,8,1,"
-    (tmp_path / "results.csv").write_text("\n".join([HEADER, *map(line.format, ("guided", "random")), ""]))
+    lines = [HAZARD | {"experiment_id": method, "method": method} for method in ("guided", "random")]
+    write_results(tmp_path, result_columns(("H1",), ()), lines)
     (tmp_path / "golden" / "S1").mkdir(parents=True)
     np.savez(tmp_path / "golden" / "S1" / "trace.npz", t=np.arange(3000) / 100)
     return RunFolder.unverified(tmp_path)

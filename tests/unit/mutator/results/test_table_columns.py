@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.results.column_facts import deviation_columns, is_text, result_columns
+from mutator.results.table_columns import deviation_columns, result_columns
 from mutator.workspace import Workspace
 
 OF_OPENPILOT = (
@@ -55,22 +55,6 @@ def test_hazard_columns_keep_the_order_of_the_manifest() -> None:
 )
 def test_deviation_columns_use_the_first_word_of_a_channel(channels: list[str], columns: list[str]) -> None:
     assert list(deviation_columns(channels).values()) == columns
-
-
-@pytest.mark.parametrize(
-    ("column", "text"),
-    [
-        ("trigger", True),
-        ("kind", True),
-        ("fault", True),
-        ("hazards", True),
-        ("value", False),
-        ("t_crushed", False),
-    ],
-)
-def test_names_are_read_as_text(column: str, text: bool) -> None:
-    """Names can look like numbers."""
-    assert is_text(column) is text
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,97 @@
+"""The columns of plan.csv, which are also columns of the results table: names, types, units, meanings, and
+how a cell follows from an experiment.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from mutator.model import Experiment, Fault, Value, fault_label
+from mutator.results.table_files import Column
+
+
+@dataclass(frozen=True, slots=True)
+class PlanColumn(Column):
+    """A column that is known before a run."""
+
+    of: Callable[[Experiment], object]
+
+
+def number_of(fault: Fault) -> Value:
+    """Return the fault's value; None if it is text, which is part of `variant`."""
+    return None if isinstance(fault.value, str) else fault.value
+
+
+def _variant(experiment: Experiment) -> str:
+    """Return the variant, with the fault's value if that is text."""
+    fault = experiment.fault
+    variant = fault.spec.split("/", 2)[-1]
+    return fault_label(variant, fault.value, fault.unit) if isinstance(fault.value, str) else variant
+
+
+FIRST_PLANNED = (
+    PlanColumn(
+        "experiment_id",
+        "text",
+        "",
+        "the experiment's id, a hash of its content: equal experiments have equal ids on every machine",
+        lambda e: e.id,
+    ),
+    PlanColumn("fault_id", "text", "", "the fault's id, also a hash of its content", lambda e: e.fault.id),
+    PlanColumn("module", "text", "", "the module of the fault spec", lambda e: e.fault.module),
+    PlanColumn("fault_type", "text", "", "the fault type of the spec", lambda e: e.fault.fault_type),
+    PlanColumn(
+        "reading",
+        "text",
+        "",
+        "the [reading](../explanation/concepts.md#readings) of the fault",
+        lambda e: e.fault.reading,
+    ),
+    PlanColumn(
+        "value",
+        "number",
+        "as the column `unit` says",
+        "the drawn value; empty for a fault without a value",
+        lambda e: number_of(e.fault),
+    ),
+    PlanColumn(
+        "unit",
+        "text",
+        "",
+        "the unit of `value` as the spec states it, `-` for a plain number",
+        lambda e: e.fault.unit,
+    ),
+    PlanColumn("scenario", "text", "", "the scenario", lambda e: e.scenario),
+    PlanColumn(
+        "method",
+        "text",
+        "",
+        "`guided` (a context or a listed trigger) or `random` (a random time)",
+        lambda e: e.method.value,
+    ),
+    PlanColumn(
+        "trigger",
+        "text",
+        "",
+        "the trigger's name; for a random time, `random/` and the name of the guided partner's trigger",
+        lambda e: e.trigger.name,
+    ),
+    PlanColumn("seed", "count", "", "the seed of all draws", lambda e: e.seed),
+)
+LAST_PLANNED = (
+    PlanColumn(
+        "variant",
+        "text",
+        "",
+        "the variant of the spec; for a mutation operator, the place and change",
+        _variant,
+    ),
+    PlanColumn("aim", "text", "", "the hazard that the fault aims at", lambda e: e.fault.aim),
+    PlanColumn("condition", "text", "", "the condition of the trigger", lambda e: e.trigger.condition),
+)
+_PLANNED = (*FIRST_PLANNED, *LAST_PLANNED)
+PLAN_COLUMNS = tuple(column.name for column in _PLANNED)
+
+
+def plan_row(experiment: Experiment) -> dict[str, object]:
+    """Return the `PLAN_COLUMNS` of one experiment. If the fault's value is text, it is part of `variant`."""
+    return {column.name: column.of(experiment) for column in _PLANNED}

@@ -1,0 +1,341 @@
+"""The columns of the results table and related tables: names, types, units, meanings, and how a cell follows
+from an experiment and its record.
+
+Hazards, compared channels and metrics of a target add columns; the others are the same for all targets.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+from mutator.errors import MutatorError
+from mutator.model import Experiment, Record, Status
+from mutator.outcomes.verdicts import reaction_time, severity_of, since_activation, since_manifestation
+from mutator.results.plan_columns import FIRST_PLANNED, LAST_PLANNED, PlanColumn
+from mutator.results.table_files import Column
+from mutator.targets.manifest import TargetManifest
+from mutator.targets.severity import Scale
+from mutator.targets.target_facts import T_END, MetricFacts
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from mutator.outcomes.fault_paths import FaultPaths
+    from mutator.store.run_head import Head
+
+AS_CHANNEL = "as its channel"  # a unit
+_TIME_DIGITS = 6  # decimals of a time in s: finer than any step, coarser than a double's precision
+
+
+class Finished:
+    """An experiment with its record, from which the cells of its row follow."""
+
+    def __init__(
+        self,
+        experiment: Experiment,
+        record: Record,
+        scale: Scale | None = None,
+        fault_paths: "FaultPaths | None" = None,
+    ) -> None:
+        self.experiment, self.record, self.scale = experiment, record, scale
+        self.is_ok = record.status is Status.OK
+        self.hazards, self.metrics = dict(record.hazards), dict(record.metrics)
+        self.max_dev = dict(record.max_dev)
+        self.path = fault_paths.untimed_path(experiment.fault, record) if fault_paths else None
+
+
+@dataclass(frozen=True, slots=True)
+class ResultColumn(Column):
+    """A column that is known after a run. None is an empty cell."""
+
+    of: Callable[[Finished], object]
+
+
+def _time(value: float | None) -> float | None:
+    return None if value is None else round(value, _TIME_DIGITS)
+
+
+_TO_MANIFESTATION = (
+    ResultColumn(
+        "status", "text", "", "whether the experiment itself worked", lambda f: f.record.status.value
+    ),
+    ResultColumn(
+        "outcome",
+        "text",
+        "",
+        "what the fault did; empty unless the status is `ok`",
+        lambda f: f.record.outcome.value if f.record.outcome else None,
+    ),
+    ResultColumn(
+        "activated",
+        "flag",
+        "",
+        "whether an injected statement ran while the trigger held",
+        lambda f: 1 if f.record.activation else (0 if f.is_ok else None),
+    ),
+    ResultColumn(
+        "t_activation",
+        "number",
+        "s",
+        "time of the first activation",
+        lambda f: _time(f.record.activation.first) if f.record.activation else None,
+    ),
+    ResultColumn(
+        "activations",
+        "count",
+        "",
+        "number of activations in the whole run",
+        lambda f: f.record.activation.count if f.record.activation else (0 if f.is_ok else None),
+    ),
+    ResultColumn(
+        "manifested",
+        "flag",
+        "",
+        "whether an actuator output differed from golden after the activation",
+        lambda f: int(f.record.t_manifest is not None) if f.is_ok else None,
+    ),
+    ResultColumn(
+        "t_manifest",
+        "number",
+        "s",
+        "when an actuator output first differed from golden after the activation",
+        lambda f: _time(f.record.t_manifest),
+    ),
+)
+_TO_REACTION = (
+    ResultColumn(
+        "alerts",
+        "text",
+        "",
+        "names of the alerts in the order of their times, joined by `;`",
+        lambda f: ";".join([name for name, _ in f.record.alerts]) or None,
+    ),
+    ResultColumn(
+        "t_alert",
+        "number",
+        "s",
+        "time of the first alert",
+        lambda f: _time(f.record.alerts[0][1]) if f.record.alerts else None,
+    ),
+    ResultColumn(
+        "reaction_time",
+        "number",
+        "s",
+        "time from the first alert to the first hazard; empty unless the alert came first",
+        lambda f: _time(reaction_time(f.record.hazards, f.record.alerts)),
+    ),
+)
+SEVERITY = ResultColumn(
+    "severity",
+    "text",
+    "",
+    "class of the contact that ended the drive; empty without a contact",
+    lambda f: severity_of(f.record, f.scale),
+)
+SINCE = (
+    ResultColumn(
+        "fault_tolerant_time",
+        "number",
+        "s",
+        "time from the activation to the first hazard",
+        lambda f: _time(since_activation(f.record)),
+    ),
+    ResultColumn(
+        "manifest_to_hazard",
+        "number",
+        "s",
+        "time from the manifestation to the first hazard; empty if the hazard came first",
+        lambda f: _time(since_manifestation(f.record)),
+    ),
+)
+OF_PATHS = (
+    ResultColumn(
+        "reached",
+        "text",
+        "",
+        "the component farthest along the fault's path that left golden",
+        lambda f: f.path.reached or None if f.path else None,
+    ),
+    ResultColumn(
+        "stopped_at",
+        "text",
+        "",
+        "the components that stopped a masked fault, joined by `;`",
+        lambda f: ";".join(f.path.stopped_at) or None if f.path else None,
+    ),
+)
+DETAIL = ResultColumn("detail", "text", "", "why the status is not `ok`", lambda f: f.record.detail or None)
+TIMINGS = (
+    Column("experiment_id", "text", "", "the experiment"),
+    Column("cpu_s", "number", "s", "CPU time of the experiment's run"),
+    Column("wall_s", "number", "s", "wall time of the experiment's run"),
+    Column("host", "text", "", "the machine that ran the experiment"),
+    Column("worker", "text", "", "the worker that ran the experiment"),
+)
+# Columns that are added when the table is read. No hazard can have one of these names.
+DERIVED = ("kind", "fault", "row", "ending", "hazards", "warning", "through", "rank", "hazard", "t_hazard")
+
+
+def result_columns(
+    hazards: Iterable[str],
+    compared: Sequence[str],
+    metrics: Sequence[MetricFacts] = (),
+    severity: Sequence[ResultColumn] = (),
+    *,
+    paths: bool = False,
+) -> tuple[PlanColumn | ResultColumn, ...]:
+    """Return the columns of results.csv, in order.
+
+    `severity` is from `severity_columns`. `paths` adds the columns of the fault's path.
+    """
+    ends = T_END in (metric.name for metric in metrics)
+    return (
+        *FIRST_PLANNED,
+        *_TO_MANIFESTATION,
+        *(column for name in hazards for column in hazard_columns(name)),
+        *_TO_REACTION,
+        *(_deviation(name, column) for name, column in deviation_columns(compared).items()),
+        *map(_metric, metrics),
+        *(_driven_deviation(name, column) for name, column in driven_columns(compared).items() if ends),
+        *severity,
+        *(OF_PATHS if paths else ()),
+        *LAST_PLANNED,
+        DETAIL,
+    )
+
+
+def columns_of(head: "Head") -> tuple[PlanColumn | ResultColumn, ...]:
+    """Return the columns of a run's results.csv, in order."""
+    paths = any(channel.component for channel in head.channels)
+    return result_columns(
+        head["hazards"], head["compared"], head.metrics, severity_columns(head), paths=paths
+    )
+
+
+def cells_of(
+    columns: Iterable[PlanColumn | ResultColumn], finished: Sequence[Finished]
+) -> list[list[object]]:
+    """Return the cells of each column, with a row for each finished experiment."""
+    planned = [one.experiment for one in finished]
+    return [
+        list(map(column.of, planned)) if isinstance(column, PlanColumn) else list(map(column.of, finished))
+        for column in columns
+    ]
+
+
+def severity_columns(head: Mapping[str, Any]) -> tuple[ResultColumn, ...]:
+    """Return the severity columns according to run.json. Older runs have none."""
+    if "severity" not in head:
+        return ()
+    return (SEVERITY, *SINCE) if head["severity"] else SINCE
+
+
+def _deviation(channel: str, column: str) -> ResultColumn:
+    about = f"largest difference of `{channel}` from golden"
+    return ResultColumn(column, "number", AS_CHANNEL, about, lambda f: f.max_dev.get(channel))
+
+
+def _driven_deviation(channel: str, column: str) -> ResultColumn:
+    """Return the column of the largest difference up to the end of the drive, where a hazard ended it."""
+
+    def of(finished: Finished) -> float | None:
+        ended = dict(finished.record.dev)
+        return ended[channel] if channel in ended else finished.max_dev.get(channel)
+
+    about = f"largest difference of `{channel}` from golden, up to `{T_END}`"
+    return ResultColumn(column, "number", AS_CHANNEL, about, of)
+
+
+def _metric(metric: MetricFacts) -> ResultColumn:
+    name = metric.name
+    if name == T_END:
+        return ResultColumn(name, "number", metric.unit, metric.about, lambda f: _time(f.record.t_end))
+    return ResultColumn(name, "number", metric.unit, metric.about, lambda f: f.metrics.get(name))
+
+
+@lru_cache(maxsize=64)
+def hazard_columns(hazard: str) -> tuple[ResultColumn, ResultColumn]:
+    """Return the flag and the time column of a hazard: `near` and `t_near` for NEAR."""
+    name = hazard.lower()
+    return (
+        ResultColumn(
+            name,
+            "flag",
+            "",
+            f"whether hazard {hazard} occurred",
+            lambda f: int(hazard in f.hazards) if f.is_ok else None,
+        ),
+        ResultColumn(
+            f"t_{name}",
+            "number",
+            "s",
+            "time of its first occurrence",
+            lambda f: _time(f.hazards.get(hazard)),
+        ),
+    )
+
+
+def hazards_of(frame: "pd.DataFrame") -> tuple[str, ...]:
+    """Return the hazards of a frame that `Results` read, in the order of run.json. MutatorError for a frame
+    without them.
+    """
+    try:
+        return tuple(frame.attrs["hazards"])
+    except KeyError:
+        raise MutatorError(
+            "a frame of results without the names of its hazards",
+            expected='`frame.attrs["hazards"]`, which frames of a run have',
+            remedy="set it to the names of the target's hazards",
+        ) from None
+
+
+def deviation_columns(channels: Sequence[str]) -> Mapping[str, str]:
+    """Map each compared channel to its column: `max_dev_` and the first word of its name (`wheel` for
+    `wheel_turn`), or the whole name if another channel begins with the same word.
+    """
+    return _deviation_columns(tuple(channels))
+
+
+@lru_cache(maxsize=64)
+def _deviation_columns(channels: tuple[str, ...]) -> Mapping[str, str]:
+    words = [name.split("_")[0] for name in channels]
+    return {
+        name: f"max_dev_{word if words.count(word) == 1 else name}"
+        for name, word in zip(channels, words, strict=True)
+    }
+
+
+def driven_columns(channels: Sequence[str]) -> dict[str, str]:
+    """Map each compared channel to its `dev_` column, which exists if a hazard can end the drive."""
+    return {name: column.removeprefix("max_") for name, column in deviation_columns(channels).items()}
+
+
+def check_names(manifest: TargetManifest) -> None:
+    """Raise MutatorError if a column of a hazard or metric has the name of another column, or if a metric's
+    column could be taken for a hazard's.
+    """
+    compared = [channel.name for channel in manifest.compared]
+    taken = {column.name for column in result_columns((), compared, paths=True)}
+    taken |= {SEVERITY.name, *(column.name for column in SINCE)}
+    taken |= {*DERIVED, T_END, *driven_columns(compared).values()}
+    named = isinstance(manifest.source.data.get("hazards"), dict)
+    for i, hazard in enumerate(manifest.hazards):
+        names = {column.name for column in hazard_columns(hazard)}
+        if names & taken:
+            raise manifest.source.error(
+                ("hazards", hazard if named else i),
+                f"hazard '{hazard}' clashes with another column of the results",
+                expected=f"a name whose columns ({' and '.join(sorted(names))}) do not exist yet",
+                remedy="rename it",
+            )
+        taken |= names
+    for metric in manifest.measures:
+        if {metric.name, f"t_{metric.name}", metric.name.removeprefix("t_")} & taken:
+            raise manifest.source.error(
+                ("metrics", metric.name),
+                f"metric '{metric.name}' clashes with another column of the results",
+                expected="a name that no other column has, with or without the prefix `t_`",
+                remedy="rename it",
+            )
+        taken.add(metric.name)
