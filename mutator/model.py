@@ -3,15 +3,17 @@
 Declare new fields with `hashing.added`, so that existing ids do not change.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
 from typing import Any
 
 from mutator._common.hashing import added, added_values, content_id, plain
+from mutator._common.yaml_records import mapping, written
 
 Value = int | float | str | bool | None
 
+MOST = 1_000_000_000  # maximum of any limit or time
 OPERATORS = "operators"  # the `module` of faults that mutation operators make
 
 
@@ -235,13 +237,20 @@ class Experiment:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
-    """Limits of one run: CPU and wall time in s, memory and disk in MiB, simulation steps."""
+    """The resources that one run can use before it is stopped."""
 
-    cpu_s: int = 60
-    wall_s: int = 300
-    memory_mb: int = 4096
-    steps: int = 20_000
-    disk_mb: int = added(1024)
+    __pydantic_config__ = mapping("Limits")
+
+    cpu_s: int = field(default=60, metadata=written("CPU time in seconds.", ge=1, le=MOST))
+    wall_s: int = field(default=300, metadata=written("Wall time in seconds.", ge=1, le=MOST))
+    memory_mb: int = field(default=4096, metadata=written("Address space in MiB.", ge=256, le=MOST))
+    steps: int = field(default=20_000, metadata=written("Number of simulation steps.", ge=1, le=MOST))
+    disk_mb: int = added(
+        1024,
+        written(
+            "MiB in the run's output folder and TMPDIR together; also the limit for each file.", ge=1, le=MOST
+        ),
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

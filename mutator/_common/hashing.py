@@ -17,12 +17,12 @@ _ADDED = "added"  # metadata key of a field
 _SCALARS = frozenset((str, int, float, bool, type(None)))
 
 
-def added(default: Any) -> Any:
+def added(default: Any, metadata: dict[str, Any] | None = None) -> Any:
     """Declare a dataclass field that is added to a hashed record after the record's first release.
 
     Files without the field are read with `default`, which must be immutable and must never change.
     """
-    return dataclasses.field(default=default, metadata={_ADDED: True})
+    return dataclasses.field(default=default, metadata={_ADDED: True, **(metadata or {})})
 
 
 def added_values(record: Any) -> dict[str, Any]:

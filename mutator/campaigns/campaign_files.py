@@ -1,13 +1,13 @@
 """Campaign files: the faults, scenarios, triggers and limits of a campaign."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
 from mutator._common.below import check_library_name
 from mutator._common.bounded import read_bounded
-from mutator.campaigns.campaign_model import CampaignModel, SelectionModel
+from mutator.campaigns.campaign_model import CampaignModel, Canary, SelectionModel
 from mutator.campaigns.operator_selection import OperatorSelection, When
 from mutator.campaigns.studies import Study, find_study
 from mutator.campaigns.trigger_choice import (
@@ -34,16 +34,6 @@ class Selection:
     file: Path | None = None
     values: int | None = None  # number of values from each variant, spread evenly; None: all
     operators: OperatorSelection | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Canary:
-    """A fault known to be harmful: active from `at_s` (s), it must cause `hazard`."""
-
-    spec: str  # the full name of a variant
-    scenario: str
-    hazard: str
-    at_s: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -134,15 +124,15 @@ def load_campaign(path: Path) -> Campaign:
         methods=tuple(Method(name) for name in model.methods),
         table=triggers.table,
         rows=tuple(triggers.rows) if triggers.rows else None,
-        listed=triggers.triggers(),
+        listed=tuple(triggers.listed or ()),
         armed_after_s=triggers.armed_after_s,
         random_until_s=triggers.random_until_s,
         hold_s=triggers.hold_s,
         sample=model.sample,
         proportional=model.proportional,
         seeds=_seeds(model),
-        canary=Canary(**model.canary.model_dump()),
-        limits=Limits(**{field.name: getattr(model.limits, field.name) for field in fields(Limits)}),
+        canary=model.canary,
+        limits=model.limits,
         chunk=model.chunk,
         after_hazard=model.after_hazard,
         yaml=source,

@@ -1,21 +1,22 @@
 """The schema of a campaign file."""
 
+from dataclasses import dataclass, field
 from typing import Annotated
 
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, model_validator
 from pydantic_core import PydanticKnownError
 
 from mutator._common.doors import OPERATORS
+from mutator._common.yaml_records import mapping, written
 from mutator.campaigns.operator_selection import When
 from mutator.campaigns.trigger_choice import (
     EVERY_READING,
-    MOST,
     Triggers,
     by_reading,
     or_by_reading,
 )
-from mutator.config.yaml_files import StrictModel
-from mutator.model import AfterHazard, Method
+from mutator.config.yaml_files import StrictModel, Written
+from mutator.model import AfterHazard, Limits, Method
 
 
 def _operator(name: str) -> str:
@@ -85,30 +86,22 @@ MOST_SEEDS = 10_000
 _NAMES = {"type": "array", "items": {"type": "string"}}
 
 
-class _CanaryModel(StrictModel, title="The canary"):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Canary:
     """A fault known to be harmful. The campaign starts only if this fault causes its hazard."""
 
-    spec: str = Field(
-        description="The full name of a variant, `<module>/<fault_type>/<variant>`. Its largest value runs "
-        "first; the other values follow until one causes the hazard."
+    __pydantic_config__ = mapping("The canary")
+
+    spec: str = field(
+        metadata=written(
+            "The full name of a variant, `<module>/<fault_type>/<variant>`. Its largest value runs first; "
+            "the other values follow until one causes the hazard."
+        )
     )
-    scenario: str = Field(description="The scenario.")
-    hazard: str = Field(description="The hazard that the fault must cause.")
-    at_s: float = Field(ge=0.0, allow_inf_nan=False, description="The time from which the fault is active.")
-
-
-class _LimitsModel(StrictModel, title="Limits"):
-    """The resources that one run can use before it is stopped."""
-
-    cpu_s: int = Field(default=60, ge=1, le=MOST, description="CPU time in seconds.")
-    wall_s: int = Field(default=300, ge=1, le=MOST, description="Wall time in seconds.")
-    memory_mb: int = Field(default=4096, ge=256, le=MOST, description="Address space in MiB.")
-    steps: int = Field(default=20_000, ge=1, le=MOST, description="Number of simulation steps.")
-    disk_mb: int = Field(
-        default=1024,
-        ge=1,
-        le=MOST,
-        description="MiB in the run's output folder and TMPDIR together; also the limit for each file.",
+    scenario: str = field(metadata=written("The scenario."))
+    hazard: str = field(metadata=written("The hazard that the fault must cause."))
+    at_s: float = field(
+        metadata=written("The time from which the fault is active.", ge=0.0, allow_inf_nan=False)
     )
 
 
@@ -177,14 +170,14 @@ class CampaignModel(StrictModel, title="The file"):
         description="The seeds; the campaign, including its `sample`, is repeated with each. `--seed` runs "
         "one seed instead.",
     )
-    canary: _CanaryModel = Field(description="A check that a known fault causes a hazard.")
+    canary: Written[Canary] = Field(description="A check that a known fault causes a hazard.")
     after_hazard: Annotated[AfterHazard, Field(strict=False)] = Field(
         AfterHazard.GO_ON,
         description="`stop` ends each faulty run at its first [terminal "
         "hazard](../explanation/verdicts.md#the-end-of-the-drive). This saves time, but later "
         "hazards and alerts are not observed.",
     )
-    limits: _LimitsModel = Field(_LimitsModel(), description="The resources that one run is allowed to use.")
+    limits: Written[Limits] = Field(Limits(), description="The resources that one run is allowed to use.")
     chunk: int = Field(
         20,
         ge=1,

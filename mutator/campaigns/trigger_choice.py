@@ -1,32 +1,23 @@
 """The triggers of a campaign file: contexts of a table, or a list."""
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
+from mutator._common.yaml_records import mapping, written
 from mutator.config.sources import Keys, Source
-from mutator.config.yaml_files import StrictModel
-from mutator.model import Hold, Trigger
+from mutator.config.yaml_files import StrictModel, Written
+from mutator.model import MOST, Hold, Trigger
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.conditions import check_condition
 from mutator.triggers.kinds import always, at_time
 
 EVERY_READING = "*"  # key of a value that applies to all readings
-MOST = 1_000_000_000  # maximum of any limit or time
 _LIST: Keys = ("triggers", "list")
 Seconds = Annotated[float, Field(ge=0.0, le=MOST, allow_inf_nan=False)]
 _SECONDS = {"type": "number", "minimum": 0.0, "maximum": MOST}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ListedTrigger:
-    """A trigger of a campaign's list: at a time (s), while a condition holds, or, with neither, always."""
-
-    at_s: float | None
-    when: str | None
-    hold_s: float | None
 
 
 def by_reading(given: object) -> object:
@@ -39,38 +30,44 @@ def or_by_reading(schema: dict[str, Any]) -> dict[str, Any]:
     return {"anyOf": [schema, {"type": "object", "additionalProperties": schema}]}
 
 
-class _ListedModel(StrictModel, title="A trigger"):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ListedTrigger:
     """Exactly one of `always`, `at_s` and `when`. `always` is short for `always: true`."""
 
-    always: bool = Field(False, description="`true`: active from the time at which triggers are armed.")
-    at_s: Seconds | None = Field(None, description="Active from this time (s) to the end.")
-    when: str | None = Field(
-        None,
-        description="Active while this condition on `t` (s) and the target's observed values holds.",
+    __pydantic_config__ = mapping("A trigger")
+
+    always: bool = field(
+        default=False, metadata=written("`true`: active from the time at which triggers are armed.")
     )
-    hold_s: float | None = Field(
-        None,
-        gt=0.0,
-        allow_inf_nan=False,
-        description="How long the fault stays active after the trigger first fires, in s. Default: the "
-        "campaign's `hold_s`.",
+    at_s: Seconds | None = field(default=None, metadata=written("Active from this time (s) to the end."))
+    when: str | None = field(
+        default=None,
+        metadata=written("Active while this condition on `t` (s) and the target's observed values holds."),
+    )
+    hold_s: float | None = field(
+        default=None,
+        metadata=written(
+            "How long the fault stays active after the trigger first fires, in s. Default: the campaign's "
+            "`hold_s`.",
+            gt=0.0,
+            allow_inf_nan=False,
+        ),
     )
 
-    @model_validator(mode="after")
-    def _check(self) -> "_ListedModel":
+    def __post_init__(self) -> None:
         if sum((self.always, self.at_s is not None, self.when is not None)) != 1:
             raise ValueError("one of `always`, `at_s` and `when`")
-        return self
 
 
-_Written = Literal["always"] | _ListedModel
+_Mapping = Written[ListedTrigger]
+_Word = Literal["always"] | _Mapping
 
 
 def _in_words(given: object) -> object:
     return {"always": True} if given == "always" else given
 
 
-_Listed = Annotated[_ListedModel, BeforeValidator(_in_words, json_schema_input_type=_Written)]
+_Listed = Annotated[_Mapping, BeforeValidator(_in_words, json_schema_input_type=_Word)]
 
 
 class TriggersModel(StrictModel, title="Triggers"):
@@ -123,9 +120,6 @@ class TriggersModel(StrictModel, title="Triggers"):
             raise ValueError("`random_until_s` later than `armed_after_s`")
         return self
 
-    def triggers(self) -> tuple[ListedTrigger, ...]:
-        return tuple(ListedTrigger(at_s=t.at_s, when=t.when, hold_s=t.hold_s) for t in self.listed or ())
-
 
 def _as_it_is(given: object) -> object:
     return given
@@ -133,7 +127,7 @@ def _as_it_is(given: object) -> object:
 
 # `with_list` has already converted the list, so that errors have its lines
 Triggers = Annotated[
-    TriggersModel, BeforeValidator(_as_it_is, json_schema_input_type=TriggersModel | list[_Written])
+    TriggersModel, BeforeValidator(_as_it_is, json_schema_input_type=TriggersModel | list[_Word])
 ]
 
 

@@ -2,7 +2,8 @@
 
 import types
 from collections.abc import Sequence
-from typing import Annotated, Any, Union, get_args, get_origin
+from dataclasses import fields, is_dataclass
+from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
 from pydantic import BaseModel
 from pydantic_core import ErrorDetails
@@ -16,10 +17,14 @@ _TYPES = {
     "string_type": ("text", "put it in quotes"),
     "bool_type": ("true or false", "write true or false"),
     "list_type": ("a list", "write [a, b], or one item per line after a dash"),
+    "tuple_type": ("a list", "write [a, b], or one item per line after a dash"),
     "dict_type": ("a mapping", "write `key: value` lines beneath it"),
     "model_type": ("a mapping", "write `key: value` lines beneath it"),
+    "dataclass_type": ("a mapping", "write `key: value` lines beneath it"),
     "finite_number": ("a finite number", "write an ordinary number"),
 }
+_SHAPES = ("list_type", "tuple_type", "dict_type", "model_type", "dataclass_type")
+_UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")  # of a model, of a dataclass
 
 
 def explain(problem: ErrorDetails, model: type[BaseModel]) -> tuple[str, str, str, tuple[str | int, ...]]:
@@ -28,7 +33,7 @@ def explain(problem: ErrorDetails, model: type[BaseModel]) -> tuple[str, str, st
     key = next((str(k) for k in reversed(keys) if isinstance(k, str)), "")
     kind = problem["type"]
     context = problem.get("ctx", {})
-    if kind == "extra_forbidden":
+    if kind in _UNKNOWN:
         return (
             f"unknown key '{key}'",
             f"one of {', '.join(known)}",
@@ -53,10 +58,10 @@ def most_telling(found: Sequence[ErrorDetails]) -> ErrorDetails:
 
     If a value can have several shapes, prefer an error about its actual shape.
     """
-    shapes = {p["loc"] for p in found if p["type"] in ("list_type", "dict_type", "model_type")}
+    shapes = {p["loc"] for p in found if p["type"] in _SHAPES}
     inside = {p["loc"][: len(loc) - 1] for loc in shapes for p in found if len(p["loc"]) > len(loc)}
     apt = [p for p in found if p["loc"] not in shapes or p["loc"][:-1] not in inside]
-    return min(apt or found, key=lambda problem: problem["type"] != "extra_forbidden")
+    return min(apt or found, key=lambda problem: problem["type"] not in _UNKNOWN)
 
 
 def _place(model: type[BaseModel], loc: tuple[str | int, ...]) -> tuple[tuple[str | int, ...], list[str]]:
@@ -74,14 +79,20 @@ def _place(model: type[BaseModel], loc: tuple[str | int, ...]) -> tuple[tuple[st
             continue
         (current,) = shapes
         keys.append(key)
-        if isinstance(current, type) and issubclass(current, BaseModel):
-            by_alias = {field.alias or name: field for name, field in current.model_fields.items()}
-            known = list(by_alias)
-            current = by_alias[str(key)].annotation if str(key) in by_alias else None
-        else:
-            known = []
-            current = (get_args(current) or (None,))[-1]
+        by_key = _fields(current)
+        known = list(by_key)
+        current = by_key.get(str(key)) if by_key else (get_args(current) or (None,))[-1]
     return tuple(keys), known
+
+
+def _fields(shape: Any) -> dict[str, Any]:
+    """Return the annotations of a model's or a dataclass's fields by key; empty for anything else."""
+    if isinstance(shape, type) and issubclass(shape, BaseModel):
+        return {field.alias or name: field.annotation for name, field in shape.model_fields.items()}
+    if isinstance(shape, type) and is_dataclass(shape):
+        hints = get_type_hints(shape, include_extras=True)
+        return {field.metadata.get("alias", field.name): hints[field.name] for field in fields(shape)}
+    return {}
 
 
 def _named(shape: Any, tag: str) -> bool:

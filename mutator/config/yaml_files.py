@@ -7,10 +7,11 @@ expand to gigabytes), and without multiple documents or duplicate keys.
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar, cast
 
 import yaml
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError
+from pydantic_core import CoreSchema
 
 from mutator._common.bounded import read_bounded
 from mutator._common.files import check_schema
@@ -20,6 +21,7 @@ from mutator.config.sources import Keys, Source
 from mutator.errors import MutatorError
 
 M = TypeVar("M", bound="StrictModel")
+T = TypeVar("T")
 
 MAX_BYTES = 1_000_000
 MAX_DEPTH = 40  # nested lists and mappings
@@ -41,6 +43,18 @@ class StrictModel(BaseModel):
     """Base of all file models: rejects unknown keys and does not convert types."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class _AsMapping:
+    def __get_pydantic_core_schema__(self, record: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        schema = handler(record)
+        found = cast(dict[str, Any], handler.resolve_ref_schema(schema))
+        found["strict"] = False  # a mapping, not only an instance
+        return schema
+
+
+Written = Annotated[T, _AsMapping()]
+"""A dataclass in a file model, with fields of `written` and a configuration of `mapping`."""
 
 
 class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]

@@ -1,10 +1,11 @@
 """The review of a group of mutants as plain records: a decision, remarks, a flag."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 
 from mutator._common.hashing import content_id
+from mutator._common.yaml_records import mapping, written
 
 # for each parameter: least and greatest number, then values that are not finite (`nan`), as text
 Values = Mapping[str, tuple[float | str, ...]]
@@ -15,6 +16,10 @@ _WORDS = {
     "diff": "diff",
     "calls": "called code",
 }
+
+
+TIME = r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ$"  # how times are written
+_TEXT = written(pattern=r"\S")
 
 
 class Verdict(StrEnum):
@@ -70,17 +75,21 @@ class Decision:
 class Remark:
     """A line of text about a group."""
 
-    by: str
-    at: str | None
-    text: str
+    __pydantic_config__ = mapping("A remark")
+
+    by: str = field(metadata=_TEXT)
+    at: str | None = field(default=None, metadata=written(pattern=TIME))
+    text: str = field(metadata=_TEXT)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Flag:
     """A mark that asks for another look at a group."""
 
-    by: str
-    at: str
+    __pydantic_config__ = mapping("A flag")
+
+    by: str = field(metadata=_TEXT)
+    at: str = field(metadata=written(pattern=TIME))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,8 +9,8 @@ from typing import Any, Literal
 from pydantic import Field
 
 from mutator.config.sources import Source
-from mutator.config.yaml_files import StrictModel, read
-from mutator.review.entries import Bound, Decision, Entry, Flag, Remark, Verdict
+from mutator.config.yaml_files import StrictModel, Written, read
+from mutator.review.entries import TIME, Bound, Decision, Entry, Flag, Remark, Verdict
 
 SCHEMA = "review/2"
 _HEAD = """\
@@ -18,19 +18,7 @@ _HEAD = """\
 # A decision is valid while diff, function, template and calls are unchanged and all values are in its ranges.
 """
 _DIGEST = r"^[0-9a-f]{16}$"
-_TIME = r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ$"
 _NEEDED = ("by", "diff", "function", "template")
-
-
-class _RemarkModel(StrictModel):
-    by: str = Field(pattern=r"\S")
-    at: str | None = Field(None, pattern=_TIME)
-    text: str = Field(pattern=r"\S")
-
-
-class _FlagModel(StrictModel):
-    by: str = Field(pattern=r"\S")
-    at: str = Field(pattern=_TIME)
 
 
 class _BlockModel(StrictModel):
@@ -38,7 +26,7 @@ class _BlockModel(StrictModel):
     what: str
     decision: Literal["approved", "rejected"] | None = None
     by: str | None = Field(None, pattern=r"\S")
-    at: str | None = Field(None, pattern=_TIME)
+    at: str | None = Field(None, pattern=TIME)
     commit: str | None = Field(None, pattern=r"^[0-9a-f]{40,64}(-dirty)?$")
     tool: str | None = None
     diff: str | None = Field(None, pattern=_DIGEST)
@@ -46,8 +34,8 @@ class _BlockModel(StrictModel):
     template: str | None = Field(None, pattern=_DIGEST)
     calls: str | None = Field(None, pattern=_DIGEST)
     values: dict[str, list[float | int | str]] | None = None
-    remarks: list[_RemarkModel] = Field(default_factory=list)
-    flag: _FlagModel | None = None
+    remarks: list[Written[Remark]] = Field(default_factory=list)
+    flag: Written[Flag] | None = None
 
 
 class _FileModel(StrictModel):
@@ -111,8 +99,8 @@ def _entry(block: _BlockModel, source: Source, i: int) -> Entry:
         group=block.group,
         what=block.what,
         decision=_decision(block) if block.decision else None,
-        remarks=tuple(Remark(by=one.by, at=one.at, text=one.text) for one in block.remarks),
-        flag=Flag(by=block.flag.by, at=block.flag.at) if block.flag else None,
+        remarks=tuple(block.remarks),
+        flag=block.flag,
     )
 
 

@@ -2,13 +2,14 @@
 
 import re
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from pydantic import Field
 
+from mutator._common.yaml_records import mapping, written
 from mutator.config.sources import Source
-from mutator.config.yaml_files import StrictModel, read
+from mutator.config.yaml_files import StrictModel, Written, read
 from mutator.errors import MutatorError
 from mutator.model import Hold, Trigger
 from mutator.stpa.coverage import Coverage, measure_coverage
@@ -21,8 +22,14 @@ _CONSTANT = re.compile(r"[a-z][a-z0-9_]*\Z")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verdicts:
-    provided: str | None
-    not_provided: str | None
+    """The hazards that follow from one control action in one context; `null` means no hazard."""
+
+    __pydantic_config__ = mapping("The hazards of an action")
+
+    provided: str | None = field(metadata=written("The hazard that occurs if the action is provided."))
+    not_provided: str | None = field(
+        metadata=written("The hazard that occurs if the action is not provided.")
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,19 +101,12 @@ class HazardList:
     leads_to: Mapping[str, tuple[str, ...]]
 
 
-class _VerdictsModel(StrictModel, title="The hazards of an action"):
-    """The hazards that follow from one control action in one context; `null` means no hazard."""
-
-    provided: str | None = Field(description="The hazard that occurs if the action is provided.")
-    not_provided: str | None = Field(description="The hazard that occurs if the action is not provided.")
-
-
 class _RowModel(StrictModel, title="A context"):
     when: str = Field(
         description="A condition. It may use `t` (s), the values observed in the target, and the constants."
     )
     about: str = Field(description="A description.")
-    actions: dict[str, _VerdictsModel] = Field(
+    actions: dict[str, Written[Verdicts]] = Field(
         description="Control action -> its hazards. All contexts must have the same actions."
     )
 
@@ -153,10 +153,7 @@ def load_context_table(path: Path, variables: Collection[str] | None = None) -> 
             id=name,
             condition=_condition(row.when, model.constants, source, name),
             about=row.about,
-            actions={
-                action: Verdicts(provided=v.provided, not_provided=v.not_provided)
-                for action, v in row.actions.items()
-            },
+            actions=row.actions,
         )
         for name, row in model.contexts.items()
     )

@@ -47,24 +47,7 @@ class EntryModel(StrictModel, title="The entry"):
     )
 
 
-class FilmModel(StrictModel, title="Films"):
-    """The commands for `mutator show --video` and `--still`. In `run`, `{film}` is the folder for the film.
-    In `args` and `still`, `{golden}` and `{faulty}` are two films, `{events}` is a JSON file of events,
-    `{out}` the file to write, and `{t}` the time of a still in s.
-    """
-
-    run: list[str] = Field(description="Extra arguments of the entry that make a run write a film.")
-    module: str = Field(description="The module that shows two films. It is run as `python -m`.")
-    args: list[str] = Field(description="The module's arguments.")
-    still: list[str] = Field(description="Extra arguments for a still.")
-    pictures: list[str] = Field(
-        default_factory=list,
-        description="The entry's changes that make the controller use camera images. After a run, stills "
-        "are made automatically for the worst experiments with one of these changes.",
-    )
-
-
-def check_commands(entry: EntryModel, film: FilmModel | None, source: Source) -> None:
+def check_commands(entry: EntryModel, film: Film | None, source: Source) -> None:
     for key, command in (("entry", entry), ("film", film)):
         if command and not all(part.isidentifier() for part in command.module.split(".")):
             raise source.error(
@@ -98,7 +81,7 @@ def _check_runs(entry: EntryModel, source: Source) -> None:
             check_placeholders(change.args, OF_RUNS, source, (*place, "args"))
 
 
-def _check_films(film: FilmModel, changes: Collection[str], source: Source) -> None:
+def _check_films(film: Film, changes: Collection[str], source: Source) -> None:
     for i, name in enumerate(film.pictures):
         if name not in changes:
             raise source.error(
@@ -107,18 +90,6 @@ def _check_films(film: FilmModel, changes: Collection[str], source: Source) -> N
                 expected=f"{one_of(changes)}, the entry's changes",
                 remedy="correct the name",
             )
-    check_placeholders(film.run, OF_FILMED_RUNS, source, ("film", "run"))
+    check_placeholders(film.run_args, OF_FILMED_RUNS, source, ("film", "run"))
     check_placeholders(film.args, OF_FILMS, source, ("film", "args"))
-    check_placeholders(film.still, OF_FILMS, source, ("film", "still"))
-
-
-def read_film(model: FilmModel | None) -> Film | None:
-    if model is None:
-        return None
-    return Film(
-        run_args=tuple(model.run),
-        module=model.module,
-        args=tuple(model.args),
-        still_args=tuple(model.still),
-        pictures=tuple(model.pictures),
-    )
+    check_placeholders(film.still_args, OF_FILMS, source, ("film", "still"))

@@ -10,6 +10,7 @@ from packaging.requirements import Requirement
 from mutator._common import caches
 from mutator._common.bounded import read_bounded
 from mutator._common.hashing import digest
+from mutator._common.yaml_records import mapping, written
 from mutator.config.sources import Source
 from mutator.errors import MutatorError
 from mutator.targets.channels import Channel, Role
@@ -35,13 +36,31 @@ FILM = "film"  # the output folder of a filmed run
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Film:
-    """How to film a target's runs, and how to show two films."""
+    """The commands for `mutator show --video` and `--still`. In `run`, `{film}` is the folder for the film.
+    In `args` and `still`, `{golden}` and `{faulty}` are two films, `{events}` is a JSON file of events,
+    `{out}` the file to write, and `{t}` the time of a still in s.
+    """
 
-    run_args: tuple[str, ...]  # arguments of the entry module, with {film}
-    module: str  # module, run as `python -m`
-    args: tuple[str, ...]  # its arguments, with {golden}, {faulty} (films), {events}, {out}
-    still_args: tuple[str, ...]  # extra arguments for a still, with {t}
-    pictures: tuple[str, ...]  # changes with which the controller uses the camera's images
+    __pydantic_config__ = mapping("Films")
+
+    run_args: tuple[str, ...] = field(
+        metadata=written(
+            "Extra arguments of the entry that make a run write a film.", alias="run", strict=False
+        )
+    )
+    module: str = field(metadata=written("The module that shows two films. It is run as `python -m`."))
+    args: tuple[str, ...] = field(metadata=written("The module's arguments.", strict=False))
+    still_args: tuple[str, ...] = field(
+        metadata=written("Extra arguments for a still.", alias="still", strict=False)
+    )
+    pictures: tuple[str, ...] = field(
+        default=(),
+        metadata=written(
+            "The entry's changes that make the controller use camera images. After a run, stills are made "
+            "automatically for the worst experiments with one of these changes.",
+            strict=False,
+        ),
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,18 +8,19 @@ from pydantic import Field
 from mutator._common.below import check_name
 from mutator._common.shipped import SHIPPED_TARGET
 from mutator.config.sources import Source
-from mutator.config.yaml_files import StrictModel, read
+from mutator.config.yaml_files import StrictModel, Written, read
 from mutator.targets.channel_model import ChannelModel, TraceModel, read_channels
-from mutator.targets.commands import ChangeModel, EntryModel, FilmModel, check_commands, read_film
+from mutator.targets.commands import ChangeModel, EntryModel, check_commands
 from mutator.targets.environment import check_environment
 from mutator.targets.judging_model import HazardModel, MetricModel, read_hazards, read_metrics
-from mutator.targets.manifest import TargetManifest
+from mutator.targets.manifest import Film, TargetManifest
 from mutator.targets.observation_model import ObservationModel, read_observation
 from mutator.targets.paths import inside
 from mutator.targets.requirements import read_requirements
 from mutator.targets.roots import INSTALLED, check_installed, find_overlay, find_root, read_packages
 from mutator.targets.scene_model import SceneModel, read_scene
-from mutator.targets.severity_model import SeverityModel, read_contact
+from mutator.targets.severity import Contact
+from mutator.targets.severity_model import check_contact
 from mutator.triggers import stl
 
 SCHEMA = "target/2"
@@ -104,7 +105,7 @@ class ManifestModel(StrictModel, title="The file"):
         default_factory=dict,
         description="The numbers computed for each run. They are columns of the results.",
     )
-    severity: SeverityModel | None = Field(
+    severity: Written[Contact] | None = Field(
         None, description="How severe a contact is. Without it, results have no severity class."
     )
     scene: SceneModel | None = Field(None, description="How to draw a drive from above.")
@@ -112,7 +113,9 @@ class ManifestModel(StrictModel, title="The file"):
         default_factory=list,
         description="The names of the alerts to use; other alerts in a record are ignored.",
     )
-    film: FilmModel | None = Field(None, description="How to film runs. Without it, runs cannot be filmed.")
+    film: Written[Film] | None = Field(
+        None, description="How to film runs. Without it, runs cannot be filmed."
+    )
 
 
 def load_manifest(path: Path, root: Path | None = None, overlay: Path | None = None) -> TargetManifest:
@@ -143,6 +146,8 @@ def load_manifest(path: Path, root: Path | None = None, overlay: Path | None = N
     _check_recorded(source, set(observation.variables) - set(known))
     rules = read_hazards(model.hazards, known, source, recorded=model.record is not None, step_s=model.step_s)
     metrics = read_metrics(model.metrics, known, source)
+    if model.severity:
+        check_contact(model.severity, rules, metrics, source)
     return TargetManifest(
         name=model.name,
         path=path,
@@ -170,11 +175,11 @@ def load_manifest(path: Path, root: Path | None = None, overlay: Path | None = N
         observation=observation,
         rules=rules,
         metrics=metrics,
-        contact=None if model.severity is None else read_contact(model.severity, rules, metrics, source),
+        contact=model.severity,
         scene=None if model.scene is None else read_scene(model.scene, known, source),
         alerts=tuple(model.alerts),
         source=source,
-        film=read_film(model.film),
+        film=model.film,
     )
 
 

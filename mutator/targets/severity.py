@@ -1,8 +1,10 @@
 """The severity of a contact: delta-v of the ego car, and its class on a scale."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
+
+from mutator._common.yaml_records import mapping, written
 
 CLASSES = ("S0", "S1", "S2", "S3")  # from ISO 26262-3, the mildest first
 DELTA_V = "delta_v"  # name of the metric
@@ -10,15 +12,34 @@ DELTA_V = "delta_v"  # name of the metric
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Contact:
-    """How severe a contact is. `hazard` is the terminal hazard, and `speed` the metric of the closing speed
-    (m/s). Masses are in kg; `scale` names the scale of the classes.
+    """How severe a contact is. The metric `delta_v` is the delta-v of the ego car, `contact_speed *
+    other_mass_kg / (mass_kg + other_mass_kg)`; the scale assigns its class.
     """
 
-    hazard: str
-    speed: str
-    mass: float
-    other_mass: float
-    scale: str
+    __pydantic_config__ = mapping("Severity")
+
+    hazard: str = field(
+        metadata=written("The terminal hazard that is a contact with another vehicle.", alias="contact")
+    )
+    speed: str = field(
+        metadata=written(
+            "The metric that holds the closing speed at the contact: one with `at_end`, in m/s. If it is "
+            "negative, the cars separate, and delta-v is 0.",
+            alias="contact_speed",
+        )
+    )
+    mass: float = field(
+        metadata=written("The mass of the ego car.", alias="mass_kg", gt=0.0, allow_inf_nan=False)
+    )
+    other_mass: float = field(
+        metadata=written("The mass of the other vehicle.", alias="other_mass_kg", gt=0.0, allow_inf_nan=False)
+    )
+    scale: str = field(
+        metadata=written(
+            "The name of a file in the library's `severity/`, without `.yaml`; or `collision`, which ships "
+            "with mutator."
+        )
+    )
 
     def delta_v(self, closing: float) -> float:
         """Return the change of the ego car's speed in m/s, in an inelastic collision along the line of

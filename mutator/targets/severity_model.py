@@ -15,24 +15,6 @@ SCHEMA = "severity/1"
 _KPH = UNITS["kph"].factor
 
 
-class SeverityModel(StrictModel, title="Severity"):
-    """How severe a contact is. The metric `delta_v` is the delta-v of the ego car, `contact_speed *
-    other_mass_kg / (mass_kg + other_mass_kg)`; the scale assigns its class.
-    """
-
-    contact: str = Field(description="The terminal hazard that is a contact with another vehicle.")
-    contact_speed: str = Field(
-        description="The metric that holds the closing speed at the contact: one with `at_end`, in m/s. If "
-        "it is negative, the cars separate, and delta-v is 0."
-    )
-    mass_kg: float = Field(gt=0.0, allow_inf_nan=False, description="The mass of the ego car.")
-    other_mass_kg: float = Field(gt=0.0, allow_inf_nan=False, description="The mass of the other vehicle.")
-    scale: str = Field(
-        description="The name of a file in the library's `severity/`, without `.yaml`; or `collision`, "
-        "which ships with mutator."
-    )
-
-
 class _ClassModel(StrictModel, title="A class"):
     from_kph: float = Field(
         ge=0.0, allow_inf_nan=False, description="The smallest delta-v in the class; 0 for S0."
@@ -50,33 +32,26 @@ class ScaleModel(StrictModel, title="severity/*.yaml"):
     )
 
 
-def read_contact(
-    model: SeverityModel, hazards: Sequence[Hazard], metrics: Sequence[Metric], source: Source
-) -> Contact:
-    """Read a manifest's severity; MutatorError, with the line, for an unsuitable hazard or metric."""
+def check_contact(
+    contact: Contact, hazards: Sequence[Hazard], metrics: Sequence[Metric], source: Source
+) -> None:
+    """Raise MutatorError, with the line, for an unsuitable hazard or metric of a manifest's severity."""
     terminal = [hazard.name for hazard in hazards if hazard.terminal]
-    if model.contact not in terminal:
+    if contact.hazard not in terminal:
         raise source.error(
             ("severity", "contact"),
-            f"'{model.contact}'",
+            f"'{contact.hazard}'",
             expected=f"a hazard with `terminal`: {', '.join(terminal) or 'there is none'}",
             remedy="correct the name, or add `terminal: true` to the hazard",
         )
     speeds = [m.name for m in metrics if m.aggregate == "at_end" and m.unit == "m/s"]
-    if model.contact_speed not in speeds:
+    if contact.speed not in speeds:
         raise source.error(
             ("severity", "contact_speed"),
-            f"'{model.contact_speed}'",
+            f"'{contact.speed}'",
             expected=f"a metric with `at_end` and the unit m/s: {', '.join(speeds) or 'there is none'}",
             remedy="correct the name, or add the metric",
         )
-    return Contact(
-        hazard=model.contact,
-        speed=model.contact_speed,
-        mass=model.mass_kg,
-        other_mass=model.other_mass_kg,
-        scale=model.scale,
-    )
 
 
 def load_scale(path: Path) -> Scale:

@@ -1,10 +1,13 @@
 """Strict YAML: every mistake is reported with file, line, finding, expectation and remedy."""
 
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import pytest
 from pydantic import Field
 
+from mutator._common.yaml_records import mapping, written
 from mutator.config import yaml_files
 from mutator.errors import MutatorError
 
@@ -21,10 +24,32 @@ class Car(yaml_files.StrictModel):
     tags: list[str] = Field(default_factory=list)
 
 
-def read(tmp_path: Path, text: str | bytes) -> Car:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WheelRecord:
+    __pydantic_config__ = mapping("A wheel")
+
+    size: float = field(metadata=written("The radius.", alias="radius"))
+    spokes: int = 5
+    nuts: tuple[str, ...] = field(default=(), metadata=written(strict=False))
+
+
+class CarOfRecords(yaml_files.StrictModel):
+    name: str
+    wheels: dict[str, yaml_files.Written[WheelRecord]] = Field(default_factory=dict)
+    spare: yaml_files.Written[WheelRecord] | None = None
+    tags: list[str] = Field(default_factory=list)
+
+
+def read(tmp_path: Path, text: str | bytes, model: type[Any] = Car) -> Any:
     path = tmp_path / "car.yaml"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
-    return yaml_files.read(path, Car, "car/2")[0]
+    return yaml_files.read(path, model, "car/2")[0]
+
+
+def test_a_dataclass_in_a_file_is_read_as_it_is(tmp_path: Path) -> None:
+    text = "schema: car/2\nname: on\nwheels: {left: {radius: 3, nuts: [a, b]}}\n"
+    car = read(tmp_path, text, CarOfRecords)
+    assert car.wheels == {"left": WheelRecord(size=3.0, nuts=("a", "b"))}
 
 
 def test_a_valid_file_is_read(tmp_path: Path) -> None:
@@ -85,13 +110,22 @@ def test_a_valid_file_is_read(tmp_path: Path) -> None:
         ("schema: car/2\nname: x\n---\nname: y\n", 3, ["a second document", "remove the `---`"]),
     ],
 )
-def test_a_mistake_is_reported_at_its_line(tmp_path: Path, text: str, line: int, pieces: list[str]) -> None:
+@pytest.mark.parametrize("model", [Car, CarOfRecords])
+def test_a_mistake_is_reported_at_its_line(
+    tmp_path: Path, model: type[Any], text: str, line: int, pieces: list[str]
+) -> None:
     with pytest.raises(MutatorError) as caught:
-        read(tmp_path, text)
+        read(tmp_path, text, model)
     message = str(caught.value)
     assert message.startswith(f"{tmp_path / 'car.yaml'}:{line}: ")
     for piece in pieces:
         assert piece in message
+
+
+def test_a_list_in_a_dataclass_is_called_a_list(tmp_path: Path) -> None:
+    text = "schema: car/2\nname: on\nspare:\n  radius: 3\n  nuts: a\n"
+    with pytest.raises(MutatorError, match=r"car\.yaml:5: 'a' for 'nuts'; expected a list"):
+        read(tmp_path, text, CarOfRecords)
 
 
 @pytest.mark.parametrize("text", ["", "- a\n", "word\n"])
