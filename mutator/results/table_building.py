@@ -130,7 +130,8 @@ def _made_from(folder: RunFolder) -> str:
     head = folder.head
     told = [head["hazards"], head["compared"], head.get("metrics", [])]
     told += [head[key] for key in ("severity", "channels", "structure") if key in head]
-    return digest([SCHEMA, VERSION, *told, found])
+    columns = [column.name for column in columns_of(head)]
+    return digest([SCHEMA, VERSION, *told, columns, found])
 
 
 def _found(folder: RunFolder) -> dict[str, str | None]:

@@ -348,6 +348,15 @@ def test_tables_are_rebuilt_after_any_change(
     assert is_rebuilt(folder, monkeypatch)
 
 
+def test_tables_are_rebuilt_after_a_change_of_columns(
+    folder: RunFolder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr(table_building, "columns_of", lambda head: columns_of(head)[:-1])
+        table_building.build(folder.path)
+    assert is_rebuilt(folder, monkeypatch)
+
+
 @pytest.mark.parametrize("stamp", [True, False])
 def test_replacing_an_edited_table_is_reported(folder: RunFolder, stamp: bool) -> None:
     table = table_building.build(folder.path)
