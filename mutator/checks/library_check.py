@@ -16,9 +16,9 @@ from mutator.faults.parameters import resolve
 from mutator.faults.readings import Readings
 from mutator.faults.specs import FaultSpec, Variant
 from mutator.model import Fault
-from mutator.mutants.anchors import parse_file, parsed
+from mutator.mutants.anchors import parse_file
 from mutator.mutants.building import build
-from mutator.mutants.injection_edits import injection_edit
+from mutator.mutants.injection_edits import edits_of, injection_edit
 from mutator.mutants.splicing import apply_edits, in_lines, joined, unsplice
 from mutator.onboarding.marks import unfilled
 from mutator.stpa.checks import check_analysis
@@ -139,18 +139,23 @@ def _unbuildable(
     spec: FaultSpec, variant: Variant, fault: Fault, models: FaultModels, manifest: TargetManifest
 ) -> Iterator[MutatorError]:
     """Yield why a fault of a variant cannot be built, located at the injection that is the cause, if any."""
-    keys: Keys = (*variant.keys, fault.reading)
     try:
-        for i, injection in enumerate(fault.injections):
-            keys = (*variant.keys, fault.reading, "injections", i, "at")
-            file = parsed(manifest.tree, injection.location.path)
-            injection_edit(file, models, injection, EXAMPLE_TAG, manifest.tree)
-        keys = (*variant.keys, fault.reading)
         build(manifest, models, fault, always())
     except MutatorError as error:
+        keys = (*variant.keys, fault.reading, *_cause(fault, models, manifest))
         got = f"{fault.spec} ({fault.reading}): {error.got}{_where(error, manifest)}"
         remedy = error.remedy or "correct the spec or the target"
         yield spec.source.error(keys, got, expected=error.expected, remedy=remedy)
+
+
+def _cause(fault: Fault, models: FaultModels, manifest: TargetManifest) -> Keys:
+    """Return the keys of the first injection without an edit; none if all have one."""
+    for count in range(1, len(fault.injections) + 1):
+        try:
+            edits_of(manifest, models, fault.injections[:count])
+        except MutatorError:
+            return ("injections", count - 1, "at")
+    return ()
 
 
 def _where(error: MutatorError, manifest: TargetManifest) -> str:

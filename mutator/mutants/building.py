@@ -10,14 +10,14 @@ from mutator._common.hashing import content_id
 from mutator.errors import InvalidMutant, MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.faults.probe_templates import CODE as PROBE_CODE
-from mutator.model import FIXED_ANCHORS, Fault, Hold, Injection, Trigger
+from mutator.model import FIXED_ANCHORS, Fault, Hold, Trigger
 from mutator.mutants.anchors import ParsedFile, parsed
 from mutator.mutants.changed_functions import compile_changed
 from mutator.mutants.injected_lines import OBSERVE_TAG, observe_call
-from mutator.mutants.injection_edits import injection_edit
+from mutator.mutants.injection_edits import InjectionEdit, edits_of
 from mutator.mutants.normalized_source import compiles, normalized
 from mutator.mutants.patches import changed_file, new_file
-from mutator.mutants.probe import Probe, injection_id, probe_of, probe_path, settings_of
+from mutator.mutants.probe import Probe, probe_of, probe_path, settings_of
 from mutator.mutants.reusable_changes import (
     Change,
     ReusableChange,
@@ -36,7 +36,6 @@ from mutator.mutants.splicing import (
     probe_import,
     unsplice,
 )
-from mutator.targets.locations import check_location
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.source_tree import SourceTree
 
@@ -81,10 +80,11 @@ def _build(
     manifest: TargetManifest, models: FaultModels, fault: Fault | None, trigger: Trigger, splicer: "_Splicer"
 ) -> Mutant:
     injections = fault.injections if fault else ()
-    ids = tuple(injection_id(i, injection) for i, injection in enumerate(injections))
+    changes = edits_of(manifest, models, injections)
+    ids = tuple(change.id for change in changes)
     hold = fault.hold if fault and fault.hold else trigger.hold
     mutant_id = content_id([manifest.tree.digest, models.digest, fault.id if fault else None, trigger])
-    edits = _edits(manifest, models, injections, ids)
+    edits = _edits(manifest, changes)
     probe_file = probe_path(manifest.package)
     sets = any(one.location.anchor.kind in FIXED_ANCHORS for one in injections)
     probe = _probe(manifest, models, mutant_id, trigger, hold, ids, sets)
@@ -106,14 +106,10 @@ def _build(
     )
 
 
-def _edits(
-    manifest: TargetManifest, models: FaultModels, injections: Sequence[Injection], ids: Sequence[str]
-) -> dict[str, list[Edit]]:
+def _edits(manifest: TargetManifest, changes: Sequence[InjectionEdit]) -> dict[str, list[Edit]]:
     edits: dict[str, list[Edit | ValueEdit]] = {manifest.observation.location.path: [_observation(manifest)]}
-    for name, injection in zip(ids, injections, strict=True):
-        check_location(manifest, injection.location)
-        file = parsed(manifest.tree, injection.location.path)
-        edits.setdefault(file.path, []).append(injection_edit(file, models, injection, name, manifest.tree))
+    for change in changes:
+        edits.setdefault(change.file.path, []).append(change.edit)
     return {path: in_lines(parsed(manifest.tree, path), own) for path, own in edits.items()}
 
 

@@ -1,17 +1,19 @@
-"""Creates the edit of one injection: resolves the anchor, renders the snippet, checks names."""
+"""Create the edits of injections: resolve the anchor, render the snippet, check names."""
 
 import ast
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
+from mutator.config.instances import names_of
 from mutator.config.locations import base_name
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel, FaultModels, Needs, SnippetKind
 from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS, AnchorKind, Injection
-from mutator.mutants.anchors import ParsedFile, Site
+from mutator.mutants.anchors import ParsedFile, Site, parsed
 from mutator.mutants.expressions import NO_PARTS, Expression, parts_of
 from mutator.mutants.imported_names import importers
-from mutator.mutants.injected_lines import ORIGINAL, asks_for, set_constant, set_default
-from mutator.mutants.limiting import check_instance, limited
+from mutator.mutants.injected_lines import ORIGINAL, asks, asks_for, set_constant, set_default
+from mutator.mutants.probe import injection_id
 from mutator.mutants.rendering import changed_value, snippet
 from mutator.mutants.reusable_changes import reuse_key
 from mutator.mutants.scopes import as_compiled, moved_names
@@ -26,7 +28,34 @@ from mutator.mutants.splicing import (
     value_change,
 )
 from mutator.mutants.statement_texts import written_out
+from mutator.targets.locations import check_location
+from mutator.targets.manifest import TargetManifest
 from mutator.targets.source_tree import SourceTree
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InjectionEdit:
+    """What an injection changes in a file; `id` is in tags and in the probe's report."""
+
+    id: str
+    file: ParsedFile
+    edit: Edit | ValueEdit
+
+
+def edits_of(
+    manifest: TargetManifest, models: FaultModels, injections: Sequence[Injection]
+) -> list[InjectionEdit]:
+    """Return the edits of a fault's injections, in their order. Only here does a fault's value become source.
+
+    MutatorError as `injection_edit`, and for a location outside the target.
+    """
+    edits = []
+    for index, injection in enumerate(injections):
+        check_location(manifest, injection.location)
+        name, file = injection_id(index, injection), parsed(manifest.tree, injection.location.path)
+        edit = injection_edit(file, models, injection, name, manifest.tree)
+        edits.append(InjectionEdit(id=name, file=file, edit=edit))
+    return edits
 
 
 def injection_edit(
@@ -53,8 +82,8 @@ def injection_edit(
         raise _needs_more(file, model, site.first)
     if model.needs is not None:
         site, texts = written_out(file, site, model.needs)
-    check_instance(file, site.names, site.first, injection)
-    code = limited(snippet(model, dict(injection.params), name, texts), injection, name, model)
+    _check_instance(file, site.names, site.first, injection)
+    code = _limited(snippet(model, dict(injection.params), name, texts), injection, name, model)
     make = guard if model.kind is SnippetKind.GUARD else insertion
     edit = make(file, site, code, name)
     key = (variables, reuse_key(file, [edit], [name]))
@@ -65,22 +94,15 @@ def injection_edit(
     return edit
 
 
-def replaced_value(
-    file: ParsedFile, model: FaultModel, injection: Injection, name: str
-) -> tuple[Expression, str]:
-    """Return the expression whose value an injection changes, and the source that replaces it."""
+def _value_edit(file: ParsedFile, model: FaultModel, injection: Injection, name: str) -> ValueEdit:
     expression = file.resolve_value(injection.location)
     params, parts = dict(injection.params), parts_of(expression)
     if model.needs is Needs.CALL and not parts["called"]:
         raise _needs_more(file, model, expression.start[0])
-    return expression, changed_value(model, params, name, expression.written, parts)
-
-
-def _value_edit(file: ParsedFile, model: FaultModel, injection: Injection, name: str) -> ValueEdit:
-    expression, changed = replaced_value(file, model, injection, name)
+    changed = changed_value(model, params, name, expression.written, parts)
     names = file.names(injection.location)
     _variables(file, names, expression.start[0], model, injection)
-    check_instance(file, names, expression.start[0], injection)
+    _check_instance(file, names, expression.start[0], injection)
     _check_sets_nothing(file, model, expression, changed)
     return value_change(file, expression, changed, name, asks_for(name, injection))
 
@@ -164,6 +186,34 @@ def _variables(
                 )
             found.add(variable)
     return frozenset(found)
+
+
+def _check_instance(file: ParsedFile, names: frozenset[str], first: int, injection: Injection) -> None:
+    unknown = names_of(injection.where or "True") - names
+    if unknown:
+        raise MutatorError(
+            f"'{min(unknown)}' in `where` is not known in {injection.location.function}",
+            where=file.where,
+            line=first + 1,
+            expected=f"names used there: {', '.join(sorted(names))}",
+            remedy="correct `where`",
+        )
+
+
+def _limited(code: tuple[str, ...], injection: Injection, name: str, model: FaultModel) -> tuple[str, ...]:
+    """Add to the snippet a check for the instance or executions that the injection selects, if any."""
+    plain, asked = asks(name), asks_for(name, injection)
+    if asked == plain:
+        return code
+    heads = {f"if {plain}:": f"if {asked}:", f"if not {plain}:": f"if not ({asked}):"}
+    if sum(line.count(plain) for line in code) != 1 or not any(line in heads for line in code):
+        raise MutatorError(
+            f"model {model.name}, with these parameters, cannot be limited by `where`, `call` or `every`",
+            where=model.template_path,
+            expected=f"a template with exactly one probe check, `if {plain}:` or `if not {plain}:`",
+            remedy="remove `where`, `call` and `every`, or use another model",
+        )
+    return tuple(heads.get(line, line) for line in code)
 
 
 def _check_own_names(

@@ -45,7 +45,7 @@ class Edit:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ValueEdit:
-    """The bytes to write before and after an expression.
+    """The bytes to write before and after an expression, so that its value can become that of `changed`.
 
     `start` and `end` are a line and a byte offset, from 0.
     """
@@ -54,6 +54,7 @@ class ValueEdit:
     end: tuple[int, int]
     before: bytes
     after: bytes
+    changed: str
     tag: str
 
 
@@ -110,6 +111,7 @@ def value_change(
         end=expression.end,
         before=_encoded(file, changed_value(asked or asks(tag), changed) + opened, expression.start[0]),
         after=closed.encode(),
+        changed=changed,
         tag=tag,
     )
 

@@ -14,12 +14,11 @@ from mutator._common.version import VERSION
 from mutator.execution import single_run
 from mutator.exports import Export, ExportRequest
 from mutator.faults.fault_models import FaultModels, SnippetKind
-from mutator.model import OPERATORS, VALUE_ANCHORS, Experiment, Fault, Injection, Outcome, Record, Status
+from mutator.model import OPERATORS, Experiment, Fault, Injection, Outcome, Record, Status
 from mutator.mutants.anchors import ParsedFile, parsed
 from mutator.mutants.expressions import enclosed
-from mutator.mutants.injection_edits import injection_edit, replaced_value
-from mutator.mutants.probe import injection_id
-from mutator.mutants.splicing import Edit, Rank, in_lines, in_order
+from mutator.mutants.injection_edits import edits_of
+from mutator.mutants.splicing import Edit, Rank, ValueEdit, in_order
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
@@ -87,16 +86,15 @@ def _line(manifest: TargetManifest, injection: Injection) -> int:
 def _change(manifest: TargetManifest, models: FaultModels, fault: Fault) -> dict[str, Any]:
     first = fault.injections[0]
     file, model = parsed(manifest.tree, first.location.path), models.get(first.model)
-    name, span = injection_id(0, first), file.span(first.location)
-    if first.location.anchor.kind in VALUE_ANCHORS:
-        expression, changed = replaced_value(file, model, first, name)
+    edit, span = edits_of(manifest, models, [first])[0].edit, file.span(first.location)
+    if isinstance(edit, ValueEdit):
         # `enclosed` adds parentheses if an adjacent operator could bind more tightly
-        return _located(file, expression.start, expression.end, enclosed(changed))
+        return _located(file, edit.start, edit.end, enclosed(edit.changed))
     if fault.module == OPERATORS and model.kind is SnippetKind.GUARD:  # the mutant omits the statement
         line, last = file.lines[span[0]], file.lines[span[1] - 1].rstrip(b"\r\n")
         start = len(line) - len(line.lstrip())
         return _located(file, (span[0], start), (span[1] - 1, len(last)), "pass")
-    return _splice(file, span, in_lines(file, [injection_edit(file, models, first, name, manifest.tree)]))
+    return _splice(file, span, [edit])
 
 
 def _located(

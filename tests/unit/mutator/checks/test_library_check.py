@@ -279,3 +279,15 @@ def test_problems_do_not_hide_each_other(toy: Workspace) -> None:
 def test_other_problems_are_reported(toy: Workspace, file: str, old: str, new: str, said: str) -> None:
     problems = edited(toy, file, old, new)
     assert any(said in problem for problem in problems)
+
+
+def test_a_problem_of_one_injection_is_reported_at_its_line(toycar: Workspace) -> None:
+    path = toycar.library / "faults" / "sensor" / "lane.yaml"
+    at = "        - at: {file: toycar/sensing.py, function: Sensor.sense, after_assign: offset}\n"
+    one = at + "          model: offset\n          unit: m\n          params: {by_m: offset}\n"
+    text = path.read_text()
+    assert text.count(one) == 1
+    path.write_text(text.replace(one, one + one.replace("after_assign: offset", "after_assign: nothing")))
+    line = text[: text.index(one)].count("\n") + 5
+    (problem,) = [p for p in check_library(toycar, "toycar") if "sensor/lane/shifted" in str(p)]
+    assert (problem.where, problem.line) == (str(path), line)

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+import mutator
 from mutator.errors import MutatorError
 from mutator.faults.fault_model_files import load_fault_models
 from mutator.faults.fault_models import FaultModels
@@ -44,6 +45,17 @@ class _Car:
         __own = self.__gap
         return Rain(x)
 """
+
+
+def test_a_fault_becomes_source_in_one_function() -> None:
+    """All others use its list of edits; only examples of models have no target."""
+    sources = Path(mutator.__file__).parent
+    calling = {
+        path.relative_to(sources).as_posix()
+        for path in sources.rglob("*.py")
+        if "injection_edit(" in path.read_text()
+    }
+    assert calling == {"mutants/injection_edits.py", "checks/library_check.py"}
 
 
 def injected(
