@@ -7,10 +7,11 @@ from html import escape
 from urllib.parse import quote
 
 from mutator.report.paths import PathCounts, link_text
+from mutator.stpa import shapes
 from mutator.stpa.analysis import LinkModel, StructureModel
 from mutator.stpa.layout import Arrow, Box, lay_out
+from mutator.stpa.shapes import course
 
-_LINE = 15  # px, line spacing of a count
 _WIDEST = 7.0  # px, width of a link that passed all its faults
 _THIN = 1.8
 
@@ -25,7 +26,10 @@ def draw_path_counts(structure: StructureModel, counts: PathCounts, links: Colle
         f'width="{layout.width:.0f}" height="{layout.height:.0f}" role="group" '
         'aria-label="Control structure with the share of faults that got through each link">',
         "<defs>",
-        *(_tip(name) for name in ("quiet", "through", "stopped")),
+        *(
+            shapes.tip(f"path-tip-{name}", 14, f'class="tip {name}" d="{shapes.TIP}"')
+            for name in ("quiet", "through", "stopped")
+        ),
         "</defs>",
     ]
     for name, link in structure.links.items():
@@ -44,24 +48,6 @@ def share_text(through: int, came: int) -> str:
     return f"{through} of {came}, {100 * through / came:.0f} %" if came else ""
 
 
-def _tip(name: str) -> str:
-    return (
-        f'<marker id="path-tip-{name}" viewBox="0 0 10 10" refX="9" refY="5" markerWidth="14" '
-        'markerHeight="14" markerUnits="userSpaceOnUse" orient="auto">'
-        f'<path class="tip {name}" d="M0,0 L10,5 L0,10 z"/></marker>'
-    )
-
-
-def _line(arrow: Arrow) -> str:
-    return "M" + " L".join(f"{x:.1f},{y:.1f}" for x, y in arrow.points)
-
-
-def _place(arrow: Arrow, line: int = 0) -> str:
-    x, y = arrow.label.at
-    y += (0, arrow.label.apart, arrow.label.apart + _LINE)[line]
-    return f'x="{x:.1f}" y="{y:.1f}" text-anchor="{arrow.label.anchor}"'
-
-
 def _is_short(arrow: Arrow) -> bool:
     """Whether the boxes are side by side, so that the count needs two lines."""
     return arrow.points[0][1] == arrow.points[-1][1]
@@ -69,8 +55,8 @@ def _is_short(arrow: Arrow) -> bool:
 
 def _idle(arrow: Arrow, link: LinkModel) -> Iterator[str]:
     yield (
-        f'<g class="idle"><path d="{_line(arrow)}" stroke-dasharray="3 4" marker-end="url(#path-tip-quiet)"/>'
-        f'<text class="label" {_place(arrow)}>{escape(link.label)}</text></g>'
+        f'<g class="idle"><path d="{course(arrow.points)}" stroke-dasharray="3 4" '
+        f'marker-end="url(#path-tip-quiet)"/>{shapes.label(arrow, escape(link.label))}</g>'
     )
 
 
@@ -84,11 +70,10 @@ def _link(name: str, arrow: Arrow, link: LinkModel, counts: PathCounts) -> Itera
         f'<a class="link is-{kind}" data-link="{escape(name)}"{" data-short" if short else ""} '
         f'href="#through={quote(link_text(link.from_, link.to))}">'
         f"<title>{escape(f'{link.label}: from {link.from_} to {link.to}')}</title>"
-        f'<path class="hit" d="{_line(arrow)}"/><path class="line" d="{_line(arrow)}" '
+        f'<path class="hit" d="{course(arrow.points)}"/><path class="line" d="{course(arrow.points)}" '
         f'style="stroke-width: {width:.1f}px" marker-end="url(#path-tip-{kind})"/>'
-        f'<text class="label" {_place(arrow)}>{escape(link.label)}</text>'
-        f'<text class="count" {_place(arrow, 1)}>{first}</text>'
-        f'<text class="count" {_place(arrow, 2)}>{last}</text></a>'
+        f"{shapes.label(arrow, escape(link.label))}"
+        f"{shapes.label(arrow, first, 1, 'count')}{shapes.label(arrow, last, 2, 'count')}</a>"
     )
 
 
@@ -105,7 +90,7 @@ def _box(name: str, box: Box, label: str, about: str, counts: PathCounts) -> Ite
     yield (
         f'<a class="box{has}" data-component="{escape(name)}" href="#stopped_at={quote(name)}">'
         f"<title>{escape(about)}</title>"
-        f'<rect x="{box.x:.1f}" y="{box.y:.1f}" width="{box.width:.1f}" height="{box.height:.1f}" rx="7"/>'
+        f"{shapes.rectangle(box)}"
         f'<text class="name" x="{middle:.1f}" y="{top - 11:.1f}" text-anchor="middle">{escape(label)}</text>'
         f'<text class="count" x="{middle:.1f}" y="{top + 6:.1f}" text-anchor="middle">{first}</text>'
         f'<text class="count" x="{middle:.1f}" y="{top + 23:.1f}" text-anchor="middle">{last}</text></a>'

@@ -1,9 +1,11 @@
 """Draw the control structure as SVG and highlight where faults are injected."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from html import escape
 
+from mutator.stpa import shapes
 from mutator.stpa.analysis import Analysis, Kind
+from mutator.stpa.labels import Point
 from mutator.stpa.layout import EDGE, Box, Layout, lay_out
 
 FILLS = {
@@ -36,7 +38,10 @@ def draw(analysis: Analysis) -> str:
         f"<title>Control structure</title><desc>{_text(analysis.structure.about)}</desc>",
         f"<style>{STYLE}</style>",
         "<defs>",
-        *(_tip(colour) for colour in (ACTION, FEEDBACK, FAULT)),
+        *(
+            shapes.tip(f"tip-{colour[1:]}", 9, f'd="{shapes.TIP}" fill="{colour}"')
+            for colour in (ACTION, FEEDBACK, FAULT)
+        ),
         "</defs>",
         f'<rect width="{layout.width:.0f}" height="{height:.0f}" fill="#ffffff"/>',
         *_links(analysis, layout),
@@ -61,28 +66,19 @@ def _text(text: str) -> str:
     return escape(" ".join(text.split()))
 
 
-def _tip(colour: str) -> str:
-    return (
-        f'<marker id="tip-{colour[1:]}" viewBox="0 0 10 10" refX="9" refY="5" markerWidth="9" '
-        f'markerHeight="9" markerUnits="userSpaceOnUse" orient="auto">'
-        f'<path d="M0,0 L10,5 L0,10 z" fill="{colour}"/></marker>'
-    )
-
-
 def _links(analysis: Analysis, layout: Layout) -> Iterator[str]:
     faulty = faulty_places(analysis)
     actions = {action.link for action in analysis.structure.control_actions.values()}
     for name, link in analysis.structure.links.items():
         colour = FAULT if name in faulty else ACTION if name in actions else FEEDBACK
-        path = "M" + " L".join(f"{x:.1f},{y:.1f}" for x, y in layout.arrows[name].points)
         width = 2.6 if colour != FEEDBACK else 1.4
-        yield _line(path, colour, width, dashed=not link.studied)
+        yield _line(layout.arrows[name].points, colour, width, dashed=not link.studied)
 
 
-def _line(path: str, colour: str, width: float, *, dashed: bool = False) -> str:
+def _line(points: Iterable[Point], colour: str, width: float, *, dashed: bool = False) -> str:
     dashes = ' stroke-dasharray="6 4"' if dashed else ""
     return (
-        f'<path d="{path}" fill="none" stroke="{colour}" stroke-width="{width}"{dashes} '
+        f'<path d="{shapes.course(points)}" fill="none" stroke="{colour}" stroke-width="{width}"{dashes} '
         f'marker-end="url(#tip-{colour[1:]})"/>'
     )
 
@@ -92,11 +88,8 @@ def _components(analysis: Analysis, layout: Layout) -> Iterator[str]:
     for name, component in analysis.structure.components.items():
         box = layout.boxes[name]
         edge, width = (FAULT, 3) if name in faulty else (INK, 1.2)
-        yield (
-            f'<g><title>{_text(component.about)}</title><rect x="{box.x:.1f}" y="{box.y:.1f}" '
-            f'width="{box.width:.1f}" height="{box.height:.1f}" rx="7" fill="{FILLS[component.kind]}" '
-            f'stroke="{edge}" stroke-width="{width}"/>'
-        )
+        look = f' fill="{FILLS[component.kind]}" stroke="{edge}" stroke-width="{width}"'
+        yield f"<g><title>{_text(component.about)}</title>{shapes.rectangle(box, look)}"
         yield from _box_text(box)
         yield "</g>"
 
@@ -114,13 +107,10 @@ def _box_text(box: Box) -> Iterator[str]:
 def _labels(analysis: Analysis, layout: Layout) -> Iterator[str]:
     faulty = faulty_places(analysis)
     for name, link in analysis.structure.links.items():
-        label = layout.arrows[name].label
-        x, y = label.at
-        place = f'x="{x:.1f}" y="{y:.1f}" text-anchor="{label.anchor}"'
-        yield f'<text class="label" {place}>{_text(link.label)}</text>'
+        arrow = layout.arrows[name]
+        yield shapes.label(arrow, _text(link.label))
         if name in faulty:
-            place = f'x="{x:.1f}" y="{y + label.apart:.1f}" text-anchor="{label.anchor}"'
-            yield f'<text class="label factor" {place}>{_text(short(faulty[name]))}</text>'
+            yield shapes.label(arrow, _text(short(faulty[name])), 1, "label factor")
 
 
 def short(names: list[str]) -> str:
@@ -139,6 +129,6 @@ def _legend(top: float) -> Iterator[str]:
     )
     x, y = float(EDGE), top + LEGEND / 2.0
     for colour, width, dashed, words in entries:
-        yield _line(f"M{x:.1f},{y:.1f} L{x + 44:.1f},{y:.1f}", colour, width, dashed=dashed)
+        yield _line([(x, y), (x + 44, y)], colour, width, dashed=dashed)
         yield f'<text x="{x + 52:.1f}" y="{y + 5:.1f}">{words}</text>'
         x += 52 + 7 * len(words) + 36

@@ -6,6 +6,7 @@ from xml.etree import ElementTree
 
 import pytest
 
+import mutator
 from mutator.stpa.analysis import Analysis, load_analysis
 from mutator.stpa.drawing import FAULT, draw, faulty_places, short
 from mutator.stpa.layout import APART, Box, Layout, Point, lay_out
@@ -95,3 +96,9 @@ def test_the_diagram_in_the_docs_is_current(analysis: Analysis) -> None:
 def test_a_common_prefix_is_written_once() -> None:
     assert short(["CF9"]) == "CF9"
     assert short(["CF9", "CF10"]) == "CF9, 10"
+
+
+@pytest.mark.parametrize("mark", ["<marker", '" L".join', "arrow.label.anchor"])
+def test_one_module_draws_the_arrows_of_all_drawings(mark: str) -> None:
+    sources = Path(mutator.__file__).parent
+    assert [path.name for path in sources.rglob("*.py") if mark in path.read_text()] == ["shapes.py"]
