@@ -1,9 +1,10 @@
 """Draws the control structure of a run, with the number of faults that passed each link or stopped in each
-box. path_counts.js updates the numbers.
+box. path_counts.js shows the counts of other faults in the drawing.
 """
 
 from collections.abc import Collection, Iterator
 from html import escape
+from typing import Any
 from urllib.parse import quote
 
 from mutator.report.paths import PathCounts, link_text
@@ -43,6 +44,18 @@ def draw_path_counts(structure: StructureModel, counts: PathCounts, links: Colle
     return "\n".join((*lines, "</svg>"))
 
 
+def drawn_counts(structure: StructureModel, counts: PathCounts, links: Collection[str]) -> dict[str, Any]:
+    """Return what path_counts.js changes in the drawing to show other counts."""
+    return {
+        "active": counts.active,
+        "links": {name: _link_look(counts.through[name], counts.came[name]) for name in links},
+        "components": {
+            name: _box_look(counts.injected[name], counts.stopped[name], counts.masked[name])
+            for name in structure.components
+        },
+    }
+
+
 def share_text(through: int, came: int) -> str:
     """For example `12 of 40, 30 %`; '' if no fault reached the link."""
     return f"{through} of {came}, {100 * through / came:.0f} %" if came else ""
@@ -61,34 +74,40 @@ def _idle(arrow: Arrow, link: LinkModel) -> Iterator[str]:
 
 
 def _link(name: str, arrow: Arrow, link: LinkModel, counts: PathCounts) -> Iterator[str]:
-    through, came = counts.through[name], counts.came[name]
-    kind = "through" if through else "stopped" if came else "quiet"
-    share, short = share_text(through, came), _is_short(arrow)
+    kind, width, share = _link_look(counts.through[name], counts.came[name])
+    short = _is_short(arrow)
     first, _, last = share.partition(", ") if short else (share, "", "")
-    width = _THIN + (_WIDEST - _THIN) * (through / came if came else 0.0)
     yield (
         f'<a class="link is-{kind}" data-link="{escape(name)}"{" data-short" if short else ""} '
         f'href="#through={quote(link_text(link.from_, link.to))}">'
         f"<title>{escape(f'{link.label}: from {link.from_} to {link.to}')}</title>"
         f'<path class="hit" d="{course(arrow.points)}"/><path class="line" d="{course(arrow.points)}" '
-        f'style="stroke-width: {width:.1f}px" marker-end="url(#path-tip-{kind})"/>'
+        f'style="stroke-width: {width}" marker-end="url(#path-tip-{kind})"/>'
         f"{shapes.label(arrow, escape(link.label))}"
         f"{shapes.label(arrow, first, 1, 'count')}{shapes.label(arrow, last, 2, 'count')}</a>"
     )
 
 
-def box_lines(injected: int, stopped: int, masked: int) -> tuple[str, str]:
-    told = ((injected, "injected"), (stopped, "stopped"))
-    return ", ".join(f"{n} {what}" for n, what in told if n), f"{masked} masked" if masked else ""
+def _link_look(through: int, came: int) -> tuple[str, str, str]:
+    """Return a link's kind, the width of its line, and its count."""
+    kind = "through" if through else "stopped" if came else "quiet"
+    width = _THIN + (_WIDEST - _THIN) * (through / came if came else 0.0)
+    return kind, f"{width:.1f}px", share_text(through, came)
+
+
+def _box_look(injected: int, stopped: int, masked: int) -> tuple[str, str, str]:
+    """Return a box's classes, and its two lines of counts."""
+    counts = {"injected": injected, "stopped": stopped}
+    has = "".join(f" has-{what}" for what, n in counts.items() if n)
+    first = ", ".join(f"{n} {what}" for what, n in counts.items() if n)
+    return f"box{has}", first, f"{masked} masked" if masked else ""
 
 
 def _box(name: str, box: Box, label: str, about: str, counts: PathCounts) -> Iterator[str]:
-    injected, stopped = counts.injected[name], counts.stopped[name]
-    first, last = box_lines(injected, stopped, counts.masked[name])
-    has = f"{' has-injected' if injected else ''}{' has-stopped' if stopped else ''}"
+    classes, first, last = _box_look(counts.injected[name], counts.stopped[name], counts.masked[name])
     middle, top = box.x + box.width / 2, box.y + box.height / 2
     yield (
-        f'<a class="box{has}" data-component="{escape(name)}" href="#stopped_at={quote(name)}">'
+        f'<a class="{classes}" data-component="{escape(name)}" href="#stopped_at={quote(name)}">'
         f"<title>{escape(about)}</title>"
         f"{shapes.rectangle(box)}"
         f'<text class="name" x="{middle:.1f}" y="{top - 11:.1f}" text-anchor="middle">{escape(label)}</text>'

@@ -185,12 +185,6 @@ class PathCounts:
         if path.stopped_at:
             self.ends[path.stopped_at] += count
 
-    def plain(self) -> dict[str, Any]:
-        links = {name: [self.through[name], came] for name, came in self.came.items()}
-        names = dict.fromkeys((*self.injected, *sorted(self.stopped)))
-        components = {n: [self.injected[n], self.stopped[n], self.masked[n]] for n in names}
-        return {"active": self.active, "links": links, "components": components}
-
 
 def counts_by_fault_type(
     kinds: "pd.Series[str]", codes: "np.ndarray", paths: RunPaths

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from mutator._common.tables import Table
 from mutator.report.panel import Panel, rendered
-from mutator.report.path_drawing import draw_path_counts, share_text
+from mutator.report.path_drawing import draw_path_counts, drawn_counts, share_text
 from mutator.report.paths import ALL, PathCounts, RunPaths, counts_by_fault_type
 from mutator.report.studies import ReportedRun
 from mutator.results.counting import kinds
@@ -68,14 +68,19 @@ def paths_panel(run: ReportedRun) -> Panel | None:
     stops = _stops(counts, paths)
     parts = ["## Fault paths", _ABOUT, _table(links, counts[ALL], paths).as_markdown()]
     parts += ["### Where masked faults were stopped", stops.as_markdown() if stops else _NONE_STOPPED]
+    figure = data = None
+    if structure:
+        figure = draw_path_counts(structure, counts[ALL], links)
+        drawn = {kind: drawn_counts(structure, of_kind, links) for kind, of_kind in counts.items()}
+        data = plainly_embedded(drawn, "path-counts-data")
     html = rendered(
         _HTML,
         about=_ABOUT,
-        figure=_markup(draw_path_counts(structure, counts[ALL], links.keys())) if structure else None,
+        figure=figure and _markup(figure),
         kinds=list(counts),
         all=ALL,
         counts=counts,
-        data=_markup(plainly_embedded({kind: c.plain() for kind, c in counts.items()}, "path-counts-data")),
+        data=data and _markup(data),
         links=links,
         label=paths.label,
         share=lambda through, came: share_text(through, came) or "none reached it",

@@ -3,10 +3,7 @@
 // Shows the counts of the chosen fault type in the control structure, which report/path_drawing.py draws.
 
 const PathCounts = (() => {
-  const ALL = "all fault types", THIN = 1.8, WIDEST = 7;
-  const share = ([through, came]) => (came ? `${through} of ${came}, ${Math.round((100 * through) / came)} %` : "");
-  const boxLines = ([injected, stopped, masked]) => [
-    [injected && `${injected} injected`, stopped && `${stopped} stopped`].filter(Boolean).join(", "), masked ? `${masked} masked` : ""];
+  const ALL = "all fault types";
 
   function start() {
     const place = document.getElementById("path-counts"), data = document.getElementById("path-counts-data");
@@ -21,20 +18,18 @@ const PathCounts = (() => {
     const filter = (element) => element.setAttribute("href", element.getAttribute("href").split("&")[0] + only);
     document.getElementById("path-counts-active").textContent = `${active} active`;
     for (const link of place.querySelectorAll("[data-link]")) {
-      const numbers = links[link.dataset.link] || [0, 0], [through, came] = numbers;
-      const state = through ? "through" : came ? "stopped" : "quiet", line = link.querySelector(".line");
+      const [state, width, share] = links[link.dataset.link], line = link.querySelector(".line");
       link.setAttribute("class", `link is-${state}`);
       line.setAttribute("marker-end", `url(#path-tip-${state})`);
-      line.style.strokeWidth = `${THIN + (came ? ((WIDEST - THIN) * through) / came : 0)}px`;
-      const [first, last = ""] = "short" in link.dataset ? share(numbers).split(", ") : [share(numbers)];
+      line.style.strokeWidth = width;
+      const [first, last = ""] = "short" in link.dataset ? share.split(", ") : [share];
       link.querySelectorAll(".count").forEach((line, i) => { line.textContent = i ? last : first; });
-      document.querySelector(`#path-counts-table [data-link="${CSS.escape(link.dataset.link)}"] td:last-child`).textContent = share(numbers) || "none reached it";
+      document.querySelector(`#path-counts-table [data-link="${CSS.escape(link.dataset.link)}"] td:last-child`).textContent = share || "none reached it";
       filter(link);
     }
     for (const box of place.querySelectorAll("[data-component]")) {
-      const numbers = components[box.dataset.component] || [0, 0, 0];
-      box.setAttribute("class", `box${numbers[0] ? " has-injected" : ""}${numbers[1] ? " has-stopped" : ""}`);
-      const lines = boxLines(numbers);
+      const [classes, ...lines] = components[box.dataset.component];
+      box.setAttribute("class", classes);
       box.querySelectorAll(".count").forEach((line, i) => { line.textContent = lines[i]; });
       filter(box);
     }

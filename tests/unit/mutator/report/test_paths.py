@@ -13,8 +13,11 @@ from mutator.outcomes.fault_paths import (
     PathLink,
     UntimedPath,
 )
+from mutator.report.path_drawing import draw_path_counts, drawn_counts
 from mutator.report.paths import PathCounts, RunPaths
+from mutator.stpa.analysis import load_analysis
 from mutator.targets.target_facts import ChannelFacts
+from mutator.workspace import Workspace
 
 CHANNELS = [
     ChannelFacts.from_plain(["seen", "m", "internal", "eyes", "what is seen"]),
@@ -87,8 +90,30 @@ def test_faults_are_counted_by_link_and_component() -> None:
     )
     counts.add(path(ComponentState.INJECTED, ComponentState.UNSEEN, ComponentState.REACHED))
     counts.add(path(ComponentState.INJECTED, ComponentState.REACHED, ComponentState.HELD))
-    plain = counts.plain()
-    assert plain["active"] == 4
-    assert plain["links"] == {"eyes-pedals": [2, 3], "pedals-car": [2, 4]}
-    assert plain["components"] == {"eyes": [4, 0, 0], "car": [0, 2, 0], "pedals": [0, 1, 1]}
+    assert counts.active == 4
+    assert counts.through == {"eyes-pedals": 2, "pedals-car": 2}
+    assert counts.came == {"eyes-pedals": 3, "pedals-car": 4}
+    assert (counts.injected, counts.stopped) == ({"eyes": 4}, {"car": 2, "pedals": 1})
+    assert counts.masked == {"pedals": 1}
     assert counts.ends == {("pedals",): 1}
+
+
+def test_the_drawing_of_other_counts_is_the_one_that_the_page_changes_to(clone: Workspace) -> None:
+    """The script puts `drawn_counts` into the drawing of all faults."""
+    structure = load_analysis(clone.library / "stpa").structure
+    links, name = list(structure.links), next(iter(structure.components))
+    counts = PathCounts(active=8)
+    counts.came.update({links[0]: 8, links[1]: 3})
+    counts.through.update({links[0]: 1})
+    counts.injected.update({name: 8})
+    counts.masked.update({name: 2})
+    drawn = drawn_counts(structure, counts, links)
+    assert drawn["active"] == 8
+    assert drawn["links"][links[0]] == ("through", "2.5px", "1 of 8, 12 %")
+    assert drawn["links"][links[1]] == ("stopped", "1.8px", "0 of 3, 0 %")
+    assert drawn["links"][links[2]] == ("quiet", "1.8px", "")
+    assert drawn["components"][name] == ("box has-injected", "8 injected", "2 masked")
+    figure = draw_path_counts(structure, counts, links)
+    for kind, width, _ in drawn["links"].values():
+        assert f'class="link is-{kind}"' in figure and f"stroke-width: {width}" in figure
+    assert f'class="box has-injected" data-component="{name}"' in figure
