@@ -29,6 +29,7 @@ from typing import Any
 from mutator.campaigns.chunks import Pending, pending
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plans import make_plan
+from mutator.campaigns.provenance import add_stretch
 from mutator.execution.cluster import crew, dask_side, dask_workers
 from mutator.execution.cluster import intake as intakes
 from mutator.execution.cluster.board import Board
@@ -39,6 +40,7 @@ from mutator.store.blocks import as_block
 from mutator.store.patches import packed_patches
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_packing import EXPERIMENT
+from mutator.store.stretches import Stretch
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -108,7 +110,11 @@ def planned(name: str = "paper") -> Iterator[tuple[Workspace, RunFolder, tuple[P
 
 
 def facts(packages: Any) -> dict[str, Any]:
-    return dict.fromkeys(("mutator", "python", "platform", "cpu"), "") | {"host": "here", "blas": []}
+    return dict.fromkeys(("mutator", "python", "platform", "cpu"), "") | {
+        "host": "here",
+        "blas": [],
+        "packages": {},
+    }
 
 
 def deliver(*given: Any) -> None:
@@ -147,10 +153,11 @@ def intake() -> None:
     for fake in (facts, deliver, attend, leave, work):
         setattr(dask_side, fake.__name__, fake)
     with planned() as (workspace, folder, left):
+        folder = add_stretch(folder, Stretch(python="", packages={}, platform=""))
         session: Any = SimpleNamespace(
             workspace=workspace,
             folder=folder,
-            manifest=workspace.manifest(folder.head["target"]),
+            manifest=workspace.manifest(folder.head.target),
             pending=left,
             proof=(),
             engine="fork",
@@ -161,7 +168,6 @@ def intake() -> None:
             interrupted=False,
             working="",
         )
-        folder.head["stretches"] = [{"python": "", "packages": {}, "platform": ""}]
         Bundle.of = classmethod(lambda cls, *given: cls(b"", ""))  # type: ignore[assignment, method-assign]
         crew.Crew.objection = lambda self, facts: ""  # type: ignore[method-assign]
         times: list[float] = []

@@ -58,7 +58,7 @@ def last_difference(golden: Series, faulty: Series) -> float:
 
 def bound(folder: RunFolder, workspace: Workspace) -> tuple[Saved, float]:
     """Return an upper bound on the saving, and the CPU time (s) of all runs."""
-    manifest, series = workspace.manifest(folder.head["target"]), SeriesFolder(folder.path)
+    manifest, series = workspace.manifest(folder.head.target), SeriesFolder(folder.path)
     timings, records = folder.timings(), folder.records()
     digests: dict[Path, str] = {}
     saved, total = Saved(), 0.0

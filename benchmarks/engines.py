@@ -20,7 +20,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from mutator.campaigns.plans import Choices, Plan, make_plan  # noqa: E402
+from mutator.campaigns.plans import Plan, make_plan  # noqa: E402
 from mutator.engines.fork import ForkEngine  # noqa: E402
 from mutator.engines.jobs import Engine, Job  # noqa: E402
 from mutator.engines.reference import ReferenceEngine  # noqa: E402
@@ -28,6 +28,7 @@ from mutator.execution.runner import Finished, Goldens, Runner  # noqa: E402
 from mutator.model import Experiment, Record  # noqa: E402
 from mutator.mutants.building import build  # noqa: E402
 from mutator.outcomes import golden  # noqa: E402
+from mutator.store.choices import Choices  # noqa: E402
 from mutator.store.run_folder import GoldenRun  # noqa: E402
 from mutator.triggers.kinds import always  # noqa: E402
 from mutator.workspace import Workspace  # noqa: E402

@@ -108,7 +108,7 @@ def planned(workspace: Workspace, size: int, out: Path) -> RunFolder:
 
 def _experiments(folder: RunFolder) -> Iterator[Experiment]:
     faults = plan_file.read_faults(folder.path)
-    for chunk in folder.head["chunks"]:
+    for chunk in folder.head.chunks:
         yield from plan_file.read_chunk(folder.path, chunk, faults)
 
 
@@ -116,7 +116,7 @@ def goldens(workspace: Workspace, folder: RunFolder, experiments: Sequence[Exper
     """Simulate the golden runs of the first seed, copy them for the others, and record the checks as
     passed.
     """
-    manifest, run = workspace.manifest(folder.head["target"]), folder.path
+    manifest, run = workspace.manifest(folder.head.target), folder.path
     known, driven = {}, dict[GoldenRun, Path]()
     for one in folder.goldens:
         like, place = one._replace(seed=None), folder.golden(*one)
@@ -184,7 +184,7 @@ def write_segments(
     blocks = _blocks(patches)
     for worker in range(WORKERS):
         name = f"0001-gw{worker}"
-        head = {"plan": folder.head["plan"]}
+        head = {"plan": folder.head.plan}
         record_lines = Lines(folder.path / "records" / f"{name}.jsonl", head | {"schema": SCHEMA})
         timing_lines = Lines(folder.path / "timings" / f"{name}.jsonl", head | {"schema": TIMINGS_SCHEMA})
         (folder.path / "patches").mkdir(exist_ok=True)
@@ -232,7 +232,7 @@ def write_proof(
     """Write the sample of the equivalence check with the experiments' records."""
     lines = _bodies(records, patches)
     proof = Lines(
-        folder.path / equivalence.FOLDER / "0001-gw0.jsonl", {"plan": folder.head["plan"], "schema": SCHEMA}
+        folder.path / equivalence.FOLDER / "0001-gw0.jsonl", {"plan": folder.head.plan, "schema": SCHEMA}
     )
     wanted = set(equivalence.sampled(folder))
     counts = [0] * WORKERS
@@ -267,7 +267,7 @@ def write_series(
     write_script(place / f"{name_of(data)}.js", data)
     key, kept = first.key, ids[:SERIES_MOST]
     index = Index(
-        plan=folder.head["plan"],
+        plan=folder.head.plan,
         chunks=((name_of(data), len(made)),),
         sizes=tuple(map(len, made)),
         goldens={key: 0},

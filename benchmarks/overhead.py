@@ -25,13 +25,14 @@ from time import process_time
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from mutator.campaigns.plans import Choices, make_plan  # noqa: E402
+from mutator.campaigns.plans import make_plan  # noqa: E402
 from mutator.engines.fork import ForkEngine  # noqa: E402
 from mutator.engines.jobs import Job  # noqa: E402
 from mutator.engines.reference import ReferenceEngine  # noqa: E402
 from mutator.execution.runner import Goldens, Runner  # noqa: E402
 from mutator.model import Experiment, Hold, Trigger  # noqa: E402
 from mutator.mutants.building import build  # noqa: E402
+from mutator.store.choices import Choices  # noqa: E402
 from mutator.store.lines import LineWriter  # noqa: E402
 from mutator.store.records import SCHEMA, line_of  # noqa: E402
 from mutator.triggers.kinds import always  # noqa: E402

@@ -19,9 +19,9 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from mutator.campaigns.plans import Choices  # noqa: E402
 from mutator.execution import runner  # noqa: E402
 from mutator.execution.running import run_campaign  # noqa: E402
+from mutator.store.choices import Choices  # noqa: E402
 from mutator.store.patches import PatchWriter  # noqa: E402
 from mutator.store.run_folder import RunFolder  # noqa: E402
 from mutator.store.series import SeriesFolder  # noqa: E402

@@ -32,7 +32,6 @@ from mutator.api.runs import merge_runs as merge_runs
 from mutator.api.trials import Trial as Trial
 from mutator.api.trials import try_fault as try_fault
 from mutator.audit.seal import Seals as Seals
-from mutator.campaigns.plans import Choices as Choices
 from mutator.campaigns.plans import Plan as Plan
 from mutator.comparison.comparison import Gate as Gate
 from mutator.errors import CheckFailed as CheckFailed
@@ -49,6 +48,7 @@ from mutator.model import Status as Status
 from mutator.model import Trigger as Trigger
 from mutator.report.film import Shot as Shot
 from mutator.report.history import History as History
+from mutator.store.choices import Choices as Choices
 from mutator.store.progress import Progress as Progress
 from mutator.workspace import Workspace as Workspace
 

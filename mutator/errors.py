@@ -232,6 +232,19 @@ class BadTrace(Signal, ValueError):
         self.got, self.expected = got, expected
 
 
+class Misfit(Signal, ValueError):
+    """A value of a file does not fit its type. `path` leads to it, from the outermost key.
+
+    * When: a record is read from JSON that has another type there, or a key too few or too many.
+    * To do: report it as a MutatorError with the file's path.
+    """
+
+    def __init__(self, got: str, expected: str | None = None) -> None:
+        super().__init__(got)
+        self.got, self.expected = got, expected
+        self.path: list[str | int] = []
+
+
 class ForkServerLost(Signal):
     """The fork server cannot be used any more.
 

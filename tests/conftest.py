@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import Choices, Plan, make_plan
+from mutator.campaigns.plans import Plan, make_plan
 from mutator.campaigns.provenance import add_stretch
 from mutator.model import (
     Activation,
@@ -32,6 +32,7 @@ from mutator.model import (
 )
 from mutator.mutants.anchors import ParsedFile, parsed
 from mutator.store import digests
+from mutator.store.choices import Choices
 from mutator.store.digests import Digest
 from mutator.store.lines import LineWriter, read_segment
 from mutator.store.patches import Patches, PatchWriter, rewrite
@@ -373,15 +374,15 @@ def write_finished(write_run: Callable[..., Path]) -> Callable[..., Path]:
             patches.append(line["experiment_id"], patch)
         patches.close()
         for kind, schema, some in (("proof", SCHEMA, lines[:3]), ("timings", TIMINGS_SCHEMA, lines)):
-            writer = LineWriter(out / kind / "0001-a.jsonl", {"schema": schema, "plan": folder.head["plan"]})
+            writer = LineWriter(out / kind / "0001-a.jsonl", {"schema": schema, "plan": folder.head.plan})
             for line in some:
                 cost = {"experiment_id": line["experiment_id"], "cpu_s": 1.0, "wall_s": 2.0, "host": "h"}
                 writer.append(line if kind == "proof" else cost | {"worker": "a"})
             writer.close()
         new = {"checks.json": b'{"schema": "checks/1", "results": [], "goldens": {}}'}
-        for scenario, changes in folder.head["goldens"]:
+        for scenario, changes in folder.head.goldens:
             place = folder.golden(scenario, tuple(changes)).relative_to(folder.path)
-            new |= {f"{place}/{name}": name.encode() for name in folder.head["golden_files"]}
+            new |= {f"{place}/{name}": name.encode() for name in folder.head.golden_files}
         with digests.rewriting(out, {name: Digest.of(data) for name, data in new.items()}):
             for name, data in new.items():
                 (out / name).parent.mkdir(parents=True, exist_ok=True)

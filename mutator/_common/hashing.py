@@ -25,6 +25,10 @@ def added(default: Any, metadata: dict[str, Any] | None = None) -> Any:
     return dataclasses.field(default=default, metadata={_ADDED: True, **(metadata or {})})
 
 
+def is_added(field: "dataclasses.Field[Any]") -> bool:
+    return _ADDED in field.metadata
+
+
 def added_values(record: Any) -> dict[str, Any]:
     """Return the `added` fields of a dataclass instance that differ from the defaults, as `plain` values."""
     _, later = _fields(type(record))  # type: ignore[arg-type]  # classes are hashable
@@ -37,8 +41,8 @@ def added_values(record: Any) -> dict[str, Any]:
 @lru_cache(maxsize=256)
 def _fields(kind: type) -> tuple[tuple[str, ...], tuple[tuple[str, Any], ...]]:
     every = dataclasses.fields(kind)
-    first = tuple(f.name for f in every if _ADDED not in f.metadata)
-    return first, tuple((f.name, f.default) for f in every if _ADDED in f.metadata)
+    first = tuple(f.name for f in every if not is_added(f))
+    return first, tuple((f.name, f.default) for f in every if is_added(f))
 
 
 def from_json(data: bytes) -> Any:

@@ -4,7 +4,6 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from mutator._common.arguments import check_type, check_whole
 from mutator._common.hashing import digest
@@ -223,15 +222,15 @@ def _seals(folder: RunFolder, checks: list[Check]) -> Seals:
 
 
 def _facts(folder: RunFolder) -> dict[str, str]:
-    head: Any = folder.head
+    head = folder.head
     packages = package_versions(folder.stretches)
     return {
         "run": folder.path.name,
-        "campaign": f"{head['campaign']} of {head['target']}, {head['reading']}, seed {head['seed']}",
+        "campaign": f"{head.campaign} of {head.target}, {head.reading}, seed {head.seed}",
         "experiments": f"{folder.planned}{f' of shard {folder.shard}' if folder.shard else ''}",
-        "plan": head["plan"],
-        **{f"digest of {name}": value for name, value in head["sources"].items()},
-        "mutator": head["provenance"]["mutator"],
+        "plan": head.plan,
+        **{f"digest of {name}": value for name, value in head.sources.items()},
+        "mutator": head.provenance.mutator,
         "python": told(folder.stretches).get("python", "none"),
         **({"packages": f"{len(packages)}, with digest {digest(packages)}"} if packages else {}),
     }

@@ -6,12 +6,12 @@ from pathlib import Path
 from mutator._common.arguments import check_type, check_whole
 from mutator.api.runs import Run
 from mutator.api.selection import WorkspaceLike, open_workspace
-from mutator.campaigns.plans import Choices
 from mutator.engines.registry import check_offered
 from mutator.errors import IncompleteRun
 from mutator.execution.distribution import distributor
 from mutator.execution.running import run_campaign
 from mutator.execution.session import Notify, Summary
+from mutator.store.choices import Choices
 from mutator.store.run_folder import RunFolder
 
 

@@ -9,7 +9,7 @@ from mutator._common.files import make_folder, write_atomic
 from mutator.api.selection import WorkspaceLike, open_workspace
 from mutator.campaigns.clones import user_name
 from mutator.campaigns.filters import compile_filter
-from mutator.campaigns.plans import Choices, make_plan
+from mutator.campaigns.plans import make_plan
 from mutator.errors import MutatorError
 from mutator.review import catalogue, gate
 from mutator.review.catalogue import Group
@@ -18,6 +18,7 @@ from mutator.review.decisions import Change, Kind, Review, State, record
 from mutator.review.decisions import load_review as load_decisions
 from mutator.review.page import write_page
 from mutator.review.pictures import of_groups
+from mutator.store.choices import Choices
 from mutator.workspace import Workspace
 
 Written = dict[str, dict[str, str]]  # by group: the file of each picture, by name

@@ -26,9 +26,9 @@ class RunContents(StoredRun):
         """Campaign, target, seed, reading and choices; digests of the sources; under `stretches`, the
         versions and machine of each stretch of work.
         """
-        head = self.folder.head
+        content = self.folder.head.content()
         keys = ("campaign", "target", "plan", "choices", "limits")
-        return {key: head[key] for key in keys} | self.folder.provenance
+        return {key: content[key] for key in keys} | self.folder.provenance
 
     @cached_property
     def plan(self) -> Plan:

@@ -74,7 +74,7 @@ class Run(RunContents):
         done = f"{sum(self.endings.values())} of {self.folder.planned} experiments"
         failed = len(self.harness_errors)
         errors = f", {failed} with a HARNESS ERROR" if failed else ""
-        return f"<Run {self.path.name}: {done} of {head['campaign']}, {head['reading']}{errors}>"
+        return f"<Run {self.path.name}: {done} of {head.campaign}, {head.reading}{errors}>"
 
     def _repr_html_(self) -> str:
         note = known_alerts_note(self)
@@ -109,8 +109,7 @@ class Run(RunContents):
             alerts = alerts_by_drive(self.fault_free())
         except (MutatorError, KeyError):  # without target or golden runs, alerts cannot be compared
             alerts = None
-        told = self.folder.head.get("operators", ())
-        return score_sheet(prepare(frame), self.faults, alerts, told)
+        return score_sheet(prepare(frame), self.faults, alerts, self.folder.head.operators)
 
     def mutation_totals(self) -> Table:
         """Return the total mutation score. Empty without operator mutants."""

@@ -62,7 +62,7 @@ class StoredRun:
     @cached_property
     def bench(self) -> Bench:
         """The run's target in the workspace."""
-        return Bench.of(self.workspace, self.folder.head["target"])
+        return Bench.of(self.workspace, self.folder.head.target)
 
     @cached_property
     def faults(self) -> dict[str, Fault]:
@@ -82,7 +82,7 @@ class StoredRun:
     @cached_property
     def fault_paths(self) -> FaultPaths | None:
         """The paths of faults through the target; None if unknown."""
-        return fault_paths_of(self.folder.head)
+        return fault_paths_of(self.folder)
 
     def experiment(self, id: str) -> "StoredExperiment":
         """Return the planned experiment whose id starts with `id`; MutatorError for none or several."""
@@ -142,7 +142,7 @@ class StoredExperiment(ExperimentResult):
 
     def not_run(self) -> MutatorError:
         """Return the error for an experiment that has not run."""
-        campaign, out = self.run.folder.head["campaign"], from_here(self.run.path)
+        campaign, out = self.run.folder.head.campaign, from_here(self.run.path)
         return MutatorError(
             f"experiment {self.id} has not run yet",
             where=self.run.path,

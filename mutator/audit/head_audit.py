@@ -1,6 +1,7 @@
 """Audit what run.json and checks.json say: against the library, the plan, the records and the golden runs."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from itertools import islice
 from typing import Any
@@ -28,14 +29,14 @@ _REMEDY = "verify with the library of the run"
 def facts_of_target(folder: RunFolder, workspace: Workspace, manifest: TargetManifest) -> Problems:
     """Yield what run.json says about the target and its hazards, but the library does not."""
     keys = {run_key(manifest, experiment) for experiment in plan_file.iterate(folder.path)}
-    for key, value in (target_facts(workspace, manifest) | {"runs": len(keys)}).items():
-        if key in folder.head and folder.head[key] != value:
-            yield MutatorError(
-                f"{key} {short(folder.head[key])}",
-                where=folder.path / HEAD,
-                expected=f"{short(value)}, as in the library",
-                remedy=_REMEDY,
-            )
+    follows = replace(folder.head, runs=len(keys), **target_facts(workspace, manifest))
+    for key, found, value in folder.head.differences(follows):
+        yield MutatorError(
+            f"{key} {short(found)}",
+            where=folder.path / HEAD,
+            expected=f"{short(value)}, as in the library",
+            remedy=_REMEDY,
+        )
 
 
 def seeds_and_sessions(folder: RunFolder) -> Problems:
@@ -46,11 +47,11 @@ def seeds_and_sessions(folder: RunFolder) -> Problems:
             yield MutatorError(
                 f"seed {experiment.seed}", where=path, line=number, expected=_of(folder, "seed")
             )
-        if experiment.fault.reading != folder.head["reading"]:
+        if experiment.fault.reading != folder.head.reading:
             got = f"reading {experiment.fault.reading}"
             yield MutatorError(got, where=path, line=number, expected=_of(folder, "reading"))
-    if folder.head["choices"].get("reading") not in (None, folder.head["reading"]):
-        got = f"choice of the reading {folder.head['choices']['reading']}"
+    if folder.head.choices.reading not in (None, folder.head.reading):
+        got = f"choice of the reading {folder.head.choices.reading}"
         yield MutatorError(got, where=folder.path / HEAD, expected=_of(folder, "reading"))
     patterns = [stretch.records for stretch in folder.stretches]
     for name in digests.segments(folder.path):
@@ -63,15 +64,15 @@ def seeds_and_sessions(folder: RunFolder) -> Problems:
             )
 
 
-def chunks_of(folder: RunFolder) -> list[list[int]]:
+def chunks_of(folder: RunFolder) -> tuple[plan_file.Chunk, ...]:
     """Return the offset, length and number of experiments of each chunk, for the numbers in run.json."""
     lines = plan_file.lines_of(folder.path / plan_file.EXPERIMENTS)
     found, offset = [], 0
-    for *_, count in folder.head["chunks"]:
+    for *_, count in folder.head.chunks:
         length = sum(map(len, islice(lines, count)))
-        found.append([offset, length, count])
+        found.append((offset, length, count))
         offset += length
-    return found
+    return tuple(found)
 
 
 def checks(folder: RunFolder) -> Problems:
@@ -134,7 +135,7 @@ def engines(folder: RunFolder, records: Sequence[Recorded]) -> Problems:
 
 
 def _of(folder: RunFolder, key: str) -> str:
-    return f"{key} {folder.head[key]}, as in {HEAD}"
+    return f"{key} {getattr(folder.head, key)}, as in {HEAD}"
 
 
 def short(value: Any) -> str:

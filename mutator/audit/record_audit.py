@@ -19,7 +19,7 @@ from mutator.store import plan_file
 from mutator.store.lines import read_segment
 from mutator.store.records import record_from
 from mutator.store.run_folder import RunFolder
-from mutator.store.run_head import Head
+from mutator.store.run_head import RunHead
 from mutator.targets.manifest import TargetManifest
 
 _DIGEST = 64  # hex digits
@@ -105,7 +105,7 @@ def _built(manifest: TargetManifest, models: FaultModels, fault: Fault, trigger:
 
 
 def verdicts(
-    head: Head, records: Sequence[Recorded], manifest: TargetManifest | None
+    head: RunHead, records: Sequence[Recorded], manifest: TargetManifest | None
 ) -> Iterator[MutatorError]:
     """Yield an error for each field that contradicts another field, run.json or the manifest."""
     tolerances = {channel.name: channel.tolerance for channel in manifest.compared} if manifest else {}
@@ -154,16 +154,16 @@ def _flaws_of_bad_end(record: Record) -> Flaws:
             yield f"{name} {value}", f"none, because the experiment ended as {record.status.value}"
 
 
-def _flaws_of_names(record: Record, head: Head, tolerances: Mapping[str, float]) -> Flaws:
+def _flaws_of_names(record: Record, head: RunHead, tolerances: Mapping[str, float]) -> Flaws:
     """Hazards or channels that the target does not have, and differences beyond the tolerance without a
     manifestation.
     """
-    strangers = [name for name, _ in record.hazards if name not in head["hazards"]]
+    strangers = [name for name, _ in record.hazards if name not in head.hazards]
     if strangers:
-        yield f"hazard {strangers[0]}", f"one of {', '.join(head['hazards'])}"
+        yield f"hazard {strangers[0]}", f"one of {', '.join(head.hazards)}"
     channels = [name for name, _ in record.max_dev]
-    if record.status is Status.OK and channels != list(head["compared"]):
-        yield f"differences of {', '.join(channels)}", f"those of {', '.join(head['compared'])}"
+    if record.status is Status.OK and channels != list(head.compared):
+        yield f"differences of {', '.join(channels)}", f"those of {', '.join(head.compared)}"
     beyond = [name for name, value in record.max_dev if value > tolerances.get(name, float("inf"))]
     largest = dict(record.max_dev)
     if any(value > largest.get(name, -1.0) for name, value in record.dev):
@@ -172,12 +172,10 @@ def _flaws_of_names(record: Record, head: Head, tolerances: Mapping[str, float])
         yield f"{beyond[0]} differs, but no manifestation is recorded", "the time of the first difference"
 
 
-def _flaws_of_path(record: Record, head: Head) -> Flaws:
+def _flaws_of_path(record: Record, head: RunHead) -> Flaws:
     """Channels that the target does not have, times after the end of the drive, and a manifestation time that
     is not the first time at which an actuator differs from the golden run.
     """
-    if "channels" not in head:
-        return
     end = inf if record.t_end is None else record.t_end + _TINY
     known = [channel.name for channel in head.channels]
     for name, first, _ in record.left:
@@ -188,7 +186,7 @@ def _flaws_of_path(record: Record, head: Head) -> Flaws:
                 f"{name} left golden at {first} s",
                 f"a time up to the end of the drive, {record.t_end} s",
             )
-    times = [first for name, first, _ in record.left if name in head["compared"]]
+    times = [first for name, first, _ in record.left if name in head.compared]
     manifested = record.t_manifest if record.t_manifest is not None and record.t_manifest <= end else None
     if record.status is Status.OK and min(times, default=None) != manifested:
         when = f"first at {manifested} s" if manifested is not None else "at no time"

@@ -1,13 +1,13 @@
 """Audit a run folder: check, without running anything, that its files are unchanged and consistent."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 
 from mutator._common.below import inside
 from mutator._common.files import read_json
-from mutator._common.hashing import digest, plain
+from mutator._common.hashing import digest
 from mutator.audit.head_audit import checks as checks_of
 from mutator.audit.head_audit import (
     chunks_of,
@@ -33,7 +33,6 @@ from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.digests import Digest
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN, HEAD
-from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 
 Problems = Iterator[MutatorError]
@@ -74,21 +73,21 @@ def audit_checks(folder: RunFolder, workspace: Workspace | None) -> list[Check]:
     reported.
     """
     head = folder.head
-    here = Check.of("sources that match those of the run", len(head["sources"]), _sources(folder, workspace))
-    manifest = workspace.manifest(head["target"]) if workspace and not here.differences else None
+    here = Check.of("sources that match those of the run", len(head.sources), _sources(folder, workspace))
+    manifest = workspace.manifest(head.target) if workspace and not here.differences else None
     records, proven = recorded(folder, "records"), recorded(folder, "proof")
     idle = idle_runs(folder, manifest, records) if manifest else ()
     checks = [
         Check.of("files, lines and ids that are unchanged", _files(folder), _content(folder)),
         Check.of(
             "ids, plan digest and run.json that follow from the plan",
-            head["experiments"],
+            head.experiments,
             chain(_plan(folder), seeds_and_sessions(folder)),
         ),
         Check.of(
             "golden runs that match the checks",
-            len(head["goldens"]),
-            chain(checks_of(folder), _goldens(folder, manifest), idle),
+            len(head.goldens),
+            chain(checks_of(folder), _goldens(folder), idle),
         ),
         here,
     ]
@@ -140,29 +139,29 @@ def _plan(folder: RunFolder) -> Problems:
     yield from plan_file.problems(run)
     plan = load_plan(folder)
     campaign = plan.campaign
-    follows = {
-        "plan": plan_digest([e.id for e in plan.experiments], plan.chunks, plan.canary.id, campaign),
-        "experiments": len(plan.experiments),
-        "campaign": campaign.name,
-        "campaign_digest": digest(campaign.source),
-        "study": campaign.study,
-        "target": campaign.target,
-        "chunks": chunks_of(folder),
-        "limits": plain(campaign.limits),
-        "goldens": [one.plain() for one in plan.goldens()],
-        "canary_hazard": campaign.canary.hazard,
-    }
-    for key, value in follows.items():
-        if head.get(key) != value:
-            expected = f"{short(value)}, which follows from {plan_file.EXPERIMENTS} and {CAMPAIGN}"
-            yield MutatorError(f"{key} {short(head.get(key))}", where=run / HEAD, expected=expected)
+    follows = replace(
+        head,
+        plan=plan_digest([e.id for e in plan.experiments], plan.chunks, plan.canary.id, campaign),
+        experiments=len(plan.experiments),
+        campaign=campaign.name,
+        campaign_digest=digest(campaign.source),
+        study=campaign.study,
+        target=campaign.target,
+        chunks=chunks_of(folder),
+        limits=campaign.limits,
+        goldens=tuple(one.stored() for one in plan.goldens()),
+        canary_hazard=campaign.canary.hazard,
+    )
+    for key, found, value in head.differences(follows):
+        expected = f"{short(value)}, which follows from {plan_file.EXPERIMENTS} and {CAMPAIGN}"
+        yield MutatorError(f"{key} {short(found)}", where=run / HEAD, expected=expected)
     if Digest.of_file(run / CSV) != Digest.of(plan_csv(plan)):
         yield MutatorError(
             "differs from the plan", where=run / CSV, expected=f"the rows of {plan_file.EXPERIMENTS}"
         )
 
 
-def _goldens(folder: RunFolder, manifest: TargetManifest | None) -> Problems:
+def _goldens(folder: RunFolder) -> Problems:
     """Check that every check passed, and that the golden runs are the ones checked."""
     path = folder.path / CHECKS
     if not path.exists():  # no experiment has run yet
@@ -171,8 +170,7 @@ def _goldens(folder: RunFolder, manifest: TargetManifest | None) -> Problems:
     for result in checks["results"]:
         if not result["passed"]:
             yield MutatorError(f"check `{result['name']}` failed: {result['detail']}", where=path)
-    old = list(manifest.outputs) if manifest else []
-    for name, found in golden_digests(folder, folder.head.get("golden_files", old)).items():
+    for name, found in golden_digests(folder, folder.head.golden_files).items():
         if checks["goldens"].get(name) != found:
             known = str(checks["goldens"].get(name))
             got = f"golden run {name} with digest {found[:16]}"
@@ -188,9 +186,9 @@ def _sources(folder: RunFolder, workspace: Workspace | None) -> Problems:
             expected="the run's sources (trees and patches were not compared)",
         )
         return
-    manifest = workspace.manifest(head["target"])
+    manifest = workspace.manifest(head.target)
     now = RunInputs.of(workspace, manifest, folder.scenarios).digests()
-    for name, known in head["sources"].items():
+    for name, known in head.sources.items():
         if now.get(name) != known:
             yield MutatorError(
                 f"{name} {known[:16]}",
@@ -198,7 +196,7 @@ def _sources(folder: RunFolder, workspace: Workspace | None) -> Problems:
                 expected=f"{str(now.get(name))[:16]}, the digest here",
                 remedy="verify with the run's sources (trees and patches were not compared)",
             )
-    for path, known in head.get("target_files", {}).items():
+    for path, known in head.target_files.items():
         if (found := manifest.tree.digests.get(path)) != known:
             yield MutatorError(
                 f"{path} {known[:16]}", where=where, expected=f"{str(found)[:16]}, the digest here"

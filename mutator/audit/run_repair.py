@@ -141,7 +141,7 @@ def _segments(folder: RunFolder, ledger: Ledger, lost: Collection[str]) -> Itera
             kept = list(_kept(_trusted(segment, known, data), planned, dropped, done))
             gone = max(0, data.count(b"\n") - 1 - len(kept))
             if gone or segment.damaged or not _in_place(segment, schema, known, data):
-                head = {"schema": schema, "plan": folder.head["plan"]}
+                head = {"schema": schema, "plan": folder.head.plan}
                 said = f"{name}: {counted(gone, 'line')} set aside, {len(kept)} kept"
                 yield name, written(path, head, kept), said
     for name, known in ledger.files.items():

@@ -69,18 +69,18 @@ def seals_of(folder: RunFolder) -> Seals:
     review = review_digest(folder.path)
     if not folder.finished:
         return Seals(review_digest=review)
-    goldens = golden_files(folder)
-    runs = digest([_RUNS_SCHEMA, folder.head["plan"], goldens, _records(folder, "records")])
+    head, goldens = folder.head.content(), golden_files(folder)
+    runs = digest([_RUNS_SCHEMA, folder.head.plan, goldens, _records(folder, "records")])
     results = digest(
         [
             RESULTS_SCHEMA,
-            without(folder.head, OUTSIDE_RESULTS),
+            without(head, OUTSIDE_RESULTS),
             goldens,
             _records(folder, "records", _without_texts),
         ]
     )
     facts = {
-        HEAD: without(folder.head, OUTSIDE[HEAD]),
+        HEAD: without(head, OUTSIDE[HEAD]),
         CHECKS: without(read_json(folder.path / CHECKS, CHECKS_SCHEMA), OUTSIDE[CHECKS]),
         "versions": _versions(folder),
         "files": _sha256(folder, _FILES),
@@ -110,11 +110,12 @@ def unsealed_facts(folder: RunFolder) -> dict[str, str]:
     """Return the facts of a run folder that its seal does not cover, by name: who can write to the folder can
     change them.
     """
-    choices = folder.head["choices"]
-    chosen = {f"chosen: {name}": str(choices[name]) for name in ("shard", "series_mb") if choices.get(name)}
+    choices = folder.head.choices
+    chosen = {"chosen: shard": choices.shard, "chosen: series_mb": choices.series_mb}
     environment = {name: text for name, text in told(folder.stretches).items() if name != "python"}
     approvals = {"approvals": _APPROVALS} if review_digest(folder.path) else {}
-    return {**environment, **chosen, **approvals, "other files": _UNSEALED_FILES}
+    made = {name: str(value) for name, value in chosen.items() if value}
+    return {**environment, **made, **approvals, "other files": _UNSEALED_FILES}
 
 
 def golden_digests(folder: RunFolder, names: Sequence[str]) -> dict[str, str]:

@@ -87,8 +87,8 @@ def _packed(
             what = "the index of the chunks beside it"
             yield MutatorError("missing", where=path, expected=what, remedy=putting_aside(run))
         return
-    if index.plan != folder.head["plan"]:
-        got, expected = f"series of plan {index.plan[:16]}", folder.head["plan"][:16]
+    if index.plan != folder.head.plan:
+        got, expected = f"series of plan {index.plan[:16]}", folder.head.plan[:16]
         yield MutatorError(got, where=path, expected=expected, remedy=putting_aside(run))
         return
     damaged = set()

@@ -57,7 +57,7 @@ def _golden_chunk(folder: RunFolder, workspace: Workspace | None, index: Index, 
     if workspace is None or not keys.keys() >= {*numbers}:
         return None
     try:
-        manifest = workspace.manifest(folder.head["target"])
+        manifest = workspace.manifest(folder.head.target)
         goldens = [
             load_channels(manifest, inside(folder.path / "golden", keys[number])) for number in numbers
         ]

@@ -40,8 +40,8 @@ def statement(folder: RunFolder, seals: Seals) -> bytes:
         "seal": seals.seal,
         "results_digest": seals.results_digest,
         "review_digest": seals.review_digest,
-        "plan": folder.head["plan"],
-        "mutator": folder.head["provenance"]["mutator"],
+        "plan": folder.head.plan,
+        "mutator": folder.head.provenance.mutator,
     }
     return canonical(said).encode() + b"\n"
 

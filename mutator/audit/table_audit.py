@@ -28,7 +28,7 @@ def _differences(folder: RunFolder, there: list[str]) -> Iterator[MutatorError]:
     if not there:
         return
     with TemporaryDirectory() as scratch:
-        made = {name: inside(Path(scratch), name) for name in table_building.names(folder)}
+        made = {name: inside(Path(scratch), name) for name in table_building.TABLES}
         table_building.write(folder, made)
         for name in there:
             path = inside(folder.path, name)

@@ -48,7 +48,7 @@ def pending(folder: RunFolder, records: Mapping[str, Record]) -> tuple[Pending, 
     names = plan_file.ids(folder.path) if done else None
     shard = folder.shard
     left: list[Pending] = []
-    for index, (_, _, count) in enumerate(folder.head["chunks"]):
+    for index, (_, _, count) in enumerate(folder.head.chunks):
         if names is None:
             places = tuple(range(count))
         else:

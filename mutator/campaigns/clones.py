@@ -17,10 +17,10 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory, TemporaryFile
-from typing import Any
 
 from mutator._common.below import open_below
 from mutator.errors import MutatorError
+from mutator.store.stretches import CloneState
 
 _PATIENCE_S = 10.0  # for one answer
 _MOST_SAID = 32 << 20  # bytes of an answer; a tiny repository can list billions of files
@@ -189,11 +189,11 @@ class Clone:
             return _git(folder, *words, places=places, asked=asked)
 
 
-def clone_state(folder: Path) -> dict[str, Any] | None:
+def clone_state(folder: Path) -> CloneState | None:
     """Return the git commit of a folder, and whether the folder has changed since; None if unknown."""
     clone = Clone.of(folder)
     changed = None if clone is None else clone.differs(folder)
-    return None if clone is None or changed is None else {"commit": clone.commit, "changed": changed}
+    return None if clone is None or changed is None else CloneState(commit=clone.commit, changed=changed)
 
 
 def user_name(folder: Path) -> str | None:

@@ -4,14 +4,12 @@ import csv
 import io
 from collections.abc import Callable, Iterable
 from contextlib import ExitStack
-from dataclasses import asdict
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
 from mutator._common.files import (
     is_half_written,
-    json_bytes,
     make_folder,
     remove_folder,
     write_atomic,
@@ -31,9 +29,9 @@ from mutator.store import digests, plan_file
 from mutator.store.digests import Digest, DigestingFile, Ledger
 from mutator.store.opening import check_contents
 from mutator.store.run_folder import RunFolder
-from mutator.store.run_head import CAMPAIGN, HEAD, SCHEMA
+from mutator.store.run_head import CAMPAIGN, HEAD, SCHEMA, Provenance, RunHead
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.target_facts import channel_facts, metric_facts
+from mutator.targets.target_facts import channel_facts, hazard_facts, metric_facts
 from mutator.workspace import Workspace
 
 CSV = "plan.csv"
@@ -85,18 +83,18 @@ def freeze_owned(plan: Plan | Planning, out: Path, workspace: Workspace) -> tupl
     if RunFolder.exists(out):
         folder = RunFolder.open(out)
         tally, found = _counted(plan)
-        if folder.head["plan"] != found:
+        if folder.head.plan != found:
             raise MutatorError(
                 "this folder holds another plan",
                 where=out,
                 expected=f"plan {found[:16]}",
                 remedy="use another folder, or the campaign and options with which this folder was planned",
             )
-        check_version(out, folder.head["schema"], folder.head["provenance"])
-        check_sources(out, folder.head["sources"], _sources(tally, plan, workspace))
+        check_version(folder)
+        check_sources(out, folder.head.sources, _sources(tally, plan, workspace))
         return folder, tally
     tally, found, places, files = _written(plan, out)
-    head = json_bytes(_head(plan, tally, found, workspace, places))
+    head = _head(plan, tally, found, workspace, places).as_json()
     digests.write(out, Ledger(files=files | {HEAD: Digest.of(head)}))
     write_atomic(out / HEAD, head)  # last, because this file makes the folder a run folder
     return RunFolder.open(out), tally
@@ -145,53 +143,50 @@ def _sources(tally: Tally, plan: Plan | Planning, workspace: Workspace) -> dict[
 
 def _head(
     plan: Plan | Planning, tally: Tally, found: str, workspace: Workspace, chunks: list[plan_file.Chunk]
-) -> dict[str, Any]:
+) -> RunHead:
     manifest = workspace.manifest(plan.campaign.target)
     canary = plan_file.to_plain(plan.canary) | {"fault": plain(plan.canary.fault)}
-    return {
-        "schema": SCHEMA,
-        "plan": found,
-        "campaign": plan.campaign.name,
-        "campaign_digest": digest(plan.campaign.source),
-        "study": plan.campaign.study,
-        "target": plan.campaign.target,
-        "seed": plan.seed,
-        **({"seeds": [plan.seeds[0], plan.seeds[-1]]} if len(plan.seeds) > 1 else {}),
-        "reading": plan.reading,
-        **({"operators": list(plan.told)} if plan.told else {}),
-        "choices": asdict(plan.choices),
-        "experiments": tally.experiments,
-        "runs": tally.runs,
-        "limits": plain(plan.campaign.limits),
+    return RunHead(
+        schema=SCHEMA,
+        plan=found,
+        campaign=plan.campaign.name,
+        campaign_digest=digest(plan.campaign.source),
+        study=plan.campaign.study,
+        target=plan.campaign.target,
+        seed=plan.seed,
+        seeds=(plan.seeds[0], plan.seeds[-1]) if len(plan.seeds) > 1 else None,
+        reading=plan.reading,
+        operators=plan.told,
+        choices=plan.choices,
+        experiments=tally.experiments,
+        runs=tally.runs,
+        limits=plan.campaign.limits,
         **target_facts(workspace, manifest),
-        "goldens": [one.plain() for one in tally.needed()],
-        "canary": canary,
-        "canary_hazard": plan.campaign.canary.hazard,
-        "sources": _sources(tally, plan, workspace),
-        "provenance": {"mutator": VERSION},
-        "stretches": [],
-        "chunks": chunks,
-    }
+        goldens=tuple(one.stored() for one in tally.needed()),
+        canary=canary,
+        canary_hazard=plan.campaign.canary.hazard,
+        sources=_sources(tally, plan, workspace),
+        provenance=Provenance(mutator=VERSION),
+        stretches=(),
+        chunks=tuple(chunks),
+    )
 
 
 def target_facts(workspace: Workspace, manifest: TargetManifest) -> dict[str, Any]:
-    """Return what run.json says about the target: keys and values in JSON types."""
-    structure, scale = workspace.structure(manifest), workspace.scale_of(manifest)
-    facts = {
+    """Return what run.json says about the target, by field of `RunHead`."""
+    structure = workspace.structure(manifest)
+    return {
         "hazards": manifest.hazards,
         "alerts": manifest.alerts,
-        "compared": [channel.name for channel in manifest.compared],
-        "metrics": [metric.plain() for metric in metric_facts(manifest)],
-        "about_hazards": [
-            {"name": one.name, "about": one.about, "terminal": bool(one.terminal)} for one in manifest.rules
-        ],
-        "severity": scale.plain() if scale else None,
-        "channels": [channel.plain() for channel in channel_facts(manifest)],
+        "compared": tuple(channel.name for channel in manifest.compared),
+        "metrics": metric_facts(manifest),
+        "about_hazards": hazard_facts(manifest),
+        "severity": workspace.scale_of(manifest),
+        "channels": channel_facts(manifest),
         "structure": structure.model_dump(mode="json", by_alias=True) if structure else None,
-        "golden_files": manifest.outputs,
+        "golden_files": tuple(manifest.outputs),
         "target_files": manifest.tree.digests,
     }
-    return dict(plain(facts))
 
 
 def csv_bytes(experiments: Iterable[Experiment], *, head: bool = False) -> bytes:

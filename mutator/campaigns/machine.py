@@ -16,6 +16,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 from mutator.engines.processes import environment
+from mutator.store.stretches import Blas
 from mutator.targets.environment import THREADS
 
 _BLAS = "import json, numpy, threadpoolctl; print(json.dumps(threadpoolctl.threadpool_info()))"
@@ -45,7 +46,7 @@ def threads() -> dict[str, str]:
 
 
 @lru_cache(maxsize=1)
-def blas() -> tuple[dict[str, Any], ...]:
+def blas() -> tuple[Blas, ...]:
     """Return the BLAS that numpy loads in the target's environment; empty without numpy.
 
     `kernel` is the one that the library chose for this processor.
@@ -61,7 +62,7 @@ def blas() -> tuple[dict[str, Any], ...]:
     loaded = json.loads(done.stdout) if done.returncode == 0 else []
     names = {"internal_api": "library", "version": "version", "architecture": "kernel"}
     names["num_threads"] = "threads"
-    return tuple({ours: one.get(theirs) for theirs, ours in names.items()} for one in loaded)
+    return tuple(Blas(**{ours: one.get(theirs) for theirs, ours in names.items()}) for one in loaded)
 
 
 @lru_cache(maxsize=1)

@@ -2,14 +2,14 @@
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 from html import escape
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mutator._common.arguments import check_type, check_whole
+from mutator._common.arguments import check_type
 from mutator._common.tables import Table
 from mutator._common.text import counted, seeds_text
 from mutator.campaigns.campaign_files import Campaign, check_readings, load_campaign, load_study
@@ -25,6 +25,7 @@ from mutator.model import AfterHazard, Experiment
 from mutator.results.plan_columns import PLAN_COLUMNS, plan_row
 from mutator.store import plan_file
 from mutator.store.check_results import measured_cpu_s
+from mutator.store.choices import Choices
 from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.store.run_head import CAMPAIGN
 from mutator.store.shards import Shard
@@ -40,32 +41,6 @@ _START_S = 3.0  # time that a campaign needs outside its runs
 _BYTES_PER_EXPERIMENT = 9_000  # series, patch, record and table rows of an experiment
 _BYTES_PER_GOLDEN = 1_200_000
 _IN_MEMORY = 50_000  # larger plans are not read as a whole
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Choices:
-    """Options that override the campaign file; None: as in the file.
-
-    Filters (`mutator.campaigns.filters`) use the columns that are known before an experiment runs.
-    """
-
-    seed: int | None = None  #: the seed of the sample, of drawn values and of random triggers
-    reading: str | None = None  #: the reading of the fault specs
-    only: str | None = None  #: filter: keep the experiments that match
-    exclude: str | None = None  #: filter: drop the experiments that match
-    limit: int | None = None  #: how many experiments to keep, spread like a sample
-    shard: str | None = None  #: the shard to run, `k/n`
-    series_mb: int | None = None  #: the budget of the series in MiB; 0: no series
-
-    def __post_init__(self) -> None:
-        for name, least in (("seed", 0), ("limit", 1), ("series_mb", 0)):
-            if (value := getattr(self, name)) is not None:
-                check_whole(name, value, least=least)
-        for name in ("reading", "only", "exclude", "shard"):
-            if (value := getattr(self, name)) is not None:
-                check_type(name, value, str, "text")
-        if self.shard is not None:
-            Shard.parse(self.shard)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -302,21 +277,21 @@ def load_plan(folder: RunFolder, tally: Tally | None = None) -> Plan:
     The experiments of a very large plan are not kept in memory.
     """
     head = folder.head
-    large = head["experiments"] > _IN_MEMORY
+    large = head.experiments > _IN_MEMORY
     plan = Plan(
         campaign=load_campaign(folder.path / CAMPAIGN),
-        choices=Choices(**{f.name: head["choices"].get(f.name) for f in fields(Choices)}),
-        seed=head["seed"],
-        reading=head["reading"],
-        experiments=plan_file.ExperimentsInOrder(folder.path, head["chunks"])
+        choices=head.choices,
+        seed=head.seed,
+        reading=head.reading,
+        experiments=plan_file.ExperimentsInOrder(folder.path, head.chunks)
         if large
         else plan_file.read_all(folder.path),
-        chunks=tuple(count for _, _, count in head["chunks"]),
+        chunks=tuple(count for _, _, count in head.chunks),
         canary=folder.canary,
-        runs=head.get("runs", head["experiments"]),
-        digest=head["plan"],
+        runs=head.runs,
+        digest=head.plan,
         run_cpu_s=measured_cpu_s(folder),
-        told=tuple(head.get("operators", ())),
+        told=head.operators,
     )
     if tally is not None:
         vars(plan)["tally"] = tally  # set the cached property; computing it would read every experiment

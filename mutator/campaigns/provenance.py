@@ -2,13 +2,12 @@
 
 import platform
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from packaging.utils import canonicalize_name
 
-from mutator._common.files import json_bytes
-from mutator._common.hashing import plain
 from mutator._common.version import VERSION
 from mutator.campaigns import machine
 from mutator.campaigns.clones import clone_state
@@ -17,7 +16,7 @@ from mutator.store import digests
 from mutator.store.check_results import loaded_packages
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import HEAD, SCHEMA
-from mutator.store.stretches import Stretch, differences
+from mutator.store.stretches import Machine, Stretch, differences
 
 if TYPE_CHECKING:
     from mutator.workspace import Workspace
@@ -26,7 +25,7 @@ _REMEDY = "undo the change, or use another run folder"
 _OWN = Path(__file__).parents[1]  # the harness
 
 
-def check_sources(run: Path, frozen: dict[str, str], now: dict[str, str]) -> None:
+def check_sources(run: Path, frozen: Mapping[str, str], now: Mapping[str, str]) -> None:
     changed = [name for name in frozen if now.get(name) != frozen[name]]
     if changed:
         raise MutatorError(
@@ -37,15 +36,15 @@ def check_sources(run: Path, frozen: dict[str, str], now: dict[str, str]) -> Non
         )
 
 
-def check_version(run: Path, schema: str, provenance: Mapping[str, Any]) -> None:
-    """Raise MutatorError for a run folder with another schema or mutator version.
+def check_version(folder: RunFolder) -> None:
+    """Raise MutatorError for a run folder of another version of mutator.
 
     Such a folder can be read but not resumed, because one program must produce all its results.
     """
-    if (schema, provenance["mutator"]) != (SCHEMA, VERSION):
+    if (version := folder.head.provenance.mutator) != VERSION:
         raise MutatorError(
-            f"this run was planned by mutator {provenance['mutator']} ({schema})",
-            where=run,
+            f"this run was planned by mutator {version} ({SCHEMA})",
+            where=folder.path,
             expected=f"mutator {VERSION} ({SCHEMA})",
             remedy="finish the run with that version, or use another folder; this run can still be read",
         )
@@ -81,17 +80,18 @@ def _packages(folder: RunFolder, more: Iterable[str] = ()) -> dict[str, str | No
     return machine.versions({*machine.required(), *loaded_packages(folder), *before, *more})
 
 
-def begin_stretch(folder: RunFolder, workspace: "Workspace", *, records: str, accept: bool) -> None:
-    """Record this session's software and machine in run.json, before its first experiment.
+def begin_stretch(folder: RunFolder, workspace: "Workspace", *, records: str, accept: bool) -> RunFolder:
+    """Record this session's software and machine in run.json, before its first experiment, and return the
+    folder with its new head.
 
     `records` is the glob of the session's files. MutatorError as in `check_versions`.
     """
-    manifest = workspace.manifest(folder.head["target"])
+    manifest = workspace.manifest(folder.head.target)
     places = {"library": workspace.library, "templates": workspace.templates, "target": manifest.root}
     places |= {"overlay": manifest.overlay} if manifest.overlay else {}
     packages = _packages(folder, (canonicalize_name(wanted.name) for wanted in manifest.requires))
     states = {name: clone_state(place) for name, place in ({"mutator": _OWN} | places).items()}
-    add_stretch(
+    return add_stretch(
         folder,
         Stretch(
             accepted=check_versions(folder, accept=accept),
@@ -107,17 +107,16 @@ def begin_stretch(folder: RunFolder, workspace: "Workspace", *, records: str, ac
     )
 
 
-def add_stretch(folder: RunFolder, stretch: Stretch) -> None:
-    _write_stretches(folder, [*folder.head.get("stretches", ()), plain(stretch)])
+def add_stretch(folder: RunFolder, stretch: Stretch) -> RunFolder:
+    return _with_stretches(folder, (*folder.stretches, stretch))
 
 
-def add_machine(folder: RunFolder, machine: Mapping[str, Any]) -> None:
-    *before, last = folder.head["stretches"]
-    _write_stretches(
-        folder, [*before, last | {"machines": [*last.get("machines", ()), plain(dict(machine))]}]
-    )
+def add_machine(folder: RunFolder, machine: Machine) -> RunFolder:
+    *before, last = folder.stretches
+    return _with_stretches(folder, (*before, replace(last, machines=(*last.machines, machine))))
 
 
-def _write_stretches(folder: RunFolder, stretches: list[dict[str, Any]]) -> None:
-    digests.rewrite(folder.path, HEAD, json_bytes(folder.head | {"stretches": stretches}))
-    folder.head["stretches"] = stretches
+def _with_stretches(folder: RunFolder, stretches: tuple[Stretch, ...]) -> RunFolder:
+    """Write run.json with these stretches of work, and return the folder as it is then."""
+    digests.rewrite(folder.path, HEAD, replace(folder.head, stretches=stretches).as_json())
+    return RunFolder(folder.path)

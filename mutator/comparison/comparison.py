@@ -96,7 +96,7 @@ class Comparison:
         return facts(self.a, self.b)
 
     @cached_property
-    def files(self) -> Files | None:
+    def files(self) -> Files:
         return files(self.a.folder, self.b.folder)
 
     @cached_property

@@ -1,9 +1,10 @@
 """Differences between the inputs of two runs: sources, choices and versions."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
+from mutator._common.hashing import plain
 from mutator.comparison.pairs import Matching, Pair
 from mutator.comparison.sides import Side
 from mutator.store.run_folder import RunFolder
@@ -46,35 +47,28 @@ def facts(a: Side, b: Side) -> tuple[Fact, ...]:
 
 def _facts(side: Side) -> dict[str, str]:
     head, stretches = side.folder.head, side.folder.stretches
-    told = {name: str(head[name]) for name in _HEAD}
+    told = {name: str(getattr(head, name)) for name in _HEAD}
     if len(seeds := side.folder.seeds) > 1:
         told["seed"] = f"{seeds[0]} to {seeds[-1]}"
     told["setting"] = ", ".join(dict.fromkeys(c for e in side.experiments for c in e.setting)) or "-"
-    told["chosen"] = ", ".join(f"{k} {v}" for k, v in head["choices"].items() if v is not None) or "-"
-    told |= {f"digest of {name}": value[:_SHORT] for name, value in head["sources"].items()}
+    told["chosen"] = ", ".join(f"{k} {v}" for k, v in plain(head.choices).items() if v is not None) or "-"
+    told |= {f"digest of {name}": value[:_SHORT] for name, value in head.sources.items()}
     if scale := side.folder.scale:
         bounds = ", ".join(f"{name} from {least:.3g} m/s" for name, least, _ in scale.classes[1:])
         told["scale of severity"] = f"{scale.name}: {bounds}"
-    told["digest of plan"] = head["plan"][:_SHORT]
-    told["mutator"] = head["provenance"]["mutator"]
+    told["digest of plan"] = head.plan[:_SHORT]
+    told["mutator"] = head.provenance.mutator
     return told | ran_with(stretches) | {f"package {k}": v for k, v in package_versions(stretches).items()}
 
 
-def files(a: RunFolder, b: RunFolder) -> Files | None:
-    """Return the target's files that differ; None if a run is too old to list them."""
-    of_a, of_b = (_files(folder.head) for folder in (a, b))
-    if of_a is None or of_b is None:
-        return None
+def files(a: RunFolder, b: RunFolder) -> Files:
+    """Return the target's files that differ."""
+    of_a, of_b = a.head.target_files, b.head.target_files
     return Files(
         changed=tuple(sorted(path for path in of_a if path in of_b and of_a[path] != of_b[path])),
         only_a=tuple(sorted(set(of_a) - set(of_b))),
         only_b=tuple(sorted(set(of_b) - set(of_a))),
     )
-
-
-def _files(head: Mapping[str, Any]) -> dict[str, str] | None:
-    found: dict[str, str] | None = head.get("target_files")
-    return found
 
 
 def remarks(a: Side, b: Side, matching: Matching) -> tuple[str, ...]:
@@ -97,7 +91,7 @@ def remarks(a: Side, b: Side, matching: Matching) -> tuple[str, ...]:
 def parts_remark(a: Side, b: Side) -> str:
     """Return a remark that the runs are different parts of a campaign; empty if they are the same part."""
     of_a, of_b = (
-        {name: value for name in _PARTS if (value := side.folder.head["choices"].get(name)) is not None}
+        {name: value for name in _PARTS if (value := getattr(side.folder.head.choices, name)) is not None}
         for side in (a, b)
     )
     if of_a == of_b:

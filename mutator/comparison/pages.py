@@ -77,8 +77,6 @@ def reasons(comparison: Comparison) -> list[tuple[str, int]]:
 
 def files_text(comparison: Comparison) -> str:
     found = comparison.files
-    if found is None:
-        return "It is unknown which target files differ, because one run is too old to list them."
     parts = {
         "changed": found.changed,
         f"only in {comparison.names.a}": found.only_a,

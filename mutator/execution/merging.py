@@ -6,11 +6,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from mutator._common.below import inside, open_below
-from mutator._common.files import json_bytes, raising_disk_full, read_json, write_atomic, writing_atomic
-from mutator._common.hashing import plain
+from mutator._common.files import raising_disk_full, read_json, write_atomic, writing_atomic
 from mutator._common.locks import owned
 from mutator._common.text import counted
 from mutator.audit.seal import OUTSIDE, without
@@ -31,7 +29,6 @@ from mutator.store.patches import PatchWriter
 from mutator.store.records import endings
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import HEAD
-from mutator.store.run_head import SCHEMA as HEAD_SCHEMA
 from mutator.store.run_writer import copy_lines
 from mutator.store.series import FOLDER as SERIES
 from mutator.store.series_packing import pack
@@ -65,7 +62,7 @@ def merge(shards: Sequence[Path], out: Path, *, accept_versions: bool = False) -
         for folder in folders:
             stack.enter_context(owned(folder.path, patience_s=0.0))
             _check_complete(folder)
-        stretches = [plain(s) for s in _stretches(folders, accept=accept_versions)]
+        stretches = list(_stretches(folders, accept=accept_versions))
         _check_goldens(folders)
         _make_empty(out)
         stack.enter_context(owned(out))
@@ -96,15 +93,15 @@ def _opened(path: Path) -> RunFolder:
 def _check_plans(folders: Sequence[RunFolder]) -> None:
     first = folders[0]
     for folder in folders[1:]:
-        for key in ("plan", "sources"):
-            if folder.head[key] != first.head[key]:
+        for key, _, _ in folder.head.differences(first.head):
+            if key in ("plan", "sources"):
                 raise MutatorError(
                     f"made from a different {key.rstrip('s')} than {first.path}",
                     where=folder.path,
                     expected="shards of one plan, with the same target, templates and scenarios",
                     remedy=_REMEDY,
                 )
-        one, other = (without(shard.head, ("schema", *OUTSIDE[HEAD])) for shard in (first, folder))
+        one, other = (without(shard.head.content(), OUTSIDE[HEAD]) for shard in (first, folder))
         if differ := [key for key in {**one, **other} if one.get(key) != other.get(key)]:
             raise MutatorError(
                 f"'{differ[0]}' differs from {first.path / HEAD}",
@@ -190,11 +187,11 @@ def _stretches(folders: Sequence[RunFolder], *, accept: bool) -> Iterator[Stretc
             yield replace(
                 stretch,
                 records=f"{stretch.records}-shard{folder.shard.number}",
-                accepted=[*stretch.accepted, *(() if i else found)],
+                accepted=(*stretch.accepted, *(() if i else found)),
             )
 
 
-def _copy(folders: Sequence[RunFolder], out: Path, stretches: Sequence[dict[str, Any]]) -> None:
+def _copy(folders: Sequence[RunFolder], out: Path, stretches: Sequence[Stretch]) -> None:
     """Copy all content. The head is written last, so that an unfinished copy is not a run folder."""
     first = folders[0]
     ledger = digests.settled(first.path)
@@ -214,12 +211,8 @@ def _copy(folders: Sequence[RunFolder], out: Path, stretches: Sequence[dict[str,
         assert folder.shard is not None
         copy_lines(folder, out, f"-shard{folder.shard.number}")
     _pack_series(folders, out)
-    whole = {
-        "schema": HEAD_SCHEMA,
-        "choices": first.head["choices"] | {"shard": None},
-        "stretches": stretches,
-    }
-    head = json_bytes(first.head | whole)
+    choices = replace(first.head.choices, shard=None)
+    head = replace(first.head, choices=choices, stretches=tuple(stretches)).as_json()
     digests.write(out, Ledger(files=files | {HEAD: Digest.of(head)}))
     digests.close_segments(out, finished=True)
     write_atomic(out / HEAD, head)
@@ -246,4 +239,4 @@ def _pack_series(folders: Sequence[RunFolder], out: Path) -> None:
         first = folders[0]
         frames = [frame_of(folder, plan_file.iterate(folder.path)) for folder in folders]
         ranks = worth(pd.concat(frames, ignore_index=True))
-        pack(out, first.head["plan"], ranks, first.series_mb, others=shards)
+        pack(out, first.head.plan, ranks, first.series_mb, others=shards)

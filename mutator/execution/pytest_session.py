@@ -13,7 +13,6 @@ import pytest
 
 from mutator._common.locks import living_workers
 from mutator._common.shortages import shortage
-from mutator.campaigns.plans import Choices
 from mutator.errors import HarnessErrors, MutatorError
 from mutator.execution.following import followed
 from mutator.execution.phases import Lines
@@ -21,6 +20,7 @@ from mutator.execution.pytest_worker import INPUT, PROBLEM, WRITTEN, CampaignIte
 from mutator.execution.session import Notify, Session, Summary, open_session
 from mutator.execution.stopped_workers import Continuing
 from mutator.execution.worker import Assignment, dying_python
+from mutator.store.choices import Choices
 from mutator.workspace import Workspace
 
 

@@ -6,12 +6,13 @@ from pathlib import Path
 from mutator._common.hashing import digest
 from mutator.campaigns.campaign_files import load_campaign
 from mutator.campaigns.freezing import freeze_owned
-from mutator.campaigns.plans import Choices, Planning, load_plan, make_plan
+from mutator.campaigns.plans import Planning, load_plan, make_plan
 from mutator.campaigns.provenance import check_sources, check_version
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.errors import MutatorError
 from mutator.review import gate
 from mutator.store.approvals import write_approvals
+from mutator.store.choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -39,19 +40,21 @@ def open_frozen(
 def _found(workspace: Workspace, campaign: str | Path, out: Path, choices: Choices) -> RunFolder:
     folder = RunFolder.open(out)
     head = folder.head
-    check_version(out, head["schema"], head["provenance"])
+    check_version(folder)
     loaded = load_campaign(workspace.campaign(campaign))
-    if digest(loaded.source) != head["campaign_digest"]:
+    if digest(loaded.source) != head.campaign_digest:
         raise MutatorError(
-            f"holds a run of campaign '{head['campaign']}' whose text differs from {loaded.path}",
+            f"holds a run of campaign '{head.campaign}' whose text differs from {loaded.path}",
             where=out,
             remedy="use another folder, or give the campaign file in the run folder: "
             + str(out / "campaign.yaml"),
         )
     for name, value in asdict(choices).items():
-        frozen = head["choices"].get(name)
-        if name == "reading" or (name == "seed" and "seeds" not in head):
-            frozen = head[name]
+        frozen = getattr(head.choices, name)
+        if name == "reading":
+            frozen = head.reading
+        elif name == "seed" and head.seeds is None:
+            frozen = head.seed
         if value is not None and value != frozen:
             raise MutatorError(
                 f"{name} {value}",
@@ -61,6 +64,6 @@ def _found(workspace: Workspace, campaign: str | Path, out: Path, choices: Choic
                 argument=name,
                 remedy=f"leave out `{name}`, or use another folder",
             )
-    now = RunInputs.of(workspace, workspace.manifest(head["target"]), folder.scenarios).digests()
-    check_sources(out, head["sources"], now)
+    now = RunInputs.of(workspace, workspace.manifest(head.target), folder.scenarios).digests()
+    check_sources(out, head.sources, now)
     return folder

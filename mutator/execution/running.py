@@ -6,13 +6,13 @@
 import warnings
 from pathlib import Path
 
-from mutator.campaigns.plans import Choices
 from mutator.errors import MutatorWarning
 from mutator.execution.distribution import Distributor
 from mutator.execution.following import followed
 from mutator.execution.left_files import LeftFiles
 from mutator.execution.local import LocalWorkers
 from mutator.execution.session import Notify, Summary, open_session
+from mutator.store.choices import Choices
 from mutator.workspace import Workspace
 
 LOCAL = LocalWorkers()

@@ -24,7 +24,6 @@ from mutator._common.locks import owned, wait_for_workers
 from mutator.audit.seal import Seals, seals_of
 from mutator.campaigns.chunks import Pending, pending
 from mutator.campaigns.freezing import make_run_folder
-from mutator.campaigns.plans import Choices
 from mutator.campaigns.provenance import add_machine, begin_stretch, check_versions
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.engines.kinds import REFERENCE
@@ -42,10 +41,12 @@ from mutator.results.ranking import worth
 from mutator.results.table_reader import Results
 from mutator.store import digests
 from mutator.store.check_results import golden_digests
+from mutator.store.choices import Choices
 from mutator.store.progress import Progress, label
 from mutator.store.records import LINE_SCHEMAS, endings
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_packing import pack, segments
+from mutator.store.stretches import Machine
 from mutator.targets.requirements import check_requirements
 from mutator.workspace import Workspace
 
@@ -115,9 +116,9 @@ class Session:
         self.notify: Notify = notify or (lambda progress: None)
         self.pending: tuple[Pending, ...] = ()
         self.proof: tuple[equivalence.Sample, ...] = ()
-        self.manifest = workspace.manifest(folder.head["target"])
+        self.manifest = workspace.manifest(folder.head.target)
         # count the whole plan, so that all shards and an unsharded run agree on whether a proof is needed
-        experiments = folder.head["experiments"]
+        experiments = folder.head.experiments
         self.engine = choose_engine(engine, self.manifest, experiments)
         self._not_forked = "" if engine else not_worth_forking(self.manifest, experiments)
         self.problem = ""
@@ -154,7 +155,7 @@ class Session:
             run_checks(self.workspace, self.folder, workers=self.workers, notify=self.notify)
             for remark in unreached_triggers(self.workspace, self.folder):
                 warnings.warn(remark, MutatorWarning, stacklevel=2)
-            begin_stretch(
+            self.folder = begin_stretch(
                 self.folder,
                 self.workspace,
                 records=self.worker_name("*"),
@@ -165,8 +166,8 @@ class Session:
         self.pending = left
         self._records = None if left else records
 
-    def note_machine(self, machine: Mapping[str, Any]) -> None:
-        add_machine(self.folder, machine)
+    def note_machine(self, machine: Machine) -> None:
+        self.folder = add_machine(self.folder, machine)
         self._ledger = digests.read(self.folder.path)
 
     def worker_name(self, name: str) -> str:
@@ -292,7 +293,7 @@ class Session:
         folder = self.folder
         if segments(folder.path) and not wait_for_workers(folder.path):
             ranks = worth(Results(folder.path).frame())
-            pack(folder.path, folder.head["plan"], ranks, folder.series_mb)
+            pack(folder.path, folder.head.plan, ranks, folder.series_mb)
 
 
 @contextmanager

@@ -112,9 +112,9 @@ def is_same(folder: RunFolder, known: Record | None, found: Record) -> bool:
 
 def manifest_of(workspace: Workspace, folder: RunFolder) -> TargetManifest:
     """Return the target of a run; MutatorError if its sources have changed since the run."""
-    manifest = workspace.manifest(folder.head["target"])
+    manifest = workspace.manifest(folder.head.target)
     now = RunInputs.of(workspace, manifest, folder.scenarios).digests()
-    check_sources(folder.path, folder.head["sources"], now)
+    check_sources(folder.path, folder.head.sources, now)
     return manifest
 
 

@@ -52,7 +52,7 @@ class Worker:
     def __init__(self, inputs: RunInputs, assignment: Assignment) -> None:
         self.was_stopped = False  # a signal handler sets it
         self.folder = RunFolder.open(assignment.run)
-        check_sources(self.folder.path, self.folder.head["sources"], inputs.digests())
+        check_sources(self.folder.path, self.folder.head.sources, inputs.digests())
         with raising_disk_full(self.folder.work):
             self.folder.work.mkdir(exist_ok=True)
         self._inputs, self._manifest, self._assignment = inputs, inputs.manifest, assignment
@@ -69,7 +69,7 @@ class Worker:
     def run(self, pending: Pending) -> list[tuple[str, str]]:
         """Run the rest of a chunk; return (experiment id, detail) of each harness error."""
         experiments = plan_file.read_chunk(
-            self.folder.path, self.folder.head["chunks"][pending.chunk], self._faults
+            self.folder.path, self.folder.head.chunks[pending.chunk], self._faults
         )
         self._make_room(experiments[0].seed)
         errors = []

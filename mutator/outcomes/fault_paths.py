@@ -16,7 +16,8 @@ from mutator.errors import MutatorError
 from mutator.model import Experiment, Fault, Outcome, Record
 from mutator.outcomes.channel_departures import Departure
 from mutator.outcomes.topology import PossibleRoute, chained, links_of, steps_from, structured
-from mutator.store.run_head import REMEDY, Head
+from mutator.store.run_folder import RunFolder
+from mutator.store.run_head import HEAD, REMEDY
 from mutator.stpa.analysis import Kind, StructureModel
 from mutator.targets.channels import Role
 from mutator.targets.target_facts import ChannelFacts
@@ -287,14 +288,15 @@ class FaultPaths:
         return min((left[name] for name in {*names, *unseen} if name in left), default=inf)
 
 
-def fault_paths_of(head: Head) -> FaultPaths | None:
+def fault_paths_of(folder: RunFolder) -> FaultPaths | None:
     """Return the fault paths of a run's target, from run.json. None if no channel names a component."""
+    head = folder.head
     if not any(channel.component for channel in head.channels):
         return None
     try:
-        structure = StructureModel.model_validate(head["structure"]) if head.get("structure") else None
+        structure = StructureModel.model_validate(head.structure) if head.structure else None
     except ValueError:
-        raise MutatorError("damaged at 'structure'", where=head.path, remedy=REMEDY) from None
+        raise MutatorError("damaged at 'structure'", where=folder.path / HEAD, remedy=REMEDY) from None
     return FaultPaths(head.channels, structure)
 
 

@@ -116,7 +116,7 @@ def _lacks(run: ReportedRun, missing: list[str]) -> Iterator[str]:
     """Yield how the run differs from the paper's mixture of faults. A shard is always incomplete."""
     if missing:
         yield f"no runs of {counted(len(missing), 'fault type')} of the paper"
-    if run.done < (planned := int(run.folder.head["experiments"])):
+    if run.done < (planned := run.folder.head.experiments):
         yield f"only {run.done} of {planned} planned experiments were run"
 
 

@@ -77,14 +77,14 @@ def _sample_of(folder: RunFolder) -> set[str]:
     """Ids of a plan's sample. For several seeds, each seed after the first adds one experiment in a
     hundred.
     """
-    return set(_sampled_ids(folder.path, folder.head["plan"], len(folder.seeds)))
+    return set(_sampled_ids(folder.path, folder.head.plan, len(folder.seeds)))
 
 
 @lru_cache(maxsize=4)  # a session asks several times
 def _sampled_ids(run: Path, plan: str, seeds: int) -> tuple[str, ...]:
     if seeds == 1:
         head = RunFolder.unverified(run).head
-        return tuple(e.id for e in sample(plan_file.read_all(run), head["seed"]))
+        return tuple(e.id for e in sample(plan_file.read_all(run), head.seed))
     found: list[str] = []
     for seed, group in groupby(plan_file.iterate(run), key=lambda experiment: experiment.seed):
         some = tuple(group)

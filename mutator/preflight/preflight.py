@@ -69,13 +69,13 @@ def unreached_triggers(workspace: Workspace, folder: RunFolder) -> list[str]:
     """
     experiments = ((folder.golden_of(e).key, e) for e in plan_file.iterate(folder.path))
     observed = unreached.read_observed(_kept(folder))
-    manifest = workspace.manifest(folder.head["target"])
+    manifest = workspace.manifest(folder.head.target)
     return unreached.remarks(workspace, manifest, experiments, observed) if observed else []
 
 
 def are_there(folder: RunFolder) -> bool:
     places = (folder.golden(*one) for one in folder.goldens)
-    goldens = (inside(place, name) for place in places for name in folder.head["golden_files"])
+    goldens = (inside(place, name) for place in places for name in folder.head.golden_files)
     return all(path.is_file() for path in (folder.path / FILE, *goldens))
 
 
@@ -90,7 +90,7 @@ class _Checks:
         self.workspace = workspace
         self.folder = folder
         self.kept = _kept(folder)
-        self.manifest: TargetManifest = workspace.manifest(head["target"])
+        self.manifest: TargetManifest = workspace.manifest(head.target)
         self.models = workspace.fault_models()
         self.keys = folder.goldens
         now = RunInputs.of(workspace, self.manifest, folder.scenarios).digests()
@@ -99,11 +99,11 @@ class _Checks:
         content = [
             now,
             machine.surroundings(),
-            head["goldens"],
-            head["seed"],
+            head.goldens,
+            head.seed,
             folder.canary.id,
-            head["canary_hazard"],
-            head["limits"],
+            head.canary_hazard,
+            head.limits,
         ]
         self.digest = digest([*content, places])
 

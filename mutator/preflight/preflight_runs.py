@@ -76,7 +76,7 @@ class CheckDriver:
         def run(experiment: Experiment) -> CheckRun:
             return self._run(engine, (_CANARY, None), canary.job(self.workspace, self.manifest, experiment))
 
-        hazard: str = self.folder.head["canary_hazard"]
+        hazard = self.folder.head.canary_hazard
         return canary.judge(canary.tries(self.workspace, self.manifest, self.folder.canary), run, hazard)
 
     def _jobs(self) -> dict[tuple[str, Any], Job]:
@@ -85,7 +85,7 @@ class CheckDriver:
         for key in self.folder.goldens:
             common: dict[str, Any] = {
                 "scenario": self.workspace.scenario(key.scenario),
-                "seed": self.folder.head["seed"] if key.seed is None else key.seed,
+                "seed": self.folder.head.seed if key.seed is None else key.seed,
                 "changes": key.changes,
             }
             name = key.key

@@ -52,7 +52,7 @@ def results(workspace: Workspace) -> str:
 def _table_of(manifest: TargetManifest) -> Iterator[str]:
     yield f"## Target {manifest.name}\n"
     compared = [channel.name for channel in manifest.compared]
-    severity = severity_columns({"severity": manifest.contact})
+    severity = severity_columns(has_classes=manifest.contact is not None)
     columns = (manifest.hazards, compared, metric_facts(manifest), severity)
     yield from _columns(result_columns(*columns, paths=True))
 

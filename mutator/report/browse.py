@@ -74,9 +74,9 @@ def browse_data(run: ReportedRun) -> Browse:
     facts = {
         **_of_target(folder, workspace),
         "series": series_facts(folder),
-        "metrics": [metric.plain() for metric in folder.head.metrics],
-        "severity": folder.head.get("severity"),
-        "hazards": folder.head.get("about_hazards", []),
+        "metrics": folder.head.metrics,
+        "severity": plain(folder.head.severity),
+        "hazards": plain(folder.head.about_hazards),
         "meanings": meanings_of(run),
     }
     return Browse(
@@ -101,7 +101,7 @@ def _which(run: ReportedRun) -> str:
 def _of_target(folder: RunFolder, workspace: "Workspace | None") -> dict[str, Any]:
     """Whether films can be made (true without a manifest), and the scene for the replay."""
     try:
-        manifest = workspace.manifest(folder.head["target"]) if workspace else None
+        manifest = workspace.manifest(folder.head.target) if workspace else None
     except MutatorError:
         manifest = None
     filmed = manifest is None or manifest.film is not None

@@ -95,7 +95,7 @@ def _report(run: Path, rows: int, summaries: tuple[Table, ...] = ()) -> Report:
 def _content(run: ReportedRun, browse: Callable[[], Browse]) -> Content:
     panels = [panel for panel_of in PANELS if (panel := panel_of(run)) is not None]
     return Content(
-        name=str(run.folder.head["campaign"]),
+        name=run.folder.head.campaign,
         alarm=run.engines.proof if run.engines and run.engines.failed else "",
         outcomes=outcome_counts(run.results),
         planned=_planned(run.folder),
@@ -108,12 +108,12 @@ def _content(run: ReportedRun, browse: Callable[[], Browse]) -> Content:
 
 
 def _planned(folder: RunFolder) -> str:
-    experiments, runs = int(folder.head["experiments"]), folder.head.get("runs")
+    experiments, runs = folder.head.experiments, folder.head.runs
     text = f"Planned: {counted(experiments, 'experiment')}"
     if folder.shard:
         text += f", {folder.planned} of them in shard {folder.shard}"
     if runs == experiments:
         text += "; each needs its own run"
-    elif runs is not None:  # older plans do not count runs
+    else:
         text += f", in {counted(runs, 'run')}, because experiments with identical runs share one run"
     return " ".join(filter(None, (f"{text}.", folder.stop_note)))

@@ -76,7 +76,7 @@ def _proof(folder: RunFolder, records: Mapping[str, Record]) -> tuple[str, str, 
         return said, f"FAILED: {err.got}", True
     if found is None:
         said = "All experiments ran on the reference engine, so no equivalence check is needed."
-        if folder.head["experiments"] < WORTH_IT:
+        if folder.head.experiments < WORTH_IT:
             said += f" Forking pays off only with {WORTH_IT} or more experiments."
         return said, "none needed", False
     same = f"{found.same} of {found.sampled} same"

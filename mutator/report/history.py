@@ -100,7 +100,7 @@ def _past_run(path: Path) -> PastRun:
     last = max(file.stat().st_mtime for file in files if file.exists())
     git = folder.stretches[-1].git or {}
     state = git.get("target")
-    commit = f"{state['commit'][:8]}{' with changes' if state['changed'] else ''}" if state else "-"
+    commit = f"{state.commit[:8]}{' with changes' if state.changed else ''}" if state else "-"
     cpu_s = sum(float(line["cpu_s"]) for line in folder.timings().values())
     date = datetime.fromtimestamp(last, UTC)
     return PastRun(folder=folder, date=date, commit=commit, rows=rows, cpu_s=cpu_s)
@@ -110,7 +110,7 @@ def _plans(runs: Sequence[PastRun]) -> dict[str, list[PastRun]]:
     """Return the runs by campaign and plan, the plan of the latest run first."""
     found: dict[str, list[PastRun]] = {}
     for run in runs:
-        found.setdefault(f"{run.folder.head['campaign']}, plan {run.folder.head['plan'][:8]}", []).append(run)
+        found.setdefault(f"{run.folder.head.campaign}, plan {run.folder.head.plan[:8]}", []).append(run)
     return dict(sorted(found.items(), key=lambda item: item[1][-1].date, reverse=True))
 
 

@@ -20,7 +20,7 @@ def series_facts(folder: RunFolder) -> dict[str, Any]:
     the browser's console would show an error.
     """
     series = SeriesFolder(folder.path)
-    columns = dict(deviation_columns(folder.head["compared"]))
+    columns = dict(deviation_columns(folder.head.compared))
     return {"packed": series.is_packed, "kept": series.kept_ids(), "deviations": columns}
 
 

@@ -87,12 +87,12 @@ class SourceLines:
         known = {name: faults[name] for name in results["fault_id"].unique() if name in faults}
         changes = {name: str(fault.value) for name, fault in known.items() if fault.module == OPERATORS}
         try:
-            manifest = workspace.manifest(folder.head["target"]) if workspace else None
+            manifest = workspace.manifest(folder.head.target) if workspace else None
         except (MutatorError, KeyError):
             manifest = None
         if manifest is None:
             return cls(changes=changes, why="The target was not found, so its source is not shown.")
-        if manifest.tree.digest != folder.head["sources"]["target"]:
+        if manifest.tree.digest != folder.head.sources["target"]:
             return cls(
                 changes=changes,
                 why="The target has changed since this run was planned, so line numbers do not match and its "

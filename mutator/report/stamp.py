@@ -99,7 +99,7 @@ def _library(folder: RunFolder, workspace: Workspace | None) -> object:
     try:
         paths = files_inside(workspace.library, "", "*.yaml")
         files += [one for one in _named(workspace.library, paths) if not one[0].startswith("reviews/")]
-        return [files, workspace.manifest(folder.head["target"]).tree.digest]
+        return [files, workspace.manifest(folder.head.target).tree.digest]
     except (MutatorError, KeyError):
         return [files, None]
 

@@ -26,7 +26,7 @@ Notify = Callable[[Progress], None]
 
 def take_stills(workspace: Workspace, folder: RunFolder, *, workers: int, notify: Notify) -> str:
     """Take the run's missing stills. Return why the first experiment without stills has none, or ''."""
-    manifest = workspace.manifest(folder.head["target"])
+    manifest = workspace.manifest(folder.head.target)
     if manifest.film is None or not manifest.film.pictures:
         return ""
     experiments = Planned(folder.path)

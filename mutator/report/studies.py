@@ -55,7 +55,7 @@ class ReportedRun:
     def open(cls, folder: RunFolder, workspace: Workspace | None) -> "ReportedRun":
         """Open a run folder whose tables are up to date."""
         experiments, records = Planned(folder.path), folder.records()
-        faults, fault_paths = plan_file.read_faults(folder.path), fault_paths_of(folder.head)
+        faults, fault_paths = plan_file.read_faults(folder.path), fault_paths_of(folder)
         results = Results(folder.path).frame()
         seen = Seen.of(folder, results, records, faults, fault_paths)
         return cls(
@@ -90,7 +90,7 @@ class ReportedRun:
         if self.workspace is None:
             return ()
         try:
-            return fault_free_runs(self.folder, self.workspace.manifest(self.folder.head["target"]))
+            return fault_free_runs(self.folder, self.workspace.manifest(self.folder.head.target))
         except (MutatorError, KeyError):
             return ()
 
@@ -102,7 +102,7 @@ class ReportedRun:
             return None
         ends: dict[str, float] = {}
         try:
-            manifest = self.workspace.manifest(self.folder.head["target"])
+            manifest = self.workspace.manifest(self.folder.head.target)
             for one in self.folder.goldens:
                 trace = load_trace(manifest, self.folder.golden(*one), [])
                 end = float(trace[manifest.time_channel][-1])
@@ -135,7 +135,7 @@ class Study:
 
 
 def _study(folder: RunFolder) -> Study | None:
-    name = folder.head.get("study")  # older runs do not have this key
+    name = folder.head.study
     try:
         return cast(Study, find_study(name)) if name else None
     except MutatorError:

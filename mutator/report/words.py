@@ -6,6 +6,7 @@ from mutator.config.yaml_files import load
 from mutator.errors import MutatorError
 from mutator.model import Method
 from mutator.report.studies import ReportedRun
+from mutator.targets.severity import Scale
 
 Words = Mapping[str, Mapping[str, str]]  # heading -> term -> meaning
 
@@ -46,8 +47,8 @@ def words_of(run: ReportedRun) -> Words:
         "How an experiment ends": _ENDINGS,
         "What is counted": _RUNS,
         "Alerts": _ALERTS if run.folder.has_alerts else {},
-        "Hazards": {one["name"]: one["about"] for one in head.get("about_hazards") or () if one["about"]},
-        "Severity": _severity(head.get("severity")),
+        "Hazards": {one.name: one.about for one in head.about_hazards if one.about},
+        "Severity": _severity(head.severity),
         "Scenarios": _scenarios(run),
         "Triggers": _triggers(run),
     }
@@ -79,12 +80,12 @@ def meanings_of(run: ReportedRun) -> Words:
     }
 
 
-def _severity(scale: Mapping[str, object] | None) -> dict[str, str]:
+def _severity(scale: Scale | None) -> dict[str, str]:
     if not scale:
         return {}
-    classes = scale["classes"]
-    assert isinstance(classes, list)
-    told = {f"severity {name}": f"delta-v of {low:.2f} m/s or more: {about}" for name, low, about in classes}
+    told = {
+        f"severity {name}": f"delta-v of {low:.2f} m/s or more: {about}" for name, low, about in scale.classes
+    }
     return told | {"no contact": "no severity class; these runs rank by margin, alternating between hazards"}
 
 

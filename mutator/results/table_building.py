@@ -47,7 +47,7 @@ def build(run: Path) -> Path:
     made_from = _made_from(folder)
     with ExitStack() as stack:
         # The stack exits in reverse order, so the first table is replaced first.
-        paths = {name: inside(folder.path, name) for name in reversed(names(folder))}
+        paths = {name: inside(folder.path, name) for name in reversed(TABLES)}
         made = {name: stack.enter_context(half_written(path)) for name, path in paths.items()}
         write(folder, made)
         now = {name: found.sha256 for name, path in made.items() if (found := Digest.of_file(path))}
@@ -57,11 +57,6 @@ def build(run: Path) -> Path:
         stamp = {"schema": SCHEMA, "made_from": made_from, "tables": now, "before": before}
         write_json(folder.path / STAMP, stamp)
     return folder.path / CSV
-
-
-def names(folder: RunFolder) -> tuple[str, ...]:
-    """Return the names of a run folder's tables. Older runs have no table of propagation."""
-    return tuple(name for name in TABLES if name != PROPAGATION or "channels" in folder.head)
 
 
 def write(folder: RunFolder, paths: Mapping[str, Path]) -> None:
@@ -77,15 +72,12 @@ def write(folder: RunFolder, paths: Mapping[str, Path]) -> None:
 
 def _write_results(folder: RunFolder, paths: Mapping[str, Path]) -> None:
     records, planned, columns = folder.records(), Planned(folder.path), columns_of(folder.head)
-    scale, fault_paths = folder.scale, fault_paths_of(folder.head)
-    tells_propagation = PROPAGATION in paths
+    scale, fault_paths = folder.scale, fault_paths_of(folder)
 
     def made(batch: Sequence[str]) -> tuple[bytes, Any, Any]:
         finished = [Finished(planned[name], records[name], scale, fault_paths) for name in batch]
         cells = cells_of(columns, finished)
         lines, table = csv_lines(zip(*cells, strict=True)), record_batch(columns, cells)
-        if not tells_propagation:
-            return lines, table, None
         found = propagation.columns_of((one.record for one in finished), folder.head.channels)
         return lines, table, record_batch(propagation.COLUMNS, list(found.values()))
 
@@ -93,15 +85,12 @@ def _write_results(folder: RunFolder, paths: Mapping[str, Path]) -> None:
         stack.enter_context(_without_collection())
         csv = stack.enter_context(CsvTable(paths[CSV], columns))
         parquet = stack.enter_context(ParquetTable(paths[PARQUET], columns))
-        propagated = None
-        if tells_propagation:
-            propagated = stack.enter_context(ParquetTable(paths[PROPAGATION], propagation.COLUMNS))
+        propagated = stack.enter_context(ParquetTable(paths[PROPAGATION], propagation.COLUMNS))
         batches = _batches(name for name in sorted(planned) if name in records)
         for lines, table, departures in shared(made, batches, processes_for(len(records))):
             csv.append(lines)
             parquet.append(table)
-            if propagated:
-                propagated.append(departures)
+            propagated.append(departures)
 
 
 @contextmanager
@@ -128,14 +117,13 @@ def _made_from(folder: RunFolder) -> str:
     files = [plan_file.EXPERIMENTS, plan_file.FAULTS, *(path.relative_to(run).as_posix() for path in lines)]
     found = list(digests.of_files(run, files).items())
     head = folder.head
-    told = [head["hazards"], head["compared"], head.get("metrics", [])]
-    told += [head[key] for key in ("severity", "channels", "structure") if key in head]
+    told = (head.hazards, head.compared, head.metrics, head.severity, head.channels, head.structure)
     columns = [column.name for column in columns_of(head)]
     return digest([SCHEMA, VERSION, *told, columns, found])
 
 
 def _found(folder: RunFolder) -> dict[str, str | None]:
-    found = digests.of_files(folder.path, names(folder))
+    found = digests.of_files(folder.path, TABLES)
     return {name: one.sha256 if one else None for name, one in found.items()}
 
 
@@ -156,8 +144,8 @@ def _unedited(folder: RunFolder, now: Mapping[str, str]) -> dict[str, str]:
     made = {name: (now[name], stamp["tables"].get(name), stamp["before"].get(name)) for name in found}
     for name in found:
         if found[name] not in made[name]:
-            text = f"{folder.path / name}: the table did not match the plan and records, so it was rebuilt"
-            warnings.warn(text, MutatorWarning, stacklevel=2)
+            text = "the table did not match the plan and records, so it was rebuilt"
+            warnings.warn(f"{inside(folder.path, name)}: {text}", MutatorWarning, stacklevel=2)
     return {name: one for name, one in found.items() if one in made[name]}
 
 

@@ -7,7 +7,7 @@ Hazards, compared channels and metrics of a target add columns; the others are t
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Record, Status
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from mutator.outcomes.fault_paths import FaultPaths
-    from mutator.store.run_head import Head
+    from mutator.store.run_head import RunHead
 
 AS_CHANNEL = "as its channel"  # a unit
 _TIME_DIGITS = 6  # decimals of a time in s: finer than any step, coarser than a double's precision
@@ -205,12 +205,11 @@ def result_columns(
     )
 
 
-def columns_of(head: "Head") -> tuple[PlanColumn | ResultColumn, ...]:
+def columns_of(head: "RunHead") -> tuple[PlanColumn | ResultColumn, ...]:
     """Return the columns of a run's results.csv, in order."""
     paths = any(channel.component for channel in head.channels)
-    return result_columns(
-        head["hazards"], head["compared"], head.metrics, severity_columns(head), paths=paths
-    )
+    severity = severity_columns(has_classes=head.severity is not None)
+    return result_columns(head.hazards, head.compared, head.metrics, severity, paths=paths)
 
 
 def cells_of(
@@ -224,11 +223,9 @@ def cells_of(
     ]
 
 
-def severity_columns(head: Mapping[str, Any]) -> tuple[ResultColumn, ...]:
-    """Return the severity columns according to run.json. Older runs have none."""
-    if "severity" not in head:
-        return ()
-    return (SEVERITY, *SINCE) if head["severity"] else SINCE
+def severity_columns(*, has_classes: bool) -> tuple[ResultColumn, ...]:
+    """Return the columns of a target whose contacts have classes of severity, or have none."""
+    return (SEVERITY, *SINCE) if has_classes else SINCE
 
 
 def _deviation(channel: str, column: str) -> ResultColumn:

@@ -89,7 +89,7 @@ class Results:
         """
         data, head = self.parquet(), read_head(self.run)
         columns = [column for column in columns_of(head) if not only or column.name in only]
-        return typed(self._table(data, columns), head["hazards"])
+        return typed(self._table(data, columns), head.hazards)
 
     def indexed_frame(self) -> "pd.DataFrame":
         """Return a frame of all columns for notebooks, indexed by experiment id.
@@ -102,7 +102,7 @@ class Results:
         import pandas as pd
 
         data, head = self.parquet(), read_head(self.run)
-        columns, hazards = columns_of(head), [name.lower() for name in head["hazards"]]
+        columns, hazards = columns_of(head), [name.lower() for name in head.hazards]
         frame: pd.DataFrame = _to_pandas(_plain(self._table(data, columns))).set_index("experiment_id")
         frame["kind"] = (frame["module"] + "/" + frame["fault_type"]).astype("category")
         for name in (column.name for column in columns if column.type == "flag"):
@@ -117,7 +117,7 @@ class Results:
         numbers = {
             column.name: column.unit or "-" for column in columns if column.type in ("count", "number")
         }
-        frame.attrs |= {"hazards": tuple(head["hazards"]), "units": numbers | {"t_hazard": "s"}}
+        frame.attrs |= {"hazards": head.hazards, "units": numbers | {"t_hazard": "s"}}
         return frame
 
     def _table(self, data: bytes, columns: Sequence[Column]) -> Any:
@@ -165,7 +165,7 @@ def frame_of(folder: RunFolder, experiments: Iterable[Experiment]) -> "pd.DataFr
     finished = (Finished(one, records[one.id], scale) for one in experiments if one.id in records)
     pieces = iter(lambda: list(islice(finished, _BATCH)), [])
     batches = [record_batch(columns, cells_of(columns, piece)) for piece in pieces]
-    return typed(pa.Table.from_batches(batches, schema_of(columns)), folder.head["hazards"])
+    return typed(pa.Table.from_batches(batches, schema_of(columns)), folder.head.hazards)
 
 
 def typed(table: Any, hazards: Iterable[str]) -> "pd.DataFrame":

@@ -66,7 +66,7 @@ def _of_run(path: Path, written: int) -> dict[str, Typical]:
     import numpy as np
 
     frame = Results(path).frame()
-    about = {one["name"]: one["about"] for one in RunFolder.open(path).head.get("about_hazards") or ()}
+    about = {one.name: one.about for one in RunFolder.open(path).head.about_hazards}
     faults = plan_file.read_faults(path)
     labels = {name: group_label(fault) for name, fault in faults.items()}
     known = [labels.get(name, "") for name in frame["fault_id"]]

@@ -104,7 +104,7 @@ class Shown:
     def _alerts(self, run: Path) -> str:
         folder = RunFolder.open(run)
         try:
-            return own_alerts(fault_free_runs(folder, self._workspace.manifest(folder.head["target"])))
+            return own_alerts(fault_free_runs(folder, self._workspace.manifest(folder.head.target)))
         except (MutatorError, KeyError):
             return ""
 

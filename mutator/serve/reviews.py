@@ -11,13 +11,14 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from mutator.campaigns.clones import user_name
-from mutator.campaigns.plans import Choices, make_plan
+from mutator.campaigns.plans import make_plan
 from mutator.config.yaml_files import StrictModel
 from mutator.errors import Absent, GroupsChanged, MutatorError, ReviewConflict
 from mutator.review import catalogue, pictures, typical
 from mutator.review.catalogue import Group
 from mutator.review.decisions import Change, Kind, Review, load_review, record
 from mutator.review.page import page_html, state_of
+from mutator.store.choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -162,7 +163,7 @@ class Reviews:
     def typical(self, chosen: Selection, name: str, run: Path) -> dict[str, Any] | None:
         """Return the group's results in a run; None if the run does not have the group."""
         folder, group = RunFolder.open(run), self.group(chosen, name)
-        found = typical.of_group(folder, group) if folder.head["target"] == chosen.target else None
+        found = typical.of_group(folder, group) if folder.head.target == chosen.target else None
         return asdict(found) if found else None
 
     def _refuse_others(self, chosen: Selection, groups: Sequence[Group], digests: Mapping[str, str]) -> None:

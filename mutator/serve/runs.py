@@ -82,7 +82,7 @@ def told(key: str, path: Path) -> dict[str, Any]:
     facts |= {"state": "damaged", "outcomes": {}, "problem": ""}
     try:
         folder = RunFolder.unverified(path)
-        facts |= {"campaign": str(folder.head["campaign"]), "target": str(folder.head["target"])}
+        facts |= {"campaign": folder.head.campaign, "target": folder.head.target}
         facts |= {"planned": folder.planned, "state": "finished" if folder.finished else "unfinished"}
         with suppress(FileNotFoundError):
             table = Results(path).path.stat()

@@ -18,7 +18,7 @@ from mutator.store.digests import Digest, Ledger
 from mutator.store.lines import Segment, bare_segment, intact_lines, read_segment
 from mutator.store.patches import Patches
 from mutator.store.records import SCHEMA, ending_on, second_record
-from mutator.store.run_head import CAMPAIGN, HEAD, Head
+from mutator.store.run_head import CAMPAIGN, HEAD, RunHead
 from mutator.store.shards import Shard
 
 SEALED = ("plan", "golden", *digests.SEGMENTS)  # folders in which a finished run has no unknown files
@@ -28,7 +28,7 @@ _MANY = 5  # at most this many experiments are named in one message
 
 
 def problems(
-    run: Path, head: Head, ledger: Ledger, shard: Shard | None, *, anew: bool = False
+    run: Path, head: RunHead, ledger: Ledger, shard: Shard | None, *, anew: bool = False
 ) -> Iterator[MutatorError]:
     """Yield every problem of a run folder in which `shard` runs.
 
@@ -89,7 +89,7 @@ def key_of(run: Path, found: Mapping[str, Digest | None]) -> str:
     return verified_runs.key_of({name: one.sha256 if one else None for name, one in told.items()})
 
 
-def share(run: Path, head: Head, shard: Shard | None) -> dict[str, int]:
+def share(run: Path, head: RunHead, shard: Shard | None) -> dict[str, int]:
     """Return the ids and positions of the experiments that run in a run folder, in plan order.
 
     MutatorError if the plan has a duplicate, or if its length does not match its chunks.
@@ -101,7 +101,7 @@ def share(run: Path, head: Head, shard: Shard | None) -> dict[str, int]:
             raise MutatorError(
                 f"duplicate experiment {name}", where=path, line=place + 1, remedy=_remedy(run, HEAD)
             )
-    counts = [count for _, _, count in head["chunks"]]
+    counts = [count for _, _, count in head.chunks]
     if sum(counts) != len(places):
         raise MutatorError(
             counted(len(places), "experiment"),
@@ -188,7 +188,7 @@ def strangers(run: Path, ledger: Ledger) -> Iterator[Path]:
             yield path
 
 
-def id_problems(run: Path, head: Head, ledger: Ledger, planned: Collection[str]) -> Iterator[MutatorError]:
+def id_problems(run: Path, head: RunHead, ledger: Ledger, planned: Collection[str]) -> Iterator[MutatorError]:
     """Yield a problem for each unplanned, duplicate or missing record."""
     patches = Patches(run)
     stored = dict(patches.digests())
@@ -197,7 +197,7 @@ def id_problems(run: Path, head: Head, ledger: Ledger, planned: Collection[str])
         for path in sorted((run / kind).glob("*.jsonl")):
             segment, lines = bare_segment(path), intact_lines(path)
             try:
-                yield from _head_problem(segment, lines, head["plan"])
+                yield from _head_problem(segment, lines, head.plan)
                 for number, name, patch, content in _counted(segment, lines, planned):
                     if isinstance(name, MutatorError):
                         yield name

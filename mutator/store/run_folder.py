@@ -13,16 +13,15 @@ from typing import Any, NamedTuple
 from mutator._common.below import inside
 from mutator._common.bounded import MOST_DATA, read_bounded
 from mutator._common.files import check_is_text
-from mutator._common.hashing import plain
 from mutator.errors import MutatorError
 from mutator.model import AfterHazard, Experiment, Limits, Record
 from mutator.store import digests, integrity, plan_file
 from mutator.store.opening import SCRATCH, TRACES, check_contents
 from mutator.store.patches import Patches
 from mutator.store.records import read_records, read_timings
-from mutator.store.run_head import HEAD, Head, read_head
+from mutator.store.run_head import HEAD, RunHead, StoredGolden, read_head
 from mutator.store.shards import Shard
-from mutator.store.stretches import Stretch, read_stretches
+from mutator.store.stretches import Stretch
 from mutator.targets.severity import Scale
 
 STOP_NOTE = "Runs end at their first terminal hazard: later hazards and alerts are not recorded."
@@ -49,12 +48,14 @@ class GoldenRun(NamedTuple):
         return name if self.seed is None else f"{name}@{self.seed}"
 
     @classmethod
-    def from_plain(cls, told: Sequence[Any]) -> "GoldenRun":
-        scenario, changes, *seed = told
+    def from_stored(cls, values: Sequence[Any]) -> "GoldenRun":
+        scenario, changes, *seed = values
         return cls(scenario, tuple(changes), *seed)
 
-    def plain(self) -> list[Any]:
-        return [self.scenario, list(self.changes), *([] if self.seed is None else [self.seed])]
+    def stored(self) -> StoredGolden:
+        """Return the values as run.json has them."""
+        golden = self.scenario, self.changes
+        return golden if self.seed is None else (*golden, self.seed)
 
 
 @dataclass(frozen=True)
@@ -116,20 +117,21 @@ class RunFolder:
         return digests.read(self.path).finished
 
     @cached_property
-    def head(self) -> Head:
+    def head(self) -> RunHead:
         return read_head(self.path)
 
     @property
     def provenance(self) -> dict[str, Any]:
-        head = self.head
-        stretches = [plain(stretch) for stretch in self.stretches]
-        found = {"mutator": head["provenance"]["mutator"], "stretches": stretches}
-        return found | {key: head[key] for key in ("sources", "seed", "seeds", "reading") if key in head}
+        content = self.head.content()
+        found = {"mutator": self.head.provenance.mutator, "stretches": content["stretches"]}
+        return found | {
+            key: content[key] for key in ("sources", "seed", "seeds", "reading") if key in content
+        }
 
     @property
     def stretches(self) -> tuple[Stretch, ...]:
         """The software and machine of each session that ran anything, oldest first."""
-        return read_stretches(self.head)
+        return self.head.stretches
 
     def stretch_of(self, experiment_id: str) -> Stretch | None:
         """Return the newest stretch of work that has a record of an experiment."""
@@ -146,48 +148,47 @@ class RunFolder:
     def planned(self) -> int:
         shard = self.shard
         if shard is None:
-            return int(self.head["experiments"])
-        return sum(count for i, (_, _, count) in enumerate(self.head["chunks"]) if shard.has(i))
+            return self.head.experiments
+        return sum(count for i, (_, _, count) in enumerate(self.head.chunks) if shard.has(i))
 
     @property
     def shard(self) -> Shard | None:
         """The share of the plan that runs in this folder; None: all of it."""
-        text = self.head["choices"].get("shard")  # older runs do not have this key
-        return Shard.parse(str(text)) if text else None
+        text = self.head.choices.shard
+        return Shard.parse(text) if text else None
 
     @property
     def limits(self) -> Limits:
-        return Limits(**self.head["limits"])
+        return self.head.limits
 
     @property
     def scale(self) -> Scale | None:
-        """The scale of delta-v classes; None in older runs, and for a target without contacts."""
-        told = self.head.get("severity")
-        return Scale.from_plain(told) if told else None
+        """The scale of delta-v classes; None for a target without contacts."""
+        return self.head.severity
 
     @property
     def series_mb(self) -> int:
-        chosen = self.head["choices"].get("series_mb")  # earlier runs do not have this key
-        return SERIES_MB if chosen is None else int(chosen)
+        chosen = self.head.choices.series_mb
+        return SERIES_MB if chosen is None else chosen
 
     @property
     def has_alerts(self) -> bool:
-        """Whether the target has alerts. True for old folders, which do not record this."""
-        return bool(self.head.get("alerts", True))
+        """Whether the target has alerts."""
+        return bool(self.head.alerts)
 
     @property
     def stop_note(self) -> str:
-        stops = self.head.get("canary", {}).get("after_hazard") == AfterHazard.STOP
+        stops = self.head.canary.get("after_hazard") == AfterHazard.STOP
         return STOP_NOTE if stops else ""
 
     @property
     def seeds(self) -> range:
-        first, last = self.head.get("seeds", (self.head["seed"], self.head["seed"]))
+        first, last = self.head.seeds or (self.head.seed, self.head.seed)
         return range(first, last + 1)
 
     @cached_property
     def goldens(self) -> tuple[GoldenRun, ...]:
-        return tuple(map(GoldenRun.from_plain, self.head["goldens"]))
+        return tuple(map(GoldenRun.from_stored, self.head.goldens))
 
     @property
     def scenarios(self) -> set[str]:
@@ -232,7 +233,7 @@ class RunFolder:
     @property
     def canary(self) -> Experiment:
         """The experiment that must cause its hazard before the campaign starts."""
-        return plan_file.canary_from(self.path / HEAD, self.head["canary"])
+        return plan_file.canary_from(self.path / HEAD, self.head.canary)
 
     def share(self) -> dict[str, int]:
         return integrity.share(self.path, self.head, self.shard)

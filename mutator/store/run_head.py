@@ -1,139 +1,117 @@
-"""Read and check `run.json`. Damage is reported with its key, whichever version wrote the file."""
+"""`run.json`, the head of a run folder: what was planned, for which target, and who worked on it."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import fields
-from functools import cached_property
+from dataclasses import dataclass, field, fields
 from pathlib import Path
-from types import NoneType
 from typing import Any
 
 from mutator._common.below import check_library_name, check_name
-from mutator._common.files import read_json
+from mutator._common.files import json_bytes, read_json
+from mutator._common.hashing import added, plain
 from mutator._common.places import RUN_HEAD
-from mutator.errors import MutatorError
+from mutator._common.plain_reader import from_plain
+from mutator.errors import Misfit, MutatorError
 from mutator.model import Limits
+from mutator.store.choices import Choices
+from mutator.store.plan_file import Chunk
+from mutator.store.stretches import Stretch
 from mutator.targets.severity import Scale
-from mutator.targets.target_facts import ChannelFacts, MetricFacts
+from mutator.targets.target_facts import ChannelFacts, HazardFacts, MetricFacts
 
 SCHEMA = "run/3"
 HEAD, CAMPAIGN = RUN_HEAD, "campaign.yaml"
 REMEDY = "the run folder is damaged: restore the file from a copy of it"
-_TEXTS = {str: str}
-# Types of values: `[x]` a list of x; `{str: x}` x by name; `{"a": x}` an x under `a`; `(x, y)` either.
-_STRETCH = {
-    "python": str,
-    "packages": _TEXTS,
-    "platform": str,
-    "cpu": str | None,
-    "blas": [dict.fromkeys(("library", "version", "kernel"), str | None) | {"threads": int | None}],
-    "threads": _TEXTS,
-    "git": ({str: {"commit": str, "changed": bool}}, NoneType),
-    "records": str,
-    "accepted": [str],
-    "machines": [{"worker": str, "host": str, "python": str, "platform": str}],
-}
-_OPTIONAL = {"machines"}  # left out without a cluster
-_SHAPES: dict[str, Any] = {
-    "plan": str,
-    "campaign": str,
-    "campaign_digest": str,
-    "target": str,
-    "seed": int,
-    "seeds": [int],
-    "reading": str,
-    "choices": {str: str | int | None},
-    "experiments": int,
-    "runs": int,
-    "limits": {str: int},
-    "hazards": [str],
-    "alerts": [str],
-    "compared": [str],
-    "metrics": [[str]],
-    "severity": ({"name": str, "about": str, "source": str, "classes": [list]}, NoneType),
-    "about_hazards": [{"name": str, "about": str, "terminal": bool}],
-    "channels": [[str]],
-    "structure": ({str: object}, NoneType),
-    "goldens": [list],
-    "golden_files": [str],
-    "canary": {str: object},
-    "canary_hazard": str,
-    "sources": _TEXTS,
-    "target_files": _TEXTS,
-    "provenance": {str: (str, _TEXTS)},
-    "stretches": [_STRETCH],
-    "chunks": [[int]],
-}
-_SIZES = {"goldens": (2, 3), "chunks": (3,), "metrics": (4,)}  # allowed lengths of items
+Names = tuple[str, ...]
+StoredGolden = tuple[str, Names] | tuple[str, Names, int]  # scenario, changes; seed, if the plan has several
 
 
-class Head(dict[str, Any]):
-    """The content of a run.json; reading a missing key raises MutatorError."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Provenance:
+    """What planned the run: the version of mutator."""
 
-    def __init__(self, path: Path, content: Mapping[str, Any]) -> None:
-        super().__init__(content)
-        self.path = path
-
-    @cached_property
-    def channels(self) -> tuple[ChannelFacts, ...]:
-        return tuple(map(ChannelFacts.from_plain, self.get("channels", ())))
-
-    @cached_property
-    def metrics(self) -> tuple[MetricFacts, ...]:
-        return tuple(map(MetricFacts.from_plain, self.get("metrics", ())))
-
-    def __missing__(self, key: str) -> Any:
-        raise MutatorError(f"no key '{key}'", where=self.path, expected="a complete run.json", remedy=REMEDY)
+    mutator: str
 
 
-def read_head(run: Path) -> Head:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunHead:
+    """The content of a run.json, key by key: docs/reference/run-folder.md says what each means."""
+
+    schema: str
+    plan: str
+    campaign: str
+    campaign_digest: str
+    study: str | None
+    target: str
+    seed: int
+    seeds: tuple[int, int] | None = added(None)  # the first and the last, if the plan has several
+    reading: str
+    operators: Names = added(())
+    choices: Choices
+    experiments: int
+    runs: int
+    limits: Limits
+    hazards: Names
+    alerts: Names
+    compared: Names
+    metrics: tuple[MetricFacts, ...]
+    about_hazards: tuple[HazardFacts, ...]
+    severity: Scale | None
+    channels: tuple[ChannelFacts, ...]
+    structure: Mapping[str, Any] | None
+    golden_files: Names
+    target_files: Mapping[str, str]
+    goldens: tuple[StoredGolden, ...]
+    canary: Mapping[str, Any]
+    canary_hazard: str
+    sources: Mapping[str, str]
+    provenance: Provenance
+    stretches: tuple[Stretch, ...]
+    chunks: tuple[Chunk, ...]
+    later: Mapping[str, Any] = field(default_factory=dict)  # keys that a later version adds: kept, and sealed
+
+    def content(self) -> dict[str, Any]:
+        """Return the keys and their values in JSON types, in the order of the file."""
+        found: dict[str, Any] = plain(self)
+        return {**{name: found[name] for name in _KEYS if name in found}, **found["later"]}
+
+    def differences(self, other: "RunHead") -> Iterator[tuple[str, Any, Any]]:
+        """Yield the keys whose values differ, with both values."""
+        for name in _KEYS:
+            mine, its = getattr(self, name), getattr(other, name)
+            if mine != its:
+                yield name, mine, its
+
+    def as_json(self) -> bytes:
+        return json_bytes(self.content())
+
+
+_KEYS = tuple(one.name for one in fields(RunHead) if one.name != "later")
+
+
+def read_head(run: Path) -> RunHead:
     """Read the head of a run folder; MutatorError if it is damaged or has another schema."""
     path = run / HEAD
-    head = Head(path, read_json(path, SCHEMA))
-    if wrong := next(_wrong(head), ""):
-        raise MutatorError(f"damaged at '{wrong}'", where=path, remedy=REMEDY)
-    _check_names(head)
-    if "provenance" in head:
-        head["provenance"] = Head(path, head["provenance"])
+    try:
+        head = from_plain(RunHead, _sorted(read_json(path, SCHEMA)))
+    except Misfit as err:
+        raise _damaged(path, err) from None
+    for name in head.golden_files:
+        check_name(name, path)
+    for name in (head.target, *(golden[0] for golden in head.goldens)):
+        check_library_name(name, path)
     return head
 
 
-def _check_names(head: Head) -> None:
-    """Raise Outside for the path of a file where the name of a file belongs."""
-    for name in head.get("golden_files", ()):
-        check_name(name, head.path)
-    for name in (head.get("target", ""), *(str(golden[0]) for golden in head.get("goldens", ()))):
-        check_library_name(name, head.path)
+def _sorted(content: dict[str, Any]) -> dict[str, Any]:
+    """Put the keys that this version does not know under `later`."""
+    known = {name: value for name, value in content.items() if name in _KEYS}
+    return known | {"later": {name: value for name, value in content.items() if name not in known}}
 
 
-def _wrong(head: Head) -> Iterator[str]:
-    yield from (key for key, shape in _SHAPES.items() if key in head and not _fits(head[key], shape))
-    known = {field.name for field in fields(Limits)}
-    if not head.get("limits", {}).keys() <= known:
-        yield "limits"
-    yield from (
-        key for key, size in _SIZES.items() if any(len(item) not in size for item in head.get(key, ()))
-    )
-    try:
-        _ = head.channels
-    except ValueError:
-        yield "channels"
-    try:
-        if told := head.get("severity"):
-            Scale.from_plain(told).class_of(0.0)
-    except (ValueError, TypeError, IndexError):
-        yield "severity"
-
-
-def _fits(value: object, shape: Any) -> bool:
-    if isinstance(shape, tuple):
-        return any(_fits(value, one) for one in shape)
-    if isinstance(shape, list):
-        return isinstance(value, list) and all(_fits(item, shape[0]) for item in value)
-    if isinstance(shape, dict):
-        if not isinstance(value, dict):
-            return False
-        if str in shape:
-            return all(_fits(item, shape[str]) for item in value.values())
-        wanted = {key: shape[key] for key in shape if key in value or key not in _OPTIONAL}
-        return all(key in value and _fits(value[key], wanted[key]) for key in wanted)
-    return isinstance(value, shape)
+def _damaged(path: Path, misfit: Misfit) -> MutatorError:
+    if not misfit.path:
+        return MutatorError(misfit.got, where=path, expected="a complete run.json", remedy=REMEDY)
+    key, *below = misfit.path
+    place = "".join(f"[{one!a}]" for one in below)
+    got = f"damaged at '{key}' ({place + ': ' if place else ''}{misfit.got})"
+    return MutatorError(got, where=path, expected=misfit.expected, remedy=REMEDY)

@@ -21,7 +21,7 @@ class RunWriter:
     """
 
     def __init__(self, folder: RunFolder, name: str) -> None:
-        self._run, self._plan, self._name = folder.path, folder.head["plan"], name
+        self._run, self._plan, self._name = folder.path, folder.head.plan, name
         self._patches = PatchWriter(folder.path, name)
         self._series = SeriesWriter(folder.path, name) if folder.series_mb else None
         self._records = self._open(RECORDS, self._sync_blocks)
@@ -97,5 +97,5 @@ def copy_lines(folder: RunFolder, out: Path, suffix: str) -> None:
         for path in sorted((folder.path / kind).glob("*.jsonl")):
             place = inside(out / kind, f"{path.stem}{suffix}.jsonl")
             lines = verified_lines(path, schema)
-            head = {"schema": schema, "plan": folder.head["plan"]}
+            head = {"schema": schema, "plan": folder.head.plan}
             write_copy(place, head, (line for _, _, line in lines))

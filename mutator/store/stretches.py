@@ -1,11 +1,45 @@
 """Stretches of work: the software and machine of each session of a run folder."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 from mutator._common.hashing import added
-from mutator.errors import MutatorError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Blas:
+    """A library of linear algebra that numpy loads, with its kernel for this processor and its threads."""
+
+    library: str | None
+    version: str | None
+    kernel: str | None
+    threads: int | None
+
+    def __str__(self) -> str:
+        kernel = f" ({self.kernel})" if self.kernel else ""
+        return f"{self.library} {self.version}{kernel}, threads: {self.threads}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CloneState:
+    """The commit of a git clone, and whether the folder in it had changed since."""
+
+    commit: str
+    changed: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Machine:
+    """A worker on another machine."""
+
+    worker: str
+    mutator: str
+    host: str
+    python: str
+    platform: str
+    cpu: str | None
+    blas: tuple[Blas, ...]
+    packages: Mapping[str, str | None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,29 +55,15 @@ class Stretch:
     packages: Mapping[str, str]  # versions of the harness's requirements and of what the golden runs loaded
     platform: str  # operating system, kernel, kind of processor
     cpu: str | None = None  # the processor's model
-    blas: Sequence[Mapping[str, Any]] = ()  # `library`, `version`, `kernel`, `threads` of what numpy loads
+    blas: tuple[Blas, ...] = ()
     threads: Mapping[str, str] = field(default_factory=dict)  # thread settings in the target's environment
-    # `commit` and `changed` of the git clones of mutator, library, templates and target
-    git: Mapping[str, Mapping[str, Any]] | None = None
+    git: Mapping[str, CloneState] | None = None  # the clones of mutator, library, templates and target
     records: str = "*"  # glob of the session's files in records/, timings/ and proof/, without suffix
-    accepted: Sequence[str] = ()  # differences of Python and packages from the previous stretch
-    # workers on other machines: `worker`, `host`, `mutator`, `python`, `platform`, `cpu`, `blas`, `packages`
-    machines: Sequence[Mapping[str, Any]] = added(())
+    accepted: tuple[str, ...] = ()  # differences of Python and packages from the previous stretch
+    machines: tuple[Machine, ...] = added(())
 
     def __str__(self) -> str:
         return ", ".join(filter(None, (self.python, self.platform, self.cpu)))
-
-
-def read_stretches(head: Mapping[str, Any]) -> tuple[Stretch, ...]:
-    """Return the stretches of work in a run.json, oldest first."""
-    try:
-        return tuple(Stretch(**stretch) for stretch in head["stretches"])
-    except TypeError as err:
-        raise MutatorError(
-            f"a damaged stretch of work ({err})",
-            where="run.json",
-            remedy="restore the file from a copy of the run folder",
-        ) from None
 
 
 def differences(before: Stretch, python: str, packages: Mapping[str, str | None]) -> tuple[str, ...]:
@@ -70,17 +90,12 @@ def _texts(stretch: Stretch) -> dict[str, str]:
     if stretch.cpu:
         texts["processor"] = stretch.cpu
     if stretch.blas:
-        texts["BLAS"] = " and ".join(_blas_text(library) for library in stretch.blas)
+        texts["BLAS"] = " and ".join(map(str, stretch.blas))
     for place, state in (stretch.git or {}).items():
-        texts[f"git commit of {place}"] = state["commit"] + (" with changes" if state["changed"] else "")
+        texts[f"git commit of {place}"] = state.commit + (" with changes" if state.changed else "")
     if stretch.accepted:
         texts["other versions accepted"] = "; ".join(stretch.accepted)
     return texts
-
-
-def _blas_text(library: Mapping[str, Any]) -> str:
-    kernel = f" ({library['kernel']})" if library["kernel"] else ""
-    return f"{library['library']} {library['version']}{kernel}, threads: {library['threads']}"
 
 
 def package_versions(stretches: Iterable[Stretch]) -> dict[str, str]:

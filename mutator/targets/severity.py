@@ -1,8 +1,6 @@
 """The severity of a contact: delta-v of the ego car, and its class on a scale."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 from mutator._common.yaml_records import mapping, written
 
@@ -59,14 +57,9 @@ class Scale:
     source: str
     classes: tuple[tuple[str, float, str], ...]
 
-    @classmethod
-    def from_plain(cls, data: Mapping[str, Any]) -> "Scale":
-        classes = tuple((name, float(least), about) for name, least, about in data["classes"])
-        return cls(name=data["name"], about=data["about"], source=data["source"], classes=classes)
-
-    def plain(self) -> dict[str, Any]:
-        told = {"name": self.name, "about": self.about, "source": self.source}
-        return told | {"classes": [list(one) for one in self.classes]}
+    def __post_init__(self) -> None:
+        if not any(least <= 0.0 for _, least, _ in self.classes):
+            raise ValueError("no class of severity begins at 0")
 
     def class_of(self, delta_v: float) -> str:
         """Return the class of a delta-v in m/s, 0 or more; a value on a bound is in the upper class."""

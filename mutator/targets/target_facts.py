@@ -1,10 +1,7 @@
-"""What a run states about the channels and metrics of its target, so that readers need no manifest.
+"""What a run states about its target, so that readers need no manifest."""
 
-In run.json, each is the list of its values in the order of the fields.
-"""
-
-from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from mutator.targets.channels import Role
 from mutator.targets.manifest import TargetManifest
@@ -12,9 +9,11 @@ from mutator.targets.manifest import TargetManifest
 T_END = "t_end"  # the metric column with the end of the drive
 
 
-@dataclass(frozen=True, slots=True)
-class ChannelFacts:
-    """A recorded channel. `about` is its meaning; `component` is '' if the manifest names none."""
+class ChannelFacts(NamedTuple):
+    """A recorded channel. `about` is its meaning; `component` is '' if the manifest names none.
+
+    In run.json, channels and metrics are the lists of their values.
+    """
 
     name: str
     unit: str
@@ -22,18 +21,8 @@ class ChannelFacts:
     component: str
     about: str
 
-    @classmethod
-    def from_plain(cls, values: Sequence[str]) -> "ChannelFacts":
-        """Read the stored form; ValueError if it has another length or an unknown role."""
-        name, unit, role, component, about = values
-        return cls(name, unit, Role(role), component, about)
 
-    def plain(self) -> list[str]:
-        return [self.name, self.unit, self.role.value, self.component, self.about]
-
-
-@dataclass(frozen=True, slots=True)
-class MetricFacts:
+class MetricFacts(NamedTuple):
     """A metric column. `worse` is the direction of its worse values, `higher` or `lower`."""
 
     name: str
@@ -41,14 +30,14 @@ class MetricFacts:
     about: str
     worse: str
 
-    @classmethod
-    def from_plain(cls, values: Sequence[str]) -> "MetricFacts":
-        """Read the stored form; ValueError if it has another length."""
-        name, unit, about, worse = values
-        return cls(name, unit, about, worse)
 
-    def plain(self) -> list[str]:
-        return [self.name, self.unit, self.about, self.worse]
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HazardFacts:
+    """A hazard. `about` is its meaning; a `terminal` one ends the drive."""
+
+    name: str
+    about: str
+    terminal: bool
 
 
 def channel_facts(manifest: TargetManifest) -> tuple[ChannelFacts, ...]:
@@ -62,3 +51,9 @@ def metric_facts(manifest: TargetManifest) -> tuple[MetricFacts, ...]:
         [MetricFacts(T_END, "s", about, "lower")] if any(hazard.terminal for hazard in manifest.rules) else []
     )
     return (*end, *(MetricFacts(m.name, m.unit, m.about, m.worse) for m in manifest.measures))
+
+
+def hazard_facts(manifest: TargetManifest) -> tuple[HazardFacts, ...]:
+    return tuple(
+        HazardFacts(name=one.name, about=one.about, terminal=bool(one.terminal)) for one in manifest.rules
+    )

@@ -227,7 +227,7 @@ def test_other_workers_do_the_work_of_a_refused_one(
     assert (summary.exit_code, summary.problem) == (0, "")
     assert (results(tmp_path / "run"), summary.seal) == whole_toy
     [machine] = RunFolder.open(tmp_path / "run").stretches[-1].machines
-    assert str(machine["worker"]).startswith("alpha")
+    assert machine.worker.startswith("alpha")
 
 
 @pytest.mark.slow

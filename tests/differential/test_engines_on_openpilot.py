@@ -6,13 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.plans import Choices, make_plan
+from mutator.campaigns.plans import make_plan
 from mutator.engines.jobs import Job, Setting
 from mutator.engines.kinds import ENGINES
 from mutator.engines.reference import ReferenceEngine
 from mutator.engines.registry import make_engine
 from mutator.execution.runner import Goldens, Runner
 from mutator.model import Record
+from mutator.store.choices import Choices
 from mutator.store.run_folder import GoldenRun
 from mutator.workspace import Workspace
 

@@ -11,7 +11,7 @@ import pytest
 
 from mutator.audit.seal import seals_of
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import Choices, make_plan
+from mutator.campaigns.plans import make_plan
 from mutator.engines import registry
 from mutator.errors import CheckFailed, MutatorError
 from mutator.execution import merging
@@ -20,6 +20,7 @@ from mutator.execution.running import run_campaign
 from mutator.execution.session import Session
 from mutator.results import table_building
 from mutator.store import approvals
+from mutator.store.choices import Choices
 from mutator.store.patches import Patches
 from mutator.store.records import read_records
 from mutator.store.run_folder import RunFolder
@@ -115,7 +116,7 @@ def test_each_experiment_is_in_exactly_one_shard(runs: Runs) -> None:
     one, two, whole = (set(read_records(runs[name])) for name in ("1/2", "2/2", "whole"))
     assert not one & two
     assert one | two == whole
-    assert len({RunFolder.open(path).head["plan"] for path in runs.values()}) == 1
+    assert len({RunFolder.open(path).head.plan for path in runs.values()}) == 1
 
 
 def test_a_shard_resumes_without_its_option(copies: Runs, toy: Workspace) -> None:

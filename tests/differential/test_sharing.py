@@ -94,7 +94,7 @@ def test_plan_and_folder_report_the_shared_runs(runs: tuple[Path, Path]) -> None
     assert (len(shared.experiments), shared.runs) == (8, 6)
     assert (len(apart.experiments), apart.runs) == (8, 8)
     assert shared.cost().cpu_s / shared.run_cpu_s < apart.cost().cpu_s / apart.run_cpu_s  # type: ignore[operator]
-    assert RunFolder.open(runs[0]).head["runs"] == 6
+    assert RunFolder.open(runs[0]).head.runs == 6
     assert {e.id for e in shared.experiments} == {e.id for e in apart.experiments}
 
 
@@ -130,7 +130,7 @@ def test_one_experiment_of_a_shared_run_can_run_on_a_cluster(runs: tuple[Path, P
 
 
 def _scenarios(folder: RunFolder, chunk: Pending) -> list[str]:
-    lines = plan_file.chunk_lines(folder.path, folder.head["chunks"][chunk.chunk])
+    lines = plan_file.chunk_lines(folder.path, folder.head.chunks[chunk.chunk])
     return [json.loads(line)["scenario"] for line in lines]
 
 

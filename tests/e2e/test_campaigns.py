@@ -13,7 +13,6 @@ import pytest
 
 import mutator
 from mutator.campaigns.chunks import Pending
-from mutator.campaigns.plans import Choices
 from mutator.engines.jobs import Execution, Job
 from mutator.engines.reference import ReferenceEngine
 from mutator.errors import CheckFailed, MutatorError
@@ -23,6 +22,7 @@ from mutator.execution.single_run import rerun, run_single
 from mutator.execution.worker import Worker
 from mutator.model import Status
 from mutator.store import plan_file
+from mutator.store.choices import Choices
 from mutator.store.patches import Patches
 from mutator.store.progress import Progress
 from mutator.workspace import Workspace

@@ -112,12 +112,12 @@ def put_patch(run: Path, name: str, data: bytes) -> None:
 
 def a_golden_trace(run: Path, deep: bool) -> None:
     folder = RunFolder.unverified(run)
-    scenario, changes = folder.head["goldens"][0]
-    path = folder.golden(scenario, tuple(changes)) / folder.head["golden_files"][0]
+    scenario, changes = folder.head.goldens[0]
+    path = folder.golden(scenario, tuple(changes)) / folder.head.golden_files[0]
     path.write_bytes(path.read_bytes()[:-1] + b"x")
     if deep:
         checks = json.loads((run / "checks.json").read_text())
-        checks["goldens"] = golden_digests(folder, folder.head["golden_files"])
+        checks["goldens"] = golden_digests(folder, folder.head.golden_files)
         (run / "checks.json").write_text(json.dumps(checks))
 
 
@@ -246,7 +246,7 @@ EDITED = "results.csv: the table did not match the plan and records, so it was r
 
 
 def readers(run: Path, genuine: Path) -> dict[str, tuple[object, ...]]:
-    campaign = RunFolder.unverified(genuine).head["campaign"]
+    campaign = RunFolder.unverified(genuine).head.campaign
     name = hazardous(genuine)[2]["experiment_id"]
     out = run.parent
     return {
@@ -298,7 +298,7 @@ def test_the_api_finds_a_plain_forgery(
     with pytest.raises(MutatorError):
         _ = mutator.load_run(run, workspace=genuine[0]).experiment(name).patch
     with pytest.raises(MutatorError):
-        mutator.run(RunFolder.unverified(run).head["campaign"], run, workspace=genuine[0]).report()
+        mutator.run(RunFolder.unverified(run).head.campaign, run, workspace=genuine[0]).report()
 
 
 def test_the_genuine_run_passes(genuine: tuple[Workspace, Path], run: Path, cli: Cli, tmp_path: Path) -> None:

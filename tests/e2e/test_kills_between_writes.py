@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from mutator.audit.seal import seals_of
-from mutator.campaigns.plans import Choices
 from mutator.execution.running import run_campaign
+from mutator.store.choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 

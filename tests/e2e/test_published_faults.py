@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.plans import Choices
 from mutator.execution.running import run_campaign
+from mutator.store.choices import Choices
 from mutator.workspace import Workspace
 
 pytestmark = pytest.mark.slow

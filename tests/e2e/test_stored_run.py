@@ -68,7 +68,7 @@ def test_it_opens_and_its_ids_still_follow_from_its_content(place: Path) -> None
 @pytest.mark.slow
 def test_a_fresh_run_has_the_same_plan_and_results(place: Path, fresh: Path) -> None:
     old, new = RunFolder.open(place / "small"), RunFolder.open(fresh)
-    assert new.head["plan"] == old.head["plan"]
+    assert new.head.plan == old.head.plan
     assert [*plan_file.ids(new.path)] == [*plan_file.ids(old.path)]
     assert (fresh / "results.csv").read_bytes() == (old.path / "results.csv").read_bytes()
     assert {name: record.trace_digest for name, record in new.records().items()} == {
@@ -160,7 +160,7 @@ def test_it_is_not_resumed_by_another_version(cli: Cli, place: Path, monkeypatch
     shutil.copytree(place / "toy", library := place / "changed")
     before = sorted((path, path.stat().st_mtime_ns) for path in copy.rglob("*") if path.name != "owner.lock")
     head = RunFolder.open(copy).head
-    made_by = f"was planned by mutator {head['provenance']['mutator']} ({head['schema']})"
+    made_by = f"was planned by mutator {head.provenance.mutator} ({head.schema})"
     with monkeypatch.context() as patch:
         patch.setattr("mutator.campaigns.provenance.VERSION", "99.0")
         for words in (("run",), ("plan",)):

@@ -13,7 +13,6 @@ import pytest
 from mutator import load_run
 from mutator._common import caches
 from mutator.campaigns import machine
-from mutator.campaigns.plans import Choices
 from mutator.cli.app import main
 from mutator.engines.jobs import Execution, Job
 from mutator.engines.reference import ReferenceEngine
@@ -21,6 +20,7 @@ from mutator.errors import CheckFailed
 from mutator.execution.running import run_campaign
 from mutator.execution.session import Session
 from mutator.execution.worker import Assignment, Worker
+from mutator.store.choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 

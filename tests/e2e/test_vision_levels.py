@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from selfdrive.sim.detection_memory import FILE
 
-from mutator.campaigns.plans import Choices
 from mutator.execution.running import run_campaign
+from mutator.store.choices import Choices
 from mutator.store.records import read_records
 from mutator.workspace import Workspace
 

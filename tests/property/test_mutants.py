@@ -9,13 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mutator.campaigns.plans import Choices, make_plan
+from mutator.campaigns.plans import make_plan
 from mutator.errors import MutatorError
 from mutator.faults.expansion import expand
 from mutator.faults.fault_models import FaultModels, ParamSchema, SnippetKind
 from mutator.model import AnchorKind, Fault, Hold, Injection, Trigger, Value
 from mutator.mutants.anchors import parsed
 from mutator.mutants.building import Mutant, build, build_directly
+from mutator.store.choices import Choices
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 

@@ -13,12 +13,12 @@ from typing import Any
 import pytest
 
 import mutator
-from mutator.campaigns.plans import Choices
 from mutator.errors import MutatorError
 from mutator.execution.cluster.bundle import Bundle, lay_out
 from mutator.execution.session import open_session
 from mutator.serve.app import Site, application
 from mutator.serve.runs import Runs
+from mutator.store.choices import Choices
 
 from .hostile_libraries import SECRET, TRICKS, World, plant_hooks
 from .readers import cli

@@ -21,6 +21,7 @@ from typing import Any
 from mutator._common.below import check_inside, check_name, files_inside, inside
 from mutator._common.bounded import read_bounded
 from mutator._common.files import raising_disk_full, read_json
+from mutator._common.hashing import plain
 from mutator._common.version import VERSION
 from mutator.engines import sandbox
 from mutator.errors import MutatorError, Outside
@@ -90,17 +91,17 @@ def _check_size(size: int, where: Path) -> None:
 
 def _parts(workspace: Workspace, folder: RunFolder, engine: str) -> Iterator[tuple[str, bytes]]:
     head = folder.head
-    manifest = workspace.manifest(head["target"])
+    manifest = workspace.manifest(head.target)
     digests = read_json(folder.path / CHECKS, CHECKS_SCHEMA)["goldens"]
     meta = {
         "schema": SCHEMA,
         "mutator": VERSION,
         "engine": engine,
-        "limits": head["limits"],
-        "seed": head["seed"],
+        "limits": plain(head.limits),
+        "seed": head.seed,
         "series": bool(folder.series_mb),
         "several_seeds": len(folder.seeds) > 1,
-        "goldens": [{"golden": one.plain(), "digest": digests[one.key]} for one in folder.goldens],
+        "goldens": [{"golden": one.stored(), "digest": digests[one.key]} for one in folder.goldens],
         "manifest": manifest.path.name,
         "sandbox": workspace.sandbox,
     }
@@ -156,7 +157,7 @@ class Site:
         meta = read_json(path, SCHEMA)
         try:
             check_name(meta["manifest"], path, folders=False)
-            goldens = [(GoldenRun.from_plain(one["golden"]), one["digest"]) for one in meta["goldens"]]
+            goldens = [(GoldenRun.from_stored(one["golden"]), one["digest"]) for one in meta["goldens"]]
             for golden, _ in goldens:
                 check_name(golden.key, path)
             if Limits(**meta["limits"]) and meta.keys() >= {"engine", "seed", "series", "several_seeds"}:
@@ -190,5 +191,5 @@ class Site:
     @cached_property
     def goldens(self) -> dict[str, tuple[GoldenRun, str]]:
         """The golden runs with their digests, by name."""
-        told = [(GoldenRun.from_plain(one["golden"]), one["digest"]) for one in self.meta["goldens"]]
+        told = [(GoldenRun.from_stored(one["golden"]), one["digest"]) for one in self.meta["goldens"]]
         return {golden.key: (golden, digest) for golden, digest in told}

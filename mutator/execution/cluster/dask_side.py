@@ -16,6 +16,7 @@ from typing import Any
 from distributed import Worker, get_worker, secede
 from distributed.core import Status
 
+from mutator._common.hashing import plain
 from mutator._common.version import VERSION
 from mutator.campaigns import machine
 from mutator.errors import MutatorError
@@ -35,7 +36,7 @@ def facts(packages: Iterable[str]) -> dict[str, Any]:
         "python": machine.python(),
         "platform": platform.platform(),
         "cpu": machine.cpu(),
-        "blas": list(machine.blas()),
+        "blas": plain(machine.blas()),
         "packages": machine.versions(packages),
     }
 

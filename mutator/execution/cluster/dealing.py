@@ -14,6 +14,7 @@ from typing import Any
 
 from distributed import Client, Future
 
+from mutator._common.plain_reader import from_plain
 from mutator.errors import DiskFull, MutatorError, SchedulerGone, WorkerCutOff, WorkerRefused
 from mutator.execution.cluster import dask_side
 from mutator.execution.cluster.board import Board
@@ -24,6 +25,7 @@ from mutator.execution.cluster.intake import Intake
 from mutator.execution.cluster.pieces import Ending, Piece, Result
 from mutator.execution.session import Session
 from mutator.preflight import equivalence
+from mutator.store.stretches import Machine
 
 _LOOK_S = 0.5  # between two checks of the present workers
 _ALONE_S = 60.0  # time without any worker after which the command gives up
@@ -247,7 +249,7 @@ class Deal:
 
     async def _done(self, piece: Piece, one: _Tended, result: Result) -> None:
         if one.facts:  # before its first results are written, run.json must name the worker
-            self._session.note_machine({"worker": one.name, **one.facts})
+            self._session.note_machine(from_plain(Machine, {"worker": one.name, **one.facts}))
             one.facts = {}
         for other in self._tended.values():  # the piece ran here, so it did not cause the failures elsewhere
             other.failures += other.name in piece.died_at and other is not one

@@ -36,7 +36,7 @@ def groups_of(folder: RunFolder, pending: Sequence[Pending], faults: Faults) -> 
     """Return the pending work by golden run. All experiments of a chunk have the same golden run."""
     chunks: dict[str, list[Pending]] = {}
     for one in pending:
-        first = next(iter(plan_file.chunk_lines(folder.path, folder.head["chunks"][one.chunk])))
+        first = next(iter(plan_file.chunk_lines(folder.path, folder.head.chunks[one.chunk])))
         chunks.setdefault(golden_of(folder, first, faults), []).append(one)
     return {
         golden: Group(golden, _runs_of(folder, ours), sum(len(one.places) for one in ours))
@@ -46,7 +46,7 @@ def groups_of(folder: RunFolder, pending: Sequence[Pending], faults: Faults) -> 
 
 def _runs_of(folder: RunFolder, pending: Sequence[Pending]) -> Iterator[Run]:
     for one in pending:
-        lines = list(plan_file.chunk_lines(folder.path, folder.head["chunks"][one.chunk]))
+        lines = list(plan_file.chunk_lines(folder.path, folder.head.chunks[one.chunk]))
         for _, same in groupby((lines[place] for place in one.places), key=_what_runs):
             yield {id_of(line): line for line in same}
 

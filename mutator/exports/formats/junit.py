@@ -31,7 +31,7 @@ def _content(request: ExportRequest) -> bytes:
     for experiment in read_all(folder.path):
         cells = plan_row(experiment)
         suites.setdefault(f"{cells['module']}/{cells['fault_type']}", []).append(experiment)
-    root = ET.Element("testsuites", name=str(folder.head["campaign"]))
+    root = ET.Element("testsuites", name=folder.head.campaign)
     for name in sorted(suites):
         suite = ET.SubElement(root, "testsuite", name=name)
         for experiment in suites[name]:

@@ -156,9 +156,9 @@ class Content:
             "scenario": experiment.scenario,
             "changes": ", ".join(experiment.changes),
             "trigger": experiment.trigger.condition,
-            "campaign": head["campaign"],
-            "target": head["target"],
-            "plan": head["plan"],
+            "campaign": head.campaign,
+            "target": head.target,
+            "plan": head.plan,
             "status": record.status.value,
             "outcome": record.outcome.value if record.outcome else "",
         }

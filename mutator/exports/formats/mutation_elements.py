@@ -46,9 +46,9 @@ def report(folder: RunFolder, manifest: TargetManifest, models: FaultModels) -> 
         source = file.data.decode(file.encoding)
         entry = files.setdefault(file.path, {"language": "python", "source": source, "mutants": []})
         entry["mutants"].append(_mutant(manifest, models, fault, experiments, records))
-    head = folder.head
-    config = {name: head[name] for name in ("campaign", "target", "seed", "reading", "plan", "sources")}
-    config |= {"seeds": head["seeds"]} if "seeds" in head else {}
+    head = folder.head.content()
+    names = ("campaign", "target", "seed", "reading", "plan", "sources", "seeds")
+    config = {name: head[name] for name in names if name in head}
     return {
         "schemaVersion": SCHEMA_VERSION,
         "thresholds": {"high": 100, "low": 0},

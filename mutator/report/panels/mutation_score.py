@@ -33,7 +33,7 @@ def score_panel(run: ReportedRun) -> Panel | None:
         run.frame,
         plan_file.read_faults(run.folder.path),
         alerts_by_drive(runs) if runs else None,
-        run.folder.head.get("operators", ()),
+        run.folder.head.operators,
     )
     html = rendered(_HTML, score=score, general=_part(score, False), functions=_part(score, True))
     return Panel(

@@ -48,22 +48,22 @@ def _facts(run: ReportedRun) -> list[tuple[str, str]]:
     folder = run.folder
     reviewed = approval_summary(folder.path)
     head, packages = folder.head, package_versions(folder.stretches)
-    chosen = without(head, OUTSIDE[HEAD])["choices"]
+    chosen = without(head.content(), OUTSIDE[HEAD])["choices"]
     facts = {
         "experiments": f"{len(run.results)} of {folder.planned} planned",
         **({"proof": run.engines.state} if run.engines else {}),
         **({"reviewed": reviewed} if reviewed else {}),
         **seal_or_why_not(folder),
-        "campaign": head["campaign"],
+        "campaign": head.campaign,
         **_study(run),
-        "plan": head["plan"],
+        "plan": head.plan,
         **(
             {"seed": seeds[0]} if len(seeds := folder.seeds) == 1 else {"seeds": f"{seeds[0]} to {seeds[-1]}"}
         ),
-        "reading": head["reading"],
+        "reading": head.reading,
         **{f"chosen: {name}": value for name, value in chosen.items() if value is not None},
-        **{f"digest of {name}": value for name, value in head["sources"].items()},
-        "mutator": head["provenance"]["mutator"],
+        **{f"digest of {name}": value for name, value in head.sources.items()},
+        "mutator": head.provenance.mutator,
         **{name: text for name, text in told(folder.stretches).items() if name == "python"},
         **{name: packages[name] for name in PACKAGES if name in packages},
     }
@@ -72,7 +72,7 @@ def _facts(run: ReportedRun) -> list[tuple[str, str]]:
 
 def _study(run: ReportedRun) -> dict[str, str]:
     """Return the study that the campaign names, and the reason if this report is not compared with it."""
-    name = run.folder.head.get("study")
+    name = run.folder.head.study
     if not name:
         return {}
     if run.study and run.workspace:

@@ -240,7 +240,7 @@ def test_a_file_outside_that_a_record_names_stays(run: Path) -> None:
     segment = read_segment(run / RECORDS)
     lines = [segment.content(number) for number in segment.lines if number > 1]
     lines[0] |= {"experiment_id": name, "patch": "ab" * 32}
-    plan = RunFolder.unverified(run).head["plan"]
+    plan = RunFolder.unverified(run).head.plan
     (run / RECORDS).write_bytes(written(run / RECORDS, {"schema": SCHEMA, "plan": plan}, lines))
     repaired(run)
     assert mine.read_text() == "mine"
@@ -252,7 +252,7 @@ def test_a_file_outside_that_an_index_of_series_names_stays(run: Path, name: str
     mine.write_text("mine")
     (run / "series").mkdir()
     index = Index(
-        plan=RunFolder.unverified(run).head["plan"],
+        plan=RunFolder.unverified(run).head.plan,
         chunks=((name, 1),),
         sizes=(4,),
         goldens={},

@@ -60,7 +60,7 @@ def test_the_seal_does_not_depend_on_workers_or_order(made: Path, run: Path, res
 def test_a_retried_harness_error_does_not_affect_the_seal(made: Path, run: Path) -> None:
     folder = RunFolder.open(run)
     name = next(iter(folder.share()))
-    head = {"schema": SCHEMA, "plan": folder.head["plan"]}
+    head = {"schema": SCHEMA, "plan": folder.head.plan}
     path = run / "records" / "0002-a.jsonl"
     digests.close_segments(run, finished=False)
     path.write_bytes(written(path, head, [{"experiment_id": name, "status": "harness_error"}]))

@@ -43,7 +43,7 @@ def test_experiments_without_a_valid_record_are_pending(
     folder: RunFolder, record: Callable[..., Record]
 ) -> None:
     faults = read_faults(folder.path)
-    chunks = [read_chunk(folder.path, chunk, faults) for chunk in folder.head["chunks"]]
+    chunks = [read_chunk(folder.path, chunk, faults) for chunk in folder.head.chunks]
     records = {e.id: record(e.id) for e in (*chunks[0], chunks[1][1], chunks[2][0])}
     wrong = record(chunks[2][0].id, status=Status.HARNESS_ERROR, outcome=None)
     records[wrong.experiment_id] = wrong
@@ -55,6 +55,6 @@ def test_experiments_without_a_valid_record_are_pending(
 
 def test_the_chunks_together_contain_the_whole_plan(folder: RunFolder) -> None:
     faults = read_faults(folder.path)
-    found = [e.id for chunk in folder.head["chunks"] for e in read_chunk(folder.path, chunk, faults)]
+    found = [e.id for chunk in folder.head.chunks for e in read_chunk(folder.path, chunk, faults)]
     assert len(found) == len(set(found)) == 24
     assert folder.find(found[5][:10]) == found[5]

@@ -5,12 +5,14 @@ import shutil
 import subprocess
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from mutator.campaigns import clones
 from mutator.campaigns.clones import Clone, clone_state, user_name
+from mutator.store.stretches import CloneState
 
 IDENTITY = ("-c", "user.name=x", "-c", "user.email=x@example.org", "-c", "commit.gpgsign=false")
 
@@ -52,10 +54,10 @@ def test_only_changes_in_the_folder_itself_make_a_commit_dirty(tmp_path: Path) -
     git(tmp_path, "add", "library")
     git(tmp_path, "commit", "-qm", "one")
     found = clone_state(library)
-    assert found is not None and len(found["commit"]) == 40 and found["changed"] is False
+    assert found is not None and len(found.commit) == 40 and not found.changed
     assert clone_state(other) is None  # inside the clone, but not in any commit
     (library / "b.yaml").write_text("new")
-    assert clone_state(library) == found | {"changed": True}
+    assert clone_state(library) == replace(found, changed=True)
 
 
 def test_without_git_there_is_no_commit(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -106,7 +108,7 @@ def test_changes_are_those_that_git_status_lists(
     CHANGES[change](library)
     state = clone_state(library)
     expected = bool(git(library, "status", "--porcelain", "--", "."))
-    assert state == {"commit": git(clone, "rev-parse", "HEAD").strip(), "changed": expected}
+    assert state == CloneState(commit=git(clone, "rev-parse", "HEAD").strip(), changed=expected)
 
 
 @pytest.mark.parametrize("hash_name", ["sha1", "sha256"])
@@ -127,11 +129,12 @@ def test_worktrees_shallow_clones_and_submodules_are_clones(tmp_path: Path, hash
     for top in (tmp_path / "tree", tmp_path / "shallow", outer / "inner"):
         library = top / "library"
         state = clone_state(library)
-        assert state == {"commit": git(root, "rev-parse", "HEAD").strip(), "changed": False}
+        assert state == CloneState(commit=git(root, "rev-parse", "HEAD").strip(), changed=False)
         found = Clone.of(library)
         assert found is not None and found.hash_name == hash_name
-        assert found.last_change([library / "b.yaml"], "--format=%H") == state["commit"] + "\n"
-    assert clone_state(outer) is not None and clone_state(outer)["changed"] is False  # type: ignore[index]
+        assert found.last_change([library / "b.yaml"], "--format=%H") == state.commit + "\n"
+    whole = clone_state(outer)
+    assert whole is not None and not whole.changed
 
 
 def test_a_file_that_git_converts_counts_as_changed(clone: Path) -> None:
@@ -141,7 +144,7 @@ def test_a_file_that_git_converts_counts_as_changed(clone: Path) -> None:
     commit(clone)
     assert git(clone, "status", "--porcelain") == ""
     state = clone_state(clone / "library")
-    assert state is not None and state["changed"]
+    assert state is not None and state.changed
 
 
 @pytest.mark.slow
@@ -154,7 +157,7 @@ def test_ten_thousand_files_take_a_second(tmp_path: Path) -> None:
     commit(tmp_path)
     began = time.process_time()
     state = clone_state(tmp_path)
-    assert state is not None and not state["changed"]
+    assert state is not None and not state.changed
     assert time.process_time() - began < 3
 
 

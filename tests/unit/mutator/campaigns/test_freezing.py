@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import Choices, load_plan, make_plan
+from mutator.campaigns.plans import load_plan, make_plan
 from mutator.errors import MutatorError
+from mutator.store.choices import Choices
 from mutator.workspace import Workspace
 
 
@@ -64,6 +65,6 @@ def test_a_disk_limit_at_its_default_does_not_change_the_plan(toycar: Workspace,
     for number, (limit, is_same) in enumerate([(1024, True), (1025, False)], start=1):
         path.write_text(text.replace("limits: {", f"limits: {{disk_mb: {limit}, "))
         folder = freeze(make_plan(toycar, "small"), tmp_path / str(number), toycar)
-        assert (folder.head["plan"] == before.head["plan"]) is is_same
-        assert (folder.head["limits"] == before.head["limits"]) is is_same
+        assert (folder.head.plan == before.head.plan) is is_same
+        assert (folder.head.limits == before.head.limits) is is_same
         assert folder.limits.disk_mb == limit

@@ -42,7 +42,7 @@ def test_blas_uses_one_thread_in_any_environment(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "2")
     machine.blas.cache_clear()
     (library,) = machine.blas()
-    assert library["library"] and library["version"] and library["threads"] == 1
+    assert library.library and library.version and library.threads == 1
     assert set(machine.threads().values()) == {"1"} and "OPENBLAS_NUM_THREADS" in machine.threads()
 
 

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.plans import Choices, Plan, make_plan
+from mutator.campaigns.plans import Plan, make_plan
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Hold, Method
+from mutator.store.choices import Choices
 from mutator.workspace import Workspace
 
 

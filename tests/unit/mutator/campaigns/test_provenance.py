@@ -14,6 +14,7 @@ from mutator.campaigns.provenance import begin_stretch, check_versions
 from mutator.errors import EXIT_WRONG_INPUT, MutatorError
 from mutator.store.check_results import SCHEMA
 from mutator.store.run_folder import RunFolder
+from mutator.store.stretches import CloneState
 from mutator.workspace import Workspace
 
 
@@ -38,16 +39,16 @@ def use(monkeypatch: pytest.MonkeyPatch, **other: str | None) -> None:
 
 
 def test_a_session_records_everything_that_affects_results(folder: RunFolder, toycar: Workspace) -> None:
-    begin_stretch(folder, toycar, records="0001-*", accept=False)
+    folder = begin_stretch(folder, toycar, records="0001-*", accept=False)
     (stretch,) = RunFolder.open(folder.path).stretches
     assert stretch == folder.stretches[0]
     assert stretch.python == machine.python() and stretch.cpu == machine.cpu()
     assert stretch.packages == machine.versions({*machine.required(), "hypothesis"})
-    assert (stretch.records, stretch.git, stretch.accepted) == ("0001-*", _clone(), [])
+    assert (stretch.records, stretch.git, stretch.accepted) == ("0001-*", _clone(), ())
     assert stretch.blas and stretch.threads and stretch.platform
 
 
-def _clone() -> dict[str, object] | None:
+def _clone() -> dict[str, CloneState] | None:
     """Return the git state of the harness; the toy is outside any clone."""
     state = clone_state(Path(machine.__file__).parents[1])
     return {"mutator": state} if state else None
@@ -85,13 +86,13 @@ def test_different_versions_are_refused_unless_accepted(
     other: dict[str, str | None],
     told: str,
 ) -> None:
-    begin_stretch(folder, toycar, records="0001-*", accept=False)
+    folder = begin_stretch(folder, toycar, records="0001-*", accept=False)
     use(monkeypatch, **other)
     with pytest.raises(MutatorError) as caught:
         check_versions(folder)
     assert caught.value.exit_code == EXIT_WRONG_INPUT
     assert caught.value.got == f"this run used other versions: {told}"
-    begin_stretch(folder, toycar, records="0002-*", accept=True)
+    folder = begin_stretch(folder, toycar, records="0002-*", accept=True)
     assert [list(stretch.accepted) for stretch in folder.stretches] == [[], [told]]
     assert check_versions(folder) == ()  # from now on, these are the run's versions
 
@@ -100,7 +101,7 @@ def test_another_python_version_is_refused(
     folder: RunFolder, toycar: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("platform.python_version", lambda: "3.11.7")
-    begin_stretch(folder, toycar, records="0001-*", accept=False)
+    folder = begin_stretch(folder, toycar, records="0001-*", accept=False)
     monkeypatch.setattr("platform.python_version", lambda: "3.12.1")
     with pytest.raises(MutatorError, match=r"CPython 3\.11\.7, here CPython 3\.12\.1"):
         check_versions(folder)
@@ -111,10 +112,10 @@ def test_another_machine_is_recorded_but_not_refused(
     folder: RunFolder, toycar: Workspace, monkeypatch: pytest.MonkeyPatch, changed: str
 ) -> None:
     """Golden runs show whether two machines compute the same results."""
-    begin_stretch(folder, toycar, records="0001-*", accept=False)
+    folder = begin_stretch(folder, toycar, records="0001-*", accept=False)
     other = {"threads": {"OMP_NUM_THREADS": "8"}}.get(changed, "another")
     name = "platform.platform" if changed == "platform" else f"mutator.campaigns.machine.{changed}"
     monkeypatch.setattr(name, lambda: other)
     assert check_versions(folder) == ()
-    begin_stretch(folder, toycar, records="0002-*", accept=False)
+    folder = begin_stretch(folder, toycar, records="0002-*", accept=False)
     assert getattr(folder.stretches[1], changed) == other != getattr(folder.stretches[0], changed)

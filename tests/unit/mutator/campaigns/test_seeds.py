@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import Choices, Plan, Planning, load_plan, make_plan
+from mutator.campaigns.plans import Plan, Planning, load_plan, make_plan
 from mutator.errors import MutatorError
 from mutator.store import plan_file
+from mutator.store.choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -94,7 +95,7 @@ def test_planned_experiments_can_be_read_by_position(
     toycar: Workspace, campaign: Callable[..., Path], tmp_path: Path
 ) -> None:
     folder = freeze(Planning(toycar, campaign()), tmp_path / "run", toycar)
-    planned = plan_file.ExperimentsInOrder(folder.path, folder.head["chunks"])
+    planned = plan_file.ExperimentsInOrder(folder.path, folder.head.chunks)
     every = plan_file.read_all(folder.path)
     assert (len(planned), tuple(planned)) == (len(every), every)
     assert [planned[i] for i in range(-3, len(every))] == [every[i] for i in range(-3, len(every))]

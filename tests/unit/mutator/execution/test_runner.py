@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mutator.campaigns.plans import Choices, make_plan
+from mutator.campaigns.plans import make_plan
 from mutator.engines.jobs import Execution, Job
 from mutator.errors import MutatorError
 from mutator.execution.runner import Goldens, Runner
 from mutator.model import Activation, Experiment, Outcome, Record, Status
 from mutator.preflight.preflight_rules import digest_of
+from mutator.store.choices import Choices
 from mutator.workspace import Workspace
 
 T = np.arange(20) * 0.05

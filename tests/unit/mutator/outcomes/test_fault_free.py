@@ -13,6 +13,7 @@ from mutator.outcomes.fault_free import fault_free_runs, fault_free_table, own_a
 from mutator.store.run_folder import RunFolder
 from mutator.targets.channels import Channel
 from mutator.targets.judging import Hazard
+from tests.made_head import made_head
 
 MANIFEST: Any = SimpleNamespace(
     trace_file="trace.npz",
@@ -32,7 +33,7 @@ MANIFEST: Any = SimpleNamespace(
 def folder(path: Path, runs: dict[tuple[str, str], dict]) -> RunFolder:
     """Create a run folder whose golden runs have the given records, by scenario and change."""
     goldens = [[scenario, [change] if change else []] for scenario, change in runs]
-    (path / "run.json").write_text(json.dumps({"schema": "run/3", "goldens": goldens}))
+    (path / "run.json").write_text(json.dumps(made_head(goldens=goldens)))
     made = RunFolder.unverified(path)
     for (scenario, changes), record in zip(goldens, runs.values(), strict=True):
         place = made.golden(scenario, tuple(changes))

@@ -1,12 +1,13 @@
 """The paths of faults through a structure with two controllers, and through chains of components without a
 structure."""
 
-from dataclasses import replace
+import json
 from pathlib import Path as Folder
 from typing import Any
 
 import pytest
 
+from mutator._common.plain_reader import from_plain
 from mutator.errors import MutatorError
 from mutator.model import (
     Activation,
@@ -23,9 +24,10 @@ from mutator.model import (
     Trigger,
 )
 from mutator.outcomes.fault_paths import ComponentState, FaultPath, FaultPaths, LinkState, fault_paths_of
-from mutator.store.run_head import Head
+from mutator.store.run_folder import RunFolder
 from mutator.stpa.analysis import StructureModel
 from mutator.targets.target_facts import ChannelFacts
+from tests.made_head import made_head
 
 # eyes -> finder -> speed -> pedals -> car, and gauge -> wheel -> rack -> car; the gauge also feeds `speed`
 KINDS = {
@@ -65,12 +67,12 @@ STRUCTURE = StructureModel.model_validate(
     }
 )
 CHANNELS = [
-    ChannelFacts.from_plain(["seen", "m", "internal", "finder", ""]),
-    ChannelFacts.from_plain(["wanted", "m/s", "internal", "speed", ""]),
-    ChannelFacts.from_plain(["angle", "rad", "internal", "wheel", ""]),
-    ChannelFacts.from_plain(["gas", "-", "actuator", "pedals", ""]),
-    ChannelFacts.from_plain(["torque", "-", "actuator", "rack", ""]),
-    ChannelFacts.from_plain(["place", "m", "truth", "car", ""]),
+    from_plain(ChannelFacts, ["seen", "m", "internal", "finder", ""]),
+    from_plain(ChannelFacts, ["wanted", "m/s", "internal", "speed", ""]),
+    from_plain(ChannelFacts, ["angle", "rad", "internal", "wheel", ""]),
+    from_plain(ChannelFacts, ["gas", "-", "actuator", "pedals", ""]),
+    from_plain(ChannelFacts, ["torque", "-", "actuator", "rack", ""]),
+    from_plain(ChannelFacts, ["place", "m", "truth", "car", ""]),
 ]
 WAYS = FaultPaths(CHANNELS, STRUCTURE)
 
@@ -229,7 +231,7 @@ def test_the_first_changed_input_decides_between_fault_and_feedback(
     left: dict[str, float], state: ComponentState
 ) -> None:
     """The car moved differently before the speed control changed."""
-    pace = ChannelFacts.from_plain(["pace", "m/s", "internal", "gauge", ""])
+    pace = from_plain(ChannelFacts, ["pace", "m/s", "internal", "gauge", ""])
     fault_paths = FaultPaths([*CHANNELS, pace], STRUCTURE)
     found = path("finder", "wheel", fault_paths=fault_paths, torque=1.0, place=1.1, wanted=1.5, **left)
     assert states(found)["speed"] is state
@@ -279,9 +281,9 @@ def test_a_chain_has_feedback_too() -> None:
     """The fault is injected after the interface, whose channels change only after the car."""
     fault_paths = FaultPaths(
         [
-            ChannelFacts.from_plain(["seen", "", "internal", "interface", ""]),
-            ChannelFacts.from_plain(["ask", "", "actuator", "control", ""]),
-            ChannelFacts.from_plain(["gap", "", "truth", "car", ""]),
+            from_plain(ChannelFacts, ["seen", "", "internal", "interface", ""]),
+            from_plain(ChannelFacts, ["ask", "", "actuator", "control", ""]),
+            from_plain(ChannelFacts, ["gap", "", "truth", "car", ""]),
         ],
         None,
     )
@@ -306,16 +308,18 @@ def replace_links(links: dict[str, Any]) -> StructureModel:
     return StructureModel.model_validate(STRUCTURE.model_dump(mode="json", by_alias=True) | {"links": links})
 
 
-def test_the_structure_is_read_from_run_json() -> None:
-    """Older runs have no components, so they have no paths."""
+def test_the_structure_is_read_from_run_json(tmp_path: Folder) -> None:
+    """Without components, there are no paths."""
+
+    def read(**changes: object) -> FaultPaths | None:
+        (tmp_path / "run.json").write_text(json.dumps(made_head(**changes)))
+        return fault_paths_of(RunFolder.unverified(tmp_path))
+
     structure = STRUCTURE.model_dump(mode="json", by_alias=True)
-    channels = [channel.plain() for channel in CHANNELS]
-    head = Head(Folder("run.json"), {"channels": channels, "structure": structure})
-    found = fault_paths_of(head)
+    found = read(channels=CHANNELS, structure=structure)
     assert found is not None and found.structure == STRUCTURE
-    assert fault_paths_of(Head(Folder("run.json"), {})) is None
-    nothing = [replace(channel, component="").plain() for channel in CHANNELS]
-    assert fault_paths_of(Head(Folder("run.json"), {"channels": nothing, "structure": None})) is None
+    assert read() is None
+    assert read(channels=[channel._replace(component="") for channel in CHANNELS]) is None
     structure["links"]["lead"]["to"] = 3
     with pytest.raises(MutatorError, match="structure"):
-        fault_paths_of(head)
+        read(channels=CHANNELS, structure=structure)

@@ -9,13 +9,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mutator.campaigns.plans import Choices
 from mutator.execution.running import run_campaign
 from mutator.figures.figures import Drawing, drawing_files
 from mutator.paper.actions import WANTED, Pair, Wanted
 from mutator.paper.examples import candidates, example_drawings
 from mutator.report import building
 from mutator.statistics.frame import load
+from mutator.store.choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 

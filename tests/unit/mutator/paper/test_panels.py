@@ -8,10 +8,11 @@ import pandas as pd
 import pytest
 
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import Choices, make_plan
+from mutator.campaigns.plans import make_plan
 from mutator.paper.panels import observations_panel
 from mutator.paper.published import load_paper
 from mutator.report.studies import ReportedRun
+from mutator.store.choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 

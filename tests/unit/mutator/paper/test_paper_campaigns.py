@@ -9,8 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.plans import Choices, Plan, make_plan
+from mutator.campaigns.plans import Plan, make_plan
 from mutator.model import Experiment, Method
+from mutator.store.choices import Choices
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).parents[4]
@@ -126,7 +127,8 @@ def test_the_reference_campaign_uses_the_reading_as_coded(library: Workspace) ->
 @pytest.mark.slow
 def test_the_plan_is_the_same_in_another_process(sample: Plan) -> None:
     code = (
-        "from pathlib import Path; from mutator.campaigns.plans import Choices, make_plan;"
+        "from pathlib import Path; from mutator.campaigns.plans import make_plan;"
+        "from mutator.store.choices import Choices;"
         "from mutator.workspace import Workspace;"
         f"print(make_plan(Workspace.find(root=Path({str(ROOT)!r})), 'paper_sample').digest)"
     )

@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 
 from mutator.api.audits import verify
-from mutator.campaigns.plans import Choices
 from mutator.engines.registry import choose_engine
 from mutator.errors import CheckFailed, MutatorError
 from mutator.execution.running import run_campaign
 from mutator.model import Experiment
 from mutator.preflight import equivalence
 from mutator.store import digests
+from mutator.store.choices import Choices
 from mutator.store.lines import LineWriter, read_segment
 from mutator.store.records import SCHEMA, read_records
 from mutator.store.run_folder import RunFolder
@@ -186,7 +186,7 @@ def test_runs_of_an_unneeded_check_are_deleted(threaded: Workspace, tmp_path: Pa
     (path,) = (run / "records").iterdir()
     (run / "proof").mkdir()
     lines = list(read_segment(path).objects(SCHEMA))
-    writer = LineWriter(run / "proof" / path.name, {"schema": SCHEMA, "plan": folder.head["plan"]})
+    writer = LineWriter(run / "proof" / path.name, {"schema": SCHEMA, "plan": folder.head.plan})
     for _, line in lines[:1]:
         writer.append(line)
     writer.close()

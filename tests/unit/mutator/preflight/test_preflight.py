@@ -148,7 +148,7 @@ def test_changed_golden_runs_are_refused(
     folder = frozen(toycar, tmp_path)
     run_checks(toycar, folder)
     LineWriter(
-        folder.path / "records" / "0001-gw0.jsonl", {"schema": SCHEMA, "plan": folder.head["plan"]}
+        folder.path / "records" / "0001-gw0.jsonl", {"schema": SCHEMA, "plan": folder.head.plan}
     ).close()
     monkeypatch.setattr(machine, "cpu", lambda: "another")
     assert all(result.passed for result in run_checks(toycar, folder))

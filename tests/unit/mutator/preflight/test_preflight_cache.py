@@ -11,12 +11,13 @@ import pytest
 from mutator._common import kept_folders
 from mutator._common.files import json_bytes
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import Choices, make_plan
+from mutator.campaigns.plans import make_plan
 from mutator.engines.jobs import Execution, Job
 from mutator.engines.reference import ReferenceEngine
 from mutator.preflight import preflight_cache
 from mutator.preflight.preflight import run_checks
 from mutator.preflight.preflight_rules import digest_of
+from mutator.store.choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 

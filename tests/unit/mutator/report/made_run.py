@@ -5,32 +5,22 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 from mutator._common.hashing import plain
-from mutator.results.table_columns import result_columns
+from mutator.results.table_columns import SINCE, result_columns
 from mutator.store import digests, plan_file
+from mutator.store.choices import Choices
 from mutator.store.digests import Ledger
 from mutator.store.stretches import Stretch
+from tests.made_head import made_head
 from tests.made_up_results import write_results
 
 COMPARED = ("gas", "brake", "steer_torque")
-COLUMNS = result_columns(("H1", "H2", "H3"), COMPARED)
-HEAD = {
-    "schema": "run/3",
-    "campaign": "night_<b>drive</b>",
-    "plan": "ab" * 32,
-    "hazards": ["H1", "H2", "H3"],
-    "compared": [*COMPARED],
-    "seed": 7,
-    "reading": "as_described",
-    "choices": {"seed": None, "limit": 3},
-    "target": "openpilot",
-    "goldens": [],
-    "experiments": 3,
-    "chunks": [],
-    "runs": 2,
-    "sources": {"target": "cd" * 32},
-    "provenance": {"mutator": "0.2.0"},
-    "stretches": [plain(Stretch(python="3.11.7", platform="Linux", packages={"numpy": "2.4.6"}))],
-}
+COLUMNS = result_columns(("H1", "H2", "H3"), COMPARED, (), SINCE)
+HEAD = made_head(
+    campaign="night_<b>drive</b>",
+    compared=COMPARED,
+    choices=plain(Choices(limit=3)),
+    stretches=[plain(Stretch(python="3.11.7", platform="Linux", packages={"numpy": "2.4.6"}))],
+)
 OK = {
     "module": "radar",
     "fault_type": "chaff",

@@ -17,7 +17,7 @@ from mutator.report.fix_order import first_to_fix
 from mutator.report.panels.answers import answers_panel
 from mutator.report.paths import RunPaths
 from mutator.report.studies import ReportedRun
-from mutator.results.table_columns import result_columns
+from mutator.results.table_columns import SINCE, result_columns
 from mutator.store.lines import written
 from mutator.store.records import TIMINGS_SCHEMA
 from mutator.store.run_folder import RunFolder
@@ -45,7 +45,7 @@ RUNS = [
 
 @pytest.fixture
 def run(tmp_path: Path) -> ReportedRun:
-    make_run(tmp_path, hazards=["H1"], compared=["gas"], metrics=[metric.plain() for metric in METRICS])
+    make_run(tmp_path, hazards=["H1"], compared=["gas"], metrics=METRICS)
     lines = []
     for i, (kind, outcome, active, hazard, alerts, alert, speed, margin) in enumerate(RUNS):
         module, fault_type = kind.split("/")
@@ -56,7 +56,7 @@ def run(tmp_path: Path) -> ReportedRun:
         line |= {"seed": 1, "t_manifest": 2.5 if outcome in ("hazard", "sdc") else "", "variant": "x"}
         line |= {"reaction_time": hazard - alert if alerts and alert < hazard else ""}
         lines.append(line)
-    write_results(tmp_path, result_columns(("H1",), ("gas",), METRICS), lines)
+    write_results(tmp_path, result_columns(("H1",), ("gas",), METRICS, SINCE), lines)
     costs = [
         {"experiment_id": f"{i}" * 16, "cpu_s": 2.0**i, "wall_s": 1.0, "worker": f"w{i % 2}"}
         for i in range(7)

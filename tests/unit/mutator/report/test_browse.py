@@ -13,6 +13,7 @@ from mutator.report.browse import column, details, media, table
 from mutator.report.seen import PLACE
 from mutator.review.groups import shapes
 from mutator.store.run_folder import RunFolder
+from tests.made_head import made_head
 
 from ..statistics.results_frame import results
 
@@ -73,7 +74,7 @@ def test_diffs_are_stored_as_shapes_and_values(experiment: Callable[..., Experim
 
 
 def test_pictures_beyond_the_budget_are_links(tmp_path: Path) -> None:
-    write_json(tmp_path / "run.json", {"schema": "run/3"})
+    write_json(tmp_path / "run.json", made_head())
     plots = tmp_path / "plots"
     plots.mkdir()
     for name in ("aa-2.00s.jpg", "aa-10.00s.jpg", "aa.mp4", "bb.svg"):

@@ -133,10 +133,11 @@ def test_figures_are_in_the_markdown_and_in_the_page(run: Path) -> None:
 
 
 def test_experiments_and_runs_are_counted_separately(run: Path) -> None:
-    """Older run folders do not contain the number of runs."""
     assert "Planned: 3 experiments, in 2 runs" in building.write(run, None).markdown.read_text()
-    (run / "run.json").write_text(json.dumps({name: x for name, x in HEAD.items() if name != "runs"}))
-    assert "Planned: 3 experiments.\n" in building.write(run, None).markdown.read_text()
+    (run / "run.json").write_text(json.dumps(HEAD | {"runs": 3}))
+    assert (
+        "Planned: 3 experiments; each needs its own run.\n" in building.write(run, None).markdown.read_text()
+    )
 
 
 def test_the_report_says_what_stopped_runs_might_have_missed(run: Path) -> None:

@@ -8,11 +8,12 @@ from pathlib import Path
 import pytest
 
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import Choices, make_plan
+from mutator.campaigns.plans import make_plan
 from mutator.model import Experiment, Outcome, Record, Status
 from mutator.report import building, engines, stamp
 from mutator.report.seen import timings_of
 from mutator.results.table_building import build
+from mutator.store.choices import Choices
 from mutator.store.lines import LineWriter
 from mutator.store.records import SCHEMA, TIMINGS_SCHEMA
 from mutator.store.run_folder import RunFolder

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from math import inf
 
+from mutator._common.plain_reader import from_plain
 from mutator.model import Record
 from mutator.outcomes.fault_paths import (
     ComponentState,
@@ -20,9 +21,9 @@ from mutator.targets.target_facts import ChannelFacts
 from mutator.workspace import Workspace
 
 CHANNELS = [
-    ChannelFacts.from_plain(["seen", "m", "internal", "eyes", "what is seen"]),
-    ChannelFacts.from_plain(["gas", "-", "actuator", "pedals", ""]),
-    ChannelFacts.from_plain(["gap", "m", "truth", "car", ""]),
+    from_plain(ChannelFacts, ["seen", "m", "internal", "eyes", "what is seen"]),
+    from_plain(ChannelFacts, ["gas", "-", "actuator", "pedals", ""]),
+    from_plain(ChannelFacts, ["gap", "m", "truth", "car", ""]),
 ]
 
 

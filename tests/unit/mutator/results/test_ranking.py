@@ -15,17 +15,16 @@ from mutator.results.table_columns import SEVERITY, SINCE, result_columns
 from mutator.results.table_reader import Results
 from mutator.targets.severity import CLASSES
 from mutator.targets.target_facts import MetricFacts
+from tests.made_head import made_head
 from tests.made_up_results import write_results
 
 METRICS = [MetricFacts(name, "-", "", "lower") for name in ("margin_h1", "margin_h2", "margin_h3", "delta_v")]
 COLUMNS = result_columns(("H1", "H2", "H3"), ("gas",), METRICS, (SEVERITY, *SINCE))
-HEAD = {
-    "schema": "run/3",
-    "hazards": ["H1", "H2", "H3"],
-    "compared": ["gas"],
-    "metrics": [metric.plain() for metric in METRICS],
-    "severity": {"name": "x", "about": "", "source": "", "classes": [["S0", 0.0, ""]]},
-}
+HEAD = made_head(
+    compared=["gas"],
+    metrics=METRICS,
+    severity={"name": "x", "about": "", "source": "", "classes": [["S0", 0.0, ""]]},
+)
 OK = {
     "fault_id": "f",
     "module": "m",

@@ -1,17 +1,19 @@
 """Counts of the experiments in the results table."""
 
+import json
 from pathlib import Path
 
 import pytest
 
 from mutator.model import Outcome, Status
 from mutator.results.counting import count_table, counts_by, hazard_names, kinds, outcome_counts
-from mutator.results.table_columns import result_columns
+from mutator.results.table_columns import SINCE, result_columns
 from mutator.results.table_reader import Results
 from mutator.store import plan_file
+from tests.made_head import made_head
 from tests.made_up_results import write_results
 
-COLUMNS = result_columns(("H1", "H2", "H3"), ("gas",))
+COLUMNS = result_columns(("H1", "H2", "H3"), ("gas",), (), SINCE)
 SEEN = {
     "module": "radar",
     "fault_type": "chaff",
@@ -28,7 +30,7 @@ SEEN = {
 
 
 def results(run: Path, *lines: dict[str, str]) -> Results:
-    (run / "run.json").write_text('{"schema": "run/3", "hazards": ["H1", "H2", "H3"], "compared": ["gas"]}')
+    (run / "run.json").write_text(json.dumps(made_head(compared=["gas"])))
     plan_file.write(run, [], [])
     named = ({"experiment_id": f"{i:016x}", "fault_id": "f"} | line for i, line in enumerate(lines))
     write_results(run, COLUMNS, named)

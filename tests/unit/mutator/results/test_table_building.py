@@ -6,7 +6,7 @@ import os
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from mutator._common.files import half_written
+from mutator._common.hashing import plain
+from mutator._common.plain_reader import from_plain
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plans import make_plan
 from mutator.errors import MutatorWarning
@@ -132,18 +134,15 @@ def test_a_row_has_the_severity_and_the_times_to_the_hazard(
     assert row_of(experiment(), kept)["severity"] is None  # without a scale
 
 
-def test_run_json_determines_the_columns_of_severity(experiment: Callable[..., Experiment]) -> None:
-    scale = {"severity": SCALE.plain()}
+def test_a_scale_determines_the_columns_of_severity() -> None:
     times = ["fault_tolerant_time", "manifest_to_hazard"]
-    heads: list[tuple[dict[str, object], list[str]]] = [
-        (scale, ["severity", *times]),
-        ({"severity": None}, times),
-        ({}, []),
-    ]
-    for head, names in heads:
-        columns = [c.name for c in result_columns(("H1",), ("gas",), (), severity_columns(head))]
+    for has_classes, names in ((True, ["severity", *times]), (False, times)):
+        severity = severity_columns(has_classes=has_classes)
+        columns = [c.name for c in result_columns(("H1",), ("gas",), (), severity)]
         assert columns[columns.index("max_dev_gas") + 1 : columns.index("variant")] == names
-    assert Scale.from_plain(SCALE.plain()) == SCALE
+    assert from_plain(Scale, plain(SCALE)) == SCALE
+    with pytest.raises(ValueError, match="no class of severity begins at 0"):
+        replace(SCALE, classes=SCALE.classes[1:])
 
 
 @pytest.mark.parametrize(
@@ -186,7 +185,7 @@ def folder(toycar: Workspace, tmp_path: Path, record: MakeRecord) -> RunFolder:
     folder = freeze(plan, tmp_path / "run", toycar)
     for i in (0, 1):
         writer = LineWriter(
-            folder.path / "records" / f"0001-gw{i}.jsonl", {"schema": SCHEMA, "plan": folder.head["plan"]}
+            folder.path / "records" / f"0001-gw{i}.jsonl", {"schema": SCHEMA, "plan": folder.head.plan}
         )
         timings = LineWriter(folder.path / "timings" / f"0001-gw{i}.jsonl", {"schema": TIMINGS_SCHEMA})
         for experiment in plan.experiments[i:22:2]:
@@ -242,7 +241,7 @@ def made_at_once(folder: RunFolder) -> dict[str, bytes]:
     done = [(e, records[e.id]) for e in planned if e.id in records]
     columns = columns_of(folder.head)
     names = [column.name for column in columns]
-    made = [cells_of(columns, [Finished(*one, folder.scale, fault_paths_of(folder.head))]) for one in done]
+    made = [cells_of(columns, [Finished(*one, folder.scale, fault_paths_of(folder))]) for one in done]
     rows = [{name: cell for name, (cell,) in zip(names, cells, strict=True)} for cells in made]
     text = io.StringIO()
     writer = csv.DictWriter(text, names, lineterminator="\n", restval="")
@@ -279,7 +278,7 @@ def test_tables_built_in_batches_have_the_same_bytes(
     left = (("gas", 2.0000001, 0.5), ("v_ego", 2.05, 1e-7), ("strange", 2.1, 3.0))
     last = plan_file.read_all(folder.path)[22]
     lines = LineWriter(
-        folder.path / "records" / "0002-gw0.jsonl", {"schema": SCHEMA, "plan": folder.head["plan"]}
+        folder.path / "records" / "0002-gw0.jsonl", {"schema": SCHEMA, "plan": folder.head.plan}
     )
     lines.append(asdict(record(last.id, left=left, detail='a "b",\nc', t_manifest=2.05)))
     lines.close()
@@ -336,7 +335,7 @@ def test_tables_are_rebuilt_after_any_change(
 ) -> None:
     table_building.build(folder.path)
     if changed == "more records":
-        head = {"schema": SCHEMA, "plan": folder.head["plan"]}
+        head = {"schema": SCHEMA, "plan": folder.head.plan}
         LineWriter(folder.path / "records" / "0002-gw0.jsonl", head).close()
     elif changed == "fewer timings":
         (folder.path / "timings" / "0001-gw1.jsonl").unlink()
@@ -375,7 +374,7 @@ def test_an_interrupted_build_is_not_reported_as_an_edited_table(
     table_building.build(folder.path)
     planned = plan_file.read_all(folder.path)
     for killed_before, number in ((table_building.CSV, 2), (table_building.PARQUET, 3)):
-        head = {"schema": SCHEMA, "plan": folder.head["plan"]}
+        head = {"schema": SCHEMA, "plan": folder.head.plan}
         lines = LineWriter(folder.path / "records" / f"000{number}-gw0.jsonl", head)
         lines.append(asdict(record(planned[20 + number].id, max_dev=(("gas", 0.5),))))
         lines.close()

@@ -6,10 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.plans import Choices, make_plan
+from mutator.campaigns.plans import make_plan
 from mutator.errors import MutatorError
 from mutator.review.catalogue import Group, of_library, of_plan
 from mutator.review.material import fault_hunks
+from mutator.store.choices import Choices
 from mutator.workspace import Workspace
 
 SENSOR = ("sensor/*",)

@@ -6,13 +6,14 @@ import pytest
 
 from mutator._common.version import VERSION
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import Choices, Plan, load_plan, make_plan
+from mutator.campaigns.plans import Plan, load_plan, make_plan
 from mutator.errors import CheckFailed
 from mutator.execution.running import run_campaign
 from mutator.review import gate
 from mutator.review.catalogue import of_plan
 from mutator.review.decisions import Change, Kind, load_review, record
 from mutator.store.approvals import approval_summary, write_approvals
+from mutator.store.choices import Choices
 from mutator.workspace import Workspace
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from mutator.campaigns.plans import Choices, make_plan
+from mutator.campaigns.plans import make_plan
 from mutator.errors import MutatorError
 from mutator.model import Outcome, Status
 from mutator.results import table_building
@@ -17,6 +17,7 @@ from mutator.results.rows import Row
 from mutator.results.table_reader import Results
 from mutator.review.catalogue import of_plan
 from mutator.review.typical import of_group, verdict_of
+from mutator.store.choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 

@@ -1,5 +1,6 @@
 """Summaries by scenario and fault type, and the frame that they use."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ from mutator.statistics.frame import load
 from mutator.statistics.shares import share
 from mutator.statistics.summary_tables import coverage_sheet, summary_sheet
 from mutator.statistics.tallies import Tally, by_kind, by_scenario
+from tests.made_head import made_head
 from tests.made_up_results import write_results
 
 from .results_frame import results
@@ -48,7 +50,7 @@ def test_crashes_count_as_injected_and_harness_errors_do_not() -> None:
 def test_a_missing_file_or_column_is_reported(tmp_path: Path) -> None:
     with pytest.raises(MutatorError, match=r"results\.parquet"):
         load(tmp_path / "results.csv")
-    (tmp_path / "run.json").write_text('{"schema": "run/3", "hazards": [], "compared": []}')
+    (tmp_path / "run.json").write_text(json.dumps(made_head(hazards=[])))
     columns = result_columns((), ())
     write_results(tmp_path, [column for column in columns if column.name != "module"], [])
     with pytest.raises(MutatorError, match="no column 'module'"):

@@ -132,7 +132,7 @@ def test_swapped_files_are_reported(run: Path) -> None:
 def unsealed(run: Path, *lines: dict[str, object], plan: str | None = None) -> Path:
     """Turn a finished run into a killed one, with these lines in an unclosed segment."""
     digests.close_segments(run, finished=False)
-    head = {"schema": SCHEMA, "plan": plan or RunFolder.unverified(run).head["plan"]}
+    head = {"schema": SCHEMA, "plan": plan or RunFolder.unverified(run).head.plan}
     writer = LineWriter(run / "records" / "0002-a.jsonl", head)
     for line in lines:
         writer.append(line)
@@ -213,7 +213,7 @@ def test_an_invalid_value_in_run_json_is_reported_by_key(run: Path, key: str) ->
     del data[key]
     (run / "run.json").write_text(json.dumps(data))
     with pytest.raises(MutatorError, match=rf"run\.json: no key '{key}'"):
-        _ = RunFolder.unverified(run).head[key]
+        RunFolder.unverified(run)
 
 
 @pytest.mark.parametrize("key", [field.name for field in fields(Stretch)])

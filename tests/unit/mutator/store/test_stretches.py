@@ -1,31 +1,54 @@
 """Stretches of work."""
 
-from dataclasses import asdict
+import json
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
-from mutator.errors import MutatorError
-from mutator.store.stretches import Stretch, differences, package_versions, read_stretches, told
+from mutator._common.hashing import plain
+from mutator._common.plain_reader import from_plain
+from mutator.errors import Misfit
+from mutator.store.stretches import (
+    Blas,
+    CloneState,
+    Machine,
+    Stretch,
+    differences,
+    package_versions,
+    told,
+)
 
 BEFORE = Stretch(
     python="CPython 3.11.7",
     packages={"numpy": "1.26.4", "old": "1.0"},
     platform="Linux-6.1",
     cpu="Cray 1",
-    blas=[{"library": "openblas", "version": "0.3", "kernel": "Haswell", "threads": 1}],
-    git={"library": {"commit": "abc", "changed": True}},
+    blas=(Blas(library="openblas", version="0.3", kernel="Haswell", threads=1),),
+    git={"library": CloneState(commit="abc", changed=True)},
 )
 
 
 def test_stretches_are_read_as_written() -> None:
-    assert read_stretches({"stretches": [asdict(BEFORE)]}) == (BEFORE,)
+    machine = Machine(
+        worker="w", mutator="0.2", host="h", python="3", platform="p", cpu=None, blas=BEFORE.blas, packages={}
+    )
+    for stretch in (BEFORE, replace(BEFORE, machines=(machine,))):
+        assert from_plain(Stretch, json.loads(json.dumps(plain(stretch)))) == stretch
 
 
-@pytest.mark.parametrize("stretch", [{}, {"python": "3"}, asdict(BEFORE) | {"stranger": 1}, 7])
-def test_a_damaged_stretch_is_reported(stretch: Any) -> None:
-    with pytest.raises(MutatorError, match=r"run\.json: a damaged stretch of work"):
-        read_stretches({"stretches": [stretch]})
+@pytest.mark.parametrize(
+    ("stretch", "got"),
+    [
+        ({}, "no key 'python'"),
+        ({"python": "3"}, "no key 'packages'"),
+        (plain(BEFORE) | {"stranger": 1}, "an unknown key 'stranger'"),
+        (7, "7"),
+    ],
+)
+def test_a_damaged_stretch_is_refused(stretch: Any, got: str) -> None:
+    with pytest.raises(Misfit, match=got):
+        from_plain(Stretch, stretch)
 
 
 def test_every_difference_is_named() -> None:

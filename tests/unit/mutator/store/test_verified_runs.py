@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 from mutator._common import caches
-from mutator.campaigns.plans import Choices
 from mutator.errors import MutatorError
 from mutator.execution.ended_runs import ended_before
 from mutator.execution.running import run_campaign
 from mutator.store import digests, integrity, verified_runs
+from mutator.store.choices import Choices
 from mutator.store.patches import Patches
 from mutator.store.patches import rewrite as rewrite_patches
 from mutator.store.run_folder import RunFolder

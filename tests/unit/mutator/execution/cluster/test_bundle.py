@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.plans import Choices
 from mutator.errors import MutatorError
 from mutator.execution.cluster import bundle
 from mutator.execution.cluster.bundle import Bundle, Site, lay_out
 from mutator.execution.cluster.parcel import pack, unpack
 from mutator.execution.session import open_session
+from mutator.store.choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 

@@ -17,6 +17,7 @@ from distributed.client import FutureCancelledError
 from mutator.campaigns.chunks import pending
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plans import make_plan
+from mutator.campaigns.provenance import add_stretch
 from mutator.errors import MutatorWarning
 from mutator.execution.cluster import dask_workers
 from mutator.execution.cluster.bundle import Bundle
@@ -29,11 +30,12 @@ from mutator.execution.written_files import WrittenFiles
 from mutator.model import Record, Status
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
+from mutator.store.stretches import Stretch
 from mutator.workspace import Workspace
 
 from .loops import run
 
-FACTS = {"host": "here", "cpu": "", "platform": "", "python": "", "mutator": "", "blas": []}
+FACTS = {"host": "here", "cpu": "", "platform": "", "python": "", "mutator": "", "blas": [], "packages": {}}
 Work = Callable[[Piece], Result]
 
 
@@ -124,7 +126,7 @@ def session(toycar: Workspace, folder: RunFolder, monkeypatch: pytest.MonkeyPatc
     """A session in which every experiment is pending, and the versions of workers are not checked."""
     monkeypatch.setattr(Bundle, "of", lambda *given: Bundle(b"", ""))
     monkeypatch.setattr(Crew, "objection", lambda *given: "")
-    folder.head["stretches"] = [{"python": "", "packages": {}, "platform": ""}]
+    folder = add_stretch(folder, Stretch(python="", packages={}, platform=""))
     return SimpleNamespace(
         workspace=toycar,
         folder=folder,

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.plans import Choices
 from mutator.errors import MutatorError, PieceNotWanted
 from mutator.execution.cluster import bundle
 from mutator.execution.cluster.board import Board
@@ -20,6 +19,7 @@ from mutator.execution.cluster.driven_goldens import DrivenGoldens
 from mutator.execution.cluster.host import Host
 from mutator.execution.cluster.pieces import Ending, Piece, Result
 from mutator.execution.session import open_session
+from mutator.store.choices import Choices
 from mutator.workspace import Workspace
 
 

@@ -10,10 +10,11 @@ from markupsafe import escape
 from mutator.report.panel import Panel
 from mutator.report.panels.tables import tables_panel
 from mutator.report.studies import ReportedRun
-from mutator.results.table_columns import result_columns
+from mutator.results.table_columns import SINCE, result_columns
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
+from tests.made_head import made_head
 from tests.made_up_results import write_results
 
 HERE = Workspace.find(Path(__file__).parents[5])
@@ -38,12 +39,11 @@ HAZARD = {
 
 @pytest.fixture
 def run(tmp_path: Path) -> RunFolder:
-    head = {"schema": "run/3", "target": "openpilot", "goldens": [["S1", []]], "hazards": ["H1"]}
-    head["compared"] = []
+    head = made_head(goldens=[["S1", []]], hazards=["H1"])
     (tmp_path / "run.json").write_text(json.dumps(head))
     plan_file.write(tmp_path, [], [])
     lines = [HAZARD | {"experiment_id": method, "method": method} for method in ("guided", "random")]
-    write_results(tmp_path, result_columns(("H1",), ()), lines)
+    write_results(tmp_path, result_columns(("H1",), (), (), SINCE), lines)
     (tmp_path / "golden" / "S1").mkdir(parents=True)
     np.savez(tmp_path / "golden" / "S1" / "trace.npz", t=np.arange(3000) / 100)
     return RunFolder.unverified(tmp_path)

@@ -1,0 +1,32 @@
+"""What a user chose for a plan, beside the campaign file."""
+
+from dataclasses import dataclass
+
+from mutator._common.arguments import check_type, check_whole
+from mutator.store.shards import Shard
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Choices:
+    """Options that override the campaign file; None: as in the file.
+
+    Filters (`mutator.campaigns.filters`) use the columns that are known before an experiment runs.
+    """
+
+    seed: int | None = None  #: the seed of the sample, of drawn values and of random triggers
+    reading: str | None = None  #: the reading of the fault specs
+    only: str | None = None  #: filter: keep the experiments that match
+    exclude: str | None = None  #: filter: drop the experiments that match
+    limit: int | None = None  #: how many experiments to keep, spread like a sample
+    shard: str | None = None  #: the shard to run, `k/n`
+    series_mb: int | None = None  #: the budget of the series in MiB; 0: no series
+
+    def __post_init__(self) -> None:
+        for name, least in (("seed", 0), ("limit", 1), ("series_mb", 0)):
+            if (value := getattr(self, name)) is not None:
+                check_whole(name, value, least=least)
+        for name in ("reading", "only", "exclude", "shard"):
+            if (value := getattr(self, name)) is not None:
+                check_type(name, value, str, "text")
+        if self.shard is not None:
+            Shard.parse(self.shard)
