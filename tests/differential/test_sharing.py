@@ -18,8 +18,9 @@ from mutator.engines.reference import ReferenceEngine
 from mutator.errors import CheckFailed
 from mutator.execution.cluster import bundle
 from mutator.execution.cluster.board import Board
-from mutator.execution.cluster.bundle import Bundle, Site
+from mutator.execution.cluster.bundle import Bundle, read_inputs
 from mutator.execution.cluster.child import PieceRunner
+from mutator.execution.cluster.site import Site
 from mutator.execution.running import run_campaign
 from mutator.preflight.preflight import run_checks
 from mutator.store import plan_file
@@ -124,7 +125,9 @@ def test_one_experiment_of_a_shared_run_can_run_on_a_cluster(runs: tuple[Path, P
     left = replace(chunk, places=(_scenarios(folder, chunk).index("C"),))
     piece = Board(folder, [left], ()).take("w")
     assert piece is not None and piece.golden == "A+alone"
-    [record] = PieceRunner(Site(tmp_path), "w", os.getpid()).run(piece, lambda name: None).records
+    site = Site(tmp_path)
+    runner = PieceRunner(site, read_inputs(site), "w", os.getpid())
+    [record] = runner.run(piece, lambda name: None).records
     [name] = piece.ids
     assert record == canonical(line_of(folder.records()[name])).encode()
 

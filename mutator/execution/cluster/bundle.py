@@ -13,33 +13,29 @@ Each machine makes the golden runs itself; their digests show whether its result
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
 
 from mutator._common.below import check_inside, check_name, files_inside, inside
 from mutator._common.bounded import read_bounded
 from mutator._common.files import raising_disk_full, read_json
 from mutator._common.hashing import plain
 from mutator._common.version import VERSION
-from mutator.engines import sandbox
+from mutator.campaigns.run_inputs import RunInputs
 from mutator.errors import MutatorError, Outside
 from mutator.execution.cluster.parcel import pack, unpack
+from mutator.execution.cluster.site import META, SCHEMA, Site
 from mutator.faults.fault_model_files import load_fault_models
-from mutator.faults.fault_models import FILES, FaultModels
-from mutator.model import Limits
+from mutator.faults.fault_models import FILES
 from mutator.results.table_columns import check_names
 from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
-from mutator.store.run_folder import GoldenRun, RunFolder
+from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.manifest_files import load_manifest
 from mutator.workspace import Workspace
 
-SCHEMA = "bundle/1"
 MOST_BYTES = 2_000_000_000
-_META = "meta.json"
 _FOLDERS = ("manifest", "target", "overlay", "templates", "scenarios")
 _ROOT = "{root}/"
 
@@ -66,7 +62,7 @@ def _check(parts: Mapping[str, bytes], where: Path) -> None:
     seen: dict[str, str] = {}
     for name in parts:
         folder = check_name(name, where).partition("/")[0]
-        if name != _META and (folder == name or folder not in _FOLDERS):
+        if name != META and (folder == name or folder not in _FOLDERS):
             raise Outside(f"the name {name!a}", where=where, expected=f"a name in {', '.join(_FOLDERS)}")
         if other := seen.get(name.casefold()):
             raise MutatorError(
@@ -105,7 +101,7 @@ def _parts(workspace: Workspace, folder: RunFolder, engine: str) -> Iterator[tup
         "manifest": manifest.path.name,
         "sandbox": workspace.sandbox,
     }
-    yield _META, json.dumps(meta).encode()
+    yield META, json.dumps(meta).encode()
     yield f"manifest/{manifest.path.name}", read_bounded(manifest.path)
     tree = manifest.tree
     for path, data in tree.files.items():
@@ -144,52 +140,17 @@ def lay_out(data: bytes, place: Path) -> None:
             path.write_bytes(content)
 
 
-@dataclass(frozen=True)
-class Site:
-    """A bundle unpacked in the folder `place`."""
-
-    place: Path
-
-    @cached_property
-    def meta(self) -> dict[str, Any]:
-        """The content of meta.json; MutatorError if it is not what `Bundle.of` writes."""
-        path = self.place / _META
-        meta = read_json(path, SCHEMA)
-        try:
-            check_name(meta["manifest"], path, folders=False)
-            goldens = [(GoldenRun.from_stored(one["golden"]), one["digest"]) for one in meta["goldens"]]
-            for golden, _ in goldens:
-                check_name(golden.key, path)
-            if Limits(**meta["limits"]) and meta.keys() >= {"engine", "seed", "series", "several_seeds"}:
-                return meta
-        except (KeyError, TypeError, ValueError):
-            pass
-        raise MutatorError("not the description of a bundle", where=path, remedy="start the workers again")
-
-    @cached_property
-    def manifest(self) -> TargetManifest:
-        """The target's manifest, with the root in the unpacked bundle."""
-        path = inside(self.place / "manifest", self.meta["manifest"])
-        overlay = self.place / "overlay"
-        found = load_manifest(path, self.place / "target", overlay if overlay.is_dir() else None)
-        check_names(found)
-        if self.meta["sandbox"]:
-            sandbox.check()
-        return replace(found, sandbox=self.meta["sandbox"])
-
-    @cached_property
-    def models(self) -> FaultModels:
-        return load_fault_models(self.place / "templates")
-
-    @property
-    def limits(self) -> Limits:
-        return Limits(**self.meta["limits"])
-
-    def scenario(self, name: str) -> Path:
-        return inside(self.place / "scenarios", f"{name}.yaml")
-
-    @cached_property
-    def goldens(self) -> dict[str, tuple[GoldenRun, str]]:
-        """The golden runs with their digests, by name."""
-        told = [(GoldenRun.from_stored(one["golden"]), one["digest"]) for one in self.meta["goldens"]]
-        return {golden.key: (golden, digest) for golden, digest in told}
+def read_inputs(site: Site) -> RunInputs:
+    """Read the YAML of an unpacked bundle. The target's root is in the bundle."""
+    overlay = site.place / "overlay"
+    manifest = load_manifest(
+        inside(site.place / "manifest", site.meta["manifest"]),
+        site.place / "target",
+        overlay if overlay.is_dir() else None,
+    )
+    check_names(manifest)
+    return RunInputs(
+        manifest=replace(manifest, sandbox=site.meta["sandbox"]),
+        models=load_fault_models(site.place / "templates"),
+        scenarios={golden.scenario: site.scenario(golden.scenario) for golden, _ in site.goldens.values()},
+    )

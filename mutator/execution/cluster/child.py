@@ -1,7 +1,9 @@
-"""The process on a worker that runs pieces of work: `python -m mutator.execution.cluster.child FD SITE NAME`.
+"""The process on a worker that runs pieces of work: `python -m mutator.execution.cluster.child FD FILE SITE
+NAME`.
 
-It receives pieces from its host over the connection FD, and sends the id of each finished experiment, then
-the result of the piece. Because the process is separate from the host, no run can kill the worker.
+It reads the run's inputs from the open file FILE. Over the connection FD, it receives pieces from its host,
+and sends the id of each finished experiment, then the result of the piece. Because the process is separate
+from the host, no run can kill the worker.
 """
 
 import os
@@ -20,14 +22,16 @@ from mutator._common.below import inside
 from mutator._common.files import raising_disk_full
 from mutator._common.hashing import canonical
 from mutator._common.shortages import shortage
+from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.shared_runs import runs
+from mutator.engines import sandbox
 from mutator.engines.jobs import FAST, Job, Setting
 from mutator.engines.reference import ReferenceEngine
 from mutator.engines.registry import make_engine
 from mutator.errors import DiskFull, GoldenRunsDiffer, MutatorError, Shortage
-from mutator.execution.cluster.bundle import Site
 from mutator.execution.cluster.driven_goldens import DrivenGoldens
 from mutator.execution.cluster.pieces import Ending, Kind, Piece, Result
+from mutator.execution.cluster.site import Site
 from mutator.execution.runner import Finished, Goldens, Runner
 from mutator.execution.worker import timing_of
 from mutator.model import Experiment
@@ -43,14 +47,17 @@ from mutator.targets.requirements import check_requirements
 class PieceRunner:
     """Runs pieces in an unpacked bundle, and packs the results."""
 
-    def __init__(self, site: Site, name: str, parent: int) -> None:
+    def __init__(self, site: Site, inputs: RunInputs, name: str, parent: int) -> None:
         self._site, self._name, self._parent = site, name, parent
-        check_requirements(site.manifest)
+        self._manifest, self._models = inputs.manifest, inputs.models
+        check_requirements(inputs.manifest)
+        if inputs.manifest.sandbox:
+            sandbox.check()
         self.place = site.place
         self._work = site.place / f"work-{os.getpid()}"
         self._work.mkdir()
         self._goldens = self._work / "golden"
-        self._driven = DrivenGoldens(site)
+        self._driven = DrivenGoldens(site, inputs.manifest)
         self._alike: set[str] = set()  # golden runs that equal the campaign's
         self._runners: dict[Kind, Runner] = {}
 
@@ -62,7 +69,7 @@ class PieceRunner:
         began = time.monotonic()
         experiments = piece.experiments()
         # a shared run is compared with the golden run of its first experiment
-        for same in runs(self._site.manifest, experiments):
+        for same in runs(self._manifest, experiments):
             if (key := self._golden_of(same[0]).key) not in self._alike:
                 self._have_golden(key)
         runner = self._runner(piece.kind)
@@ -82,26 +89,26 @@ class PieceRunner:
             site = self._site
             if kind is Kind.PROVE:
                 engine = ReferenceEngine(
-                    site.manifest, self._work, site.limits, self._parent, independent=True
+                    self._manifest, self._work, site.limits, self._parent, independent=True
                 )
             else:
                 setting = Setting(
-                    manifest=site.manifest,
-                    models=site.models,
+                    manifest=self._manifest,
+                    models=self._models,
                     work=self._work,
                     limits=site.limits,
                     parent=self._parent,
                 )
                 engine = make_engine(site.meta["engine"], setting)  # type: ignore[assignment]
             goldens = Goldens(
-                site.manifest,
+                self._manifest,
                 lambda experiment: inside(self._goldens, self._golden_of(experiment).key),
                 several_seeds=site.meta["several_seeds"],
                 digests={inside(self._goldens, key): known for key, (_, known) in site.goldens.items()},
             )
             with_series = kind is Kind.RUN and site.meta["series"]
             self._runners[kind] = Runner(
-                site.manifest, site.models, engine, goldens, site.scenario, with_series=with_series
+                self._manifest, self._models, engine, goldens, site.scenario, with_series=with_series
             )
         return self._runners[kind]
 
@@ -117,7 +124,7 @@ class PieceRunner:
 
     def _drive_golden(self, golden: GoldenRun, known: str, place: Path) -> None:
         site = self._site
-        engine = ReferenceEngine(site.manifest, self._work, site.limits, self._parent)
+        engine = ReferenceEngine(self._manifest, self._work, site.limits, self._parent)
         job = Job(
             name=f"golden-{len(self._alike)}",
             scenario=site.scenario(golden.scenario),
@@ -125,13 +132,13 @@ class PieceRunner:
             changes=golden.changes,
         )
         for _, execution in engine.run([job]):
-            found = look(site.manifest, execution)
+            found = look(self._manifest, execution)
             if found.problem or found.digest != known:
                 came = found.problem or f"has the digest {found.digest[:16]} here, not {known[:16]}"
                 raise GoldenRunsDiffer(f"golden run {golden.key} {came}")
             execution.out.rename(place)
             if golden.seed is not None:  # the images of a hundred seeds would fill the disk
-                caches.make_room(site.manifest.cache_name)
+                caches.make_room(self._manifest.cache_name)
 
     def _golden_of(self, experiment: Experiment) -> GoldenRun:
         return GoldenRun.of(experiment, several_seeds=self._site.meta["several_seeds"])
@@ -187,11 +194,13 @@ def _refuse(connection: Connection, err: Exception) -> None:
 
 
 def main() -> int:
-    connection, site, name = Connection(int(sys.argv[1])), Site(Path(sys.argv[2])), sys.argv[3]
+    connection, site, name = Connection(int(sys.argv[1])), Site(Path(sys.argv[3])), sys.argv[4]
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the host handles these signals
     try:
         with raising_disk_full(site.place):
-            runner = PieceRunner(site, name, os.getppid())
+            with os.fdopen(int(sys.argv[2]), "rb") as file:
+                inputs = RunInputs.unpacked(file.read())
+            runner = PieceRunner(site, inputs, name, os.getppid())
     except Exception as err:
         _refuse(connection, err)
         return 1

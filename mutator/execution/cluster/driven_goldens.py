@@ -14,9 +14,10 @@ from mutator._common.bounded import read_bounded
 from mutator._common.hashing import digest
 from mutator._common.version import VERSION
 from mutator.campaigns import machine
-from mutator.execution.cluster.bundle import Site
+from mutator.execution.cluster.site import Site
 from mutator.preflight.preflight_rules import digest_of
 from mutator.store.run_folder import GoldenRun
+from mutator.targets.manifest import TargetManifest
 
 _SOURCES = ("manifest", "target", "overlay")  # folders of a bundle
 
@@ -24,8 +25,8 @@ _SOURCES = ("manifest", "target", "overlay")  # folders of a bundle
 class DrivenGoldens:
     """The cached golden runs of a site."""
 
-    def __init__(self, site: Site) -> None:
-        self._site = site
+    def __init__(self, site: Site, manifest: TargetManifest) -> None:
+        self._site, self._manifest = site, manifest
         files = sorted(path for name in _SOURCES for path in (site.place / name).rglob("*") if path.is_file())
         self._common = [
             VERSION,
@@ -39,7 +40,7 @@ class DrivenGoldens:
         """Copy the golden run with the digest `known` to `to`; return False if it is not cached."""
         with suppress(OSError):
             kept_folders.fetch(self._entry(golden), to)
-            if digest_of(self._site.manifest, to) == known:
+            if digest_of(self._manifest, to) == known:
                 return True
         shutil.rmtree(to, ignore_errors=True)
         return False

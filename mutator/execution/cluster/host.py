@@ -21,10 +21,10 @@ from pathlib import Path
 
 from mutator._common.files import raising_disk_full, remove_folder
 from mutator._common.shortages import shortage
-from mutator.errors import PieceNotWanted
+from mutator.errors import MutatorError, PieceNotWanted
 from mutator.execution.cluster import bundle
-from mutator.execution.cluster.bundle import Site
 from mutator.execution.cluster.pieces import Ending, Piece, Result
+from mutator.execution.cluster.site import Site
 from mutator.execution.worker import dying_python
 
 _LOOK_S = 0.25  # between two checks that the work is still wanted
@@ -95,6 +95,7 @@ class Host:
     _lock: threading.Lock = field(default_factory=threading.Lock)
     _ended: bool = False  # if set, no process is started or reused
     _leaving: bool = False
+    _inputs: bytes = b""  # what each process gets
     _gone: threading.Event = field(default_factory=threading.Event)
 
     @classmethod
@@ -140,8 +141,9 @@ class Host:
         piece = Piece.of(data)
         try:
             child = self._borrowed()
-        except OSError as err:
-            return Result(number=piece.number, ending=Ending.UNFIT, text=str(shortage(err) or err))
+        except (OSError, MutatorError) as err:
+            text = str(err if isinstance(err, MutatorError) else shortage(err) or err)
+            return Result(number=piece.number, ending=Ending.UNFIT, text=text)
         keep = False
         try:
             result = child.run(data, piece, self.patience_s, wanted)
@@ -172,16 +174,21 @@ class Host:
 
     def _started(self) -> _Child:
         """Start a process that dies with this thread."""
+        self._inputs = self._inputs or bundle.read_inputs(Site(self.folder)).packed()
         ours, its = socket.socketpair()
         try:
-            words = ["-m", _CHILD, str(its.fileno()), str(self.folder), self.name]
-            process = subprocess.Popen(
-                [*dying_python(os.getpid()), *words],
-                pass_fds=[its.fileno()],
-                cwd=self.folder,
-                stdin=subprocess.DEVNULL,
-                start_new_session=True,  # signals from the worker's terminal are for the worker only
-            )
+            with tempfile.TemporaryFile(dir=self.folder) as file:  # nameless, so no run can change it
+                file.write(self._inputs)
+                file.seek(0)
+                descriptors = [its.fileno(), file.fileno()]
+                words = ["-m", _CHILD, *map(str, descriptors), str(self.folder), self.name]
+                process = subprocess.Popen(
+                    [*dying_python(os.getpid()), *words],
+                    pass_fds=descriptors,
+                    cwd=self.folder,
+                    stdin=subprocess.DEVNULL,
+                    start_new_session=True,  # signals from the worker's terminal are for the worker only
+                )
         except BaseException:
             ours.close()
             raise

@@ -10,8 +10,9 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.execution.cluster import bundle
-from mutator.execution.cluster.bundle import Bundle, Site, lay_out
+from mutator.execution.cluster.bundle import Bundle, lay_out, read_inputs
 from mutator.execution.cluster.parcel import pack, unpack
+from mutator.execution.cluster.site import Site
 from mutator.execution.session import open_session
 from mutator.store.choices import Choices
 from mutator.store.run_folder import RunFolder
@@ -190,6 +191,6 @@ def test_a_description_that_names_other_files_is_refused(
     place.mkdir()
     lay_out(pack(data), place)
     with pytest.raises(MutatorError, match=r"meta\.json"):
-        _ = Site(place).manifest
+        read_inputs(Site(place))
     with pytest.raises(MutatorError):
         Site(place).scenario("../../notes")

@@ -14,10 +14,11 @@ import pytest
 from mutator.errors import MutatorError, PieceNotWanted
 from mutator.execution.cluster import bundle
 from mutator.execution.cluster.board import Board
-from mutator.execution.cluster.bundle import Bundle, Site
+from mutator.execution.cluster.bundle import Bundle, read_inputs
 from mutator.execution.cluster.driven_goldens import DrivenGoldens
 from mutator.execution.cluster.host import Host
 from mutator.execution.cluster.pieces import Ending, Piece, Result
+from mutator.execution.cluster.site import Site
 from mutator.execution.session import open_session
 from mutator.store.choices import Choices
 from mutator.workspace import Workspace
@@ -163,10 +164,11 @@ def test_a_cached_golden_run_must_match_the_campaign(
     run_once(sent, tmp_path / "a")
     bundle.lay_out(sent[0].data, tmp_path / "site")
     site = Site(tmp_path / "site")
+    manifest = read_inputs(site).manifest
     golden, known = site.goldens[sent[1].golden]
     to = tmp_path / "golden"
-    assert DrivenGoldens(site).fetch(golden, known, to) and to.is_dir()
-    assert not DrivenGoldens(site).fetch(golden, "0" * 64, to) and not to.exists()
+    assert DrivenGoldens(site, manifest).fetch(golden, known, to) and to.is_dir()
+    assert not DrivenGoldens(site, manifest).fetch(golden, "0" * 64, to) and not to.exists()
     source = next((site.place / "target").rglob("*.py"))
     source.write_text(source.read_text() + "# another\n")
-    assert not DrivenGoldens(site).fetch(golden, known, to)
+    assert not DrivenGoldens(site, manifest).fetch(golden, known, to)
