@@ -60,6 +60,21 @@ def hazard_times(frame: "pd.DataFrame") -> "pd.DataFrame":
     return pd.DataFrame(times, index=frame.index, dtype=float)
 
 
+def hazard_margins(frame: "pd.DataFrame") -> "pd.DataFrame":
+    """Return the margins to the hazards that occurred or, if none did, to all that were checked. There is a
+    column for each hazard with a margin; NaN: no value.
+    """
+    import pandas as pd
+
+    had = hazard_times(frame).notna()
+    had_none = ~had.any(axis=1)
+    margins = {}
+    for name in hazards_of(frame):
+        if (column := f"margin_{name.lower()}") in frame:
+            margins[name] = frame[column].where(had[name] | had_none & frame[name.lower()].notna())
+    return pd.DataFrame(margins, index=frame.index, dtype=float)
+
+
 def hazards_joined(frame: "pd.DataFrame") -> list[str]:
     """Return the names of the hazards that occurred in each row, sorted and joined by `;`."""
     had = hazard_times(frame).notna()

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from mutator.model import Outcome, Status
-from mutator.results.counting import endings, hazard_times
+from mutator.results.counting import endings, hazard_margins
 from mutator.targets.severity import CLASSES, DELTA_V
 
 if TYPE_CHECKING:
@@ -50,22 +50,16 @@ def places(frame: "pd.DataFrame") -> "np.ndarray":
 def _turns(
     frame: "pd.DataFrame", ending: "np.ndarray", has_class: "np.ndarray", by_id: "np.ndarray"
 ) -> "np.ndarray":
-    """Rank rows without a severity class among those with the same outcome, by margin to a hazard: those that
-    occurred or, if none did, all that were checked.
+    """Rank rows without a severity class among those with the same outcome, by `hazard_margins`.
 
     A row with margins to several hazards gets its lowest rank number. Rows without a margin: infinite.
     """
     import numpy as np
 
     turn = np.full(len(frame), np.inf)
-    had = hazard_times(frame).notna()
-    any_came = had.any(axis=1).to_numpy()
-    for name in had.columns.map(str):
-        if (column := f"margin_{name.lower()}") not in frame:
-            continue
-        margin = frame[column].to_numpy()
-        counts = np.where(any_came, had[name], frame[name.lower()].notna())
-        rows = np.flatnonzero(counts & ~has_class & ~np.isnan(margin))
+    for _, margins in hazard_margins(frame).items():
+        margin = margins.to_numpy()
+        rows = np.flatnonzero(~has_class & ~np.isnan(margin))
         rows = rows[np.lexsort((by_id[rows], margin[rows], ending[rows]))]
         _, first, sizes = np.unique(ending[rows], return_index=True, return_counts=True)
         turn[rows] = np.minimum(turn[rows], np.arange(len(rows)) - np.repeat(first, sizes))

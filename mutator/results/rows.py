@@ -1,13 +1,13 @@
 """The rows of a frame of results as objects."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
+from math import isnan
 from typing import TYPE_CHECKING, Any
 
 from mutator.model import Fault, Outcome, Status, Value, fault_label
-from mutator.results.counting import UNUSABLE, endings, kinds
+from mutator.results.counting import UNUSABLE, endings, hazard_margins, hazard_times, kinds
 from mutator.results.plan_columns import number_of
-from mutator.results.table_columns import hazards_of
 from mutator.targets.severity import DELTA_V
 
 if TYPE_CHECKING:
@@ -30,7 +30,6 @@ class Row:
     ending: str  # the outcome, or the status if the run failed
     t_activation: float | None
     t_manifest: float | None
-    checked: tuple[str, ...]  # hazards that the target checks
     hazards: tuple[tuple[str, float], ...]
     alerts: tuple[str, ...]
     t_alert: float | None
@@ -67,16 +66,27 @@ def rows_of(frame: "pd.DataFrame", faults: Mapping[str, Fault]) -> list[Row]:
     """Return the rows of a frame of results. `faults` are those of the plan, by id, which has the digits of
     each value (35), while the table has a float. ValueError for an unknown status or outcome.
     """
-    hazards = hazards_of(frame)
     lines = cells_by_row(frame.assign(kind=kinds(frame), ending=endings(frame)))
-    return [_row(cells, hazards, faults.get(cells["fault_id"])) for cells in lines]
+    hazards, margins = _by_row(hazard_times(frame)), _by_row(hazard_margins(frame))
+    rows = zip(lines, hazards, margins, strict=True)
+    return [_row(cells, came, near, faults.get(cells["fault_id"])) for cells, came, near in rows]
 
 
-def _row(cells: Mapping[str, Any], hazards: Sequence[str], fault: Fault | None) -> Row:
-    checked = [name for name in hazards if cells[name.lower()] is not None]
-    times = [(name, cells[f"t_{name.lower()}"]) for name in checked]
-    came = [(name, time) for name, time in times if time is not None]
-    margins = [(name, cells.get(f"margin_{name.lower()}")) for name in [name for name, _ in came] or checked]
+def _by_row(frame: "pd.DataFrame") -> list[tuple[tuple[str, float], ...]]:
+    """Return the names and the cells of each row. Cells without a value are left out."""
+    columns = [(str(name), cells.tolist()) for name, cells in frame.items()]
+    return [
+        tuple((name, cells[row]) for name, cells in columns if not isnan(cells[row]))
+        for row in range(len(frame))
+    ]
+
+
+def _row(
+    cells: Mapping[str, Any],
+    hazards: tuple[tuple[str, float], ...],
+    margins: tuple[tuple[str, float], ...],
+    fault: Fault | None,
+) -> Row:
     return Row(
         experiment_id=cells["experiment_id"],
         kind=cells["kind"],
@@ -90,13 +100,12 @@ def _row(cells: Mapping[str, Any], hazards: Sequence[str], fault: Fault | None) 
         ending=cells["ending"],
         t_activation=cells["t_activation"],
         t_manifest=cells["t_manifest"],
-        checked=tuple(checked),
-        hazards=tuple(sorted(came, key=lambda hazard: hazard[1])),
+        hazards=tuple(sorted(hazards, key=lambda hazard: hazard[1])),
         alerts=tuple(filter(None, cells["alerts"].split(";"))),
         t_alert=cells["t_alert"],
         reaction_time=cells["reaction_time"],
         detail=cells["detail"],
         severity=cells.get("severity", ""),
         delta_v=cells.get(DELTA_V),
-        margins=tuple((name, margin) for name, margin in margins if margin is not None),
+        margins=margins,
     )

@@ -42,6 +42,7 @@ class Finished:
         self.is_ok = record.status is Status.OK
         self.hazards, self.metrics = dict(record.hazards), dict(record.metrics)
         self.max_dev = dict(record.max_dev)
+        self.dev = self.max_dev | dict(record.dev)  # up to the end of the drive, where a hazard ended it
         self.path = fault_paths.untimed_path(experiment.fault, record) if fault_paths else None
 
 
@@ -234,14 +235,8 @@ def _deviation(channel: str, column: str) -> ResultColumn:
 
 
 def _driven_deviation(channel: str, column: str) -> ResultColumn:
-    """Return the column of the largest difference up to the end of the drive, where a hazard ended it."""
-
-    def of(finished: Finished) -> float | None:
-        ended = dict(finished.record.dev)
-        return ended[channel] if channel in ended else finished.max_dev.get(channel)
-
     about = f"largest difference of `{channel}` from golden, up to `{T_END}`"
-    return ResultColumn(column, "number", AS_CHANNEL, about, of)
+    return ResultColumn(column, "number", AS_CHANNEL, about, lambda f: f.dev.get(channel))
 
 
 def _metric(metric: MetricFacts) -> ResultColumn:

@@ -37,7 +37,6 @@ def rows(draw: st.DrawFn) -> Row:
         ending=(outcome or status).value,
         t_activation=draw(st.none() | st.just(1.5)),
         t_manifest=None,
-        checked=("H1", "H2"),
         hazards=hazards,
         alerts=tuple(draw(st.lists(st.just("fcw"), max_size=1))),
         t_alert=None,

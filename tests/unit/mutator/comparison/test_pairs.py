@@ -24,7 +24,6 @@ def row(experiment_id: str = "e", **given: Any) -> Row:
         "outcome": Outcome.MASKED,
         "t_activation": 2.0,
         "t_manifest": None,
-        "checked": ("H1", "H2"),
         "hazards": (),
         "alerts": (),
         "t_alert": None,

@@ -94,7 +94,7 @@ def row(**given: Any) -> Row:
     fields: dict[str, Any] = {
         "experiment_id": "e", "kind": "m/f", "variant": "v", "value": "", "unit": "",
         "scenario": "A", "trigger": "C1", "status": Status.OK, "outcome": None,
-        "t_activation": 2.0, "t_manifest": 2.5, "checked": (), "hazards": (), "alerts": (), "t_alert": None,
+        "t_activation": 2.0, "t_manifest": 2.5, "hazards": (), "alerts": (), "t_alert": None,
         "reaction_time": None, "detail": "",
     }  # fmt: skip
     fields |= given
