@@ -122,10 +122,6 @@ def written(name: str, edit: Callable[[bytes], bytes]) -> Callable[[Path], None]
     return apply
 
 
-def with_a_key(data: bytes) -> bytes:
-    return data.replace(b"{", b'{"x": 1,', 1)
-
-
 def harmless(table: bytes) -> bytes:
     return table.replace(b"hazard,", b"sdc,")
 
