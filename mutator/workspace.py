@@ -11,7 +11,7 @@ from mutator._common.arguments import check_whole
 from mutator._common.below import check_inside, files_inside
 from mutator._common.bounded import MOST_WHOLE, check_open, open_regular
 from mutator._common.files import check_is_text
-from mutator._common.places import environment_path, library_files, library_folder, templates_folder
+from mutator._common.folder_search import environment_path, library_files, library_folder, templates_folder
 from mutator._common.shipped import shipped_folder
 from mutator._common.tables import Table
 from mutator._common.text import counted, one_of, suggestion

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from mutator._common.places import RUNS
+from mutator._common.folder_search import RUNS
 from mutator.api.selection import WorkspaceLike, open_workspace
 from mutator.errors import MutatorError
 from mutator.serve.app import Site

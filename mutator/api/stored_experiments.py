@@ -7,7 +7,7 @@ from pathlib import Path
 
 from mutator._common.arguments import check_type
 from mutator._common.below import inside
-from mutator._common.places import run_folders
+from mutator._common.folder_search import run_folders
 from mutator.api.experiment_results import ExperimentResult
 from mutator.api.mutants import built
 from mutator.api.selection import Bench

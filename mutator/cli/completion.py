@@ -10,7 +10,7 @@ from typing import Any
 import typer
 
 from mutator._common.doors import EXPORTS
-from mutator._common.places import library_files, library_folder, run_folders
+from mutator._common.folder_search import library_files, library_folder, run_folders
 from mutator.errors import MutatorError
 
 Completer = Callable[[typer.Context, str], list[str]]

@@ -9,7 +9,7 @@ from typing import Any, BinaryIO
 from urllib.parse import quote
 
 from mutator._common.below import open_below
-from mutator._common.places import RUN_HEAD
+from mutator._common.folder_search import RUN_HEAD
 from mutator.errors import Absent, MutatorError, Outside
 from mutator.results.counting import outcome_counts
 from mutator.results.table_reader import Results

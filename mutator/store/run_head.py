@@ -7,8 +7,8 @@ from typing import Any
 
 from mutator._common.below import check_library_name, check_name
 from mutator._common.files import json_bytes, read_json
+from mutator._common.folder_search import RUN_HEAD
 from mutator._common.hashing import added, plain
-from mutator._common.places import RUN_HEAD
 from mutator._common.plain_reader import from_plain
 from mutator.errors import Misfit, MutatorError
 from mutator.model import Limits
