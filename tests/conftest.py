@@ -377,7 +377,9 @@ def write_finished(write_run: Callable[..., Path]) -> Callable[..., Path]:
             writer = LineWriter(out / kind / "0001-a.jsonl", {"schema": schema, "plan": folder.head.plan})
             for line in some:
                 cost = {"experiment_id": line["experiment_id"], "cpu_s": 1.0, "wall_s": 2.0, "host": "h"}
-                writer.append(line if kind == "proof" else cost | {"worker": "a"})
+                writer.append(
+                    line if kind == "proof" else cost | {"worker": "a", "engine": "reference", "why": ""}
+                )
             writer.close()
         new = {"checks.json": b'{"schema": "checks/1", "results": [], "goldens": {}}'}
         for scenario, changes in folder.head.goldens:

@@ -209,7 +209,7 @@ def proof(
     """
     place = folder.path / equivalence.FOLDER
     if not place.is_dir():
-        modes = {str(line.get("engine")) for line in folder.timings().values()}
+        modes = {str(line["engine"]) for line in folder.timings().values()}
         if forked := sorted(modes & FAST):
             yield MutatorError("missing", where=place, expected=f"a proof of the engine `{forked[0]}`")
         return

@@ -39,9 +39,7 @@ class EngineSummary:
 def engine_summary(
     folder: RunFolder, records: Mapping[str, Record], timings: "DataFrame"
 ) -> EngineSummary | None:
-    """Summarize a run's `timings` (as in `Seen`) and `proof/`. None if no timing names an engine and there
-    is no `proof/`.
-    """
+    """Summarize a run's `timings` (as in `Seen`) and `proof/`. None without timings and without `proof/`."""
     ways = _ways(timings)
     if not ways and not (folder.path / equivalence.FOLDER).is_dir():
         return None
@@ -51,9 +49,8 @@ def engine_summary(
 
 
 def _ways(timings: "DataFrame") -> Counter[tuple[str | None, str]]:
-    told = timings[timings["engine"].astype(object) != ""]  # older runs have no engine names
-    engines = (None if name is None or name != name else str(name) for name in told["engine"])
-    return Counter(zip(engines, map(str, told["why"]), strict=True))
+    engines = (None if name is None or name != name else str(name) for name in timings["engine"])
+    return Counter(zip(engines, map(str, timings["why"]), strict=True))
 
 
 def _lines(ways: Counter[tuple[str | None, str]]) -> Iterator[list[str]]:

@@ -96,8 +96,7 @@ def timings_of(folder: RunFolder) -> "DataFrame":
 
     newest = folder.timings()
     told = [
-        (float(str(line["cpu_s"])), line["worker"], line.get("engine", ""), line.get("why", ""))
-        for line in newest.values()
+        (float(str(line["cpu_s"])), line["worker"], line["engine"], line["why"]) for line in newest.values()
     ]
     cpu_s, *words = zip(*told, strict=True) if told else ((), (), (), ())
     columns = dict(zip(("worker", "engine", "why"), map(pd.Categorical, words), strict=True))

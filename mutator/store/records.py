@@ -133,8 +133,8 @@ def _timing_from(data: dict[str, Any]) -> dict[str, Any]:
     for name in ("cpu_s", "wall_s"):
         if type(data[name]) not in (int, float) or not 0.0 <= data[name] <= _LONGEST_S:
             raise ValueError(name)
-    for name in ("experiment_id", "host", "worker", "engine", "why"):  # older folders lack some
-        value = data.get(name, "")  # `engine` is None if nothing ran
+    for name in ("experiment_id", "host", "worker", "engine", "why"):
+        value = data[name]  # `engine` is None if nothing ran
         if not (isinstance(value, str) or (name == "engine" and value is None)):
             raise ValueError(name)
         if name != "why" and value and not value.isprintable():

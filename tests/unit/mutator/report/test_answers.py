@@ -58,7 +58,8 @@ def run(tmp_path: Path) -> ReportedRun:
         lines.append(line)
     write_results(tmp_path, result_columns(("H1",), ("gas",), METRICS, SINCE), lines)
     costs = [
-        {"experiment_id": f"{i}" * 16, "cpu_s": 2.0**i, "wall_s": 1.0, "worker": f"w{i % 2}"}
+        {"experiment_id": f"{i}" * 16, "cpu_s": 2.0**i, "wall_s": 1.0, "host": "h", "worker": f"w{i % 2}"}
+        | {"engine": "fork", "why": ""}
         for i in range(7)
     ]
     costs.append(costs[0] | {"experiment_id": "7" * 16, "cpu_s": 0, "engine": "golden"})

@@ -1,7 +1,7 @@
 """The report's description of how experiments ran, and of their equivalence check."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -47,7 +47,9 @@ def finish(toycar: Workspace, tmp_path: Path) -> Finish:
     proof. With None, there is no proof."""
 
     def made(
-        proven: int | None, change: Callable[[Record], Record] = lambda r: r, ways: object = WAYS
+        proven: int | None,
+        change: Callable[[Record], Record] = lambda r: r,
+        ways: Sequence[tuple[str | None, str]] = WAYS,
     ) -> Path:
         run = tmp_path / "run"
         plan = make_plan(toycar, "small", Choices(**asdict(Choices(limit=4))))
@@ -56,10 +58,8 @@ def finish(toycar: Workspace, tmp_path: Path) -> Finish:
         write_records(run / "records/0001-main.jsonl", records)
         if proven is not None:
             write_records(run / "proof/0001-main.jsonl", [change(r) for r in records[:proven]])
-        lines = [timing(r.experiment_id) for r in records]
-        if ways is WAYS:
-            pairs = zip(lines, WAYS, strict=True)
-            lines = [line | {"engine": engine, "why": why} for line, (engine, why) in pairs]
+        pairs = zip(records, ways, strict=False)
+        lines = [timing(r.experiment_id) | {"engine": engine, "why": why} for r, (engine, why) in pairs]
         write(run / "timings/0001-main.jsonl", TIMINGS_SCHEMA, lines)
         return run
 
@@ -197,6 +197,5 @@ def test_a_failed_proof_is_reported_without_timings(finish: Finish) -> None:
     assert told.failed
 
 
-def test_without_an_engine_in_the_timings_the_report_names_none(finish: Finish) -> None:
-    """Older versions did not record the engine."""
+def test_without_timings_and_proof_the_report_names_no_engine(finish: Finish) -> None:
     assert summary(finish(None, ways=())) is None

@@ -192,6 +192,7 @@ def folder(toycar: Workspace, tmp_path: Path, record: MakeRecord) -> RunFolder:
             writer.append(asdict(record(experiment.id, max_dev=(("gas", 0.5), ("wheel_turn", 0.25)))))
             timings.append(
                 {"experiment_id": experiment.id, "cpu_s": 1.0, "wall_s": 2.0, "host": "h", "worker": "gw"}
+                | {"engine": "fork", "why": ""}
             )
         writer.close()
         timings.close()

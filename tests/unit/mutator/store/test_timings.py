@@ -48,6 +48,13 @@ def test_another_type_of_a_value_is_a_damaged_line(tmp_path: Path, name: str, va
     assert (error.value.where, error.value.line) == (f"{tmp_path}/timings/1-1.jsonl", 2)
 
 
+@pytest.mark.parametrize("name", LINE)
+def test_a_line_without_a_value_is_damaged(tmp_path: Path, name: str) -> None:
+    write(tmp_path, {key: value for key, value in LINE.items() if key != name})
+    with pytest.raises(MutatorError):
+        dict(read_timings(tmp_path))
+
+
 @pytest.mark.parametrize("number", ["1e999", "-1e999", "NaN", "9" * 5000])
 def test_a_time_is_finite(tmp_path: Path, number: str) -> None:
     write(tmp_path, LINE)
