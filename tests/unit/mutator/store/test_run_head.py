@@ -69,8 +69,9 @@ def test_a_value_of_another_type_is_refused_by_its_key(run: Path) -> None:
     """Whatever is accepted instead is written again as it was read."""
     path, original = run / "run.json", json.loads((run / "run.json").read_text())
     tried = accepted = 0
-    for place in values(original):
-        for value in OTHERS:
+    for number, place in enumerate(values(original)):
+        for turn in range(2):  # two of the values for each place
+            value = OTHERS[(2 * number + turn) % len(OTHERS)]
             content = put(original, place, value)
             path.write_text(json.dumps(content))
             tried += 1
@@ -83,7 +84,7 @@ def test_a_value_of_another_type_is_refused_by_its_key(run: Path) -> None:
             else:
                 accepted += 1
                 assert json.loads(found.as_json()) == content
-    assert tried > 400 and accepted < tried / 5
+    assert tried > 150 and accepted < tried / 5
 
 
 def test_each_key_is_needed_unless_it_is_optional(run: Path) -> None:
