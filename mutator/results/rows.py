@@ -64,7 +64,7 @@ def cells_by_row(frame: "pd.DataFrame") -> list[dict[str, Any]]:
 
 def rows_of(frame: "pd.DataFrame", faults: Mapping[str, Fault]) -> list[Row]:
     """Return the rows of a frame of results. `faults` are those of the plan, by id, which has the digits of
-    each value (35), while the table has a float. ValueError for an unknown status or outcome.
+    each value (35), while the table has a float.
     """
     lines = cells_by_row(frame.assign(kind=kinds(frame), ending=endings(frame)))
     hazards, margins = _by_row(hazard_times(frame)), _by_row(hazard_margins(frame))

@@ -77,11 +77,7 @@ class Results:
         return len(self.frame("experiment_id"))
 
     def rows(self) -> tuple[Row, ...]:
-        frame = self.frame()
-        try:
-            return tuple(rows_of(frame, plan_file.read_faults(self.run)))
-        except ValueError as err:
-            raise self._no_table(str(err)) from None
+        return tuple(rows_of(self.frame(), plan_file.read_faults(self.run)))
 
     def frame(self, *only: str) -> "pd.DataFrame":
         """Return a frame with the types of results.parquet, of all columns or only those named. Without a
@@ -121,7 +117,7 @@ class Results:
         return frame
 
     def _table(self, data: bytes, columns: Sequence[Column]) -> Any:
-        """Return these columns; MutatorError if one is missing or has another type."""
+        """Return these columns; MutatorError if one is missing, or has another type or impossible cells."""
         import pyarrow as pa  # type: ignore[import-untyped]
         from pyarrow import parquet
 
@@ -133,9 +129,25 @@ class Results:
                     raise self._no_table(f"no column '{field.name}'")
                 if (found := schema.field(field.name).type) != field.type:
                     raise self._no_table(f"column '{field.name}' has the type {found}, not {field.type}")
-            return _table(source, [column.name for column in columns])
+            table = _table(source, [column.name for column in columns])
+            self._check_cells(table, columns)
+            return table
         except (pa.ArrowException, OSError) as err:
             raise self._no_table(str(err)) from None
+
+    def _check_cells(self, table: Any, columns: Sequence[Column]) -> None:
+        """MutatorError for a cell that is not a status, an outcome or a flag."""
+        for column in columns:
+            name = column.name
+            if column.type == "flag":
+                known: set[object] = {0, 1, None}
+            elif name in _SCALES:
+                known = {*_SCALES[name], *([None] if name == "outcome" else [])}
+            else:
+                continue
+            cells = {cell for part in table[name].chunks for cell in part.unique().to_pylist()}
+            if unknown := sorted(map(repr, cells - known)):
+                raise self._no_table(f"column '{name}' has the cell {unknown[0]}")
 
     def propagation(self) -> "pd.DataFrame":
         """Return a frame of propagation.parquet, with a row for each channel that left golden."""

@@ -103,8 +103,11 @@ def check(path: Path) -> list[Path]:
 
 
 def _patterns() -> tuple[str, ...]:
-    """Return the patterns of all files that a run folder can contain, also in formats of other packages."""
-    return (*CONTENT, *(f"exports/{name}.*" for name in EXPORTS.installed()))
+    """Return the patterns of all files that a run folder can contain, also in formats of other packages.
+
+    An export that is one file for the whole run is named after its format.
+    """
+    return (*CONTENT, *(f"exports/{name}.*" for name in EXPORTS.names()))
 
 
 def _matches(name: str, patterns: Iterable[str]) -> bool:

@@ -23,15 +23,14 @@ _TABLES = ("results", "propagation", "timings")
 CONTENT = (  # all files that a run folder can contain; * matches any text, including folders
     *(HEAD, digests.FILE, CAMPAIGN, "plan.csv", "plan/*.jsonl", "reviewed.json", "checks.json"),
     *SIGNATURE,
-    *("golden/*/*", "patches/*.blocks", "patches/*.patch"),
+    *("golden/*/*", "patches/*.blocks"),
     *("records/*.jsonl", "timings/*.jsonl", "proof/*.jsonl"),
     *("series/*.js", "series/*.blocks"),
     *(f"{TRACES}/*/*", *(f"plots/*.{kind}" for kind in ("svg", "jpg", "png", "mp4", "gif"))),
     *("results.csv", "results.parquet", "propagation.parquet", "timings.parquet", "results.json"),
     *("report/*.md", "report/*.html", "report/made_from.json", "report/series/*.js"),
     *("report/tables/*.csv", "report/figures/*.svg", "report/figures/*.png", "report/compare-*/*.csv"),
-    *("exports/mutation-elements.json", "exports/junit.xml", "exports/mcap/*.mcap"),
-    *(f"exports/{name}.{kind}" for name in _TABLES for kind in ("csv", "parquet")),
+    *("exports/mcap/*.mcap", *(f"exports/{name}.{kind}" for name in _TABLES for kind in ("csv", "parquet"))),
     *(f"{ASIDE}/*", "owner.lock", "workers/*", f"{SCRATCH}/*"),
 )
 FOLDERS = {pattern.partition("/")[0] for pattern in CONTENT if "/" in pattern}

@@ -19,13 +19,12 @@ from mutator._common.version import VERSION
 from mutator.errors import MutatorError
 
 _SCHEMA = "verified/2"
-_OTHER_FILES = ("patches/*.blocks", "patches/*/*.patch")  # verified files that are not in the ledger
+_PATCHES = "patches/*.blocks"  # verified files that are not in the ledger
 Digests = Mapping[str, str | None]  # SHA-256 by name
 
 
 def other_files(run: Path) -> list[str]:
-    paths = (path for pattern in _OTHER_FILES for path in run.glob(pattern))
-    return sorted(path.relative_to(run).as_posix() for path in paths)
+    return sorted(path.relative_to(run).as_posix() for path in run.glob(_PATCHES))
 
 
 def key_of(found: Digests) -> str:

@@ -216,13 +216,19 @@ def test_an_incomplete_table_is_refused(run: Path, cut: float) -> None:
             table.frame()
 
 
-def test_an_unknown_status_is_refused(run: Path) -> None:
+@pytest.mark.parametrize(
+    ("name", "cell"), [("status", "melted"), ("status", None), ("outcome", "melted"), ("activated", 7)]
+)
+def test_an_impossible_cell_is_refused(run: Path, name: str, cell: object) -> None:
+    """However the table is read, it is a mistake in the table and no defect of mutator."""
     table = Results.up_to_date(run)
-    cells = parquet.read_table(table.path)
-    melted = pa.array(["melted"] * len(cells), pa.string())
-    parquet.write_table(cells.set_column(cells.column_names.index("status"), "status", melted), table.path)
-    with pytest.raises(MutatorError, match="not a results table: 'melted'"):
-        table.rows()
+    found = parquet.read_table(table.path)
+    at = found.column_names.index(name)
+    cells = pa.array([cell] * len(found), found.schema.field(at).type)
+    parquet.write_table(found.set_column(at, name, cells), table.path)
+    for read in (table.rows, table.frame, table.indexed_frame):
+        with pytest.raises(MutatorError, match=f"not a results table: column '{name}' has the cell {cell!r}"):
+            read()
 
 
 @pytest.mark.parametrize(

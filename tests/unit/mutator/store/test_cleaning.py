@@ -6,9 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from mutator._common.doors import EXPORTS
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plans import make_plan
 from mutator.errors import MutatorError
+from mutator.exports import Table, find_export
 from mutator.store.cleaning import clean, finish_deletion
 from mutator.store.opening import CONTENT
 from mutator.workspace import Workspace
@@ -39,6 +41,18 @@ def test_everything_that_a_run_wrote_is_deleted(run: Path) -> None:
     assert run.parent.exists()
 
 
+@pytest.mark.parametrize("name", EXPORTS.shipped())
+def test_the_file_of_each_export_is_no_stranger(run: Path, name: str) -> None:
+    """A new format is one module, which cleaning need not know."""
+    for table in Table:
+        made = run / "exports" / find_export(name).file.format(table=table.value)
+        file = made if made.suffix else made / "1.mcap"
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.touch()
+    clean(run)
+    assert not run.exists()
+
+
 @pytest.mark.parametrize(
     "stranger",
     [
@@ -46,6 +60,7 @@ def test_everything_that_a_run_wrote_is_deleted(run: Path) -> None:
         "data/night.csv",
         "empty/",
         "records/notes.txt",
+        "patches/mine.patch",
         "report/mine.docx",
         "golden/notes",
         "plan/x/y.txt",
