@@ -6,6 +6,7 @@ read heads of runs.
 """
 
 import dataclasses
+import re
 from collections.abc import Callable, Mapping, Sequence
 from enum import Enum
 from functools import cache
@@ -18,6 +19,7 @@ from mutator.errors import Misfit, MutatorError
 _T = TypeVar("_T")
 _Reader = Callable[[Any], Any]
 _WORDS = {str: "text", int: "a whole number", float: "a number", bool: "true or false", NoneType: "null"}
+_SURROGATE = re.compile("[\ud800-\udfff]")
 _LONGEST = 60  # of a value in a message, in characters
 
 
@@ -54,11 +56,16 @@ def _scalar(kind: type) -> _Reader:
     kinds = (float, int) if kind is float else (kind,)
 
     def read(data: Any) -> Any:
-        if type(data) not in kinds:  # a bool is no number
+        if type(data) not in kinds or not _is_writable(data):  # a bool is no number
             raise Misfit(_described(data), _WORDS[kind])
         return data
 
     return read
+
+
+def _is_writable(data: object) -> bool:
+    """Return whether a file can have this value: JSON can spell half of a character."""
+    return not isinstance(data, str) or data.isascii() or _SURROGATE.search(data) is None
 
 
 def _member(kind: type[Enum]) -> _Reader:

@@ -180,7 +180,7 @@ def _aggregate(metric: Metric, numbers: np.ndarray, values: Values, t_end: float
     if metric.aggregate in ("integral", "duration"):
         until = np.append(time[1:], time[-1:])  # each value lasts until the next step or the end of the drive
         lengths = np.minimum(until, math.inf if t_end is None else max(t_end, time[0])) - time
-        return math.fsum((numbers * lengths)[counts].tolist())
+        return math.fsum((numbers[counts] * lengths[counts]).tolist())
     kept = numbers[counts]
     if not kept.size:
         return None

@@ -107,3 +107,11 @@ def test_a_value_in_a_message_is_short_and_printable() -> None:
     with pytest.raises(Misfit) as refused:
         from_plain(int, "\x1b[2J" * 99)
     assert refused.value.got.isprintable() and len(refused.value.got) < 70
+
+
+def test_text_that_no_file_can_have_is_refused() -> None:
+    """JSON can spell half of a character, but UTF-8 has none."""
+    with pytest.raises(Misfit) as error:
+        from_plain(Part, json.loads(r'{"name": "a\ud800", "size": null}'))
+    assert (error.value.got, error.value.path) == (r"'a\ud800'", ["name"])
+    assert from_plain(Part, json.loads(r'{"name": "\ud83d\ude00", "size": null}')).name == "\U0001f600"

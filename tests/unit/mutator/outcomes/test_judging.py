@@ -1,5 +1,6 @@
 """Hazards, ends of drives and metrics, compared with values computed by hand."""
 
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -295,6 +296,18 @@ def test_durations_and_integrals_use_the_times_of_the_trace(write: Write) -> Non
     found = judge_run(manifest, trace, {})
     assert found.hazards == (("HIT", 1.0),)
     assert dict(found.metrics)["way"] == pytest.approx(1.0)
+
+
+def test_an_infinite_value_in_the_last_step_warns_of_nothing(write: Write) -> None:
+    """The last step lasts 0 s, and infinity times 0 is no number."""
+    manifest = write(
+        "hazards: {NEAR: {when: gap < -9}}\n"
+        "metrics: {way: {integral: speed, unit: m, worse: lower, about: x}}\n"
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = judged(manifest, speed=np.append(SPEED[:-1], np.inf))
+    assert dict(found.metrics)["way"] == 5.0  # 1 + 2 - 1 + 2 + 1
 
 
 def test_a_temporal_formula_is_judged_after_its_horizon(write: Write) -> None:
