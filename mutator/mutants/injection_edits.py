@@ -45,7 +45,7 @@ class InjectionEdit:
 def edits_of(
     manifest: TargetManifest, models: FaultModels, injections: Sequence[Injection]
 ) -> list[InjectionEdit]:
-    """Return the edits of a fault's injections, in their order. Only here does a fault's value become source.
+    """Return the edits of a fault's injections, in order. Only here does a fault's value enter a mutant.
 
     MutatorError as `injection_edit`, and for a location outside the target.
     """
