@@ -118,7 +118,7 @@ def _made_from(folder: RunFolder) -> str:
     found = list(digests.of_files(run, files).items())
     head = folder.head
     told = (head.hazards, head.compared, head.metrics, head.severity, head.channels, head.structure)
-    columns = [column.name for column in columns_of(head)]
+    columns = [(one.name, one.type) for one in (*columns_of(head), *propagation.COLUMNS, *TIMINGS)]
     return digest([SCHEMA, VERSION, *told, columns, found])
 
 

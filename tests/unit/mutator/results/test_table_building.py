@@ -348,11 +348,18 @@ def test_tables_are_rebuilt_after_any_change(
     assert is_rebuilt(folder, monkeypatch)
 
 
+def with_numbers_for_counts(columns: Sequence[Any]) -> list[Any]:
+    return [replace(one, type="number") if one.type == "count" else one for one in columns]
+
+
+@pytest.mark.parametrize(
+    "change", [lambda columns: columns[:-1], with_numbers_for_counts], ids=["name", "type"]
+)
 def test_tables_are_rebuilt_after_a_change_of_columns(
-    folder: RunFolder, monkeypatch: pytest.MonkeyPatch
+    folder: RunFolder, monkeypatch: pytest.MonkeyPatch, change: Callable[..., Any]
 ) -> None:
     with monkeypatch.context() as patch:
-        patch.setattr(table_building, "columns_of", lambda head: columns_of(head)[:-1])
+        patch.setattr(table_building, "columns_of", lambda head: change(columns_of(head)))
         table_building.build(folder.path)
     assert is_rebuilt(folder, monkeypatch)
 
