@@ -25,8 +25,8 @@ from mutator.model import Status
 from mutator.store import digests, integrity
 from mutator.store.blocks import read_blocks
 from mutator.store.digests import Digest, Ledger
+from mutator.store.folder_contents import ASIDE
 from mutator.store.lines import Segment, read_segment, written
-from mutator.store.opening import ASIDE
 from mutator.store.patches import rewrite
 from mutator.store.records import LINE_SCHEMAS
 from mutator.store.run_folder import RunFolder

@@ -27,7 +27,7 @@ from mutator.model import Experiment
 from mutator.results.plan_columns import PLAN_COLUMNS, plan_row
 from mutator.store import digests, plan_file
 from mutator.store.digests import Digest, DigestingFile, Ledger
-from mutator.store.opening import check_contents
+from mutator.store.folder_contents import check_contents
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN, HEAD, SCHEMA, Provenance, RunHead
 from mutator.targets.manifest import TargetManifest

@@ -24,7 +24,7 @@ from mutator.store.approvals import FILE as REVIEWED
 from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.digests import Digest, Ledger
-from mutator.store.opening import check_contents
+from mutator.store.folder_contents import check_contents
 from mutator.store.patches import PatchWriter
 from mutator.store.records import endings
 from mutator.store.run_folder import RunFolder

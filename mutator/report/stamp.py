@@ -14,7 +14,7 @@ from mutator.report.page_series import series_facts
 from mutator.report.panel import FOLDER
 from mutator.store import digests
 from mutator.store import series as series_store
-from mutator.store.opening import ASIDE, SCRATCH, SIGNATURE, TRACES, belongs
+from mutator.store.folder_contents import ASIDE, SCRATCH, SIGNATURE, TRACES, belongs
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 

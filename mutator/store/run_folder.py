@@ -16,7 +16,7 @@ from mutator._common.files import check_is_text
 from mutator.errors import MutatorError
 from mutator.model import AfterHazard, Experiment, Limits, Record
 from mutator.store import digests, integrity, plan_file
-from mutator.store.opening import SCRATCH, TRACES, check_contents
+from mutator.store.folder_contents import SCRATCH, TRACES, check_contents
 from mutator.store.patches import Patches
 from mutator.store.records import read_records, read_timings
 from mutator.store.run_head import HEAD, RunHead, StoredGolden, read_head

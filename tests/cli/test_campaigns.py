@@ -18,7 +18,7 @@ import pytest
 from mutator.cli import campaigns
 from mutator.errors import MutatorError
 from mutator.store import approvals
-from mutator.store.opening import CONTENT
+from mutator.store.folder_contents import CONTENT
 from mutator.store.series import SeriesFolder, read_kept
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
