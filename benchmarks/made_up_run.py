@@ -40,12 +40,13 @@ from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.digests import Digest
 from mutator.store.patches import _Packer
-from mutator.store.records import SCHEMA, TIMINGS_SCHEMA, line_of
+from mutator.store.records import SCHEMA, line_of
 from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.store.series import INDEX, Index, write_index
 from mutator.store.series_format import encode
 from mutator.store.series_script import name_of, write_script
 from mutator.store.stretches import Stretch
+from mutator.store.timings import TIMINGS_SCHEMA
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -36,9 +36,10 @@ from mutator.store.choices import Choices
 from mutator.store.digests import Digest
 from mutator.store.lines import LineWriter, read_segment
 from mutator.store.patches import Patches, PatchWriter, rewrite
-from mutator.store.records import SCHEMA, TIMINGS_SCHEMA
+from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.store.stretches import Stretch
+from mutator.store.timings import TIMINGS_SCHEMA
 from mutator.triggers.kinds import always
 from mutator.workspace import Workspace
 

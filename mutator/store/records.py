@@ -1,4 +1,4 @@
-"""Records on disk. Each worker appends to its own file, which stays readable if the worker is killed."""
+"""Records on disk: what a line has, and the readers of whole records and of their endings."""
 
 import json
 import re
@@ -11,12 +11,11 @@ from mutator._common.below import inside
 from mutator.errors import CheckFailed, MutatorError
 from mutator.model import Activation, Outcome, Record, RunError, Status
 from mutator.store.indexed_lines import IndexedLines, Line
+from mutator.store.timings import TIMINGS, TIMINGS_SCHEMA
 
 SCHEMA = "records/2"
-TIMINGS_SCHEMA = "timings/2"
-RECORDS, TIMINGS, PROOF = "records", "timings", "proof"  # folders of files of lines
+RECORDS, PROOF = "records", "proof"  # folders of files of lines
 LINE_SCHEMAS = {RECORDS: SCHEMA, TIMINGS: TIMINGS_SCHEMA, PROOF: SCHEMA}
-_LONGEST_S = 1e9  # of a run; sums of such times are finite
 _NAMES = tuple(field.name for field in fields(Record))
 _RECORDS = ("activation", "error")  # fields that contain dataclasses
 
@@ -120,26 +119,6 @@ def _replaces(line: Line, known: Line) -> bool:
     if before.status is not Status.HARNESS_ERROR:
         raise second_record(line.path, line.number, record.experiment_id, same=before == record)
     return True
-
-
-def read_timings(run: Path) -> IndexedLines[dict[str, Any]]:
-    """Return the newest timing line of each experiment that has one; MutatorError for a damaged line."""
-    paths = sorted((run / "timings").glob("*.jsonl"))
-    return IndexedLines(paths, TIMINGS_SCHEMA, _timing_from, lambda line, known: True)
-
-
-def _timing_from(data: dict[str, Any]) -> dict[str, Any]:
-    """Check the types of a timing line, which anybody can edit: the seal leaves it out."""
-    for name in ("cpu_s", "wall_s"):
-        if type(data[name]) not in (int, float) or not 0.0 <= data[name] <= _LONGEST_S:
-            raise ValueError(name)
-    for name in ("experiment_id", "host", "worker", "engine", "why"):
-        value = data[name]  # `engine` is None if nothing ran
-        if not (isinstance(value, str) or (name == "engine" and value is None)):
-            raise ValueError(name)
-        if name != "why" and value and not value.isprintable():
-            raise ValueError(name)
-    return data
 
 
 def second_record(path: Path, line: int, experiment_id: str, *, same: bool) -> MutatorError:

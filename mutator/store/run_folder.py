@@ -18,10 +18,11 @@ from mutator.model import AfterHazard, Experiment, Limits, Record
 from mutator.store import digests, integrity, plan_file
 from mutator.store.folder_contents import SCRATCH, TRACES, check_contents
 from mutator.store.patches import Patches
-from mutator.store.records import read_records, read_timings
+from mutator.store.records import read_records
 from mutator.store.run_head import HEAD, RunHead, StoredGolden, read_head
 from mutator.store.shards import Shard
 from mutator.store.stretches import Stretch
+from mutator.store.timings import read_timings
 from mutator.targets.severity import Scale
 
 STOP_NOTE = "Runs end at their first terminal hazard: later hazards and alerts are not recorded."

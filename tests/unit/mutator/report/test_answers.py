@@ -19,8 +19,8 @@ from mutator.report.paths import RunPaths
 from mutator.report.studies import ReportedRun
 from mutator.results.table_columns import SINCE, result_columns
 from mutator.store.lines import written
-from mutator.store.records import TIMINGS_SCHEMA
 from mutator.store.run_folder import RunFolder
+from mutator.store.timings import TIMINGS_SCHEMA
 from mutator.targets.target_facts import MetricFacts
 from tests.made_up_results import write_results
 

@@ -15,8 +15,9 @@ from mutator.report.seen import timings_of
 from mutator.results.table_building import build
 from mutator.store.choices import Choices
 from mutator.store.lines import LineWriter
-from mutator.store.records import SCHEMA, TIMINGS_SCHEMA
+from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
+from mutator.store.timings import TIMINGS_SCHEMA
 from mutator.workspace import Workspace
 
 WAYS = (("fork", ""), ("golden", ""), ("reference", "its golden run has <two> threads"), (None, ""))

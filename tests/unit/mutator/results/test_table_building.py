@@ -36,8 +36,9 @@ from mutator.results.table_columns import (
 from mutator.results.table_files import Column
 from mutator.store import plan_file
 from mutator.store.lines import LineWriter
-from mutator.store.records import SCHEMA, TIMINGS_SCHEMA
+from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
+from mutator.store.timings import TIMINGS_SCHEMA
 from mutator.targets.severity import Scale
 from mutator.workspace import Workspace
 

@@ -7,7 +7,7 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.store.lines import LineWriter
-from mutator.store.records import TIMINGS_SCHEMA, read_timings
+from mutator.store.timings import TIMINGS_SCHEMA, read_timings
 
 LINE = {
     "experiment_id": "a" * 16,
