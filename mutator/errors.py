@@ -5,7 +5,7 @@
         ReviewConflict
       Shortage, DiskFull    the machine's limits; exit code 3
       Outside, TooLarge     files of others that must not be read
-      InvalidMutant, BadOutput
+      InvalidMutant, BadOutput, BadAddition
       JobEnded, GroupsChanged, Absent, UnknownPage    the server refuses a request
     MutatorWarning, IncompleteRun
     Signal                  caught by the harness itself; users see what it makes of it
@@ -165,6 +165,14 @@ class BadOutput(MutatorError):
 
     * When: its trace or record is missing or does not match the manifest.
     * To do: correct the manifest, or the code that records the run.
+    """
+
+
+class BadAddition(MutatorError):
+    """What another package adds to mutator fails.
+
+    * When: an operator, export, importer, distributor or study of an installed package raises an exception.
+    * To do: correct the package, update it or uninstall it.
     """
 
 

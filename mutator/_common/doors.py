@@ -1,22 +1,30 @@
 """Doors: where a module, or another package by an entry point, adds to the harness.
 
 A door has a group of entry points and, unless packages alone add to it, a folder of modules. Each module and
-each entry point has an object of the same kind. Whatever is not asked for by name is not imported.
+each entry point has an object of the same kind. Whatever is not asked for by name is not imported. What fails
+in the code of another package is blamed on that package.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from keyword import iskeyword
 from pathlib import Path
 from pkgutil import iter_modules, resolve_name
+from traceback import walk_tb
 from typing import TYPE_CHECKING, Any
 
+from mutator._common.files import is_disk_full
+from mutator._common.shortages import shortage
 from mutator._common.text import suggestion
-from mutator.errors import MutatorError
+from mutator.errors import BadAddition, MutatorError, Signal
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint, EntryPoints
+
+_OWN = Path(__file__).parent.parent  # the harness
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,6 +103,39 @@ class Door:
             )
         return loaded
 
+    @contextmanager
+    def running(self, name: str) -> Iterator[None]:
+        """Raise BadAddition for an exception in code of that name, if another package adds it. What the
+        harness raises itself, and errors of a machine that is out of something, stay as they are.
+        """
+        try:
+            yield
+        except (MutatorError, Signal):
+            raise
+        except Exception as err:
+            if shortage(err) or is_disk_full(err) or (failure := self.failure(name, err)) is None:
+                raise
+            raise failure from err
+
+    def failure(self, name: str, err: Exception) -> BadAddition | None:
+        """Return the error that blames another package for an exception in what it adds under that name;
+        None if the harness adds it.
+        """
+        packages = [_package(point) for point in self._of_others(name)]
+        if not packages:
+            return None
+        where, line = next(_places_of_others(err), (None, None))
+        return BadAddition(
+            f"{self.thing} '{name}' of package {packages[0]} fails: {type(err).__name__}: {err}",
+            where=where,
+            line=line,
+            remedy="correct or remove the package",
+        )
+
+    def _of_others(self, name: str) -> "list[EntryPoint]":
+        points = _entry_points(self.group).select(name=name)
+        return [point for point in points if not (point.dist and point.dist.name == "mutator")]
+
     def _refused(self, name: str, got: str, remedy: str) -> MutatorError:
         others = ", ".join(other for other in self.names() if other != name)
         expected = f"one of {others}" if others else f"no {self.thing}, because none is installed"
@@ -103,7 +144,7 @@ class Door:
 
 @cache
 def _shipped(folder: str) -> tuple[str, ...]:
-    path = Path(__file__).parent.parent.joinpath(*folder.split(".")[1:])  # without importing the package
+    path = _OWN.joinpath(*folder.split(".")[1:])  # without importing the package
     return tuple(module.name.rstrip("_").replace("_", "-") for module in iter_modules([str(path)]))
 
 
@@ -117,6 +158,14 @@ def _entry_points(group: str) -> "EntryPoints":
     from importlib.metadata import entry_points  # takes 12 ms, a tenth of the command line's start
 
     return entry_points(group=group)
+
+
+def _places_of_others(err: Exception) -> Iterator[tuple[str, int]]:
+    """Yield the files and lines of an exception that are not the harness's, from the outermost call."""
+    for frame, line in walk_tb(err.__traceback__):
+        file = frame.f_code.co_filename
+        if not Path(file).is_relative_to(_OWN):
+            yield file, line
 
 
 def _package(point: "EntryPoint") -> str:

@@ -216,7 +216,8 @@ def generate(
         str | None,
         typer.Option(
             metavar="NAMES",
-            help=f"Use mutation operators instead of specs: {OPERATOR_NAMES}; or all.",
+            help=f"Use mutation operators instead of specs: {OPERATOR_NAMES}; or all. "
+            "Other packages can add operators.",
         ),
     ] = None,
     places: Annotated[

@@ -58,4 +58,16 @@ def distributor(cluster: str | None = None, *, insecure: bool = False) -> Distri
         name, where = _DEFAULT, cluster
     kind = DISTRIBUTORS.find(name)
     assert isinstance(kind, DistributorKind)
-    return kind.open(where, insecure)
+    with DISTRIBUTORS.running(name):
+        opened = kind.open(where, insecure)
+    return opened if name in DISTRIBUTORS.shipped() else _OfAnotherPackage(name, opened)
+
+
+@dataclass(frozen=True, slots=True)
+class _OfAnotherPackage:
+    name: str
+    opened: Distributor
+
+    def run(self, session: Session) -> None:
+        with DISTRIBUTORS.running(self.name):
+            self.opened.run(session)

@@ -13,7 +13,7 @@ from mutator._common.hashing import digest
 from mutator._common.unchanged_files import UnchangedFiles
 from mutator.campaigns.shared_runs import runs
 from mutator.engines.jobs import Engine, Execution, Job, RunMode
-from mutator.errors import BadOutput, InvalidMutant, MutatorError
+from mutator.errors import BadAddition, BadOutput, InvalidMutant, MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Activation, AfterHazard, Experiment, Record, Status
 from mutator.mutants.building import Mutant, build
@@ -189,7 +189,7 @@ class Runner:
         faulty = None
         try:
             record, faulty = self._record(experiment, built, execution)
-        except BadOutput as err:
+        except (BadOutput, BadAddition) as err:
             record = _bare(experiment, Status.HARNESS_ERROR, _problem_of(err), built)
         self._check_input(experiment, execution)
         return Finished(
@@ -298,7 +298,7 @@ def _changed(path: Path) -> MutatorError:
     )
 
 
-def _problem_of(err: BadOutput) -> str:
+def _problem_of(err: MutatorError) -> str:
     return f"{Path(err.where or '').name}: {err.got}"
 
 

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from mutator._common.below import inside
+from mutator._common.doors import EXPORTS
 from mutator._common.files import make_folder, write_atomic
 from mutator.exports import ExportRequest, Parts, check_options, find_export
 from mutator.store.run_folder import RunFolder
@@ -28,8 +29,11 @@ def export(
     found = find_export(format)
     folder = RunFolder.open(run)
     check_options(format, found, parts)
-    place = out or inside(folder.path / FOLDER, found.file.format(table=parts.table.value))
-    content = found.write(ExportRequest(folder=folder, out=place, workspace=workspace, parts=parts))
+    with EXPORTS.running(format):
+        place = out or inside(folder.path / FOLDER, found.file.format(table=parts.table.value))
+        content = found.write(ExportRequest(folder=folder, out=place, workspace=workspace, parts=parts))
+        if not isinstance(content, bytes | None):
+            raise TypeError(f"`write` returns {type(content).__name__}, not bytes")
     if content is not None:
         make_folder(place.parent)
         write_atomic(place, content)

@@ -9,10 +9,10 @@ from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Anchor, AnchorKind, FaultLocation
 from mutator.mutants.anchors import ParsedFile
-from mutator.mutants.expressions import parts_of
+from mutator.mutants.expressions import Expression, parts_of
 from mutator.mutants.rendering import changed_value
 from mutator.mutants.statements import Statement
-from mutator.operators import Operator
+from mutator.operators import Operator, Rule
 from mutator.operators.facts import Facts
 from mutator.operators.mutations import Mutation
 from mutator.operators.names import find_operator
@@ -49,13 +49,7 @@ def _of_values(
         if any(isinstance(inner, _UNCALCULATED) for inner in ast.walk(expression.node)):
             continue  # templates refuse `yield`
         parts = None
-        rules = (
-            (name, rule)
-            for name, operator in operators.items()
-            if operator.rules
-            for rule in operator.rules(expression, facts)
-        )
-        for name, rule in rules:
+        for name, rule in _rules(operators, expression, facts):
             parts = parts_of(expression) if parts is None else parts
             model = models.get(rule.model)
             yield Mutation(
@@ -67,6 +61,16 @@ def _of_values(
                 was=text,
                 now=changed_value(model, dict(rule.params), _ID, expression.written, parts),
             )
+
+
+def _rules(operators: _Operators, expression: Expression, facts: Facts) -> Iterator[tuple[str, Rule]]:
+    for name, operator in operators.items():
+        if operator.rules:
+            with OPERATORS.running(name):
+                for rule in operator.rules(expression, facts):
+                    if not isinstance(rule, Rule):
+                        raise TypeError(f"{rule!r} is no Rule")
+                    yield name, rule
 
 
 def _omissions(file: ParsedFile, facts: Facts, function: str, operators: _Operators) -> Iterator[Mutation]:
@@ -81,7 +85,7 @@ def _omissions(file: ParsedFile, facts: Facts, function: str, operators: _Operat
                 anchored = anchored or (verb, name, seen[verb, name])
         if anchored is None or not _can_be_left_out(statement, facts, line):
             continue
-        omitting = [name for name, one in operators.items() if one.omits and one.omits(statement, facts)]
+        omitting = [name for name, one in operators.items() if _omits(name, one, statement, facts)]
         if not omitting:
             continue
         verb, name, number = anchored
@@ -103,6 +107,11 @@ def _omissions(file: ParsedFile, facts: Facts, function: str, operators: _Operat
                 was=facts.texts.get(statement.first + 1, name),
                 now=LEFT_OUT,
             )
+
+
+def _omits(name: str, operator: Operator, statement: Statement, facts: Facts) -> bool:
+    with OPERATORS.running(name):
+        return bool(operator.omits and operator.omits(statement, facts))
 
 
 def _can_be_left_out(statement: Statement, facts: Facts, function: int) -> bool:

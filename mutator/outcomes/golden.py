@@ -12,6 +12,7 @@ import numpy as np
 
 from mutator._common.below import inside
 from mutator._common.bounded import MOST_JSON, read_bounded
+from mutator._common.doors import IMPORTERS
 from mutator._common.hashing import digest
 from mutator._common.shortages import shortage
 from mutator.errors import BadOutput, BadTrace, MutatorError
@@ -59,14 +60,24 @@ def load_trace(
     except BadTrace as err:
         raise BadOutput(err.got, where=path, expected=err.expected) from None
     except KeyError as err:
+        _check_is_of_run(err, manifest, path)
         raise BadOutput(f"no channel {err}", where=path, expected="the manifest's channels") from None
     except MutatorError:
         raise
     except Exception as err:  # a run can write anything, so readers can fail in many ways
         _check_is_of_output(err)
+        _check_is_of_run(err, manifest, path)
         raise BadOutput(f"not a readable trace ({_why(err)})", where=path, expected=kind) from None
     _check_arrays(trace, manifest, path)
     return trace
+
+
+def _check_is_of_run(err: Exception, manifest: TargetManifest, path: Path) -> None:
+    """Raise BadAddition if an importer of another package failed: nobody knows whether the run did."""
+    names = {name for one in manifest.channels for name in (one.in_trace, one.time)}
+    lacks = isinstance(err, KeyError) and err.args[:1] and err.args[0] in {manifest.time_channel, *names}
+    if path.is_file() and not lacks and (failure := IMPORTERS.failure(path.suffix.removeprefix("."), err)):
+        raise failure from err
 
 
 def _check_arrays(trace: Trace, manifest: TargetManifest, path: Path) -> None:

@@ -52,7 +52,8 @@ class Importer:
 
     `read` returns an array for each channel and for the step times, by manifest name; a channel that lacks
     values at some steps also has its times, named by `own_times`. BadTrace for an invalid file, KeyError for
-    a missing channel. A file can claim any size, so check before you unpack it.
+    a missing channel. After any other exception, the experiment is a harness error, because nobody knows
+    whether the run or the importer failed. A file can claim any size, so check before you unpack it.
     """
 
     about: str
@@ -85,7 +86,7 @@ def read(
 
     Without `channels`, read everything, including names that are not in the manifest. Channels in `also` can
     be missing. BadTrace for an invalid file, KeyError for any other missing channel. Other errors of the
-    reader are not caught.
+    importer are not caught.
     """
     wanted = manifest.channels if channels is None else (*channels, *also)
     request = TraceRequest(
@@ -95,7 +96,12 @@ def read(
         also=also,
         everything=channels is None,
     )
-    return _importer(path.suffix.removeprefix(".")).read(request)
+    arrays = _importer(path.suffix.removeprefix(".")).read(request)
+    needed = () if request.everything else [channel.name for channel in wanted if channel not in also]
+    lacking = {request.time, *needed} - arrays.keys()
+    if lacking or not all(isinstance(array, np.ndarray) for array in arrays.values()):
+        raise TypeError(f"no array for {', '.join(sorted(lacking)) or 'some channels'}")
+    return arrays
 
 
 def by_channel(columns: Arrays, request: TraceRequest, *, has_empty_cells: bool = False) -> Arrays:

@@ -16,10 +16,13 @@ A door is a place where you add something to mutator. Most take one file.
 """
 _PACKAGES = """\
 Another package adds these by an entry point. It is loaded only when somebody uses its name. If it cannot be
-loaded, is no object of the stated class, or has the name of another, the error names the package. Its code
-runs with your rights, so install only packages that you trust. Inside the project, the object is an attribute
-of a new module in the folder; the module's name is the object's name, with `_` for `-`, and after a keyword
-of Python.
+loaded, is no object of the stated class, has the name of another, or fails while it is used, the error names
+the package. Its code runs with your rights, so install only packages that you trust. Inside the project, the
+object is an attribute of a new module in the folder; the module's name is the object's name, with `_` for
+`-`, and after a keyword of Python.
+
+Once a package is uninstalled, the files that its exports wrote in run folders are strangers to
+`mutator clean`, which then leaves these folders alone.
 
 The package in `tests/fixtures/doors/` has an example of each but the study.
 """

@@ -4,6 +4,7 @@ returns None if there is nothing to show.
 
 from collections.abc import Callable
 
+from mutator._common.doors import STUDIES
 from mutator.report.panel import Panel
 from mutator.report.panels import failed, figures, mutation_score, origin, paths, seeds, source, tables
 from mutator.report.studies import ReportedRun
@@ -24,8 +25,9 @@ def study_panels(run: ReportedRun) -> tuple[Panel, ...]:
     """Return the panels of the study's page: those of the study, then the run's tables and figures next to
     the published ones. Empty if the run has too few experiments or none of the study's faults.
     """
-    said = [panel for panel_of in run.study.panels if (panel := panel_of(run))] if run.study else []
-    if not said:
+    if not run.study:
         return ()
-    beside = (tables.published_panel(run), figures.study_figures(run))
+    with STUDIES.running(run.folder.head.study or ""):
+        said = [panel for panel_of in run.study.panels if (panel := panel_of(run))]
+        beside = (tables.published_panel(run), figures.study_figures(run)) if said else ()
     return (*said, *(panel for panel in beside if panel))

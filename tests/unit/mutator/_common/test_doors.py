@@ -70,3 +70,10 @@ def test_the_command_line_starts_without_any_addition() -> None:
     code = f"import sys, mutator.cli.app; print([m for m in sys.modules if any(p in m for p in {parts})])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_the_pages_say_what_other_packages_can_add_and_what_stays_of_them() -> None:
+    pages = CLONE / "docs" / "reference"
+    lines = [line for line in (pages / "cli.md").read_text().splitlines() if "--operators NAMES" in line]
+    assert lines and all("Other packages can add operators." in line for line in lines)
+    assert "its exports wrote in run folders are strangers" in (pages / "doors.md").read_text()

@@ -1,6 +1,7 @@
 """How executions become records, and which of them are harness errors."""
 
 import json
+import sys
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -13,11 +14,13 @@ from mutator.engines.jobs import Execution, Job
 from mutator.errors import MutatorError
 from mutator.execution.runner import Goldens, Runner
 from mutator.model import Activation, Experiment, Outcome, Record, Status
+from mutator.outcomes import trace_files
 from mutator.preflight.preflight_rules import digest_of
 from mutator.store.choices import Choices
 from mutator.workspace import Workspace
 
 T = np.arange(20) * 0.05
+TRACE = "log.npz"
 Outputs = dict[str, Any]
 
 
@@ -53,7 +56,8 @@ class PlayedEngine:
 def write(out: Path, **channels: np.ndarray) -> None:
     if channels or not out.name.startswith("faulty"):
         quiet = {name: np.zeros(20) for name in ("gas", "brake", "wheel_turn")}
-        np.savez(out / "log.npz", **{"time": T, **quiet, **channels})
+        with (out / TRACE).open("wb") as file:
+            np.savez(file, **{"time": T, **quiet, **channels})
 
 
 METRICS = """\
@@ -145,6 +149,70 @@ def test_a_run_without_usable_outputs_is_a_crash_only_if_its_fault_was_active(
     assert record.detail.startswith(("log.npz: ", "said.json: "))
     assert "/" not in record.detail
     assert judged(ran=NEVER, **outputs).status is Status.HARNESS_ERROR
+
+
+IMPORTER = """\
+from mutator._common.doors import IMPORTERS
+from mutator.errors import BadTrace
+from mutator.outcomes.trace_files import Importer
+
+def read(request):
+    arrays = IMPORTERS.find("npz").read(request)
+    if request.path.parent.name == "faulty":
+        return RESULT
+    return arrays
+
+boom = Importer(about="", read=read)
+"""
+
+
+@pytest.fixture
+def boom(
+    toycar: Workspace, tmp_path: Path, install: Callable[[Path], None], monkeypatch: pytest.MonkeyPatch
+) -> Callable[[str], None]:
+    """Have the target's traces read by an importer of another package, whose result is an expression."""
+    manifest = toycar.manifest("toycar").path
+    manifest.write_text(manifest.read_text().replace("log.npz", "log.boom"))
+    monkeypatch.setattr(sys.modules[__name__], "TRACE", "log.boom")
+
+    def installed(result: str) -> None:
+        (tmp_path / "rvtraces.py").write_text(IMPORTER.replace("RESULT", result))
+        text = '[project]\nname = "rvtraces"\nversion = "0.3"\n[project.entry-points."mutator.importers"]\n'
+        (tmp_path / "pyproject.toml").write_text(f'{text}boom = "rvtraces:boom"\n')
+        monkeypatch.delitem(sys.modules, "rvtraces", raising=False)
+        trace_files._importer.cache_clear()
+        install(tmp_path)
+
+    return installed
+
+
+@pytest.mark.parametrize(
+    ("result", "said"),
+    [
+        ("1 / 0", "ZeroDivisionError: division by zero"),
+        ("arrays['gass']", "KeyError: 'gass'"),
+        ("arrays[b'a' * (1 << 60)]", "MemoryError"),
+        ("None", "AttributeError: 'NoneType'"),
+        ("{}", "TypeError: no array for brake, gas, time, wheel_turn"),
+        ("{name: list(array) for name, array in arrays.items()}", "TypeError: no array for some channels"),
+    ],
+)
+def test_a_failing_importer_of_another_package_never_makes_a_run_a_crash(
+    result: str, said: str, boom: Callable[[str], None], request: pytest.FixtureRequest
+) -> None:
+    boom(result)
+    record = request.getfixturevalue("judged")(ran=RAN)
+    assert (record.status, record.outcome) == (Status.HARNESS_ERROR, None)
+    assert f"importer 'boom' of package rvtraces 0.3 fails: {said}" in record.detail
+
+
+def test_what_an_importer_of_another_package_says_of_a_run_is_judged_as_usual(
+    boom: Callable[[str], None], request: pytest.FixtureRequest
+) -> None:
+    boom("exec('raise BadTrace(\"half\", \"whole\")') if arrays['gas'].any() else arrays")
+    judged = request.getfixturevalue("judged")
+    assert judged(ran=RAN).outcome is Outcome.MASKED
+    assert judged(ran=RAN, trace={"gas": stepped(5)}).status is Status.CRASHED
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,7 @@ def test_a_trace_of_another_package_is_read(tmp_path: Path, door_examples: Path)
     with pytest.raises(BadOutput, match="no channel 'distance'"):
         load_trace(manifest, tmp_path, [GAP])
     file.write_text("3")
-    with pytest.raises(BadOutput, match="not a readable trace"):
+    with pytest.raises(BadOutput, match="no step, or one that is no object"):
         load_trace(manifest, tmp_path, [GAP])
 
 
