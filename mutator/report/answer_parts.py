@@ -33,7 +33,19 @@ class Part:
     text: str
 
 
-Cell = str | Link | Part
+@dataclass(frozen=True, slots=True)
+class Codes:
+    """Codes of hazards or of a severity class, whose meanings the page explains. `word` precedes them."""
+
+    names: tuple[str, ...]
+    word: str = ""
+
+    @property
+    def text(self) -> str:
+        return f"{self.word} {', '.join(self.names)}".lstrip()
+
+
+Cell = str | Link | Part | Codes
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,5 +1,7 @@
 """Answers to a reader's first questions. Each answer links to its experiments in the list."""
 
+from typing import Any
+
 import pandas as pd
 
 from mutator._common.text import counted
@@ -54,9 +56,10 @@ def _told(run: ReportedRun) -> pd.DataFrame:
     told = frame.assign(place=frame[PLACE], untimed_path=frame[UNTIMED_PATH], warning=warnings_of(frame))
     shown = worst_of(told)
     rows = rows_of(run.results[run.results["experiment_id"].isin(shown)], run.faults)
-    words = {
+    words: dict[str, dict[str, Any]] = {
         "fault": {row.experiment_id: row.fault for row in rows},
-        "hazard_names": {row.experiment_id: ", ".join(name for name, _ in row.hazards) for row in rows},
+        "hazard_names": {row.experiment_id: tuple(name for name, _ in row.hazards) for row in rows},
+        "margins": {row.experiment_id: row.margins for row in rows},
         "warned": {row.experiment_id: _warned(row) for row in rows},
     }
     return told.assign(**{name: told["experiment_id"].map(word) for name, word in words.items()})

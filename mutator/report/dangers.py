@@ -1,12 +1,23 @@
 """The most dangerous results: the worst experiments, and the fault types with the most hazards."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import isnan
 from typing import Any
 
 import pandas as pd
 
-from mutator.report.answer_parts import Answer, Link, Listing, bar, by_kind, kind_link, share, to_list
+from mutator.report.answer_parts import (
+    Answer,
+    Cell,
+    Codes,
+    Link,
+    Listing,
+    bar,
+    by_kind,
+    kind_link,
+    share,
+    to_list,
+)
 from mutator.targets.target_facts import MetricFacts
 
 WORST = 10  # maximum number of experiments listed as most dangerous
@@ -107,14 +118,13 @@ def _worst(
     """
     contact = contact_measure(ranked)
     heads = [head, "scenario", "hazards"]
-    columns = [ranked["scenario"], ranked["hazard_names"]]
+    columns: list[Iterable[Cell]] = [ranked["scenario"], map(Codes, ranked["hazard_names"])]
     if SEVERITY in ranked and (ranked[SEVERITY] != "").any():
         heads.append("severity")
-        columns.append(("severity " + ranked[SEVERITY]).where(ranked[SEVERITY] != "", "-"))
+        columns.append(Codes((name,), "severity") if name else "-" for name in ranked[SEVERITY])
     if contact or any(name.startswith(MARGIN) for name in units):
         heads.append("measure")
-        told = [_how_bad(row, contact, units) for row in ranked.to_dict("records")]
-        columns.append(pd.Series(told, ranked.index, dtype=str))
+        columns.append(_how_bad(row, contact, units) for row in ranked.to_dict("records"))
     heads.append("time to hazard")
     columns.append((ranked["t_hazard"] - ranked["t_activation"]).map("{:.2f} s".format))
     if has_alerts:
@@ -135,6 +145,5 @@ def _how_bad(row: Mapping[Any, Any], contact: str, units: Mapping[str, str]) -> 
     if contact and row[contact] and not isnan(row[contact]):
         words = "delta-v" if contact == "delta_v" else "contact at"
         return f"{words} {row[contact]:.2f} {units.get(contact, '')}"
-    names = [f"{MARGIN}{name.lower()}" for name in row["hazard_names"].split(", ")]
-    margins = [(row[name], units[name]) for name in names if name in units and not isnan(row[name])]
+    margins = [(margin, units[f"{MARGIN}{name.lower()}"]) for name, margin in row["margins"]]
     return "margin {:.2f} {}".format(*min(margins)) if margins else "-"

@@ -48,7 +48,7 @@ def words_of(run: ReportedRun) -> Words:
         "What is counted": _RUNS,
         "Alerts": _ALERTS if run.folder.has_alerts else {},
         "Hazards": {one.name: one.about for one in head.about_hazards if one.about},
-        "Severity": _severity(head.severity),
+        "Severity": _severity(head.severity, "severity "),
         "Scenarios": _scenarios(run),
         "Triggers": _triggers(run),
     }
@@ -74,17 +74,15 @@ def meanings_of(run: ReportedRun) -> Words:
         "ending": endings,
         "outcome": endings,
         "hazards": words.get("Hazards", {}),
-        "severity": {
-            name.removeprefix("severity "): about for name, about in words.get("Severity", {}).items()
-        },
+        "severity": _severity(run.folder.head.severity),
     }
 
 
-def _severity(scale: Scale | None) -> dict[str, str]:
+def _severity(scale: Scale | None, before: str = "") -> dict[str, str]:
     if not scale:
         return {}
     told = {
-        f"severity {name}": f"delta-v of {low:.2f} m/s or more: {about}" for name, low, about in scale.classes
+        f"{before}{name}": f"delta-v of {low:.2f} m/s or more: {about}" for name, low, about in scale.classes
     }
     return told | {"no contact": "no severity class; these runs rank by margin, alternating between hazards"}
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from mutator.model import Fault, Outcome, Status, Value, fault_label
 from mutator.results.counting import UNUSABLE, endings, hazard_margins, hazard_times, kinds
 from mutator.results.plan_columns import number_of
+from mutator.results.table_columns import alerts_of
 from mutator.targets.severity import DELTA_V
 
 if TYPE_CHECKING:
@@ -101,7 +102,7 @@ def _row(
         t_activation=cells["t_activation"],
         t_manifest=cells["t_manifest"],
         hazards=tuple(sorted(hazards, key=lambda hazard: hazard[1])),
-        alerts=tuple(filter(None, cells["alerts"].split(";"))),
+        alerts=alerts_of(cells["alerts"]),
         t_alert=cells["t_alert"],
         reaction_time=cells["reaction_time"],
         detail=cells["detail"],

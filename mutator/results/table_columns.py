@@ -268,6 +268,11 @@ def hazard_columns(hazard: str) -> tuple[ResultColumn, ResultColumn]:
     )
 
 
+def alerts_of(cell: str) -> tuple[str, ...]:
+    """Return the names in a cell of the column `alerts`."""
+    return tuple(filter(None, cell.split(";")))
+
+
 def hazards_of(frame: "pd.DataFrame") -> tuple[str, ...]:
     """Return the hazards of a frame that `Results` read, in the order of run.json. MutatorError for a frame
     without them.

@@ -13,6 +13,7 @@ import pandas as pd
 
 from mutator._common.tables import Table
 from mutator.model import OPERATORS, Fault, Status
+from mutator.results.table_columns import alerts_of
 from mutator.statistics.paired import resampled_interval
 from mutator.statistics.shares import Share, share
 from mutator.statistics.sheet import Cell, Sheet, text_of
@@ -78,7 +79,7 @@ def _new_alerts(found: pd.DataFrame, golden_alerts: GoldenAlerts) -> list[bool]:
     rows = zip(found["scenario"], found["seed"].astype(str), found["alerts"], strict=True)
     return [
         not golden_alerts.get((scenario, seed), golden_alerts.get((scenario, ""), frozenset())).issuperset(
-            filter(None, str(alerts).split(";"))
+            alerts_of(alerts)
         )
         for scenario, seed, alerts in rows
     ]

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from markupsafe import Markup
 
 from mutator._common.tables import Table
-from mutator.report.answer_parts import Cell, Link, Listing, Part
+from mutator.report.answer_parts import Cell, Codes, Link, Listing, Part
 from mutator.report.answers import answers_of
 from mutator.report.panel import Panel, rendered
 from mutator.report.studies import ReportedRun
@@ -65,17 +65,17 @@ def _html(listing: Listing, meanings: Words) -> Markup:
 
 
 def _labelled(head: str, cell: Cell, meanings: Mapping[str, str]) -> str:
-    shown = _explained(cell, meanings) if isinstance(cell, str) else _cell(cell)
-    if isinstance(cell, str) and cell.startswith(f"{head} "):  # e.g. "severity S2"
+    shown = _explained(cell, meanings) if isinstance(cell, str | Codes) else _cell(cell)
+    if isinstance(cell, Codes) and cell.word == head:  # e.g. "severity S2"
         return shown
     return Markup('<span class="label">{} </span>{}').format(head, shown)
 
 
-def _explained(codes: str, meanings: Mapping[str, str]) -> str:
-    """Return the codes of hazards or of a severity class, with their meanings as a tooltip."""
-    names = codes.removeprefix("severity ").split(", ")
+def _explained(cell: str | Codes, meanings: Mapping[str, str]) -> str:
+    """Return the text of a cell, with the meanings of what it names as a tooltip."""
+    names, text = (cell.names, cell.text) if isinstance(cell, Codes) else ((cell,), cell)
     about = "; ".join(meanings[name] for name in names if name in meanings)
-    return Markup('<abbr title="{}">{}</abbr>').format(about, codes) if about else codes
+    return Markup('<abbr title="{}">{}</abbr>').format(about, text) if about else text
 
 
 def _cell(cell: Cell) -> str:
@@ -84,4 +84,4 @@ def _cell(cell: Cell) -> str:
         return Markup('<a href="#{}">{}</a>').format(cell.to, text)
     if isinstance(cell, Part):
         return Markup(_BAR).format(cell.part / cell.of if cell.of else 0.0, cell.text)
-    return cell
+    return cell if isinstance(cell, str) else cell.text

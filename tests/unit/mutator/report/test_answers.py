@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from mutator.outcomes.fault_paths import LinkState, PathLink, UntimedPath
-from mutator.report.answer_parts import NO_ALERT, Answer, Link, Part, to_list
+from mutator.report.answer_parts import NO_ALERT, Answer, Codes, Link, Part, to_list
 from mutator.report.answers import answers_of
 from mutator.report.dangers import dangerous
 from mutator.report.fix_order import first_to_fix
@@ -137,7 +137,9 @@ def hazards(*rows: tuple[str, str, float]) -> pd.DataFrame:
     frame["t_hazard"] = 2 + frame["after"]
     frame["experiment_id"] = [f"e{i}" for i in frame.index]
     same = {"outcome": "hazard", "is_activated": True, "t_activation": 2.0, "warning": NO_ALERT}
-    told = {"scenario": "S1", "hazard_names": "H1", "warned": "none", "delta_v": math.nan, "margin_h1": -1.0}
+    told = {"scenario": "S1", "warned": "none", "delta_v": math.nan}
+    for name, cell in {"hazard_names": ("H1", "H2"), "margins": (("H1", -1.0), ("H2", -2.0))}.items():
+        told[name] = [cell] * len(frame)
     return frame.assign(fault=frame["kind"], place=frame.index, **same, **told)
 
 
@@ -180,12 +182,15 @@ def test_the_component_that_let_most_faults_through_is_named() -> None:
 
 def test_six_contacts_and_four_other_hazards_are_listed() -> None:
     frame = hazards(*[("a/hit", "S1", 1.0)] * 12, *[("b/miss", "", 1.0)] * 12)
-    hit, missed, _ = dangerous(frame, [MetricFacts("margin_h1", "m", "", "lower")], has_alerts=True).listings
+    metrics = [MetricFacts("margin_h1", "m", "", "lower"), MetricFacts("margin_h2", "s", "", "lower")]
+    hit, missed, _ = dangerous(frame, metrics, has_alerts=True).listings
     assert (len(hit.lines), len(missed.lines)) == (6, 4)
     assert "severity" in hit.heads and "severity" not in missed.heads
     assert hit.lines[0][0] == Link("a/hit", "e=e0&outcome=hazard&severity=S1&sort=rank")
     assert missed.lines[0][0] == Link("b/miss", "e=e12&outcome=hazard&severity=no%20contact&sort=rank")
-    assert len(dangerous(frame[:12], [], has_alerts=True).listings[0].lines) == 10
+    assert hit.lines[0][2:5] == (Codes(("H1", "H2")), Codes(("S1",), "severity"), "margin -2.00 s")
+    assert missed.lines[0][2:4] == (Codes(("H1", "H2")), "margin -2.00 s")
+    assert len(dangerous(frame[:12], metrics, has_alerts=True).listings[0].lines) == 10
 
 
 def test_tolerated_faults_are_a_share_of_the_activated_ones(answer_by_name: dict[str, Answer]) -> None:
