@@ -24,7 +24,8 @@ from mutator.faults.specs import FaultSpec, load_spec
 from mutator.model import Fault
 from mutator.results.table_columns import check_names
 from mutator.stpa.analysis import Analysis, StructureModel, load_analysis, load_structure
-from mutator.stpa.context_tables import ContextTable, HazardList, load_context_table, load_hazards
+from mutator.stpa.context_tables import ContextTable, load_context_table
+from mutator.stpa.hazards import HazardList, load_hazards
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.manifest_files import load_manifest
 from mutator.targets.severity import Scale

@@ -10,7 +10,7 @@ from mutator.faults import specs
 from mutator.faults.readings import SCHEMA as READINGS_SCHEMA
 from mutator.faults.readings import UNDECLARED, ReadingsModel
 from mutator.reference.tables import generated, sections
-from mutator.stpa import analysis, context_tables
+from mutator.stpa import analysis, context_tables, hazards
 from mutator.targets import manifest_files, severity_model
 from mutator.workspace import Workspace
 
@@ -88,11 +88,11 @@ def hazard_analysis(workspace: Workspace) -> str:
         "analysis](../how-to/change-the-hazard-analysis.md) shows how to write "
         "them. `mutator stpa` prints and checks them.\n",
         f"{_SAME} The first key of each file is `schema`: "
-        f"`{context_tables.HAZARDS_SCHEMA}`, `{context_tables.CONTEXT_SCHEMA}`,\n`control_structure/1`, "
+        f"`{hazards.HAZARDS_SCHEMA}`, `{context_tables.CONTEXT_SCHEMA}`,\n`control_structure/1`, "
         "`unsafe_control_actions/1`, `causal_factors/1`.\n",
         *sections(
             "hazard-analysis.md",
-            context_tables.HazardsModel,
+            hazards.HazardsModel,
             context_tables.TableModel,
             analysis.StructureModel,
             analysis.UnsafeActionsModel,

@@ -14,7 +14,7 @@ from mutator.faults import specs as spec
 from mutator.faults.fault_models import NAMES, TARGET_UNIT, FaultModel, FaultModels, ParamSchema
 from mutator.faults.injections import DIMENSIONLESS
 from mutator.faults.readings import Readings
-from mutator.stpa import analysis, context_tables
+from mutator.stpa import analysis, context_tables, hazards
 from mutator.targets import manifest_files, severity_model
 
 DRAFT = "http://json-schema.org/draft-07/schema#"  # best supported by editors
@@ -50,7 +50,7 @@ _FILES: tuple[tuple[type[StrictModel], str, str], ...] = (
     (campaign_model.CampaignModel, campaign_files.SCHEMA, "campaigns/*.yaml"),
     (manifest_files.ManifestModel, manifest_files.SCHEMA, "targets/*.yaml"),
     (severity_model.ScaleModel, severity_model.SCHEMA, "severity/*.yaml"),
-    (context_tables.HazardsModel, context_tables.HAZARDS_SCHEMA, "stpa/hazards.yaml"),
+    (hazards.HazardsModel, hazards.HAZARDS_SCHEMA, "stpa/hazards.yaml"),
     (context_tables.TableModel, context_tables.CONTEXT_SCHEMA, "stpa/contexts/*.yaml"),
     (analysis.StructureModel, "control_structure/1", "stpa/control_structure.yaml"),
     (analysis.UnsafeActionsModel, "unsafe_control_actions/1", "stpa/unsafe_control_actions.yaml"),

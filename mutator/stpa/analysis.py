@@ -15,7 +15,8 @@ from mutator._common.below import inside
 from mutator._common.text import one_of, suggestion
 from mutator.config.sources import Keys, Source
 from mutator.config.yaml_files import StrictModel, read
-from mutator.stpa.context_tables import ContextTable, HazardList, load_context_table, load_hazards
+from mutator.stpa.context_tables import ContextTable, load_context_table
+from mutator.stpa.hazards import HazardList, load_hazards
 
 _WIDEST = 100  # most rows and columns of the drawing
 

@@ -1,4 +1,4 @@
-"""Hazards and context tables, from which guided triggers are taken."""
+"""Context tables of the hazard analysis, from which guided triggers are taken."""
 
 import re
 from collections.abc import Collection, Iterable, Mapping
@@ -16,7 +16,6 @@ from mutator.stpa.coverage import Coverage, measure_coverage
 from mutator.triggers.conditions import TIME, check_condition, names_in
 
 CONTEXT_SCHEMA = "context_table/1"
-HAZARDS_SCHEMA = "hazards/1"
 _CONSTANT = re.compile(r"[a-z][a-z0-9_]*\Z")
 
 
@@ -91,16 +90,6 @@ class ContextTable:
         )
 
 
-@dataclass(frozen=True, kw_only=True)
-class HazardList:
-    """Accidents and hazards (id -> description), and the accidents that each hazard can cause."""
-
-    source: Source
-    accidents: Mapping[str, str]
-    hazards: Mapping[str, str]
-    leads_to: Mapping[str, tuple[str, ...]]
-
-
 class _RowModel(StrictModel, title="A context"):
     when: str = Field(
         description="A condition. It may use `t` (s), the values observed in the target, and the constants."
@@ -120,18 +109,6 @@ class TableModel(StrictModel, title="contexts/*.yaml"):
     about: str = Field("", description="The subject of the table.")
     constants: dict[str, float] = Field(description="Name -> number, for use in the conditions.")
     contexts: dict[str, _RowModel] = Field(description="Id -> context.")
-
-
-class _HazardModel(StrictModel, title="A hazard"):
-    about: str = Field(description="What the hazard is.")
-    leads_to: list[str] = Field(description="The accidents that it can cause.")
-
-
-class HazardsModel(StrictModel, title="hazards.yaml"):
-    """Accidents, and the hazards that can lead to them."""
-
-    accidents: dict[str, str] = Field(description="Id -> description.")
-    hazards: dict[str, _HazardModel] = Field(description="Id -> hazard.")
 
 
 def load_context_table(path: Path, variables: Collection[str] | None = None) -> ContextTable:
@@ -217,23 +194,3 @@ def _covered_once(rows: tuple[ContextRow, ...], source: Source) -> Coverage:
 def _condition(text: str, constants: Mapping[str, float], source: Source, row: str) -> str:
     with source.placing(("contexts", row, "when")):
         return check_condition(text, constants)
-
-
-def load_hazards(path: Path) -> HazardList:
-    """Read accidents and hazards; MutatorError if a hazard names an unknown accident."""
-    model, source = read(path, HazardsModel, HAZARDS_SCHEMA)
-    for name, hazard in model.hazards.items():
-        for i, accident in enumerate(hazard.leads_to):
-            if accident not in model.accidents:
-                raise source.error(
-                    ("hazards", name, "leads_to", i),
-                    f"accident '{accident}'",
-                    expected=f"one of {', '.join(model.accidents)}",
-                    remedy="correct the name, or add the accident to `accidents`",
-                )
-    return HazardList(
-        source=source,
-        accidents=dict(model.accidents),
-        hazards={name: hazard.about for name, hazard in model.hazards.items()},
-        leads_to={name: tuple(hazard.leads_to) for name, hazard in model.hazards.items()},
-    )
