@@ -33,8 +33,8 @@ from mutator.review.groups import Shape, shapes
 from mutator.statistics.mutation_score import PERMANENT, TRANSIENT
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
+from mutator.triggers.json_trees import Tree, tree
 from mutator.triggers.kinds import ALWAYS
-from mutator.triggers.trees import Tree, tree
 from mutator.web import embedded
 
 if TYPE_CHECKING:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from mutator.report.browse import scene_facts
-from mutator.triggers.trees import Tree
+from mutator.triggers.json_trees import Tree
 from mutator.workspace import Workspace
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from mutator.triggers.conditions import check_condition, check_formula
-from mutator.triggers.trees import tree
+from mutator.triggers.json_trees import tree
 
 KNOWN = ("t", "gap", "speed", "hwt", "risk")
 DERIVED = {"hwt": "(gap / speed)", "risk": "(1.0 / hwt)"}
