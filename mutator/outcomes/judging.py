@@ -17,7 +17,7 @@ from mutator.outcomes.golden import (
     load_trace,
     on_steps,
 )
-from mutator.targets.judging import Hazard, Metric
+from mutator.targets.criteria import Hazard, Metric
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.severity import DELTA_V
 from mutator.triggers import over_time, stl

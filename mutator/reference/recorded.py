@@ -9,7 +9,7 @@ from mutator.results.propagation import COLUMNS as PROPAGATION
 from mutator.results.table_columns import TIMINGS, result_columns, severity_columns
 from mutator.results.table_files import ARROW_TYPES, Column
 from mutator.targets.channels import Channel
-from mutator.targets.judging import Hazard, Metric
+from mutator.targets.criteria import Hazard, Metric
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.observation import variable_units
 from mutator.targets.severity import DELTA_V

@@ -14,7 +14,7 @@ from mutator._common.yaml_records import mapping, written
 from mutator.config.sources import Source
 from mutator.errors import MutatorError
 from mutator.targets.channels import Channel, Role
-from mutator.targets.judging import Hazard, Metric
+from mutator.targets.criteria import Hazard, Metric
 from mutator.targets.observation import Observation
 from mutator.targets.placeholders import filled
 from mutator.targets.scene import Scene

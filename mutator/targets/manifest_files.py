@@ -11,8 +11,8 @@ from mutator.config.sources import Source
 from mutator.config.yaml_files import StrictModel, Written, read
 from mutator.targets.channel_model import ChannelModel, TraceModel, read_channels
 from mutator.targets.commands import ChangeModel, EntryModel, check_commands
+from mutator.targets.criteria_model import HazardModel, MetricModel, read_hazards, read_metrics
 from mutator.targets.environment import check_environment
-from mutator.targets.judging_model import HazardModel, MetricModel, read_hazards, read_metrics
 from mutator.targets.manifest import Film, TargetManifest
 from mutator.targets.observation_model import ObservationModel, read_observation
 from mutator.targets.paths import inside

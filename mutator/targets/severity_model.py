@@ -8,7 +8,7 @@ from pydantic import Field
 from mutator.config.sources import Source
 from mutator.config.units import UNITS
 from mutator.config.yaml_files import StrictModel, read
-from mutator.targets.judging import Hazard, Metric
+from mutator.targets.criteria import Hazard, Metric
 from mutator.targets.severity import CLASSES, Contact, Scale
 
 SCHEMA = "severity/1"

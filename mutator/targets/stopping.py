@@ -5,7 +5,7 @@ from inspect import getsource
 
 from mutator.config.sources import Keys
 from mutator.errors import MutatorError
-from mutator.targets.judging import Hazard
+from mutator.targets.criteria import Hazard
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.conditions import TIME, divide, names_in, parse, to_code
 

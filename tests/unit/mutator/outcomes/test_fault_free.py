@@ -12,7 +12,7 @@ from mutator.errors import MutatorError
 from mutator.outcomes.fault_free import fault_free_runs, fault_free_table, own_alerts
 from mutator.store.run_folder import RunFolder
 from mutator.targets.channels import Channel
-from mutator.targets.judging import Hazard
+from mutator.targets.criteria import Hazard
 from tests.made_head import made_head
 
 MANIFEST: Any = SimpleNamespace(

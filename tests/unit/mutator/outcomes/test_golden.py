@@ -16,7 +16,7 @@ from mutator.outcomes.golden import alerts_of, compare, load_record, load_trace,
 from mutator.outcomes.importers import npz
 from mutator.store.run_folder import GoldenRun
 from mutator.targets.channels import Channel
-from mutator.targets.judging import Hazard
+from mutator.targets.criteria import Hazard
 
 T = np.arange(5) * 0.1
 GAS = Channel(name="gas", unit="-")

@@ -8,8 +8,8 @@ from pydantic import Field
 
 from mutator.config.sources import Keys, Source
 from mutator.config.yaml_files import StrictModel
+from mutator.targets.criteria import Aggregate, Hazard, Metric, Worse
 from mutator.targets.formulas import condition, formula
-from mutator.targets.judging import Aggregate, Hazard, Metric, Worse
 from mutator.triggers import stl
 from mutator.triggers.conditions import GOLDEN, TIME, parse
 
