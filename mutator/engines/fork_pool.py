@@ -21,8 +21,8 @@ from mutator._common.bounded import read_bounded
 from mutator._common.files import remove_folder
 from mutator._common.unchanged_files import UnchangedFiles
 from mutator.engines import bytecode
-from mutator.engines.base_tree import RunTree
 from mutator.engines.processes import end, environment, raised_in
+from mutator.engines.run_tree import RunTree
 from mutator.engines.sandbox import Sandbox
 from mutator.engines.threads import too_many, turned_off
 from mutator.errors import ForkServerLost, NotForkable

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from mutator.engines.base_tree import BaseTree, RunTree
+from mutator.engines.base_tree import BaseTree
+from mutator.engines.run_tree import RunTree
 from mutator.targets.source_tree import read_tree
 
 CODE = "__pycache__/go.pyc"
