@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from mutator._common.doors import STUDIES
 from mutator.report.panel import Panel
-from mutator.report.panels import failed, figures, mutation_score, origin, paths, seeds, source, tables
+from mutator.report.panels import failed, figures, mutation_score, paths, provenance, seeds, source, tables
 from mutator.report.studies import ReportedRun
 
 PANELS: tuple[Callable[[ReportedRun], Panel | None], ...] = (
@@ -17,7 +17,7 @@ PANELS: tuple[Callable[[ReportedRun], Panel | None], ...] = (
     seeds.seeds_panel,
     figures.figures_panel,
     failed.failed_panel,
-    origin.origin_panel,
+    provenance.provenance_panel,
 )
 
 

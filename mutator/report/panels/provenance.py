@@ -25,7 +25,7 @@ _HTML = """\
 """
 
 
-def origin_panel(run: ReportedRun) -> Panel:
+def provenance_panel(run: ReportedRun) -> Panel:
     """Return the panel with engines, equivalence check, plan, choices, sources and versions."""
     engines, facts = run.engines, _facts(run)
     unsealed = list(unsealed_facts(run.folder).items())
