@@ -103,6 +103,10 @@ class Door:
             )
         return loaded
 
+    def package(self, name: str) -> str | None:
+        """Return the package that adds that name; None if the harness does, or nobody."""
+        return next((point.dist.name for point in self._of_others(name) if point.dist), None)
+
     @contextmanager
     def running(self, name: str) -> Iterator[None]:
         """Raise BadAddition for an exception in code of that name, if another package adds it. What the

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from packaging.utils import canonicalize_name
 
+from mutator._common.doors import IMPORTERS
 from mutator._common.version import VERSION
 from mutator.campaigns import machine
 from mutator.campaigns.clones import clone_state
@@ -80,23 +81,28 @@ def _packages(folder: RunFolder, more: Iterable[str] = ()) -> dict[str, str | No
     return machine.versions({*machine.required(), *loaded_packages(folder), *before, *more})
 
 
-def begin_stretch(folder: RunFolder, workspace: "Workspace", *, records: str, accept: bool) -> RunFolder:
+def begin_stretch(
+    folder: RunFolder, workspace: "Workspace", *, records: str, accept: bool, packages: Iterable[str] = ()
+) -> RunFolder:
     """Record this session's software and machine in run.json, before its first experiment, and return the
     folder with its new head.
 
-    `records` is the glob of the session's files. MutatorError as in `check_versions`.
+    `records` is the glob of the session's files; `packages` are what it uses besides. MutatorError as in
+    `check_versions`.
     """
     manifest = workspace.manifest(folder.head.target)
     places = {"library": workspace.library, "templates": workspace.templates, "target": manifest.root}
     places |= {"overlay": manifest.overlay} if manifest.overlay else {}
-    packages = _packages(folder, (canonicalize_name(wanted.name) for wanted in manifest.requires))
+    importer = IMPORTERS.package(Path(manifest.trace_file).suffix.removeprefix("."))
+    used = (*(wanted.name for wanted in manifest.requires), *packages, *([importer] if importer else []))
+    versions = _packages(folder, map(canonicalize_name, used))
     states = {name: clone_state(place) for name, place in ({"mutator": _OWN} | places).items()}
     return add_stretch(
         folder,
         Stretch(
             accepted=check_versions(folder, accept=accept),
             python=machine.python(),
-            packages={name: version for name, version in packages.items() if version},
+            packages={name: version for name, version in versions.items() if version},
             platform=platform.platform(),
             cpu=machine.cpu(),
             blas=machine.blas(),

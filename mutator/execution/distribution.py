@@ -63,6 +63,12 @@ def distributor(cluster: str | None = None, *, insecure: bool = False) -> Distri
     return opened if name in DISTRIBUTORS.shipped() else _OfAnotherPackage(name, opened)
 
 
+def packages_of(distributor: Distributor) -> tuple[str, ...]:
+    """Return the package that adds a distributor, if the harness does not."""
+    name = distributor.name if isinstance(distributor, _OfAnotherPackage) else ""
+    return (package,) if (package := DISTRIBUTORS.package(name)) else ()
+
+
 @dataclass(frozen=True, slots=True)
 class _OfAnotherPackage:
     name: str

@@ -66,7 +66,7 @@ def pytest_configure(config: pytest.Config) -> None:
         config.pluginmanager.register(WorkerSide(config, config.workerinput))
         return
     from mutator.errors import MutatorError
-    from mutator.execution.distribution import distributor
+    from mutator.execution.distribution import distributor, packages_of
     from mutator.execution.pytest_session import configure
 
     cluster, insecure = config.getoption("campaign_cluster"), config.getoption("insecure_network")
@@ -84,4 +84,5 @@ def pytest_configure(config: pytest.Config) -> None:
         accept_versions=config.getoption("accept_versions"),
         sandbox=config.getoption("campaign_sandbox"),
         distributor=deals,
+        packages=packages_of(deals) if deals else (),
     )

@@ -53,11 +53,12 @@ def configure(
     accept_versions: bool,
     sandbox: bool,
     distributor: "Deals | None" = None,
+    packages: Sequence[str] = (),
 ) -> None:
     """Register the plugin of the process that is no worker.
 
     Workers take items one by one, even if the user's configuration groups tests, for example by file. With a
-    `distributor`, pytest itself distributes nothing.
+    `distributor`, pytest itself distributes nothing; `packages` are what it comes from.
     """
     if getattr(config.option, "dist", "no") != "no":
         config.option.dist = "load"
@@ -70,6 +71,7 @@ def configure(
                 accept_versions=accept_versions,
                 sandbox=sandbox,
                 distributor=distributor,
+                packages=packages,
             )
         )
 
@@ -159,9 +161,11 @@ class PlainController(Controller):
         accept_versions: bool,
         sandbox: bool,
         distributor: "Deals | None" = None,
+        packages: Sequence[str] = (),
     ) -> None:
         super().__init__()
         self._distributor = distributor
+        self._packages = packages
         self._campaign = campaign
         self._reviewed = reviewed
         self._accept_versions = accept_versions
@@ -185,7 +189,7 @@ class PlainController(Controller):
                 notify=_told(session.config),
             )
             self.begun = self._open.enter_context(opened)
-            self.begun.prepare()
+            self.begun.prepare(self._packages)
         except MutatorError as err:
             self._open.close()
             self.begun = None

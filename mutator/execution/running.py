@@ -7,7 +7,7 @@ import warnings
 from pathlib import Path
 
 from mutator.errors import MutatorWarning
-from mutator.execution.distribution import Distributor
+from mutator.execution.distribution import Distributor, packages_of
 from mutator.execution.following import followed
 from mutator.execution.left_files import LeftFiles
 from mutator.execution.local import LocalWorkers
@@ -53,7 +53,7 @@ def run_campaign(
         accept_versions=accept_versions,
         notify=notify,
     ) as session:
-        session.prepare()
+        session.prepare(packages_of(distributor))
         if session.pending or session.proof:
             left = LeftFiles()
             with followed(session):

@@ -9,7 +9,7 @@ import shutil
 import time
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -133,8 +133,9 @@ class Session:
         self._records: Mapping[str, Record] | None = None
         self._known: Ended | None = None
 
-    def prepare(self) -> None:
-        """Find the work to do. If there is any, run the checks and begin a stretch.
+    def prepare(self, packages: Iterable[str] = ()) -> None:
+        """Find the work to do. If there is any, run the checks and begin a stretch, which records the
+        versions of `packages` and of those that affect every run.
 
         Unless `accept_versions`, raises MutatorError if versions of Python or packages have changed.
         """
@@ -159,6 +160,7 @@ class Session:
                 self.folder,
                 self.workspace,
                 records=self.worker_name("*"),
+                packages=packages,
                 accept=self.accept_versions,
             )
             self.golden_digests = golden_digests(self.folder)

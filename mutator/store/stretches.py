@@ -52,7 +52,7 @@ class Stretch:
     """
 
     python: str  # CPython 3.11.7
-    packages: Mapping[str, str]  # versions of the harness's requirements and of what the golden runs loaded
+    packages: Mapping[str, str]  # versions of the harness's requirements and of all else that was used
     platform: str  # operating system, kernel, kind of processor
     cpu: str | None = None  # the processor's model
     blas: tuple[Blas, ...] = ()

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plans import make_plan
 from mutator.campaigns.provenance import begin_stretch, check_versions
 from mutator.errors import EXIT_WRONG_INPUT, MutatorError
+from mutator.execution.distribution import distributor, packages_of
 from mutator.store.check_results import SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.store.stretches import CloneState
@@ -61,6 +63,25 @@ def test_a_later_session_only_appends_to_run_json(folder: RunFolder, toycar: Wor
     after = json.loads((folder.path / "run.json").read_text())
     assert [stretch["records"] for stretch in after.pop("stretches")] == ["0001-*", "0002-*"]
     assert before.pop("stretches") == [] and before == after
+
+
+def test_a_package_that_reads_the_traces_or_distributes_the_work_is_recorded(
+    folder: RunFolder, toycar: Workspace, door_examples: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for cached in (machine._installed, machine._providers):
+        monkeypatch.setattr(machine, cached.__name__, cached.__wrapped__)
+    manifest = toycar.manifest("toycar")
+    plain = begin_stretch(folder, toycar, records="0001-*", accept=False).stretches[-1]
+    assert "door-examples" not in plain.packages
+    packages = packages_of(distributor("here:"))
+    spread = begin_stretch(folder, toycar, records="0001-*", accept=False, packages=packages)
+    monkeypatch.setattr(type(toycar), "manifest", lambda *_: replace(manifest, trace_file="log.jsonl"))
+    reading = begin_stretch(folder, toycar, records="0001-*", accept=False)
+    for begun in (spread, reading):
+        assert begun.stretches[-1].packages == {**plain.packages, "door-examples": "1.0"}
+    use(monkeypatch, **{"door-examples": "1.1"})
+    with pytest.raises(MutatorError, match=r"door-examples 1\.0, here 1\.1"):
+        check_versions(reading)
 
 
 def test_before_the_first_run_any_version_is_accepted(

@@ -6,7 +6,7 @@ import pytest
 
 import mutator
 from mutator.errors import MutatorError
-from mutator.execution.distribution import distributor
+from mutator.execution.distribution import distributor, packages_of
 from mutator.execution.local import LocalWorkers
 from mutator.workspace import Workspace
 
@@ -24,6 +24,7 @@ def test_a_distributor_of_another_package_runs_a_campaign(
     ran = mutator.run("small", tmp_path / "a", choices=TWO, cluster="here:", workspace=toycar)
     assert ran.summary is not None
     assert (len(used), ran.summary.ran) == (1, 2)
+    assert packages_of(distributor("here:")) == ("door-examples",)
 
 
 def test_without_a_cluster_work_stays_on_this_machine() -> None:
