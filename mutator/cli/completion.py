@@ -63,6 +63,8 @@ def _library(ctx: typer.Context) -> Path:
 
 
 def _ids(run: Path) -> list[str]:
+    # plan.csv instead of the frozen plan, because the command line reads run folders only through the
+    # API, whose import would delay every completion
     try:
         with (run / "plan.csv").open(encoding="utf-8", newline="") as file:
             return [line["experiment_id"] for line in csv.DictReader(file)]
