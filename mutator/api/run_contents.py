@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from mutator._common.hashing import plain
 from mutator.api.stored_experiments import StoredRun
 from mutator.campaigns.plans import Plan, load_plan
 from mutator.errors import MutatorError
@@ -26,9 +27,15 @@ class RunContents(StoredRun):
         """Campaign, target, seed, reading and choices; digests of the sources; under `stretches`, the
         versions and machine of each stretch of work.
         """
-        content = self.folder.head.content()
-        keys = ("campaign", "target", "plan", "choices", "limits")
-        return {key: content[key] for key in keys} | self.folder.provenance
+        head = self.folder.head
+        return {
+            "campaign": head.campaign,
+            "target": head.target,
+            "plan": head.plan,
+            "choices": plain(head.choices),
+            "limits": plain(head.limits),
+            **self.folder.provenance,
+        }
 
     @cached_property
     def plan(self) -> Plan:

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 from mutator._common.below import inside
 from mutator._common.bounded import MOST_DATA, read_bounded
 from mutator._common.files import check_is_text
+from mutator._common.hashing import plain
 from mutator.errors import MutatorError
 from mutator.model import AfterHazard, Experiment, Limits, Record
 from mutator.store import digests, integrity, plan_file
@@ -123,10 +124,14 @@ class RunFolder:
 
     @property
     def provenance(self) -> dict[str, Any]:
-        content = self.head.content()
-        found = {"mutator": self.head.provenance.mutator, "stretches": content["stretches"]}
-        return found | {
-            key: content[key] for key in ("sources", "seed", "seeds", "reading") if key in content
+        head = self.head
+        return {
+            "mutator": head.provenance.mutator,
+            "stretches": plain(head.stretches),
+            "sources": plain(head.sources),
+            "seed": head.seed,
+            **({"seeds": plain(head.seeds)} if head.seeds else {}),
+            "reading": head.reading,
         }
 
     @property

@@ -46,9 +46,16 @@ def report(folder: RunFolder, manifest: TargetManifest, models: FaultModels) -> 
         source = file.data.decode(file.encoding)
         entry = files.setdefault(file.path, {"language": "python", "source": source, "mutants": []})
         entry["mutants"].append(_mutant(manifest, models, fault, experiments, records))
-    head = folder.head.content()
-    names = ("campaign", "target", "seed", "reading", "plan", "sources", "seeds")
-    config = {name: head[name] for name in names if name in head}
+    head = folder.head
+    config = {
+        "campaign": head.campaign,
+        "target": head.target,
+        "seed": head.seed,
+        "reading": head.reading,
+        "plan": head.plan,
+        "sources": head.sources,
+        **({"seeds": head.seeds} if head.seeds else {}),
+    }
     return {
         "schemaVersion": SCHEMA_VERSION,
         "thresholds": {"high": 100, "low": 0},
