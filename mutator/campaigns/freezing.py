@@ -2,11 +2,11 @@
 
 import csv
 import io
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack
 from operator import itemgetter
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 from mutator._common.files import (
     is_half_written,
@@ -29,9 +29,17 @@ from mutator.store import digests, plan_file
 from mutator.store.digests import Digest, DigestingFile, Ledger
 from mutator.store.folder_contents import check_contents
 from mutator.store.run_folder import RunFolder
-from mutator.store.run_head import CAMPAIGN, HEAD, SCHEMA, Provenance, RunHead
+from mutator.store.run_head import CAMPAIGN, HEAD, SCHEMA, Names, Provenance, RunHead
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.target_facts import channel_facts, hazard_facts, metric_facts
+from mutator.targets.severity import Scale
+from mutator.targets.target_facts import (
+    ChannelFacts,
+    HazardFacts,
+    MetricFacts,
+    channel_facts,
+    hazard_facts,
+    metric_facts,
+)
 from mutator.workspace import Workspace
 
 CSV = "plan.csv"
@@ -172,8 +180,22 @@ def _head(
     )
 
 
-def target_facts(workspace: Workspace, manifest: TargetManifest) -> dict[str, Any]:
-    """Return what run.json says about the target, by field of `RunHead`."""
+class _TargetFacts(TypedDict):
+    """What run.json says about the target, by field of `RunHead`."""
+
+    hazards: Names
+    alerts: Names
+    compared: Names
+    metrics: tuple[MetricFacts, ...]
+    about_hazards: tuple[HazardFacts, ...]
+    severity: Scale | None
+    channels: tuple[ChannelFacts, ...]
+    structure: Mapping[str, Any] | None
+    golden_files: Names
+    target_files: Mapping[str, str]
+
+
+def target_facts(workspace: Workspace, manifest: TargetManifest) -> _TargetFacts:
     structure = workspace.structure(manifest)
     return {
         "hazards": manifest.hazards,
