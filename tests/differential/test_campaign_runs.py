@@ -6,7 +6,7 @@ import re
 import shutil
 import signal
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -61,8 +61,8 @@ def test_order_and_interruptions_change_no_byte(
     prepare, draw = Session.prepare, random.Random(3)
     taken: list[int] = []
 
-    def two_chunks(self: Session) -> None:
-        prepare(self)
+    def two_chunks(self: Session, packages: Iterable[str]) -> None:
+        prepare(self, packages)
         self.pending = tuple(draw.sample(self.pending, min(2, len(self.pending))))
         taken.extend(item.chunk for item in self.pending)
 
