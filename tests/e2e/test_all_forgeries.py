@@ -66,8 +66,8 @@ def leaves(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
         yield path
 
 
-def other(value: Any) -> Any:
-    """Another value of the same type."""
+def other(value: Any, name: object = "") -> Any:
+    """Return another value of the same type, for the key `name`."""
     match value:
         case bool():
             return not value
@@ -76,7 +76,7 @@ def other(value: Any) -> Any:
         case str():
             return f"{value}x"
         case None:
-            return "1/1"  # also a shard
+            return 1 if name == "series_mb" else "1/1"  # a size or a shard
         case list():
             return ["x"]
         case _:
@@ -86,8 +86,8 @@ def other(value: Any) -> Any:
 def changed(content: Any, path: tuple[Any, ...]) -> Any:
     if not path:
         return other(content)
-    copy = content.copy()
-    copy[path[0]] = changed(content[path[0]], path[1:])
+    copy, (name, *rest) = content.copy(), path
+    copy[name] = changed(content[name], tuple(rest)) if rest else other(content[name], name)
     return copy
 
 
