@@ -29,7 +29,7 @@ _REMEDY = "verify with the library of the run"
 def facts_of_target(folder: RunFolder, workspace: Workspace, manifest: TargetManifest) -> Problems:
     """Yield what run.json says about the target and its hazards, but the library does not."""
     keys = {run_key(manifest, experiment) for experiment in plan_file.iterate(folder.path)}
-    follows = replace(folder.head, runs=len(keys), **target_facts(workspace, manifest))
+    follows = replace(folder.head, runs=len(keys), **vars(target_facts(workspace, manifest)))
     for key, found, value in folder.head.differences(follows):
         yield MutatorError(
             f"{key} {short(found)}",

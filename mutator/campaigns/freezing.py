@@ -2,11 +2,10 @@
 
 import csv
 import io
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from contextlib import ExitStack
 from operator import itemgetter
 from pathlib import Path
-from typing import Any, TypedDict
 
 from mutator._common.files import (
     is_half_written,
@@ -29,17 +28,9 @@ from mutator.store import digests, plan_file
 from mutator.store.digests import Digest, DigestingFile, Ledger
 from mutator.store.folder_contents import check_contents
 from mutator.store.run_folder import RunFolder
-from mutator.store.run_head import CAMPAIGN, HEAD, SCHEMA, Names, Provenance, RunHead
+from mutator.store.run_head import CAMPAIGN, HEAD, SCHEMA, Provenance, RunHead
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.severity import Scale
-from mutator.targets.target_facts import (
-    ChannelFacts,
-    HazardFacts,
-    MetricFacts,
-    channel_facts,
-    hazard_facts,
-    metric_facts,
-)
+from mutator.targets.target_facts import TargetFacts, channel_facts, hazard_facts, metric_facts
 from mutator.workspace import Workspace
 
 CSV = "plan.csv"
@@ -169,7 +160,7 @@ def _head(
         experiments=tally.experiments,
         runs=tally.runs,
         limits=plan.campaign.limits,
-        **target_facts(workspace, manifest),
+        **vars(target_facts(workspace, manifest)),
         goldens=tuple(one.stored() for one in tally.needed()),
         canary=canary,
         canary_hazard=plan.campaign.canary.hazard,
@@ -180,35 +171,20 @@ def _head(
     )
 
 
-class _TargetFacts(TypedDict):
-    """What run.json says about the target, by field of `RunHead`."""
-
-    hazards: Names
-    alerts: Names
-    compared: Names
-    metrics: tuple[MetricFacts, ...]
-    about_hazards: tuple[HazardFacts, ...]
-    severity: Scale | None
-    channels: tuple[ChannelFacts, ...]
-    structure: Mapping[str, Any] | None
-    golden_files: Names
-    target_files: Mapping[str, str]
-
-
-def target_facts(workspace: Workspace, manifest: TargetManifest) -> _TargetFacts:
+def target_facts(workspace: Workspace, manifest: TargetManifest) -> TargetFacts:
     structure = workspace.structure(manifest)
-    return {
-        "hazards": manifest.hazards,
-        "alerts": manifest.alerts,
-        "compared": tuple(channel.name for channel in manifest.compared),
-        "metrics": metric_facts(manifest),
-        "about_hazards": hazard_facts(manifest),
-        "severity": workspace.scale_of(manifest),
-        "channels": channel_facts(manifest),
-        "structure": structure.model_dump(mode="json", by_alias=True) if structure else None,
-        "golden_files": tuple(manifest.outputs),
-        "target_files": manifest.tree.digests,
-    }
+    return TargetFacts(
+        hazards=manifest.hazards,
+        alerts=manifest.alerts,
+        compared=tuple(channel.name for channel in manifest.compared),
+        metrics=metric_facts(manifest),
+        about_hazards=hazard_facts(manifest),
+        severity=workspace.scale_of(manifest),
+        channels=channel_facts(manifest),
+        structure=structure.model_dump(mode="json", by_alias=True) if structure else None,
+        golden_files=tuple(manifest.outputs),
+        target_files=manifest.tree.digests,
+    )
 
 
 def csv_bytes(experiments: Iterable[Experiment], *, head: bool = False) -> bytes:

@@ -15,8 +15,7 @@ from mutator.model import Limits
 from mutator.store.choices import Choices
 from mutator.store.plan_file import Chunk
 from mutator.store.stretches import Stretch
-from mutator.targets.severity import Scale
-from mutator.targets.target_facts import ChannelFacts, HazardFacts, MetricFacts
+from mutator.targets.target_facts import TargetFacts
 
 SCHEMA = "run/3"
 HEAD, CAMPAIGN = RUN_HEAD, "campaign.yaml"
@@ -32,9 +31,9 @@ class Provenance:
     mutator: str
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RunHead:
-    """The content of a run.json, key by key: docs/reference/run-folder.md says what each means."""
+@dataclass(frozen=True, kw_only=True)
+class PlanFacts:
+    """What run.json says about the plan."""
 
     schema: str
     plan: str
@@ -50,16 +49,14 @@ class RunHead:
     experiments: int
     runs: int
     limits: Limits
-    hazards: Names
-    alerts: Names
-    compared: Names
-    metrics: tuple[MetricFacts, ...]
-    about_hazards: tuple[HazardFacts, ...]
-    severity: Scale | None
-    channels: tuple[ChannelFacts, ...]
-    structure: Mapping[str, Any] | None
-    golden_files: Names
-    target_files: Mapping[str, str]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunHead(TargetFacts, PlanFacts):
+    """The content of a run.json, key by key: docs/reference/run-folder.md says what each means. The keys of
+    `PlanFacts`, the last base, come first.
+    """
+
     goldens: tuple[StoredGolden, ...]
     canary: Mapping[str, Any]
     canary_hazard: str

@@ -1,10 +1,12 @@
 """What a run states about its target, so that readers need no manifest."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from mutator.targets.channels import Role
 from mutator.targets.manifest import TargetManifest
+from mutator.targets.severity import Scale
 
 T_END = "t_end"  # the metric column with the end of the drive
 
@@ -38,6 +40,22 @@ class HazardFacts:
     name: str
     about: str
     terminal: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class TargetFacts:
+    """What run.json says about the target, key by key: docs/reference/run-folder.md says what each means."""
+
+    hazards: tuple[str, ...]
+    alerts: tuple[str, ...]
+    compared: tuple[str, ...]
+    metrics: tuple[MetricFacts, ...]
+    about_hazards: tuple[HazardFacts, ...]
+    severity: Scale | None
+    channels: tuple[ChannelFacts, ...]
+    structure: Mapping[str, Any] | None
+    golden_files: tuple[str, ...]
+    target_files: Mapping[str, str]
 
 
 def channel_facts(manifest: TargetManifest) -> tuple[ChannelFacts, ...]:
