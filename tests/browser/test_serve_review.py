@@ -51,6 +51,13 @@ def ready(page: Any) -> None:
     page.wait_for_selector("html[data-ready]", state="attached")
 
 
+def intercept(page: Any, handler: Callable[[Any], None]) -> None:
+    """Pass the page's requests to `handler`. A page loaded before can still send some past it."""
+    page.route("**/api/review/**", handler)
+    page.reload()
+    ready(page)
+
+
 def saved(page: Any, group: str) -> None:
     page.wait_for_selector(f"#group-{group} .kept:text('saved')")
 
@@ -198,8 +205,8 @@ def test_a_pending_approval_is_not_applied_to_later_code(
         ready(page)
         page.fill("#by", "Jane")
         page.keyboard.press("Escape")
+        intercept(page, lambda route: route.abort())
         page.keyboard.press("j")
-        page.route("**/api/review/**", lambda route: route.abort())
         page.keyboard.press("a")
         page.wait_for_selector("#banner:text('1 mark waits')")
         lens.write_text(text.replace("picture + self.amount", "picture + 2 * self.amount"))
@@ -225,8 +232,7 @@ def test_a_late_response_does_not_hide_a_mark(review: Callable[..., Any], librar
         else:
             route.continue_()
 
-    page.route("**/api/review/**", hold)
-    page.evaluate("document.dispatchEvent(new Event('visibilitychange'))")
+    intercept(page, hold)
     while not late:
         page.wait_for_timeout(20)
     page.keyboard.press("j")
