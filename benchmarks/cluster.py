@@ -28,8 +28,8 @@ from typing import Any
 
 from mutator.campaigns.chunks import Pending, pending
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import make_plan
-from mutator.campaigns.provenance import add_stretch
+from mutator.campaigns.plan import make_plan
+from mutator.campaigns.run_provenance import add_stretch
 from mutator.execution.cluster import crew, dask_side, dask_workers
 from mutator.execution.cluster import intake as intakes
 from mutator.execution.cluster.board import Board

@@ -20,7 +20,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from mutator.campaigns.plans import Plan, make_plan  # noqa: E402
+from mutator.campaigns.plan import Plan, make_plan  # noqa: E402
 from mutator.engines.fork import ForkEngine  # noqa: E402
 from mutator.engines.jobs import Engine, Job  # noqa: E402
 from mutator.engines.reference import ReferenceEngine  # noqa: E402

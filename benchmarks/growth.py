@@ -20,11 +20,11 @@ from time import process_time
 from mutator._common.hashing import digest
 from mutator.audit.seal import seals_of
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import Plan, make_plan
+from mutator.campaigns.plan import Plan, make_plan
 from mutator.model import Activation, Experiment, Outcome, Record, Status
 from mutator.mutants.building import build
 from mutator.results import table_building
-from mutator.statistics.frame import load
+from mutator.statistics.results_frame import load
 from mutator.store import digests, plan_file
 from mutator.store.check_results import FILE as CHECKS
 from mutator.store.digests import Digest

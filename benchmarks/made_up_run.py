@@ -23,10 +23,10 @@ from growth import record
 
 from mutator._common.hashing import canonical, digest
 from mutator.audit.seal import seals_of
-from mutator.campaigns import machine
+from mutator.campaigns import run_environment
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import Planning
-from mutator.campaigns.provenance import add_stretch
+from mutator.campaigns.plan import Planning
+from mutator.campaigns.run_provenance import add_stretch
 from mutator.execution.single_run import run_golden
 from mutator.model import Experiment, Record
 from mutator.mutants.building import build
@@ -75,9 +75,11 @@ def make(size: int, out: Path) -> str:
     add_stretch(
         folder,
         Stretch(
-            python=machine.python(),
+            python=run_environment.python(),
             packages={
-                name: version for name, version in machine.versions(machine.required()).items() if version
+                name: version
+                for name, version in run_environment.versions(run_environment.required()).items()
+                if version
             },
             platform="made up",
             records="0001-*",

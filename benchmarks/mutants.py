@@ -18,7 +18,7 @@ from statistics import median
 from time import process_time
 
 from mutator._common.doors import OPERATORS
-from mutator.campaigns.plans import make_plan
+from mutator.campaigns.plan import make_plan
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Experiment
 from mutator.mutants.anchors import parse_file

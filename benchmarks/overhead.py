@@ -25,7 +25,7 @@ from time import process_time
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from mutator.campaigns.plans import make_plan  # noqa: E402
+from mutator.campaigns.plan import make_plan  # noqa: E402
 from mutator.engines.fork import ForkEngine  # noqa: E402
 from mutator.engines.jobs import Job  # noqa: E402
 from mutator.engines.reference import ReferenceEngine  # noqa: E402

@@ -16,7 +16,7 @@ from typing import Any
 
 from mutator._common.files import json_bytes
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import make_plan
+from mutator.campaigns.plan import make_plan
 from mutator.engines.jobs import Execution, Job
 from mutator.engines.reference import ReferenceEngine
 from mutator.execution.running import run_campaign

@@ -22,7 +22,7 @@ from growth import record
 from markupsafe import Markup
 
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import make_plan
+from mutator.campaigns.plan import make_plan
 from mutator.model import Experiment, Record, Trigger
 from mutator.mutants.building import build
 from mutator.mutants.readable_diffs import readable
@@ -38,7 +38,7 @@ from mutator.report.studies import ReportedRun
 from mutator.report.words import words_of
 from mutator.results import table_building
 from mutator.results.counting import outcome_counts
-from mutator.review.groups import shapes
+from mutator.review.patch_shapes import shapes
 from mutator.store.lines import LineWriter
 from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder

@@ -32,8 +32,8 @@ from mutator.api.runs import merge_runs as merge_runs
 from mutator.api.trials import Trial as Trial
 from mutator.api.trials import try_fault as try_fault
 from mutator.audit.seal import Seals as Seals
-from mutator.campaigns.plans import Plan as Plan
-from mutator.comparison.comparison import Gate as Gate
+from mutator.campaigns.plan import Plan as Plan
+from mutator.comparison.run_comparison import Gate as Gate
 from mutator.errors import CheckFailed as CheckFailed
 from mutator.errors import IncompleteRun as IncompleteRun
 from mutator.errors import MutatorError as MutatorError

@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import Plan, make_plan
-from mutator.campaigns.provenance import add_stretch
+from mutator.campaigns.plan import Plan, make_plan
+from mutator.campaigns.run_provenance import add_stretch
 from mutator.model import (
     Activation,
     Anchor,

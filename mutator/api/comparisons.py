@@ -10,10 +10,10 @@ from mutator._common.below import inside
 from mutator._common.tables import Table
 from mutator.api.html import text_html
 from mutator.api.runs import Run, known_alerts_note, load_run
-from mutator.comparison import comparison as comparing
-from mutator.comparison import pages
-from mutator.comparison.comparison import Comparison, Finding, Gate
+from mutator.comparison import comparison_files
+from mutator.comparison import run_comparison as comparing
 from mutator.comparison.pairs import Change, Pair
+from mutator.comparison.run_comparison import Comparison, Finding, Gate
 from mutator.errors import MutatorError
 from mutator.report import history
 from mutator.report.history import History
@@ -45,17 +45,17 @@ class RunComparison:
     @property
     def summary(self) -> str:
         """The comparison in a few sentences."""
-        return pages.summary(self.comparison)
+        return comparison_files.summary(self.comparison)
 
     @property
     def files_text(self) -> str:
         """A text that says which of the target's files differ."""
-        return pages.files_text(self.comparison)
+        return comparison_files.files_text(self.comparison)
 
     @property
     def not_compared(self) -> dict[str, int]:
         """Reasons why experiments could not be compared, with counts."""
-        return dict(pages.reasons(self.comparison))
+        return dict(comparison_files.reasons(self.comparison))
 
     @property
     def changes(self) -> dict[str, int]:
@@ -95,11 +95,11 @@ class RunComparison:
             )
         return comparing.findings(self.comparison, [Gate(gate) for gate in gates])
 
-    def write(self, out: str | Path | None = None) -> pages.Written:
+    def write(self, out: str | Path | None = None) -> comparison_files.Written:
         """Write HTML, Markdown and CSV to `out`; default: report/compare-<first run> in the second run."""
         a, b = self.comparison.a, self.comparison.b
         default = inside(b.folder.path / "report", f"compare-{a.name}")
-        return pages.write(self.comparison, default if out is None else Path(out))
+        return comparison_files.write(self.comparison, default if out is None else Path(out))
 
 
 def compare(a: Run | str | Path, b: Run | str | Path, *, only: str | None = None) -> RunComparison:
@@ -117,7 +117,7 @@ def compare(a: Run | str | Path, b: Run | str | Path, *, only: str | None = None
 def _frame(pairs: Sequence[Pair]) -> "pd.DataFrame":
     import pandas as pd
 
-    frame = pd.DataFrame([pages.pair_line(pair) for pair in pairs])
+    frame = pd.DataFrame([comparison_files.pair_line(pair) for pair in pairs])
     times = [name for name in frame.columns if name.startswith("t_")]
     return frame.astype(dict.fromkeys(times, float))
 

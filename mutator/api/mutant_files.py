@@ -12,7 +12,7 @@ from mutator._common.text import counted
 from mutator.api.mutants import BuiltMutant, built
 from mutator.api.operator_mutants import OperatorChoice, operator_faults
 from mutator.api.selection import Bench, FaultChoice, WorkspaceLike, context_tables, open_workspace
-from mutator.campaigns.plans import make_plan
+from mutator.campaigns.plan import make_plan
 from mutator.errors import MutatorError
 from mutator.model import Fault, Trigger
 from mutator.mutants.building import write_tree

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from mutator.api.selection import WorkspaceLike, open_workspace
 from mutator.campaigns.freezing import freeze_and_tell
-from mutator.campaigns.plans import Plan, Planning, load_plan, make_plan
+from mutator.campaigns.plan import Plan, Planning, load_plan, make_plan
 from mutator.engines.forkable import not_forked
 from mutator.store.choices import Choices
 from mutator.workspace import Workspace

@@ -7,17 +7,17 @@ from pathlib import Path
 from mutator._common.below import inside
 from mutator._common.files import make_folder, write_atomic
 from mutator.api.selection import WorkspaceLike, open_workspace
-from mutator.campaigns.clones import user_name
 from mutator.campaigns.filters import compile_filter
-from mutator.campaigns.plans import make_plan
+from mutator.campaigns.git_clone import user_name
+from mutator.campaigns.plan import make_plan
 from mutator.errors import MutatorError
-from mutator.review import catalogue, gate
-from mutator.review.catalogue import Group
-from mutator.review.columns import COLUMNS
+from mutator.review import approval_gate, mutant_groups
 from mutator.review.decisions import Change, Kind, Review, State, record
 from mutator.review.decisions import load_review as load_decisions
-from mutator.review.page import write_page
-from mutator.review.pictures import of_groups
+from mutator.review.effect_pictures import of_groups
+from mutator.review.group_columns import COLUMNS
+from mutator.review.mutant_groups import Group
+from mutator.review.review_page import write_page
 from mutator.store.choices import Choices
 from mutator.workspace import Workspace
 
@@ -42,7 +42,7 @@ class ReviewedGroups:
     def lacking(self) -> tuple[tuple[Group, str], ...]:
         """The groups that `run --require-reviewed` refuses, and why, e.g. `missing, 12 experiments`."""
         return tuple(
-            (group, f"{gate.reason(self.review, group)}, {gate.share(group)}")
+            (group, f"{approval_gate.reason(self.review, group)}, {approval_gate.share(group)}")
             for group in self.review.in_turn(self.groups)
             if self.review.state(group) is not State.APPROVED
         )
@@ -131,10 +131,10 @@ def load_review(
     if campaign:
         plan = make_plan(found, campaign, Choices(seed=seed, reading=reading))
         manifest = found.manifest(plan.campaign.target)
-        groups = catalogue.of_plan(found, plan)
+        groups = mutant_groups.of_plan(found, plan)
     else:
         manifest = found.manifest(found.target_name(target))
-        groups = catalogue.of_library(found, manifest, specs=specs, reading=reading, seed=seed or 0)
+        groups = mutant_groups.of_library(found, manifest, specs=specs, reading=reading, seed=seed or 0)
     review = load_decisions(found, manifest.name)
     given = {"--campaign": campaign, "--reading": reading, "--manifest": target}
     words = [word for name, value in given.items() if value for word in (name, value)]

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from mutator._common.hashing import plain
 from mutator.api.stored_experiments import StoredRun
-from mutator.campaigns.plans import Plan, load_plan
+from mutator.campaigns.plan import Plan, load_plan
 from mutator.errors import MutatorError
 from mutator.execution.traces import Traces
 from mutator.model import Status

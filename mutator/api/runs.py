@@ -29,9 +29,9 @@ from mutator.report import building
 from mutator.report.stills import take_stills
 from mutator.results import counting
 from mutator.results import table_building as results_table
-from mutator.statistics.frame import prepare
 from mutator.statistics.mutation_score import score_sheet, totals
-from mutator.statistics.sheet import Sheet
+from mutator.statistics.results_frame import prepare
+from mutator.statistics.statistics_sheet import Sheet
 from mutator.store import cleaning
 from mutator.store.run_folder import GoldenRun, RunFolder
 

@@ -22,8 +22,8 @@ from mutator.audit.seal import golden_digests
 from mutator.audit.series_audit import series
 from mutator.audit.table_audit import tables
 from mutator.campaigns.freezing import CSV, plan_csv
+from mutator.campaigns.plan import load_plan
 from mutator.campaigns.plan_parts import plan_digest
-from mutator.campaigns.plans import load_plan
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.errors import MutatorError
 from mutator.store import digests, plan_file

@@ -19,7 +19,7 @@ from mutator._common.text import counted
 from mutator.audit.record_audit import recorded
 from mutator.audit.series_repair import repair_series
 from mutator.campaigns.freezing import CSV, plan_csv
-from mutator.campaigns.plans import load_plan
+from mutator.campaigns.plan import load_plan
 from mutator.errors import MutatorError, Outside, TooLarge
 from mutator.model import Status
 from mutator.store import digests, integrity

@@ -8,13 +8,13 @@ from typing import TypeVar
 from mutator._common.below import check_library_name
 from mutator._common.bounded import read_bounded
 from mutator.campaigns.campaign_model import CampaignModel, Canary, SelectionModel
-from mutator.campaigns.operator_selection import OperatorSelection, When
-from mutator.campaigns.studies import Study, find_study
-from mutator.campaigns.trigger_choice import (
+from mutator.campaigns.campaign_triggers import (
     EVERY_READING,
     ListedTrigger,
     with_list,
 )
+from mutator.campaigns.installed_studies import Study, find_study
+from mutator.campaigns.operator_selection import OperatorSelection, When
 from mutator.config.sources import Keys, Source
 from mutator.config.yaml_files import read
 from mutator.errors import MutatorError

@@ -8,13 +8,13 @@ from pydantic_core import PydanticKnownError
 
 from mutator._common.doors import OPERATORS
 from mutator._common.yaml_records import mapping, written
-from mutator.campaigns.operator_selection import When
-from mutator.campaigns.trigger_choice import (
+from mutator.campaigns.campaign_triggers import (
     EVERY_READING,
     Triggers,
     by_reading,
     or_by_reading,
 )
+from mutator.campaigns.operator_selection import When
 from mutator.config.yaml_files import StrictModel, Written
 from mutator.model import AfterHazard, Limits, Method
 

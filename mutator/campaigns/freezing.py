@@ -17,10 +17,10 @@ from mutator._common.files import (
 from mutator._common.hashing import digest, plain
 from mutator._common.locks import owned
 from mutator._common.version import VERSION
+from mutator.campaigns.plan import Plan, Planning
 from mutator.campaigns.plan_parts import Part, PlanDigest, Tally
-from mutator.campaigns.plans import Plan, Planning
-from mutator.campaigns.provenance import check_sources, check_version
 from mutator.campaigns.run_inputs import RunInputs
+from mutator.campaigns.run_provenance import check_sources, check_version
 from mutator.errors import MutatorError
 from mutator.model import Experiment
 from mutator.results.plan_columns import PLAN_COLUMNS, plan_row

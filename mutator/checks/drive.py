@@ -14,8 +14,8 @@ from typing import Any
 from mutator._common.below import inside
 from mutator._common.cores import usable_cores
 from mutator._common.files import ScratchFolder
+from mutator.campaigns.campaign_expansion import Expansion
 from mutator.campaigns.campaign_files import Campaign, load_campaign
-from mutator.campaigns.experiments import Expansion
 from mutator.checks import causes, fast_engines
 from mutator.checks.difference import first_difference
 from mutator.checks.findings import Finding, Level

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import TypeVar
 
 from mutator.campaigns.campaign_files import Campaign, check_readings, load_campaign, load_study
-from mutator.campaigns.studies import study_problems
-from mutator.campaigns.trigger_choice import listed_triggers
+from mutator.campaigns.campaign_triggers import listed_triggers
+from mutator.campaigns.installed_studies import study_problems
 from mutator.config.sources import Keys
 from mutator.errors import MutatorError
 from mutator.faults.expansion import expand

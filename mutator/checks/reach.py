@@ -13,7 +13,7 @@ import numpy as np
 
 from mutator._common.text import counted
 from mutator.campaigns.campaign_files import Campaign
-from mutator.campaigns.trigger_choice import listed_triggers
+from mutator.campaigns.campaign_triggers import listed_triggers
 from mutator.checks.findings import Finding, Level, Place
 from mutator.faults.fault_models import FaultModel, FaultModels, SnippetKind
 from mutator.model import Fault, FaultLocation, Injection, Method, Trigger

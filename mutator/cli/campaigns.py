@@ -37,7 +37,7 @@ from mutator.execution.phases import duration
 
 if TYPE_CHECKING:
     from mutator.api.runs import Run
-    from mutator.campaigns.plans import Cost
+    from mutator.campaigns.plan import Cost
     from mutator.execution.session import Notify, Summary
     from mutator.report.building import Report
 

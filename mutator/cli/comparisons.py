@@ -13,7 +13,7 @@ from mutator.cli.options import Json, Only
 from mutator.errors import EXIT_CHECK_FAILED, EXIT_HARNESS_ERRORS, MutatorError
 
 if TYPE_CHECKING:
-    from mutator.comparison.comparison import Comparison, Finding
+    from mutator.comparison.run_comparison import Comparison, Finding
 
 NAMED = 20  # experiments listed in the terminal; the written comparison lists all of them
 GATES = (

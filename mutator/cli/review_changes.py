@@ -15,7 +15,7 @@ from mutator.cli.review_options import By, Groups, MutantOptions, OnlyGroups, re
 from mutator.errors import MutatorError
 
 if TYPE_CHECKING:
-    from mutator.review.catalogue import Group
+    from mutator.review.mutant_groups import Group
 
 SomeGroups = Annotated[
     list[str] | None,

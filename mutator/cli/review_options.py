@@ -9,7 +9,7 @@ import mutator
 from mutator.cli.console import Terminal
 from mutator.cli.options import Manifest, Place, Reading, Seed
 from mutator.errors import MutatorError
-from mutator.review.columns import COLUMNS
+from mutator.review.group_columns import COLUMNS
 
 Campaign = Annotated[
     str | None,

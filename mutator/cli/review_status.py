@@ -10,7 +10,7 @@ from mutator.cli.console import Terminal, short_path
 
 if TYPE_CHECKING:
     import mutator
-    from mutator.review.catalogue import Group
+    from mutator.review.mutant_groups import Group
 
 
 def print_status(terminal: Terminal, found: "mutator.ReviewedGroups", campaign: str | None) -> None:

@@ -9,8 +9,8 @@ from mutator._common.text import counted
 from mutator.cli.console import Terminal
 
 if TYPE_CHECKING:
-    from mutator.review.catalogue import Group
     from mutator.review.decisions import Review
+    from mutator.review.mutant_groups import Group
 
 STYLES = {"new": "yellow", "changed": "bold yellow", "rejected": "bold red", "approved": "green"}
 ROWS = 24  # rows of values shown in a terminal

@@ -22,7 +22,7 @@ from mutator.cli.review_options import (
 )
 
 if TYPE_CHECKING:
-    from mutator.review.catalogue import Group
+    from mutator.review.mutant_groups import Group
 
 EXAMPLES = """\b
 Examples:

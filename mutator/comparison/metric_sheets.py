@@ -5,12 +5,12 @@ from collections.abc import Sequence
 
 import pandas as pd
 
+from mutator.comparison.compared_runs import Side
+from mutator.comparison.pair_sheets import Names, adjusted, whole_and_parts
 from mutator.comparison.pairs import Pair
-from mutator.comparison.sheets import Names, adjusted, whole_and_parts
-from mutator.comparison.sides import Side
-from mutator.statistics.medians import median_difference
-from mutator.statistics.paired import wilcoxon
-from mutator.statistics.sheet import Cell, P, Sheet
+from mutator.statistics.median_intervals import median_difference
+from mutator.statistics.paired_statistics import wilcoxon
+from mutator.statistics.statistics_sheet import Cell, P, Sheet
 from mutator.targets.severity import CLASSES
 
 NO_CONTACT = "no contact"

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
 
-from mutator.comparison.sides import Side, key_of
+from mutator.comparison.compared_runs import Side, key_of
 from mutator.model import Experiment, Outcome, Status
 from mutator.results.rows import Row
 

@@ -13,7 +13,7 @@ from mutator._common.locks import owned
 from mutator._common.text import counted
 from mutator.audit.seal import OUTSIDE, without
 from mutator.campaigns.freezing import make_run_folder
-from mutator.campaigns.provenance import other_versions
+from mutator.campaigns.run_provenance import other_versions
 from mutator.errors import CheckFailed, MutatorError
 from mutator.preflight import equivalence
 from mutator.results import table_building

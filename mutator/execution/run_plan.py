@@ -6,11 +6,11 @@ from pathlib import Path
 from mutator._common.hashing import digest
 from mutator.campaigns.campaign_files import load_campaign
 from mutator.campaigns.freezing import freeze_owned
-from mutator.campaigns.plans import Planning, load_plan, make_plan
-from mutator.campaigns.provenance import check_sources, check_version
+from mutator.campaigns.plan import Planning, load_plan, make_plan
 from mutator.campaigns.run_inputs import RunInputs
+from mutator.campaigns.run_provenance import check_sources, check_version
 from mutator.errors import MutatorError
-from mutator.review import gate
+from mutator.review import approval_gate
 from mutator.store.approvals import write_approvals
 from mutator.store.choices import Choices
 from mutator.store.run_folder import RunFolder
@@ -27,10 +27,12 @@ def open_frozen(
     """
     if RunFolder.exists(out):
         folder = _found(workspace, campaign, out, choices)
-        approvals = gate.approvals(workspace, load_plan(folder)) if reviewed else None
+        approvals = approval_gate.approvals(workspace, load_plan(folder)) if reviewed else None
     else:
         planning = Planning(workspace, campaign, choices)
-        approvals = gate.approvals(workspace, make_plan(workspace, campaign, choices)) if reviewed else None
+        approvals = (
+            approval_gate.approvals(workspace, make_plan(workspace, campaign, choices)) if reviewed else None
+        )
         folder, _ = freeze_owned(planning, out, workspace)
     if approvals is not None:
         write_approvals(folder.path, approvals)

@@ -35,8 +35,8 @@ def run_campaign(
 
     A frozen plan in `out` is used unchanged. Omitted `choices` keep their frozen values. `engine` is a name
     in `engines.kinds` (None: the fastest that pays off). With `reviewed`, only approved mutants run
-    (`mutator.review.gate`). Without `accept_versions`, Python and packages must not change during a run.
-    Another thread calls `notify` about twice a second.
+    (`mutator.review.approval_gate`). Without `accept_versions`, Python and packages must not change during a
+    run. Another thread calls `notify` about twice a second.
 
     Raises MutatorError for wrong input, choices that differ from the frozen ones, or a changed campaign file
     or target. Raises CheckFailed if an unapproved mutant would run with `reviewed`, or if a

@@ -24,8 +24,8 @@ from mutator._common.locks import owned, wait_for_workers
 from mutator.audit.seal import Seals, seals_of
 from mutator.campaigns.chunks import Pending, pending
 from mutator.campaigns.freezing import make_run_folder
-from mutator.campaigns.provenance import add_machine, begin_stretch, check_versions
 from mutator.campaigns.run_inputs import RunInputs
+from mutator.campaigns.run_provenance import add_machine, begin_stretch, check_versions
 from mutator.engines.kinds import REFERENCE
 from mutator.engines.registry import choose_engine, not_worth_forking
 from mutator.engines.run_home import make_work

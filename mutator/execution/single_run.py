@@ -10,8 +10,8 @@ from tempfile import mkdtemp
 from mutator._common.below import inside
 from mutator._common.files import make_folder, raising_disk_full, remove_folder, write_atomic
 from mutator._common.locks import alone_in
-from mutator.campaigns.provenance import check_sources
 from mutator.campaigns.run_inputs import RunInputs
+from mutator.campaigns.run_provenance import check_sources
 from mutator.engines.jobs import Job
 from mutator.engines.reference import ReferenceEngine
 from mutator.errors import CheckFailed

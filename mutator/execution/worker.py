@@ -12,8 +12,8 @@ from mutator._common import caches
 from mutator._common.below import inside
 from mutator._common.files import raising_disk_full
 from mutator.campaigns.chunks import Pending
-from mutator.campaigns.provenance import check_sources
 from mutator.campaigns.run_inputs import RunInputs
+from mutator.campaigns.run_provenance import check_sources
 from mutator.engines.in_target import guard
 from mutator.engines.jobs import FAST, Engine, Setting
 from mutator.engines.reference import ReferenceEngine

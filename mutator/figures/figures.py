@@ -8,7 +8,7 @@ import pandas as pd
 
 from mutator.figures import hazards, heat_map, propagation_times
 from mutator.figures.run_plot import images
-from mutator.statistics.frame import slim
+from mutator.statistics.results_frame import slim
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

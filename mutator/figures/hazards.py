@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from mutator.figures import style
-from mutator.statistics.frame import hazard_names
+from mutator.statistics.results_frame import hazard_names
 from mutator.statistics.shares import share
 from mutator.statistics.tallies import Tally, by_kind
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import pandas as pd
 
 from mutator.figures import style
-from mutator.statistics.times import Spread, propagation
+from mutator.statistics.event_times import Spread, propagation
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -1,10 +1,10 @@
 """Measures for published observations: numbers computed from a frame of results, each with an interval.
 
-`runs` comes from `mutator.statistics.frame.load`. `of`, `part` and `against` are pandas queries on it; an
-empty query selects all runs. Reports show the call for each claim, which you can repeat in Python:
+`runs` comes from `mutator.statistics.results_frame.load`. `of`, `part` and `against` are pandas queries on
+it; an empty query selects all runs. Reports show the call for each claim, which you can repeat in Python:
 
     from mutator.paper.measures import *
-    from mutator.statistics.frame import load
+    from mutator.statistics.results_frame import load
     runs = load(Path("results.csv"))
 """
 
@@ -16,7 +16,7 @@ from pathlib import Path
 import pandas as pd
 
 from mutator._common.text import counted
-from mutator.statistics import contrasts, times
+from mutator.statistics import event_times, guided_against_random
 from mutator.statistics.shares import CONFIDENCE, Share
 from mutator.statistics.shares import share as wilson
 from mutator.statistics.tallies import by_kind
@@ -68,9 +68,10 @@ def clustered_difference(runs: pd.DataFrame, *, of: str) -> Estimate:
     """
     chosen = _query(runs, of)
     one, other = (
-        _share(chosen, f'method == "{how}"', "is_hazard") for how in (contrasts.GUIDED, contrasts.RANDOM)
+        _share(chosen, f'method == "{how}"', "is_hazard")
+        for how in (guided_against_random.GUIDED, guided_against_random.RANDOM)
     )
-    found = contrasts.resampled(chosen, "injected")  # `chosen` has only the runs to count
+    found = guided_against_random.resampled(chosen, "injected")  # `chosen` has only the runs to count
     faults = counted(found.clusters, "fault")
     return Estimate(
         estimate=found.difference,
@@ -83,8 +84,8 @@ def clustered_difference(runs: pd.DataFrame, *, of: str) -> Estimate:
 
 def stratified(runs: pd.DataFrame, *, of: str) -> Estimate:
     """Return the odds ratio of a hazard, guided against random, over all fault types (Mantel-Haenszel)."""
-    parts = contrasts.strata(by_kind(_query(runs, of)), "injected")
-    found = contrasts.mantel_haenszel(parts)
+    parts = guided_against_random.strata(by_kind(_query(runs, of)), "injected")
+    found = guided_against_random.mantel_haenszel(parts)
     types = counted(found.strata, "fault type")
     said = f"- ({types})"
     if not math.isnan(found.odds_ratio):
@@ -109,7 +110,7 @@ def paired(runs: pd.DataFrame, *, of: str) -> Estimate:
     """
     from statsmodels.stats.proportion import proportion_confint  # type: ignore[import-untyped]
 
-    matched = contrasts.mcnemar(_query(contrasts.pairs(runs), of))
+    matched = guided_against_random.mcnemar(_query(guided_against_random.pairs(runs), of))
     unlike = matched.first_only + matched.second_only
     low = high = estimate = math.nan
     if unlike:
@@ -151,7 +152,7 @@ def median_time(runs: pd.DataFrame, *, of: str) -> Estimate:
         nan = math.nan
         return Estimate(estimate=nan, low=nan, high=nan, n=0, text="- (the ends of the runs are not known)")
     ends = {str(scenario): float(group["t_end"].iloc[0]) for scenario, group in chosen.groupby("scenario")}
-    found = times.reaction(chosen, ends, 0.0)
+    found = event_times.reaction(chosen, ends, 0.0)
     median, low, high = found.median, found.median_low, found.median_high
     if found.at_risk and math.isnan(low):  # the curve stays above one half or jumps past it
         median = math.inf if math.isnan(median) else median

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from mutator._common.tables import Table
 from mutator.paper.observations import FEWEST, JudgedClaim, JudgedObservation
-from mutator.statistics.sheet import Cell, Sheet
+from mutator.statistics.statistics_sheet import Cell, Sheet
 
 RULES = f"""\
 A claim is decided by the 95 % interval of its number, not by the number itself. *above x*: the claim holds if
@@ -19,7 +19,7 @@ uncertainty is at least as large."""
 
 SESSION = """\
 from mutator.paper.measures import *
-from mutator.statistics.frame import load
+from mutator.statistics.results_frame import load
 
 runs = load(Path("results.csv"))"""
 

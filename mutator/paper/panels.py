@@ -14,7 +14,7 @@ from mutator.paper.published import has_paper, load_paper
 from mutator.report.panel import Panel, rendered
 from mutator.report.panels.tables import csv_files
 from mutator.report.studies import ReportedRun
-from mutator.statistics.frame import slim
+from mutator.statistics.results_frame import slim
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -7,7 +7,7 @@ from pydantic import Field
 
 from mutator.config.sources import Source
 from mutator.config.yaml_files import StrictModel, read
-from mutator.statistics.published import Published
+from mutator.statistics.published_counts import Published
 from mutator.statistics.tallies import Tally
 
 FILES = ("paper_summary.yaml", "paper_coverage.yaml", "paper_times.yaml")

@@ -7,8 +7,8 @@ import pandas as pd
 
 from mutator._common.tables import Table
 from mutator.paper.observations import JudgedObservation, Verdict, judge
-from mutator.statistics.seeds import seeds_of
-from mutator.statistics.sheet import Cell, Sheet
+from mutator.statistics.seed_spread import seeds_of
+from mutator.statistics.statistics_sheet import Cell, Sheet
 
 BySeed = Mapping[str, Sequence[JudgedObservation]]
 

@@ -6,7 +6,7 @@ from mutator.paper.panels import observations_panel
 from mutator.paper.published import has_paper, load_paper
 from mutator.paper.published_checks import check_paper
 from mutator.report.studies import ReportedRun, Study
-from mutator.statistics.published import Published
+from mutator.statistics.published_counts import Published
 
 
 def published(run: ReportedRun) -> Published | None:

@@ -11,7 +11,7 @@ from mutator._common.below import inside
 from mutator._common.bounded import read_bounded
 from mutator._common.files import json_bytes, raising_disk_full, read_json, write_atomic
 from mutator._common.hashing import digest
-from mutator.campaigns import machine
+from mutator.campaigns import run_environment
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.shared_runs import same_in
 from mutator.errors import CheckFailed, DiskFull, InvalidMutant, MutatorError
@@ -98,7 +98,7 @@ class _Checks:
         places = sorted((name, [i.location for i in f.injections]) for name, f in self.variants.items())
         content = [
             now,
-            machine.surroundings(),
+            run_environment.surroundings(),
             head.goldens,
             head.seed,
             folder.canary.id,
@@ -201,7 +201,7 @@ class _Checks:
         """Return the packages that the golden runs loaded, without the target and the standard library."""
         loaded = {module for key in self.keys for module in runs[GOLDEN, key].modules}
         own = {path.split("/")[0].removesuffix(".py") for path in self.manifest.tree.files}
-        return list(machine.packages_of(loaded - own))
+        return list(run_environment.packages_of(loaded - own))
 
     def _judge(self, runs: Runs) -> Iterator[CheckResult]:
         for key in self.keys:

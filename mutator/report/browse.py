@@ -29,7 +29,7 @@ from mutator.report.whole_map import map_of
 from mutator.report.words import meanings_of
 from mutator.results.counting import endings, hazard_names, hazard_times, hazards_joined, kinds
 from mutator.results.rows import Row, rows_of
-from mutator.review.groups import Shape, shapes
+from mutator.review.patch_shapes import Shape, shapes
 from mutator.statistics.mutation_score import PERMANENT, TRANSIENT
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest

@@ -10,7 +10,7 @@ from mutator._common.processes import processes_for, shared
 from mutator.model import Fault, Record
 from mutator.outcomes.fault_paths import FaultPaths, PathInputs, UntimedPath
 from mutator.results.ranking import places
-from mutator.statistics.times import Alerts
+from mutator.statistics.event_times import Alerts
 from mutator.store.run_folder import RunFolder
 
 if TYPE_CHECKING:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, cast
 
-from mutator.campaigns.studies import find_study
+from mutator.campaigns.installed_studies import find_study
 from mutator.errors import MutatorError
 from mutator.figures.figures import Drawing
 from mutator.model import Experiment, Fault, Record, Status
@@ -18,8 +18,8 @@ from mutator.report.seen import PLACE, UNTIMED_PATH, Seen
 from mutator.report.source_lines import SourceLines
 from mutator.results.rows import Row, rows_of
 from mutator.results.table_reader import Results
-from mutator.statistics.frame import prepare
-from mutator.statistics.published import Published
+from mutator.statistics.published_counts import Published
+from mutator.statistics.results_frame import prepare
 from mutator.store import plan_file
 from mutator.store.planned import Planned
 from mutator.store.run_folder import RunFolder

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from mutator.report.studies import ReportedRun
-from mutator.statistics.frame import hazard_names
+from mutator.statistics.results_frame import hazard_names
 from mutator.targets.severity import CLASSES
 
 Cells = list[list[Any]]  # by row; each cell has a count or value, and its base (the number of runs)

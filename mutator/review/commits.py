@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from mutator.campaigns.clones import Clone
+from mutator.campaigns.git_clone import Clone
 from mutator.errors import MutatorError
-from mutator.review.catalogue import Group
+from mutator.review.mutant_groups import Group
 from mutator.workspace import Workspace
 
 _FORMAT = "--format=%H%x00%an <%ae>%x00%(trailers:key=Co-authored-by,valueonly,separator=%x00)"

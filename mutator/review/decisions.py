@@ -18,9 +18,9 @@ from mutator._common.shipped import refuse_shipped
 from mutator._common.version import VERSION
 from mutator.errors import MutatorError, ReviewConflict
 from mutator.review import review_file, seen_texts
-from mutator.review.catalogue import Group
 from mutator.review.commits import check_four_eyes, library_commit
 from mutator.review.entries import Decision, Entry, Flag, Remark, Verdict
+from mutator.review.mutant_groups import Group
 from mutator.workspace import Workspace
 
 _FOLDER = "reviews"  # in the library

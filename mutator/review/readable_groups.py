@@ -4,9 +4,9 @@ import re
 from collections.abc import Sequence
 
 from mutator.model import Trigger
-from mutator.review.catalogue import Group
 from mutator.review.entries import values_in_words
-from mutator.review.groups import Shape
+from mutator.review.mutant_groups import Group
+from mutator.review.patch_shapes import Shape
 
 _TIME = re.compile(r"t >= ([0-9.e+-]+)\Z")
 _ID_HOLE = re.compile(r"id(_\d+)?\Z")  # readers do not need ids

@@ -10,8 +10,8 @@ from mutator._common.below import check_plain
 from mutator._common.bounded import read_open
 from mutator._common.hashing import digest
 from mutator.audit.table_audit import tables
-from mutator.comparison import comparison as comparing
-from mutator.comparison import pages
+from mutator.comparison import comparison_files
+from mutator.comparison import run_comparison as comparing
 from mutator.errors import Absent, MutatorError
 from mutator.outcomes.fault_free import fault_free_runs, own_alerts
 from mutator.report import building
@@ -96,9 +96,9 @@ class Shown:
     def _comparison(self, a: Path, b: Path) -> dict[str, bytes]:
         made = comparing.compare(a, b, None, (self._alerts(a), self._alerts(b)))
         return {
-            "index.html": pages.page(made).encode(),
-            "pairs.csv": pages.pairs_csv(made),
-            "unmatched.csv": pages.unmatched_csv(made),
+            "index.html": comparison_files.page(made).encode(),
+            "pairs.csv": comparison_files.pairs_csv(made),
+            "unmatched.csv": comparison_files.unmatched_csv(made),
         }
 
     def _alerts(self, run: Path) -> str:

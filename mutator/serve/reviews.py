@@ -10,14 +10,14 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from mutator.campaigns.clones import user_name
-from mutator.campaigns.plans import make_plan
+from mutator.campaigns.git_clone import user_name
+from mutator.campaigns.plan import make_plan
 from mutator.config.yaml_files import StrictModel
 from mutator.errors import Absent, GroupsChanged, MutatorError, ReviewConflict
-from mutator.review import catalogue, pictures, typical
-from mutator.review.catalogue import Group
+from mutator.review import effect_pictures, group_results, mutant_groups
 from mutator.review.decisions import Change, Kind, Review, load_review, record
-from mutator.review.page import page_html, state_of
+from mutator.review.mutant_groups import Group
+from mutator.review.review_page import page_html, state_of
 from mutator.store.choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -147,23 +147,23 @@ class Reviews:
     def picture(self, chosen: Selection, name: str, level: str, *, after: bool) -> bytes:
         """Return a frame before or after the group's effect, as a JPEG file; Absent if there is none."""
         manifest = self.workspace.manifest(chosen.target)
-        found = pictures.of_group(self.workspace, manifest, self.group(chosen, name), level)
+        found = effect_pictures.of_group(self.workspace, manifest, self.group(chosen, name), level)
         if found is None:
             raise Absent(
-                "no such picture", expected=f"one of the group's levels ({', '.join(pictures.LEVELS)})"
+                "no such picture", expected=f"one of the group's levels ({', '.join(effect_pictures.LEVELS)})"
             )
         return found[after]
 
     def levels(self, chosen: Selection, name: str) -> list[dict[str, str]]:
         """Return the levels that have frames, with their values as text."""
         manifest, group = self.workspace.manifest(chosen.target), self.group(chosen, name)
-        found = pictures.of_groups(self.workspace, manifest, [group]).get(name)
+        found = effect_pictures.of_groups(self.workspace, manifest, [group]).get(name)
         return [{"name": level.name, "label": level.label} for level in found.levels] if found else []
 
     def typical(self, chosen: Selection, name: str, run: Path) -> dict[str, Any] | None:
         """Return the group's results in a run; None if the run does not have the group."""
         folder, group = RunFolder.open(run), self.group(chosen, name)
-        found = typical.of_group(folder, group) if folder.head.target == chosen.target else None
+        found = group_results.of_group(folder, group) if folder.head.target == chosen.target else None
         return asdict(found) if found else None
 
     def _refuse_others(self, chosen: Selection, groups: Sequence[Group], digests: Mapping[str, str]) -> None:
@@ -180,11 +180,11 @@ class Reviews:
     def _found(self, chosen: Selection) -> tuple[Group, ...]:
         workspace = self.workspace
         if chosen.campaign is None:
-            return catalogue.of_library(workspace, workspace.manifest(chosen.target), specs=chosen.specs)
+            return mutant_groups.of_library(workspace, workspace.manifest(chosen.target), specs=chosen.specs)
         plan = make_plan(workspace, chosen.campaign, Choices())
         if plan.campaign.target != chosen.target:
             raise Absent(f"campaign '{chosen.campaign}' belongs to target '{plan.campaign.target}'")
-        return catalogue.of_plan(workspace, plan)
+        return mutant_groups.of_plan(workspace, plan)
 
     def _stamp(self, target: str) -> object:
         manifest = self.workspace.manifest(target)

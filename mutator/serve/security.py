@@ -16,7 +16,7 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import PlainTextResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from mutator.comparison import pages
+from mutator.comparison import comparison_files
 from mutator.web import asset, assets
 
 HOST = "127.0.0.1"
@@ -154,7 +154,7 @@ def _with_policy(send: Send) -> Send:
 def policy() -> str:
     """Return the policy for pages: they can run only code from `mutator.web`, as files or inline by hash."""
     scripts = [_hash(f"\n{asset(name)}") for name in assets(".js")]
-    styles = [_hash(f"\n{asset(name)}") for name in assets(".css")] + [_hash(f"\n{pages.style()}")]
+    styles = [_hash(f"\n{asset(name)}") for name in assets(".css")] + [_hash(f"\n{comparison_files.style()}")]
     return "; ".join(
         (
             "default-src 'none'",

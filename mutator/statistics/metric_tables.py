@@ -5,10 +5,10 @@ from collections.abc import Iterator, Sequence
 
 import pandas as pd
 
-from mutator.statistics.frame import slim
-from mutator.statistics.medians import median_interval
+from mutator.statistics.median_intervals import median_interval
+from mutator.statistics.results_frame import slim
 from mutator.statistics.shares import share
-from mutator.statistics.sheet import Cell, Sheet
+from mutator.statistics.statistics_sheet import Cell, Sheet
 from mutator.targets.severity import CLASSES
 from mutator.targets.target_facts import MetricFacts
 

@@ -14,9 +14,9 @@ import pandas as pd
 from mutator._common.tables import Table
 from mutator.model import OPERATORS, Fault, Status
 from mutator.results.table_columns import alerts_of
-from mutator.statistics.paired import resampled_interval
+from mutator.statistics.paired_statistics import resampled_interval
 from mutator.statistics.shares import Share, share
-from mutator.statistics.sheet import Cell, Sheet, text_of
+from mutator.statistics.statistics_sheet import Cell, Sheet, text_of
 from mutator.triggers.kinds import ALWAYS
 
 GoldenAlerts = Mapping[tuple[str, str], frozenset[str]]  # (scenario, seed or "") -> names of alerts

@@ -2,9 +2,9 @@
 
 from collections.abc import Iterable
 
-from mutator.statistics.published import OURS, Counts, Published
+from mutator.statistics.published_counts import OURS, Counts, Published
 from mutator.statistics.shares import Share, share
-from mutator.statistics.sheet import Cell, Sheet
+from mutator.statistics.statistics_sheet import Cell, Sheet
 from mutator.statistics.tallies import Tally, total
 
 _MEASURES = (

@@ -16,7 +16,7 @@ import pytest
 
 from mutator._common.hashing import digest
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import make_plan
+from mutator.campaigns.plan import make_plan
 from mutator.model import Activation, Experiment, Outcome, Record, Status
 from mutator.mutants.building import build
 from mutator.outcomes.series_sampling import Sampler, keep_series

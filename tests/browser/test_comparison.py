@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from mutator.comparison import pages
-from mutator.comparison.comparison import Comparison, compare
+from mutator.comparison import comparison_files
+from mutator.comparison.run_comparison import Comparison, compare
 from mutator.model import Experiment, Outcome
 from mutator.workspace import Workspace
 
@@ -37,11 +37,11 @@ def test_a_long_comparison_is_cut_and_can_be_filtered(
     serious_faults: Callable[[Any], list[str]],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(pages, "SHOWN", SHOWN)
+    monkeypatch.setattr(comparison_files, "SHOWN", SHOWN)
     page = browser.new_page()
     errors: list[str] = []
     page.on("pageerror", lambda error: errors.append(str(error)))
-    page.goto(pages.write(found, tmp_path / "out").page.as_uri())
+    page.goto(comparison_files.write(found, tmp_path / "out").page.as_uri())
     total, seen = len(found.changed), page.locator("#changed tr:visible")
     assert total == 24 * COPIES
     assert seen.count() == 1 + SHOWN

@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from mutator.review.catalogue import of_library
 from mutator.review.decisions import Change, Kind, record
-from mutator.review.page import write_page
+from mutator.review.mutant_groups import of_library
+from mutator.review.review_page import write_page
 from mutator.workspace import Workspace
 
 

@@ -11,9 +11,9 @@ import pytest
 from mutator._common.hashing import digest
 from mutator.report.panels import figures
 from mutator.report.stamp import made_from
-from mutator.review.catalogue import of_library
 from mutator.review.decisions import load_review
-from mutator.review.page import page_html
+from mutator.review.mutant_groups import of_library
+from mutator.review.review_page import page_html
 from mutator.serve.jobs import Jobs
 from mutator.store import digests
 from mutator.store.run_folder import RunFolder

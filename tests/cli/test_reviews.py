@@ -14,7 +14,7 @@ import typer
 
 from mutator.cli import review_walk
 from mutator.cli.app import main
-from mutator.review.catalogue import of_library
+from mutator.review.mutant_groups import of_library
 from mutator.workspace import Workspace
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json

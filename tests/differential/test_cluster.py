@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns import machine
+from mutator.campaigns import run_environment
 from mutator.errors import MutatorWarning
 from mutator.execution.cluster import bundle
 from mutator.execution.distribution import distributor
@@ -111,8 +111,8 @@ def test_workers_that_do_not_reproduce_the_golden_run_are_refused(
 def test_a_worker_with_another_version_is_refused(
     toy: Workspace, tmp_path: Path, two: Machines, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    real = machine.versions
-    monkeypatch.setattr(machine, "versions", lambda names=None: real(names) | {"numpy": "1.0"})
+    real = run_environment.versions
+    monkeypatch.setattr(run_environment, "versions", lambda names=None: real(names) | {"numpy": "1.0"})
     with pytest.warns(MutatorWarning, match=r"worker beta.*gets no work: numpy 1\.0, there 2"):
         summary = on(two, toy, tmp_path / "run")
     assert "no worker is left" in summary.problem

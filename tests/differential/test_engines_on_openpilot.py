@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.plans import make_plan
+from mutator.campaigns.plan import make_plan
 from mutator.engines.jobs import Job, Setting
 from mutator.engines.kinds import ENGINES
 from mutator.engines.reference import ReferenceEngine

@@ -11,7 +11,7 @@ import pytest
 
 from mutator.audit.seal import seals_of
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import make_plan
+from mutator.campaigns.plan import make_plan
 from mutator.engines import registry
 from mutator.errors import CheckFailed, MutatorError
 from mutator.execution import merging

@@ -13,7 +13,7 @@ import pytest
 from mutator._common.hashing import canonical
 from mutator.campaigns.chunks import Pending, pending
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import load_plan, make_plan
+from mutator.campaigns.plan import load_plan, make_plan
 from mutator.engines.reference import ReferenceEngine
 from mutator.errors import CheckFailed
 from mutator.execution.cluster import bundle

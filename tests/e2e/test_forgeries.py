@@ -16,8 +16,8 @@ import mutator
 from mutator._common.hashing import canonical, digest
 from mutator.audit.seal import golden_digests, seals_of
 from mutator.campaigns.freezing import plan_csv
+from mutator.campaigns.plan import load_plan
 from mutator.campaigns.plan_parts import plan_digest
-from mutator.campaigns.plans import load_plan
 from mutator.cli.app import main
 from mutator.errors import MutatorError
 from mutator.execution.running import run_campaign

@@ -162,7 +162,7 @@ def test_it_is_not_resumed_by_another_version(cli: Cli, place: Path, monkeypatch
     head = RunFolder.open(copy).head
     made_by = f"was planned by mutator {head.provenance.mutator} ({head.schema})"
     with monkeypatch.context() as patch:
-        patch.setattr("mutator.campaigns.provenance.VERSION", "99.0")
+        patch.setattr("mutator.campaigns.run_provenance.VERSION", "99.0")
         for words in (("run",), ("plan",)):
             code, _, err = cli(*words, "small", "--out", copy)
             assert code == 2 and made_by in err and "can still be read" in err

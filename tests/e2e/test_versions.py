@@ -12,7 +12,7 @@ import pytest
 
 from mutator import load_run
 from mutator._common import caches
-from mutator.campaigns import machine
+from mutator.campaigns import run_environment
 from mutator.cli.app import main
 from mutator.engines.jobs import Execution, Job
 from mutator.engines.reference import ReferenceEngine
@@ -172,12 +172,12 @@ def test_another_machine_repeats_the_golden_runs(
     assert sorted(executed) == ["a-A", "a-A+alone", "b-A", "b-A+alone"]
     run_campaign(toy, "small", out, distributor=OnePiece())
     assert len(executed) == 4  # this machine is already checked
-    monkeypatch.setattr(machine, "cpu", lambda: "another")
+    monkeypatch.setattr(run_environment, "cpu", lambda: "another")
     assert run_campaign(toy, "small", out, distributor=OnePiece()).done == 6
     assert len(executed) == 8
     assert [stretch.cpu == "another" for stretch in RunFolder.open(out).stretches] == [False, False, True]
 
-    monkeypatch.setattr(machine, "cpu", lambda: "a third")
+    monkeypatch.setattr(run_environment, "cpu", lambda: "a third")
     monkeypatch.setattr(ReferenceEngine, "execute", other_digits(ReferenceEngine.execute))
     before = contents(out)
     with pytest.raises(CheckFailed, match=r"the golden run A.* differs from the one this run began with"):
@@ -194,7 +194,7 @@ def shard(
 ) -> Shard:
     def run(number: int, version: str = "3.11.7") -> Path:
         python(version)
-        monkeypatch.setattr(machine, "cpu", lambda: f"machine {number}")
+        monkeypatch.setattr(run_environment, "cpu", lambda: f"machine {number}")
         out = tmp_path / f"part{number}"
         assert run_campaign(toy, "small", out, choices=Choices(shard=f"{number}/2")).exit_code == 0
         return out
@@ -260,7 +260,7 @@ def test_another_installed_python_resumes_only_if_accepted(toy: Workspace, tmp_p
         return subprocess.run(command, env=os.environ | places, capture_output=True, text=True, check=False)
 
     refused = run()
-    assert refused.returncode == 2 and f"{machine.python()}, here CPython 3." in refused.stderr
+    assert refused.returncode == 2 and f"{run_environment.python()}, here CPython 3." in refused.stderr
     accepted = run("--accept-versions")
     assert accepted.returncode == 0, accepted.stderr
     assert "12 of 12 experiments done, 10 now" in accepted.stderr + accepted.stdout

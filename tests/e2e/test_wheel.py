@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.plans import make_plan
+from mutator.campaigns.plan import make_plan
 from mutator.workspace import Workspace
 
 pytestmark = pytest.mark.slow

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mutator.campaigns.plans import make_plan
+from mutator.campaigns.plan import make_plan
 from mutator.errors import MutatorError
 from mutator.faults.expansion import expand
 from mutator.faults.fault_models import FaultModels, ParamSchema, SnippetKind

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from mutator.faults.expansion import expand
 from mutator.model import Fault, Hold, Trigger
 from mutator.mutants.building import build
-from mutator.review.groups import group_label, parameter_values, shapes
+from mutator.review.patch_shapes import group_label, parameter_values, shapes
 from mutator.workspace import Workspace
 
 WORKSPACE = Workspace.find(root=Path(__file__).parents[2])

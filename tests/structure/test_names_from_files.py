@@ -30,10 +30,10 @@ PACKAGES = (
     *("targets", "faults", "stpa", "mutants", "operators", "onboarding", "campaigns", "review"),
 )
 ALLOWED = {  # joins of names that no file contains
-    "campaigns/clones.py: folder / objects": "printed by git, and only read",
-    "campaigns/clones.py: folder / shallow": "printed by git, and only read",
-    "campaigns/clones.py: folder / excluded": "printed by git, and only read",
-    "campaigns/clones.py: folder / within": "names from os.scandir",
+    "campaigns/git_clone.py: folder / objects": "printed by git, and only read",
+    "campaigns/git_clone.py: folder / shallow": "printed by git, and only read",
+    "campaigns/git_clone.py: folder / excluded": "printed by git, and only read",
+    "campaigns/git_clone.py: folder / within": "names from os.scandir",
     "execution/cluster/child.py: site.place / f'work-{os.getpid()}'": "a process id",
     "faults/imports.py: root / path": "only shown",
     "mutants/anchors.py: root / path": "only shown",
@@ -45,7 +45,7 @@ ALLOWED = {  # joins of names that no file contains
     "onboarding/survey.py: root / name": "names from a folder's listing",
     "operators/executed.py: scratch / 'work' / f'lines-{i}'": "a number",
     "review/called_code.py: folder / one.value": "only compared with the tree's paths",
-    "review/pictures.py: scratch / 'work' / f'pictures-{i}'": "a number",
+    "review/effect_pictures.py: scratch / 'work' / f'pictures-{i}'": "a number",
     "store/cleaning.py: Path(folder, name)": "names from os.walk",
     "store/cleaning.py: Path(name).with_name(complete(Path(name).name))": "only compared with patterns",
     "targets/source_tree.py: root / name": "the folder of a checked glob",

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-ASKED: dict[str, Any] = json.loads("{}")  # file, picture, effects; filled in by `review.pictures`
+ASKED: dict[str, Any] = json.loads("{}")  # file, picture, effects; filled in by `review.effect_pictures`
 FILE = "pictures.npz"
 
 _folder = Path.cwd()

@@ -18,7 +18,7 @@ from distributed.core import Status
 
 from mutator._common.hashing import plain
 from mutator._common.version import VERSION
-from mutator.campaigns import machine
+from mutator.campaigns import run_environment
 from mutator.errors import MutatorError
 from mutator.execution.cluster.host import Host, Wanted
 
@@ -33,11 +33,11 @@ def facts(packages: Iterable[str]) -> dict[str, Any]:
     return {
         "mutator": VERSION,
         "host": socket.gethostname(),
-        "python": machine.python(),
+        "python": run_environment.python(),
         "platform": platform.platform(),
-        "cpu": machine.cpu(),
-        "blas": plain(machine.blas()),
-        "packages": machine.versions(packages),
+        "cpu": run_environment.cpu(),
+        "blas": plain(run_environment.blas()),
+        "packages": run_environment.versions(packages),
     }
 
 

@@ -13,7 +13,7 @@ from mutator._common import caches, kept_folders
 from mutator._common.bounded import read_bounded
 from mutator._common.hashing import digest
 from mutator._common.version import VERSION
-from mutator.campaigns import machine
+from mutator.campaigns import run_environment
 from mutator.execution.cluster.site import Site
 from mutator.preflight.preflight_rules import digest_of
 from mutator.store.run_folder import GoldenRun
@@ -32,7 +32,7 @@ class DrivenGoldens:
             VERSION,
             [[path.relative_to(site.place).as_posix(), digest(read_bounded(path))] for path in files],
             site.meta["limits"],
-            machine.surroundings(),
+            run_environment.surroundings(),
             platform.node(),
         ]
 

@@ -10,7 +10,7 @@ from mutator.report.panel import Panel, rendered
 from mutator.report.panels.tables import sheet_files
 from mutator.report.studies import ReportedRun
 from mutator.statistics.mutation_score import score_sheet
-from mutator.statistics.sheet import Sheet
+from mutator.statistics.statistics_sheet import Sheet
 from mutator.store import plan_file
 
 _HTML = """\

@@ -2,7 +2,7 @@
 
 from mutator._common.tables import Table
 from mutator.audit.seal import OUTSIDE, seal_or_why_not, unsealed_facts, without
-from mutator.campaigns.studies import study_problems
+from mutator.campaigns.installed_studies import study_problems
 from mutator.report.panel import Panel, rendered
 from mutator.report.studies import ReportedRun
 from mutator.store.approvals import approval_summary

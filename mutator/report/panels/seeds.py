@@ -4,8 +4,8 @@ from mutator._common.tables import Table
 from mutator.report.panel import Panel, rendered
 from mutator.report.panels.tables import sheet_files
 from mutator.report.studies import ReportedRun
-from mutator.statistics.seeds import ALL, kinds_sheet, seeds_of, seeds_sheet
-from mutator.statistics.sheet import Sheet, text_of
+from mutator.statistics.seed_spread import ALL, kinds_sheet, seeds_of, seeds_sheet
+from mutator.statistics.statistics_sheet import Sheet, text_of
 
 _HTML = """\
 <h2>Seeds</h2>

@@ -10,9 +10,9 @@ from mutator.report.panel import Panel, rendered
 from mutator.report.studies import ReportedRun
 from mutator.results.counting import count_table, counts_by, hazard_names, kinds
 from mutator.statistics.metric_tables import metrics_sheet, severity_sheet, tolerant_times_sheet
-from mutator.statistics.published import Published
-from mutator.statistics.sheet import Sheet
-from mutator.statistics.sheets import run_sheets
+from mutator.statistics.published_counts import Published
+from mutator.statistics.sheet_selection import run_sheets
+from mutator.statistics.statistics_sheet import Sheet
 from mutator.store.run_folder import RunFolder
 
 FOLDER = "tables"  # a folder of the report

@@ -8,7 +8,7 @@ import pytest
 from mutator.api import worst as module
 from mutator.api.worst import worst_results
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import make_plan
+from mutator.campaigns.plan import make_plan
 from mutator.model import Outcome, Record
 from mutator.store.lines import written
 from mutator.store.records import SCHEMA, line_of

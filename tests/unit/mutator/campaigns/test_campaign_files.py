@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from mutator.campaigns.campaign_files import check_readings, load_campaign, load_study
-from mutator.campaigns.plans import make_plan
+from mutator.campaigns.plan import make_plan
 from mutator.checks.library_check import check_library
 from mutator.errors import MutatorError
 from mutator.model import Method

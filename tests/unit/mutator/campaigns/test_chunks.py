@@ -7,7 +7,7 @@ import pytest
 
 from mutator.campaigns.chunks import Pending, cut, pending
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import make_plan
+from mutator.campaigns.plan import make_plan
 from mutator.model import Record, Status
 from mutator.store.plan_file import read_chunk, read_faults
 from mutator.store.run_folder import RunFolder

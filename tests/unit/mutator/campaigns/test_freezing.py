@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import load_plan, make_plan
+from mutator.campaigns.plan import load_plan, make_plan
 from mutator.errors import MutatorError
 from mutator.store.choices import Choices
 from mutator.workspace import Workspace

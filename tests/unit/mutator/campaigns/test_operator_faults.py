@@ -10,11 +10,11 @@ import pytest
 from mutator.campaigns import operator_faults
 from mutator.campaigns.campaign_files import load_campaign
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import Plan, load_plan, make_plan
+from mutator.campaigns.plan import Plan, load_plan, make_plan
 from mutator.errors import MutatorError
 from mutator.model import Hold, Limits, Method
 from mutator.operators.executed import Executed, GoldenDrive
-from mutator.review.catalogue import of_plan
+from mutator.review.mutant_groups import of_plan
 from mutator.store.choices import Choices
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import Plan, Planning, load_plan, make_plan
+from mutator.campaigns.plan import Plan, Planning, load_plan, make_plan
 from mutator.errors import MutatorError
 from mutator.store import plan_file
 from mutator.store.choices import Choices

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.plans import make_plan
+from mutator.campaigns.plan import make_plan
 from mutator.errors import MutatorError
 from mutator.workspace import Workspace
 

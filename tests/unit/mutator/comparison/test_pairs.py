@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
+from mutator.comparison.compared_runs import Side
 from mutator.comparison.pairs import Change, Pair, match
-from mutator.comparison.sides import Side
 from mutator.model import Experiment, Method, Outcome, Status
 from mutator.results.rows import Row
 from mutator.store.run_folder import RunFolder

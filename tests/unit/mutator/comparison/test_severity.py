@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from mutator.comparison.comparison import Comparison, Gate, compare, findings
-from mutator.comparison.pages import pair_line, summary
+from mutator.comparison.comparison_files import pair_line, summary
 from mutator.comparison.pairs import Change
+from mutator.comparison.run_comparison import Comparison, Gate, compare, findings
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Method, Outcome
 from mutator.workspace import Workspace

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from mutator._common.hashing import digest
-from mutator.campaigns.plans import make_plan
+from mutator.campaigns.plan import make_plan
 from mutator.engines.fork import ForkEngine
 from mutator.engines.in_target.stop import compiled
 from mutator.engines.jobs import Engine, RunMode

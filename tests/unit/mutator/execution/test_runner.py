@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mutator.campaigns.plans import make_plan
+from mutator.campaigns.plan import make_plan
 from mutator.engines.jobs import Execution, Job
 from mutator.errors import MutatorError
 from mutator.execution.runner import Goldens, Runner

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import make_plan
+from mutator.campaigns.plan import make_plan
 from mutator.paper.panels import observations_panel
 from mutator.paper.published import load_paper
 from mutator.report.studies import ReportedRun

@@ -8,8 +8,8 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.paper.published import Paper, load_paper
-from mutator.statistics import contrasts
-from mutator.statistics.compare_tables import kinds_sheet, overall_sheet
+from mutator.statistics import guided_against_random
+from mutator.statistics.guided_against_random_tables import kinds_sheet, overall_sheet
 from mutator.statistics.shares import share
 from mutator.statistics.summary_tables import coverage_sheet, summary_sheet
 from mutator.statistics.tallies import Tally, by_kind, by_scenario, total
@@ -104,7 +104,8 @@ def test_contradictory_counts_are_reported_with_their_line(tmp_path: Path) -> No
 
 def test_within_fault_types_guided_faults_are_ahead_only_per_activated_fault(paper: Paper) -> None:
     activated, injected = (
-        contrasts.mantel_haenszel(contrasts.strata(paper.coverage, whole)) for whole in contrasts.WHOLES
+        guided_against_random.mantel_haenszel(guided_against_random.strata(paper.coverage, whole))
+        for whole in guided_against_random.WHOLES
     )
     assert activated.strata == injected.strata == 17
     assert injected.high < 1

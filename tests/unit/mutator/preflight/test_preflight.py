@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns import machine
+from mutator.campaigns import run_environment
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import load_plan, make_plan
+from mutator.campaigns.plan import load_plan, make_plan
 from mutator.engines.reference import ReferenceEngine
 from mutator.errors import CheckFailed
 from mutator.preflight.canary import judge
@@ -150,11 +150,11 @@ def test_changed_golden_runs_are_refused(
     LineWriter(
         folder.path / "records" / "0001-gw0.jsonl", {"schema": SCHEMA, "plan": folder.head.plan}
     ).close()
-    monkeypatch.setattr(machine, "cpu", lambda: "another")
+    monkeypatch.setattr(run_environment, "cpu", lambda: "another")
     assert all(result.passed for result in run_checks(toycar, folder))
     shutil.rmtree(folder.work)
     before = {path: path.read_bytes() for path in folder.path.rglob("*") if path.is_file()}
-    monkeypatch.setattr(machine, "cpu", lambda: "a third")
+    monkeypatch.setattr(run_environment, "cpu", lambda: "a third")
     original = ReferenceEngine.execute
 
     def other(self: ReferenceEngine, job, folder):  # type: ignore[no-untyped-def]

@@ -11,7 +11,7 @@ import pytest
 from mutator._common import kept_folders
 from mutator._common.files import json_bytes
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import make_plan
+from mutator.campaigns.plan import make_plan
 from mutator.engines.jobs import Execution, Job
 from mutator.engines.reference import ReferenceEngine
 from mutator.preflight import preflight_cache

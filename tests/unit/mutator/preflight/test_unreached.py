@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import make_plan
+from mutator.campaigns.plan import make_plan
 from mutator.model import Experiment, Trigger
 from mutator.preflight.preflight import run_checks, unreached_triggers
 from mutator.preflight.unreached import read_observed, remarks, write_observed

@@ -11,7 +11,7 @@ from mutator.model import Experiment
 from mutator.report import browse
 from mutator.report.browse import column, details, media, table
 from mutator.report.seen import PLACE
-from mutator.review.groups import shapes
+from mutator.review.patch_shapes import shapes
 from mutator.store.run_folder import RunFolder
 from tests.made_head import made_head
 

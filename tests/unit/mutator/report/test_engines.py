@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import make_plan
+from mutator.campaigns.plan import make_plan
 from mutator.model import Experiment, Outcome, Record, Status
 from mutator.report import building, engines, stamp
 from mutator.report.seen import timings_of

@@ -18,7 +18,7 @@ from mutator._common.files import half_written
 from mutator._common.hashing import plain
 from mutator._common.plain_reader import from_plain
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import make_plan
+from mutator.campaigns.plan import make_plan
 from mutator.errors import MutatorWarning
 from mutator.model import Experiment, Method, Outcome, Record, Status
 from mutator.outcomes.fault_paths import fault_paths_of

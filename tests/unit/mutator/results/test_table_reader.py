@@ -15,7 +15,7 @@ import pytest
 from pyarrow import parquet
 
 import mutator
-from mutator.comparison.sides import read_side
+from mutator.comparison.compared_runs import read_side
 from mutator.errors import MutatorError
 from mutator.execution.single_run import run_single
 from mutator.exports import Format
@@ -34,7 +34,7 @@ from mutator.results.table_columns import (
     result_columns,
 )
 from mutator.results.table_reader import Results, _table, frame_of, same_parquet
-from mutator.statistics.frame import hazard_names, load, prepare
+from mutator.statistics.results_frame import hazard_names, load, prepare
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import read_head

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from mutator.campaigns.clones import user_name
+from mutator.campaigns.git_clone import user_name
 from mutator.errors import MutatorError
-from mutator.review.catalogue import Group, of_library
 from mutator.review.commits import library_commit
 from mutator.review.decisions import Change, Kind, Review, State, load_review, record
+from mutator.review.mutant_groups import Group, of_library
 from mutator.workspace import Workspace
 
 HEAD = 'schema: review/2\ntarget: "toycar"\nfour_eyes: true\ndecisions: []\n'

@@ -12,9 +12,9 @@ import pytest
 from mutator._common import shipped
 from mutator._common.version import VERSION
 from mutator.errors import MutatorError, Outside, ReviewConflict
-from mutator.review.catalogue import Group
 from mutator.review.decisions import Change, Kind, Review, State, load_review, record
 from mutator.review.entries import Bound
+from mutator.review.mutant_groups import Group
 from mutator.review.seen_texts import changes, keep, text_of
 from mutator.workspace import Workspace
 

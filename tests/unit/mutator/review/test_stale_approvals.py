@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from mutator.review.catalogue import Group, of_library
 from mutator.review.decisions import Change, Kind, State, load_review, record
+from mutator.review.mutant_groups import Group, of_library
 from mutator.workspace import Workspace
 
 EFFECTS = """\

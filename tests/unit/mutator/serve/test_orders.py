@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import make_plan
+from mutator.campaigns.plan import make_plan
 from mutator.errors import MutatorError
 from mutator.serve.orders import Desk, Work
 from mutator.serve.runs import Runs

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from mutator.review.catalogue import of_library
 from mutator.review.decisions import Change, Kind, load_review, record
+from mutator.review.mutant_groups import of_library
 from mutator.workspace import Workspace
 
 from .conftest import SECRET, Client

@@ -6,9 +6,9 @@ import pandas as pd
 import pytest
 
 from mutator.paper.measures import mean_time, of_difference, paired
-from mutator.statistics import contrasts
-from mutator.statistics.contrasts import Stratum
-from mutator.statistics.paired import mcnemar, times
+from mutator.statistics import guided_against_random
+from mutator.statistics.guided_against_random import Stratum
+from mutator.statistics.paired_statistics import mcnemar, times
 from mutator.statistics.shares import share
 
 from . import by_hand
@@ -39,7 +39,7 @@ BERKELEY = [
 
 def test_mantel_haenszel() -> None:
     """The result of R's `mantelhaen.test`."""
-    found = contrasts.mantel_haenszel([stratum(*table) for table in BERKELEY])
+    found = guided_against_random.mantel_haenszel([stratum(*table) for table in BERKELEY])
     assert found.odds_ratio == pytest.approx(0.9046968, abs=1e-7)
     assert (found.low, found.high) == pytest.approx((0.7719074, 1.0603298), abs=1e-7)
     assert found.strata == 6
@@ -55,7 +55,7 @@ def test_mantel_haenszel() -> None:
 )
 def test_breslow_day(tables: list[tuple[int, int, int, int]], p: float) -> None:
     """The results equal those of DescTools' BreslowDayTest in the course P8120 of Columbia University."""
-    found = contrasts.mantel_haenszel([stratum(*table) for table in tables])
+    found = guided_against_random.mantel_haenszel([stratum(*table) for table in tables])
     assert found.p_equal == pytest.approx(p, rel=2e-4)
 
 
@@ -67,7 +67,7 @@ def test_breslow_day(tables: list[tuple[int, int, int, int]], p: float) -> None:
 def test_fisher(table: tuple[int, int, int, int], p: float) -> None:
     """Fisher's test gives the p-values of R's `fisher.test` for the lady tasting tea and the convictions
     of twins, and that of SAS for Berkeley's department B (Pennsylvania State University, STAT 504)."""
-    assert contrasts.fisher(stratum(*table)) == pytest.approx(p, rel=2e-4)
+    assert guided_against_random.fisher(stratum(*table)) == pytest.approx(p, rel=2e-4)
 
 
 def test_mcnemar() -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.results.table_columns import result_columns
-from mutator.statistics.frame import load
+from mutator.statistics.results_frame import load
 from mutator.statistics.shares import share
 from mutator.statistics.summary_tables import coverage_sheet, summary_sheet
 from mutator.statistics.tallies import Tally, by_kind, by_scenario

@@ -10,8 +10,8 @@ import pandas as pd
 import pytest
 from scipy.stats import CensoredData, ecdf
 
-from mutator.statistics import times
-from mutator.statistics.times import Reaction
+from mutator.statistics import event_times
+from mutator.statistics.event_times import Reaction
 
 from .results_frame import results
 
@@ -29,7 +29,7 @@ def reaction(sample: dict[str, Any], driver_s: float = 1.8) -> Reaction:
         ends[f"S{i}"] = ALERT_S + time
         row = {"scenario": f"S{i}", "t_activation": 1.0, "t_alert": ALERT_S, "alerts": "fcw"}
         rows.append(row | ({"t_h1": ALERT_S + time} if event else {}))
-    return times.reaction(results(*rows), ends, driver_s)
+    return event_times.reaction(results(*rows), ends, driver_s)
 
 
 @pytest.mark.parametrize("sample", LIFELINES.values(), ids=LIFELINES)

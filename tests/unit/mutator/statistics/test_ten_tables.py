@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from mutator.statistics.shares import Share
-from mutator.statistics.sheet import Sheet
-from mutator.statistics.sheets import run_sheets
+from mutator.statistics.sheet_selection import run_sheets
+from mutator.statistics.statistics_sheet import Sheet
 
 from . import by_hand
 from .by_hand import ENDS, Row

@@ -8,7 +8,7 @@ import pytest
 
 from mutator._common.doors import EXPORTS
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import make_plan
+from mutator.campaigns.plan import make_plan
 from mutator.errors import MutatorError
 from mutator.exports import Table, find_export
 from mutator.store.cleaning import clean, finish_deletion

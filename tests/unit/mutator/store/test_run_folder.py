@@ -10,7 +10,7 @@ import pytest
 
 from mutator._common import locks
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import make_plan
+from mutator.campaigns.plan import make_plan
 from mutator.errors import MutatorError
 from mutator.store.cleaning import clean
 from mutator.store.run_folder import RunFolder

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import make_plan
+from mutator.campaigns.plan import make_plan
 from mutator.errors import MutatorError, Outside
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import RunHead, read_head

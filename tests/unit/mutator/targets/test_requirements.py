@@ -8,8 +8,8 @@ import pytest
 import mutator
 from mutator.api.trials import try_fault
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import make_plan
-from mutator.campaigns.provenance import begin_stretch, check_versions
+from mutator.campaigns.plan import make_plan
+from mutator.campaigns.run_provenance import begin_stretch, check_versions
 from mutator.checks.doctor import Level, examine
 from mutator.checks.library_check import check_library
 from mutator.errors import MutatorError

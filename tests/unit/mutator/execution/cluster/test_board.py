@@ -9,7 +9,7 @@ import pytest
 
 from mutator.campaigns.chunks import pending
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import make_plan
+from mutator.campaigns.plan import make_plan
 from mutator.execution.cluster.board import Board
 from mutator.execution.cluster.pieces import Kind, Piece
 from mutator.preflight.equivalence import Sample

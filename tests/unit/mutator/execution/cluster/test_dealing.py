@@ -16,8 +16,8 @@ from distributed.client import FutureCancelledError
 
 from mutator.campaigns.chunks import pending
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import make_plan
-from mutator.campaigns.provenance import add_stretch
+from mutator.campaigns.plan import make_plan
+from mutator.campaigns.run_provenance import add_stretch
 from mutator.errors import MutatorWarning
 from mutator.execution.cluster import dask_workers
 from mutator.execution.cluster.bundle import Bundle

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from mutator.campaigns.plans import Plan
+from mutator.campaigns.plan import Plan
 from mutator.errors import MutatorError
 from mutator.exports import Format
 from mutator.exports.formats.mutation_elements import verdict

@@ -1,0 +1,298 @@
+"""A plan: the frozen, ordered list of a campaign's experiments, and the expected cost of running them."""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from html import escape
+from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mutator._common.arguments import check_type
+from mutator._common.tables import Table
+from mutator._common.text import counted, seeds_text
+from mutator.campaigns.campaign_expansion import Expansion
+from mutator.campaigns.campaign_files import Campaign, check_readings, load_campaign, load_study
+from mutator.campaigns.chunks import cut_runs
+from mutator.campaigns.filters import compile_filter
+from mutator.campaigns.plan_parts import Group, Part, Tally, plan_digest
+from mutator.campaigns.plan_warnings import IdleValues
+from mutator.campaigns.sampling import pick, pick_in_proportion, pick_pairs
+from mutator.campaigns.shared_runs import in_turn, runs
+from mutator.errors import MutatorError
+from mutator.model import AfterHazard, Experiment
+from mutator.results.plan_columns import PLAN_COLUMNS, plan_row
+from mutator.store import plan_file
+from mutator.store.check_results import measured_cpu_s
+from mutator.store.choices import Choices
+from mutator.store.run_folder import GoldenRun, RunFolder
+from mutator.store.run_head import CAMPAIGN
+from mutator.store.shards import Shard
+from mutator.targets.stopping import stop_source
+from mutator.workspace import Workspace
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+RUNS_PER_GOLDEN = 3  # two golden runs and the null mutant, for each scenario with its changes
+_DEFAULT_CPU_S = 1.4  # one run on the reference engine, including interpreter start
+_START_S = 3.0  # time that a campaign needs outside its runs
+_BYTES_PER_EXPERIMENT = 9_000  # series, patch, record and table rows of an experiment
+_BYTES_PER_GOLDEN = 1_200_000
+_IN_MEMORY = 50_000  # larger plans are not read as a whole
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cost:
+    """The expected cost of a plan: CPU seconds, wall seconds on `workers`, bytes on disk."""
+
+    cpu_s: float
+    wall_s: float
+    disk_bytes: int
+    workers: int
+    measured: bool  # whether `cpu_s` is based on golden runs of the run folder
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Plan:
+    """Experiments in run order, cut into chunks."""
+
+    campaign: Campaign  #: the campaign file as read
+    choices: Choices  #: the options that override the file
+    seed: int  #: the seed of the plan
+    reading: str  #: the reading of the fault specs
+    experiments: Sequence[Experiment]  #: the experiments in run order
+    chunks: tuple[int, ...]  #: the number of experiments in each chunk, in order
+    canary: Experiment  #: a fault that must cause its hazard; the checks before the campaign run it
+    runs: int  #: the number of runs; a run that several scenarios share is counted once
+    digest: str  #: the digest: equal on every machine for the same campaign, choices, library and scenarios
+    run_cpu_s: float | None = None  #: the measured CPU time of one run in s; None: not measured
+    told: tuple[str, ...] = ()  #: how many mutants the operators produced, and what was left out
+
+    def __repr__(self) -> str:
+        count = counted(len(self.experiments), "experiment")
+        return f"<Plan of {self.campaign.name}, {self.reading}: {count}, {seeds_text(self.seeds)}>"
+
+    @property
+    def seeds(self) -> range:
+        """All seeds of the plan."""
+        return _seeds(self.campaign, self.choices)
+
+    @cached_property
+    def tally(self) -> Tally:
+        """The plan's totals."""
+        found = self.empty_tally()
+        for part in self.parts():
+            found.add(part)
+        return found
+
+    def empty_tally(self) -> Tally:
+        """Return a tally without parts."""
+        return Tally(canary=self.canary, several_seeds=len(self.seeds) > 1)
+
+    def parts(self) -> Iterator[Part]:
+        """Yield the plan as one part."""
+        yield Part(experiments=self.experiments, chunks=self.chunks, runs=self.runs)
+
+    def _repr_html_(self) -> str:
+        groups = sorted(self.groups().items())
+        rows = [(f"{module}/{kind}", method, str(n)) for (module, kind, method), n in groups]
+        rows.append(("total", "", str(len(self.experiments))))
+        table = Table(heads=("fault type", "method", "experiments"), rows=rows, right=(2,)).as_html()
+        return f"<p>{escape(repr(self))}</p>{table}"
+
+    def frame(self) -> "pd.DataFrame":
+        """Return the planned experiments as a pandas frame: `rows`, indexed by experiment id."""
+        import pandas as pd
+
+        return pd.DataFrame(self.rows()).set_index("experiment_id")
+
+    def groups(self) -> Counter[Group]:
+        """Return the number of experiments for each (module, fault type, method)."""
+        return self.tally.groups
+
+    def rows(self) -> list[dict[str, object]]:
+        """Return one dict per experiment: the result columns that are known before it runs."""
+        return [plan_row(experiment) for experiment in self.experiments]
+
+    def goldens(self) -> tuple[GoldenRun, ...]:
+        """Return every golden run that the plan needs, including the canary's."""
+        return self.tally.needed()
+
+    def cost(self, workers: int = 2) -> Cost:
+        """Return the expected time and disk space."""
+        goldens = len(self.goldens())
+        runs = self.runs + RUNS_PER_GOLDEN * goldens + 1
+        cpu_s = runs * (self.run_cpu_s or _DEFAULT_CPU_S)
+        return Cost(
+            cpu_s=cpu_s,
+            wall_s=cpu_s / max(workers, 1) + _START_S,
+            disk_bytes=len(self.experiments) * _BYTES_PER_EXPERIMENT + goldens * _BYTES_PER_GOLDEN,
+            workers=workers,
+            measured=self.run_cpu_s is not None,
+        )
+
+
+class Planning:
+    """A campaign with checked choices, expanded seed by seed.
+
+    MutatorError for a choice that is invalid in this campaign.
+    """
+
+    def __init__(self, workspace: Workspace, campaign: str | Path, choices: Choices | None = None) -> None:
+        self.choices = Choices() if choices is None else choices
+        check_type("choices", self.choices, Choices, "mutator.Choices")
+        self.campaign = load_campaign(workspace.campaign(campaign))
+        self.seeds = _seeds(self.campaign, self.choices)
+        readings = workspace.readings()
+        check_readings(self.campaign, readings)
+        load_study(self.campaign)
+        self.reading = self.choices.reading or self.campaign.reading or readings.default
+        if self.choices.reading is not None:
+            readings.check(self.choices.reading)
+        self._workspace, self._manifest = workspace, workspace.manifest(self.campaign.target)
+        if self.campaign.after_hazard is AfterHazard.STOP:
+            stop_source(self._manifest)  # raises before any run starts
+        self._expansion = Expansion(workspace, self.campaign, self._manifest, self.seeds[0], self.reading)
+        self.canary = self._expansion.canary()
+
+    @property
+    def seed(self) -> int:
+        return self.seeds[0]
+
+    @property
+    def told(self) -> tuple[str, ...]:
+        """How many mutants the operators produced, and what was left out; known once the parts exist."""
+        return self._expansion.told
+
+    def empty_tally(self) -> Tally:
+        return Tally(canary=self.canary, several_seeds=len(self.seeds) > 1)
+
+    def parts(self) -> Iterator[Part]:
+        """Yield the experiments of each seed that has any.
+
+        MutatorError if no seed has an experiment, or if there are more shards than chunks; MutatorWarning for
+        values that change nothing.
+        """
+        idle, chunks = IdleValues(self._workspace.fault_models()), 0
+        limit = self.choices.limit
+        for number, seed in enumerate(self.seeds):
+            if limit == 0:
+                break
+            most = None if limit is None else -(-limit // (len(self.seeds) - number))
+            part = self._part(seed, most)
+            limit = None if limit is None else limit - len(part.experiments)
+            chunks += len(part.chunks)
+            idle.add(part.experiments)
+            if part.experiments:
+                yield part
+        if not chunks:
+            raise MutatorError(
+                "no experiment is left",
+                where=self.campaign.path,
+                argument="only",
+                expected="at least one",
+                remedy="widen `only` or the campaign's faults, or narrow `exclude`",
+            )
+        self._check_shards(chunks)
+        idle.warn()
+
+    def _part(self, seed: int, most: int | None) -> Part:
+        found = self._expansion.with_seed(seed).experiments()
+        once = in_turn(runs(self._manifest, _choose(found, self.campaign, self.choices, seed, most)))
+        return Part(
+            experiments=tuple(experiment for same in once for experiment in same),
+            chunks=cut_runs(once, self.campaign.chunk),
+            runs=len(once),
+        )
+
+    def _check_shards(self, chunks: int) -> None:
+        if self.choices.shard is not None and Shard.parse(self.choices.shard).of > chunks:
+            raise MutatorError(
+                self.choices.shard,
+                argument="shard",
+                expected=f"at most {chunks}, because the plan has that many chunks",
+                remedy="use fewer shards, or a smaller chunk in the campaign",
+            )
+
+
+def _seeds(campaign: Campaign, choices: Choices) -> range:
+    return campaign.seeds if choices.seed is None else range(choices.seed, choices.seed + 1)
+
+
+def make_plan(workspace: Workspace, campaign: str | Path, choices: Choices | None = None) -> Plan:
+    """Expand a campaign (a library name or a file) into its plan, without writing or running anything.
+
+    MutatorError for an invalid choice, and if no experiment is left; MutatorWarning for values that change
+    nothing.
+    """
+    planning = Planning(workspace, campaign, choices)
+    parts = tuple(planning.parts())
+    experiments = tuple(chain.from_iterable(part.experiments for part in parts))
+    chunks = tuple(chain.from_iterable(part.chunks for part in parts))
+    canary, loaded = planning.canary, planning.campaign
+    return Plan(
+        campaign=loaded,
+        choices=planning.choices,
+        seed=planning.seed,
+        reading=planning.reading,
+        experiments=experiments,
+        chunks=chunks,
+        canary=canary,
+        digest=plan_digest([e.id for e in experiments], chunks, canary.id, loaded),
+        runs=sum(part.runs for part in parts),
+        told=planning.told,
+    )
+
+
+def _choose(
+    experiments: tuple[Experiment, ...], campaign: Campaign, choices: Choices, seed: int, most: int | None
+) -> tuple[Experiment, ...]:
+    if campaign.sample is not None:
+        experiments = _sample(experiments, campaign, campaign.sample, seed)
+    for text, wanted in ((choices.only, True), (choices.exclude, False)):
+        if text is not None:
+            accepts = compile_filter(text, PLAN_COLUMNS)
+            experiments = tuple(e for e in experiments if accepts(plan_row(e)) is wanted)
+    return experiments if most is None else pick_pairs(experiments, most, seed)
+
+
+def _sample(
+    experiments: tuple[Experiment, ...], campaign: Campaign, count: int, seed: int
+) -> tuple[Experiment, ...]:
+    if not campaign.proportional:
+        return pick(experiments, count, seed)
+    try:
+        return pick_in_proportion(experiments, count, seed)
+    except ValueError as err:
+        raise campaign.error(
+            ("sample",), f"sample {count}", expected=str(err), remedy="correct the number"
+        ) from None
+
+
+def load_plan(folder: RunFolder, tally: Tally | None = None) -> Plan:
+    """Load the frozen plan of a run folder; `tally` has its totals, if known.
+
+    The experiments of a very large plan are not kept in memory.
+    """
+    head = folder.head
+    large = head.experiments > _IN_MEMORY
+    plan = Plan(
+        campaign=load_campaign(folder.path / CAMPAIGN),
+        choices=head.choices,
+        seed=head.seed,
+        reading=head.reading,
+        experiments=plan_file.ExperimentsInOrder(folder.path, head.chunks)
+        if large
+        else plan_file.read_all(folder.path),
+        chunks=tuple(count for _, _, count in head.chunks),
+        canary=folder.canary,
+        runs=head.runs,
+        digest=head.plan,
+        run_cpu_s=measured_cpu_s(folder),
+        told=head.operators,
+    )
+    if tally is not None:
+        vars(plan)["tally"] = tally  # set the cached property; computing it would read every experiment
+    return plan

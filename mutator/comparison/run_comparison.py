@@ -1,0 +1,223 @@
+"""A comparison of two runs: tables, remarks and gate findings."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cached_property
+from pathlib import Path
+
+from mutator.comparison.compared_runs import Side, read_side
+from mutator.comparison.input_differences import (
+    Fact,
+    Files,
+    facts,
+    files,
+    parts_remark,
+    remarks,
+    severity_remarks,
+)
+from mutator.comparison.metric_sheets import metrics_sheets, severity_sheet
+from mutator.comparison.pair_sheets import (
+    Names,
+    changes_sheet,
+    endings_sheet,
+    frame_of,
+    rates_sheets,
+    times_sheets,
+)
+from mutator.comparison.pairs import Change, Matching, Pair, match, time_to_hazard
+from mutator.errors import MutatorError
+from mutator.model import Experiment
+from mutator.results.rows import Row
+from mutator.statistics.statistics_sheet import Sheet
+
+
+class Gate(StrEnum):
+    """What a gate fails on: a change for the worse, or an unmatched experiment."""
+
+    NEW_HAZARD = Change.NEW_HAZARD.value  #: a hazard, although the first run has none
+    #: another hazard, although the first run already has one
+    OTHER_HAZARD = Change.OTHER_HAZARD.value
+    HIGHER_SEVERITY = (
+        Change.HIGHER_SEVERITY.value
+    )  #: a contact of a higher class, or a contact although the first run has none
+    EARLIER_HAZARD = Change.EARLIER_HAZARD.value  #: less time from activation to the first hazard
+    LOST_ALERT = Change.LOST_ALERT.value  #: no alert, although the first run has one
+    WORSE = Change.WORSE.value  #: a worse outcome, in the order no effect, sdc, hazard; includes a new hazard
+    NEW_CRASH = Change.NEW_CRASH.value  #: the controller crashes or does not finish
+    HARNESS_ERROR = Change.HARNESS_ERROR.value  #: the second run has no result, although the first has one
+    UNMATCHED = "unmatched"  #: an experiment that only one of the runs has
+    SEVERITY_S0 = "severity:S0"  #: a contact of class S0 or worse; in the first run a milder one or none
+    SEVERITY_S1 = "severity:S1"  #: a contact of class S1 or worse; in the first run a milder one or none
+    SEVERITY_S2 = "severity:S2"  #: a contact of class S2 or worse; in the first run a milder one or none
+    SEVERITY_S3 = "severity:S3"  #: a contact of class S3; in the first run a milder one or none
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """An experiment on which a gate fails, and why. If both runs have it, the id is the second run's."""
+
+    gate: Gate
+    experiment_id: str
+    words: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Comparison:
+    """Two matched runs. `alerts_notes` has a note on the alerts of each run's fault-free runs, or ''."""
+
+    a: Side
+    b: Side
+    matching: Matching
+    alerts_notes: tuple[str, str] = ("", "")
+
+    @cached_property
+    def names(self) -> Names:
+        """The display names of the runs, made distinct if they are equal."""
+        a, b = self.a.name, self.b.name
+        return Names(a=a, b=b) if a != b else Names(a=f"A: {a}", b=f"B: {b}")
+
+    @property
+    def pairs(self) -> tuple[Pair, ...]:
+        return self.matching.pairs
+
+    @cached_property
+    def changed(self) -> tuple[Pair, ...]:
+        """The pairs with any change: new hazards first, then in the order of `Change` and the plan."""
+        order = list(Change)
+        changed = (pair for pair in self.pairs if pair.changes)
+        return tuple(sorted(changed, key=lambda pair: sorted(map(order.index, pair.changes))))
+
+    def having(self, change: Change) -> tuple[Pair, ...]:
+        return tuple(p for p in self.pairs if change in p.changes)
+
+    @cached_property
+    def facts(self) -> tuple[Fact, ...]:
+        return facts(self.a, self.b)
+
+    @cached_property
+    def files(self) -> Files:
+        return files(self.a.folder, self.b.folder)
+
+    @cached_property
+    def remarks(self) -> tuple[str, ...]:
+        """Caveats to read before the tables."""
+        noted = zip((self.names.a, self.names.b), self.alerts_notes, strict=True)
+        own = tuple(f"{name}: {note}" for name, note in noted if note)
+        first = (self.parts_remark,) if self.parts_remark else ()
+        return first + remarks(self.a, self.b, self.matching) + severity_remarks(self.a, self.b) + own
+
+    @cached_property
+    def parts_remark(self) -> str:
+        return parts_remark(self.a, self.b)
+
+    @cached_property
+    def sheets(self) -> tuple[Sheet, ...]:
+        """The tables, most important first."""
+        frame = frame_of(self.pairs)
+        rates, rates_by_type = rates_sheets(frame, self.names)
+        spans, spans_by_type = times_sheets(frame, self.names)
+        counts = (endings_sheet(self.pairs, self.names), changes_sheet(self.pairs))
+        metrics, metrics_by_type = metrics_sheets(self.pairs, self.a, self.b, self.names)
+        severity = severity_sheet(self.pairs, self.names)
+        return (
+            *(*counts, rates, spans),
+            *(sheet for sheet in (severity, metrics) if sheet.lines),
+            *(rates_by_type, spans_by_type, *([metrics_by_type] if metrics.lines else [])),
+        )
+
+    @cached_property
+    def unmatched(self) -> tuple[tuple[str, Experiment], ...]:
+        """The experiments that could not be compared, with reasons."""
+        m, names = self.matching, self.names
+        groups: tuple[tuple[str, Sequence[Experiment]], ...] = (
+            (f"only in {names.a}", m.only_a),
+            (f"only in {names.b}", m.only_b),
+            (f"without a result in {names.a}", m.no_result_a),
+            (f"without a result in {names.b}", m.no_result_b),
+            ("with the same fault, scenario and trigger as another experiment of their run", m.ambiguous),
+        )
+        return tuple((why, experiment) for why, group in groups for experiment in group)
+
+    @property
+    def incomplete(self) -> int:
+        """The number of missing results among experiments that both runs planned."""
+        m = self.matching
+        return (
+            len(m.no_result_a)
+            + len(m.no_result_b)
+            + sum(not row.usable for pair in self.pairs for row in (pair.row_a, pair.row_b))
+        )
+
+
+def compare(
+    run_a: Path, run_b: Path, only: str | None = None, alerts_notes: tuple[str, str] = ("", "")
+) -> Comparison:
+    """Compare two run folders; `only` filters experiments by plan columns.
+
+    Raise MutatorError if no experiment has a partner, and CheckFailed if a run's equivalence check failed.
+    """
+    a, b = read_side(run_a, only), read_side(run_b, only)
+    scale = b.folder.scale if a.folder.scale else None  # classify both runs by the same scale, or neither
+    a, b = a.classed(scale), b.classed(scale)
+    matching = match(a, b)
+    if not matching.pairs:
+        raise MutatorError(
+            f"no experiment of {a.name} has a partner in {b.name} (experiments with a result: {len(a.rows)} "
+            f"and {len(b.rows)})",
+            where=run_b,
+            argument="only",
+            expected="runs of the same faults, scenarios and triggers",
+            remedy="compare runs of one campaign, or widen `only`",
+        )
+    return Comparison(a=a, b=b, matching=matching, alerts_notes=alerts_notes)
+
+
+def findings(comparison: Comparison, gates: Sequence[Gate]) -> tuple[Finding, ...]:
+    found: list[Finding] = []
+    for gate in gates:
+        if gate is Gate.UNMATCHED:
+            m = comparison.matching
+            strangers = (*m.only_a, *m.only_b, *m.ambiguous)
+            found += [Finding(gate=gate, experiment_id=e.id, words=e.label) for e in strangers]
+            continue
+        _, is_severity, least = gate.value.partition(":")
+        pairs = _reaching(comparison, least) if is_severity else comparison.having(Change(gate.value))
+        found += [
+            Finding(gate=gate, experiment_id=p.b.id, words=f"{p.b.label}: {ending_change(p)}") for p in pairs
+        ]
+    return tuple(found)
+
+
+def _reaching(comparison: Comparison, least: str) -> tuple[Pair, ...]:
+    """Return the pairs that reach the severity class `least` in the second run but not in the first."""
+    for side in (comparison.a, comparison.b):
+        if side.folder.scale is None:
+            raise MutatorError(
+                f"{side.name} has no severity classes",
+                where=side.folder.path,
+                argument="fail_on",
+                expected="two runs planned with a manifest that has `severity`",
+                remedy="omit the severity gate, or rerun the campaign",
+            )
+    return tuple(p for p in comparison.pairs if p.usable and p.row_a.severity < least <= p.row_b.severity)
+
+
+def ending_change(pair: Pair) -> str:
+    """How a pair's outcome changed, for example `sdc -> hazard (NEAR 7.10 s after activation)`."""
+    return f"{_ending(pair.row_a)} -> {_ending(pair.row_b)}"
+
+
+def _ending(row: Row) -> str:
+    time = time_to_hazard(row)
+    details = []
+    if row.hazards:
+        names = ", ".join(name for name, _ in row.hazards)
+        details.append(names if time is None else f"{names} {time:.2f} s after activation")
+    if row.severity:
+        details.append(f"{row.severity}, delta-v {row.delta_v:.1f} m/s")
+    if row.alerts:
+        details.append(f"alert {', '.join(row.alerts)}")
+    if not row.usable or (row.detail and not details):
+        details.append(row.detail.splitlines()[0] if row.detail else "no result")
+    return f"{row.ending} ({'; '.join(details)})" if details else row.ending

@@ -1,0 +1,119 @@
+"""The review page: every group with its state, diff and values, in one self-contained file or served."""
+
+import shlex
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, StrictUndefined
+from markupsafe import Markup
+
+from mutator._common.files import write_atomic
+from mutator._common.hashing import content_id, plain
+from mutator.errors import MutatorError
+from mutator.mutants.injected_lines import tag_words
+from mutator.review.decisions import Review, State
+from mutator.review.effect_pictures import has_pictures
+from mutator.review.mutant_groups import Group
+from mutator.review.readable_groups import condition_lines, value_table
+from mutator.web import asset, embedded, load_order, plainly_embedded
+
+
+def write_page(out: Path, review: Review, groups: Sequence[Group], options: Sequence[str]) -> None:
+    """Write the page of `groups`; its commands include `options`, which select the groups."""
+    try:
+        write_atomic(out, page_html(review, groups, options).encode())
+    except OSError as err:
+        raise MutatorError(
+            f"cannot be written ({err.strerror})", where=out, remedy="choose another file"
+        ) from None
+
+
+def page_html(
+    review: Review,
+    groups: Sequence[Group],
+    options: Sequence[str],
+    served: Mapping[str, Any] | None = None,
+) -> str:
+    """Return the page of `groups`. `served` has what a served page needs: target, reviewer, address and token
+    for decisions, runs.
+    """
+    data = {
+        "target": review.target,
+        "states": [state.value for state in State],
+        "options": shlex.join(options),
+        "groups": [_group(review, group, like) for group, like in _in_stacks(review, groups)],
+        "served": served,
+    }
+    return render_page(data)
+
+
+def render_page(data: dict[str, Any]) -> str:
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    return environment.from_string(asset("review/review.html")).render(
+        target=data["target"],
+        count=len(data["groups"]),
+        served=data.get("served") is not None,
+        styles=[Markup(asset(name)) for name in load_order("review", ".css")],
+        tags=Markup(plainly_embedded(tag_words(), "tags")),
+        data=Markup(embedded(data, "review")),
+        scripts=[Markup(asset(name)) for name in load_order("review", ".js")],
+    )
+
+
+def state_of(review: Review, group: Group) -> dict[str, Any]:
+    """Return the review of a group, as the page shows it. `digest` identifies the mutants, so that decisions
+    from a page that shows other mutants are refused.
+    """
+    decision, flag = review.decision(group.id), review.flag(group.id)
+    return {
+        "state": review.state(group).value,
+        "decision": decision
+        and {
+            "verdict": decision.verdict.value,
+            "by": decision.by,
+            "at": decision.at or "",
+            "commit": decision.commit or "",
+            "tool": decision.tool or "",
+            "text": "",
+            "changed": review.changed(group),
+        },
+        "remarks": [{"by": one.by, "at": one.at or "", "text": one.text} for one in review.remarks(group.id)],
+        "flag": flag and plain(flag),
+        "revision": review.revision(group.id),
+        "digest": content_id([group.bound, group.values])[:12],
+    }
+
+
+def _in_stacks(review: Review, groups: Sequence[Group]) -> list[tuple[Group, int]]:
+    """Return the groups with stack numbers, in stack order. The groups of a stack share state, template,
+    function and called code.
+    """
+    kinds: dict[tuple[object, ...], int] = {}
+    numbered = []
+    for group in groups:
+        kind = (review.state(group), group.files, group.functions, group.models, group.bound.calls)
+        numbered.append((group, kinds.setdefault(kind, len(kinds))))
+    return sorted(numbered, key=lambda pair: pair[1])
+
+
+def _group(review: Review, group: Group, like: int) -> dict[str, Any]:
+    heads, rows = value_table(group)
+    return state_of(review, group) | {
+        "id": group.id,
+        "like": like,
+        "injections": group.injections,
+        "specs": group.specs,
+        "trigger": group.trigger,
+        "hold": group.hold,
+        "conditions": condition_lines(group.triggers),
+        "faults": len(group.faults),
+        "runs": group.runs,
+        "diff": group.diff,
+        "changes": review.changes(group),
+        "pictures": has_pictures(group),
+        "heads": heads,
+        "rows": rows,
+    }

@@ -1,0 +1,106 @@
+"""Tables of times, alerts and the order of hazards."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import astuple
+
+import pandas as pd
+
+from mutator.statistics import event_times
+from mutator.statistics.published_counts import Published
+from mutator.statistics.statistics_sheet import Cell, Sheet
+
+_ALERT_NOTE = (
+    " Alert to hazard: only if the alert came first. Hazards that would follow after the end of the run are "
+    "missing here; see the table *From alert to hazard, censored*."
+)
+
+
+def propagation_sheet(frame: pd.DataFrame, published: Published | None, *, alerts: bool = True) -> Sheet:
+    lines: list[tuple[Cell, ...]] = []
+    for method, scenario, group in _groups(frame):
+        for step, spread in event_times.propagation(group).items():
+            if alerts or "alert" not in step:
+                lines.append((method, scenario, step, *astuple(spread)))
+    return Sheet(
+        name="propagation",
+        title="Propagation times by scenario",
+        note="Time in s between two events, in the N runs with both. Manifest: first difference of an "
+        "actuator output from the fault-free run."
+        + (_ALERT_NOTE if alerts else "")
+        + (f" {published.times_note}" if published else ""),
+        heads=(
+            "method",
+            "scenario",
+            "time",
+            "N",
+            "mean, s",
+            "lower quartile, s",
+            "median, s",
+            "upper quartile, s",
+        ),
+        lines=tuple(lines),
+    )
+
+
+def reaction_sheet(frame: pd.DataFrame, ends: Mapping[str, float], driver_s: float) -> Sheet:
+    lines: list[tuple[Cell, ...]] = []
+    for method, scenario, group in _groups(frame):
+        found = event_times.reaction(group, ends, driver_s)
+        median: tuple[Cell, ...] = (found.median, found.median_low, found.median_high)
+        counts = (found.at_risk, found.events, found.at_risk - found.events, found.too_late)
+        lines.append((method, scenario, *counts, *median, found.survival, found.in_time))
+    late = f"{driver_s:g} s"
+    return Sheet(
+        name="alert_to_hazard",
+        title="From alert to hazard, censored",
+        note="The table covers runs whose first alert came before any hazard. Runs without a hazard are "
+        "censored at their end. Median: Kaplan-Meier with its 95 % interval, `-` or `inf` if not reached; if "
+        "the curve is flat at one half, the middle of the flat part. The last columns: the share of alerts "
+        f"that no hazard follows within {late}, the driver's reaction time (Kaplan-Meier); and, of the "
+        f"hazards that follow an alert, the share that come more than {late} later. Alerts with or after the "
+        "first hazard are counted separately.",
+        heads=(
+            *("method", "scenario", "alerts first", "then hazard", "censored", "alert not before hazard"),
+            *("median, s", "median, low, s", "median, high, s"),
+            *(f"no hazard within {late}", f"hazards later than {late}"),
+        ),
+        lines=tuple(lines),
+    )
+
+
+def alerts_sheet(frame: pd.DataFrame, alerts: event_times.Alerts) -> Sheet:
+    lines: list[tuple[Cell, ...]] = []
+    for method, group in frame.groupby("method"):
+        shares = event_times.alerts_before(group, alerts)
+        lines += [(str(method), hazard, alert, share) for (hazard, alert), share in shares.items()]
+    return Sheet(
+        name="alerts_before_hazards",
+        title="Alerts before hazards",
+        note="Runs with a hazard in which an alert came first, with 95 % Wilson intervals. "
+        "A run with several alerts is in several lines. `any`: at least one alert; `none`: no alert.",
+        heads=("method", "hazard", "alert", "came before it"),
+        lines=tuple(lines),
+    )
+
+
+def orders_sheet(frame: pd.DataFrame) -> Sheet:
+    lines: list[tuple[Cell, ...]] = []
+    for (method, module), group in frame.groupby(["method", "module"]):
+        lines += [
+            (str(method), str(module), order, n) for order, n in event_times.hazard_orders(group).items()
+        ]
+    return Sheet(
+        name="hazard_orders",
+        title="Order of hazards",
+        note="Runs with at least one hazard, by their hazards in order of first occurrence.",
+        heads=("method", "module", "hazards", "N"),
+        lines=tuple(lines),
+    )
+
+
+def _groups(frame: pd.DataFrame) -> Iterator[tuple[str, str, pd.DataFrame]]:
+    """Yield the groups by method and scenario. After the scenarios of a method comes its total."""
+    for method, of_method in frame.groupby("method"):
+        for scenario, group in of_method.groupby("scenario"):
+            yield str(method), str(scenario), group
+        yield str(method), "total", of_method

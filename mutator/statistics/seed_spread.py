@@ -1,0 +1,120 @@
+"""The variation between a campaign's seeds. Each seed repeats the whole campaign with different draws.
+
+An interval over runs assumes independence and ignores the variation of draws. Resampling whole seeds shows
+how much another campaign with the same number of seeds could differ.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from mutator.statistics.paired_statistics import resampled_interval
+from mutator.statistics.results_frame import hazard_names
+from mutator.statistics.shares import share
+from mutator.statistics.statistics_sheet import Cell, Rate, Sheet
+
+ALL = "all"  # label of the lines for all faults
+_NOTE = (
+    "All seeds: the share over all runs, with its 95 % Wilson interval. Between seeds: the 95 % interval "
+    "from 9,999 resamples of whole seeds (none if all seeds agree). Least and largest: the smallest and the "
+    "largest share of a seed."
+)
+_HEADS = (
+    *("faults", "what", "of", "all seeds", "between seeds, low", "between seeds, high"),
+    *("least", "seed of the least", "largest", "seed of the largest", "seeds"),
+)
+_INJECTED, _ACTIVATED, _HAZARDS = "injected", "activated", "hazards"
+_BY_KIND = ((_ACTIVATED, _INJECTED), (_HAZARDS, _ACTIVATED), (_HAZARDS, _INJECTED))
+
+
+def seeds_of(frame: pd.DataFrame) -> list[str]:
+    """Return the seeds of a frame in numeric order."""
+    return list(map(str, sorted(frame["seed"].unique())))
+
+
+def seeds_sheet(frame: pd.DataFrame, *, alerts: bool = True) -> Sheet:
+    """Tabulate each share over all faults and by method. With a single seed, the table has no lines."""
+    methods = sorted(map(str, frame["method"].unique()))
+    groups = {ALL: np.ones(len(frame), dtype=bool)}
+    if len(methods) > 1:
+        groups |= {name: (frame["method"] == name).to_numpy() for name in methods}
+    return Sheet(
+        name="seeds",
+        title="Spread between seeds",
+        note=_NOTE,
+        heads=_HEADS,
+        lines=tuple(_lines(frame, groups, _shares(frame, alerts=alerts))),
+    )
+
+
+def kinds_sheet(frame: pd.DataFrame) -> Sheet:
+    kinds = sorted(map(str, frame["kind"].unique()))
+    groups = {name: (frame["kind"] == name).to_numpy() for name in kinds}
+    return Sheet(
+        name="seeds_by_fault_type",
+        title="Spread between seeds by fault type",
+        note=_NOTE,
+        heads=("fault type", *_HEADS[1:]),
+        lines=tuple(_lines(frame, groups, _BY_KIND)),
+    )
+
+
+def _shares(frame: pd.DataFrame, *, alerts: bool) -> list[tuple[str, str]]:
+    """Return the shares to compute, each as (what is counted, the base)."""
+    made = [(_ACTIVATED, _INJECTED), ("manifested", _ACTIVATED), *_BY_KIND[1:]]
+    made += [(name, whole) for name in hazard_names(frame) for whole in (_ACTIVATED, _INJECTED)]
+    if alerts:
+        made += [("alerts", _ACTIVATED), ("alerts", _INJECTED)]
+        made += [("hazards without alert", whole) for whole in (_ACTIVATED, _HAZARDS)]
+        made += [("alerts without hazard", _ACTIVATED)]
+    return made
+
+
+def _flags(frame: pd.DataFrame) -> dict[str, np.ndarray]:
+    hazard, alert = (frame[name].to_numpy(dtype=bool) for name in ("is_hazard", "is_alert"))
+    return {
+        _INJECTED: np.ones(len(frame), dtype=bool),
+        _ACTIVATED: frame["is_activated"].to_numpy(dtype=bool),
+        "manifested": frame["is_manifested"].to_numpy(dtype=bool),
+        _HAZARDS: hazard,
+        "alerts": alert,
+        "hazards without alert": hazard & ~alert,
+        "alerts without hazard": alert & ~hazard,
+        **{name: frame[f"t_{name.lower()}"].notna().to_numpy() for name in hazard_names(frame)},
+    }
+
+
+def _lines(
+    frame: pd.DataFrame, groups: Mapping[str, np.ndarray], shares: Sequence[tuple[str, str]]
+) -> Iterator[tuple[Cell, ...]]:
+    seeds = seeds_of(frame)
+    if len(seeds) < 2:
+        return
+    codes, flags = pd.Index(seeds).get_indexer(pd.Index(frame["seed"].astype(str))), _flags(frame)
+    for group, chosen in groups.items():
+        for part, whole in shares:
+            of = chosen & flags[whole] & (codes >= 0)
+            counts, wholes = (
+                np.bincount(codes[rows], minlength=len(seeds)) for rows in (of & flags[part], of)
+            )
+            yield (group, part, whole, *_spread(seeds, counts, wholes))
+
+
+def _spread(seeds: Sequence[str], counts: np.ndarray, wholes: np.ndarray) -> tuple[Cell, ...]:
+    low, high = resampled_interval((counts, wholes), _rate)
+    known = [(count / of, int(seed)) for seed, count, of in zip(seeds, counts, wholes, strict=True) if of]
+    least, largest = min(known, default=None), min(known, key=lambda k: (-k[0], k[1]), default=None)
+    return (
+        share(int(counts.sum()), int(wholes.sum())),
+        *(Rate(low), Rate(high)),
+        *((Rate(least[0]), least[1]) if least else (None, None)),
+        *((Rate(largest[0]), largest[1]) if largest else (None, None)),
+        len(known),
+    )
+
+
+def _rate(counts: Any, wholes: Any, axis: int = -1) -> Any:
+    with np.errstate(invalid="ignore"):  # if a draw has nothing to count, the result is NaN
+        return np.sum(counts, axis=axis) / np.sum(wholes, axis=axis)
