@@ -1,5 +1,6 @@
 """Read fault models: the YAML and the template of each."""
 
+from dataclasses import asdict
 from functools import lru_cache
 from pathlib import Path
 from typing import Literal
@@ -11,7 +12,7 @@ from mutator._common.below import check_inside
 from mutator._common.bounded import read_bounded
 from mutator.config import units
 from mutator.config.sources import Source
-from mutator.config.yaml_files import MAX_BYTES, StrictModel, read
+from mutator.config.yaml_files import MAX_BYTES, StrictModel, Written, read
 from mutator.errors import MutatorError
 from mutator.faults import probe_templates
 from mutator.faults.fault_models import (
@@ -21,8 +22,8 @@ from mutator.faults.fault_models import (
     FaultModel,
     FaultModels,
     Needs,
+    Param,
     ParamSchema,
-    ParamType,
     SnippetKind,
 )
 from mutator.faults.injection_model import InjectionModel
@@ -37,34 +38,6 @@ _TARGET = ParamSchema(
     type="variable",
     about="the variable to change, if it is not the one that the anchor names",
 )
-
-
-class _ParamModel(StrictModel, title="A parameter"):
-    """The key is the parameter's name without a unit. A spec adds the unit: `by_m` for the parameter `by`."""
-
-    type: ParamType = Field(
-        description="The type of a value. `variable`: a name in the function. `import`: a dotted name to "
-        "import. `number`, `integer`, `boolean`: a value of that type. `constant`: a number, truth value,"
-        " text or null. `choice`: one of the terms in `choices`. `unit`: the suffix of a unit. "
-        "`seed`: drawn during expansion; a spec cannot set it."
-    )
-    about: str = Field(description="What the parameter is.")
-    unit: str | None = Field(
-        None,
-        description="The unit that the template expects, or `target` for the unit of the changed variable. "
-        "Default: no unit.",
-    )
-    optional: bool = Field(
-        False, description="Whether a spec can omit the parameter. The template then gets `none`."
-    )
-    min: float | None = Field(None, description="The minimum, in the parameter's unit.")
-    max: float | None = Field(None, description="The maximum, in the parameter's unit.")
-    neutral: float | None = Field(
-        None, description="The value with which a fault changes nothing. Plans and `try` warn about it."
-    )
-    choices: list[str] = Field(
-        [], description="The terms that a `choice` allows. The template writes them verbatim."
-    )
 
 
 class _ExampleModel(StrictModel, title="An example"):
@@ -102,7 +75,7 @@ class FaultModelModel(StrictModel, title="The file"):
         "is a call, passed as `called` and `arguments`. `statement`: the anchored statement on "
         "one line. `next_statement`: also the statement after it; a guard then wraps both.",
     )
-    params: dict[str, _ParamModel] = Field(default_factory=dict, description="Name -> parameter.")
+    params: dict[str, Written[Param]] = Field(default_factory=dict, description="Name -> parameter.")
     examples: list[_ExampleModel] = Field(min_length=1, description="At least one.")
 
 
@@ -178,7 +151,7 @@ def _load(path: Path) -> FaultModel:
     )
 
 
-def _param(name: str, model: _ParamModel, source: Source) -> ParamSchema:
+def _param(name: str, param: Param, source: Source) -> ParamSchema:
     keys = ("params", name)
     if not name.isidentifier() or units.split(name)[1]:
         raise source.error(keys, f"parameter '{name}'", expected="an identifier without a unit suffix")
@@ -189,16 +162,16 @@ def _param(name: str, model: _ParamModel, source: Source) -> ParamSchema:
             expected=f"a name other than these, which templates already use: {', '.join(_GIVEN)}",
             remedy="rename the parameter",
         )
-    if model.unit not in (None, TARGET_UNIT, *units.UNITS):
-        raise source.error((*keys, "unit"), f"'{model.unit}'", expected=f"target or one of {units.KNOWN}")
-    if (model.type == "choice") != bool(model.choices):
-        state = "no `choices`" if model.type == "choice" else "`choices`"
+    if param.unit not in (None, TARGET_UNIT, *units.UNITS):
+        raise source.error((*keys, "unit"), f"'{param.unit}'", expected=f"target or one of {units.KNOWN}")
+    if (param.type == "choice") != bool(param.choices):
+        state = "no `choices`" if param.type == "choice" else "`choices`"
         raise source.error(
             keys,
-            f"parameter '{name}' of type {model.type} has {state}",
+            f"parameter '{name}' of type {param.type} has {state}",
             expected="`choices` for a choice, and only for a choice",
         )
-    return ParamSchema(name=name, **model.model_dump() | {"choices": tuple(model.choices)})
+    return ParamSchema(name=name, **asdict(param))
 
 
 def _text(path: Path) -> str:

@@ -2,12 +2,13 @@
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
 from typing import Literal
 
 from mutator._common.text import suggestion
+from mutator._common.yaml_records import mapping, written
 from mutator.config.sources import Source
 from mutator.errors import MutatorError
 from mutator.faults.injections import InjectionSpec
@@ -15,8 +16,6 @@ from mutator.faults.probe_templates import ProbeTemplates
 
 FILES = ("*.yaml", "*.j2")  # what a templates folder consists of
 TARGET_UNIT = "target"
-# `variable`: a name known at the anchor; `import`: the dotted name of something in a module of the target;
-# `constant`: a number, truth value, text or None; `choice`: one of a few terms; `unit`: the suffix of a unit.
 ParamType = Literal[
     "variable", "import", "number", "integer", "boolean", "constant", "choice", "unit", "seed"
 ]
@@ -41,23 +40,50 @@ class Needs(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ParamSchema:
-    """One parameter of a model.
+class Param:
+    """The key is the parameter's name without a unit. A spec adds the unit: `by_m` for the parameter `by`."""
 
-    `unit` is None (a plain number), 'target' (the unit of the changed variable), or the unit that the
-    template expects (`s`). `min` and `max` are inclusive, in that unit. With the value `neutral` the model
-    changes nothing. `choices` lists the terms of a `choice`.
-    """
+    __pydantic_config__ = mapping("A parameter")
+
+    type: ParamType = field(
+        metadata=written(
+            "The type of a value. `variable`: a name in the function. `import`: a dotted name to import. "
+            "`number`, `integer`, `boolean`: a value of that type. `constant`: a number, truth value, text "
+            "or null. `choice`: one of the terms in `choices`. `unit`: the suffix of a unit. `seed`: drawn "
+            "during expansion; a spec cannot set it."
+        )
+    )
+    about: str = field(metadata=written("What the parameter is."))
+    unit: str | None = field(
+        default=None,
+        metadata=written(
+            "The unit that the template expects, or `target` for the unit of the changed variable. Default: "
+            "no unit."
+        ),
+    )
+    optional: bool = field(
+        default=False,
+        metadata=written("Whether a spec can omit the parameter. The template then gets `none`."),
+    )
+    min: float | None = field(default=None, metadata=written("The minimum, in the parameter's unit."))
+    max: float | None = field(default=None, metadata=written("The maximum, in the parameter's unit."))
+    neutral: float | None = field(
+        default=None,
+        metadata=written("The value with which a fault changes nothing. Plans and `try` warn about it."),
+    )
+    choices: tuple[str, ...] = field(
+        default=(),
+        metadata=written(
+            "The terms that a `choice` allows. The template writes them verbatim.", strict=False
+        ),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ParamSchema(Param):
+    """A parameter of a model, with its name."""
 
     name: str
-    type: ParamType
-    about: str
-    unit: str | None = None
-    optional: bool = False
-    min: float | None = None
-    max: float | None = None
-    neutral: float | None = None
-    choices: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
