@@ -15,7 +15,7 @@ from mutator.errors import BadOutput, Shortage
 from mutator.outcomes.golden import alerts_of, compare, load_record, load_trace, sharing_times, trace_digest
 from mutator.outcomes.importers import npz
 from mutator.store.run_folder import GoldenRun
-from mutator.targets.channels import Channel
+from mutator.targets.channels import Channel, Role
 from mutator.targets.criteria import Hazard
 
 T = np.arange(5) * 0.1
@@ -57,6 +57,25 @@ def test_a_channel_is_compared_at_its_own_times() -> None:
     assert compare(golden, {**faulty, "t": times[:3]}, [GAS], "t").t_first == T[3]
     later = {**golden, "gas@": own + 0.05}
     assert compare(golden, later, [GAS], "t").t_first == 0.0
+
+
+@pytest.mark.parametrize(
+    ("later", "first", "largest"),
+    [
+        ([0.0, 1.9, 2.5], 1.0, 7.0),  # the value 9 comes at 1.9 s instead of 1 s
+        ([0.0, 1.0, 2.5], 2.0, 4.0),
+        ([0.0, 1.0, 2.0], None, 0.0),
+    ],
+)
+def test_a_value_at_another_time_is_a_difference(
+    later: list[float], first: float | None, largest: float
+) -> None:
+    pedal = Channel(name="pedal", unit="-", role=Role.ACTUATOR, time="t_pedal")
+    values = np.array([2.0, 9.0, 5.0])
+    golden = {"t": np.arange(6.0), "pedal": values, "pedal@": np.array([0.0, 1.0, 2.0])}
+    found = compare(golden, golden | {"pedal@": np.array(later)}, [pedal], "t")
+    assert found.t_first == first
+    assert dict(found.max_dev) == {"pedal": largest}
 
 
 @pytest.mark.parametrize("times", [T, T + 0.01, T[:3]], ids=["equal", "others", "shorter"])

@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -9,50 +10,18 @@ import numpy as np
 import pytest
 
 from mutator.errors import BadOutput, MutatorError
-from mutator.outcomes.golden import Trace, compare, load_record, load_trace
+from mutator.outcomes.golden import Trace
 from mutator.outcomes.judging import Judged, judge_run, load_judged
-from mutator.targets.channels import Channel, Role
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.manifest_files import load_manifest
 
-# a cart rolls towards a wall, backs off, hits it, and goes through it
-T = np.array([0.0, 1.0, 2.0, 3.0, 4.0, 5.0])
-GAP = np.array([3.0, 1.0, 2.0, 0.0, -1.0, 4.0])
-SPEED = np.array([1.0, 2.0, -1.0, 2.0, 1.0, 0.0])
-HEAD = """\
-schema: target/2
-name: cart
-root: .
-package: cart
-files: ["cart/*.py"]
-step_s: 1
-entry: {module: cart.go, args: []}
-trace: {file: trace.npz, time: time}
-channels:
-  force: {unit: N, role: actuator}
-  gap: {unit: m, role: truth}
-  speed: {unit: m/s, role: truth}
-observation:
-  at: {file: cart/go.py, function: step, after_assign: now}
-  values:
-    gap: {is: now.gap, unit: m, about: to the wall}
-    speed: {is: now.speed, unit: m/s, about: towards it}
-  derived:
-    left: {is: gap / speed if speed > 0 else inf, unit: s, about: until contact}
-"""
+from .cart import GAP, SPEED, T, write_manifest
+
 Write = Callable[..., TargetManifest]
 
 
 @pytest.fixture
 def write(tmp_path: Path) -> Write:
-    def manifest(rest: str, **replaced: str) -> TargetManifest:
-        text = HEAD
-        for old, new in replaced.items():
-            text = text.replace(f"{old}:", f"{new}")
-        (tmp_path / "cart.yaml").write_text(text + rest)
-        return load_manifest(tmp_path / "cart.yaml")
-
-    return manifest
+    return partial(write_manifest, tmp_path)
 
 
 def judged(manifest: TargetManifest, golden_run: Trace | None = None, **channels: Any) -> Judged:
@@ -327,106 +296,3 @@ def test_temporal_logic_needs_even_steps(write: Write) -> None:
     manifest = write('hazards: {LATE: {stl: "speed < 3"}}\n')
     with pytest.raises(BadOutput, match="a step of 2 s at 4 s"):
         judged(manifest, time=np.array([0.0, 1, 2, 3, 4, 6]))
-
-
-@pytest.mark.parametrize("kind", ["npz", "csv", "parquet", "mcap"])
-def test_every_trace_format_gives_the_same_result(tmp_path: Path, kind: str) -> None:
-    import pandas as pd
-
-    places = ("/cart:force", "/cart:state.gap", "/cam:d") if kind == "mcap" else ("force", "gap", "seen")
-    force, gap, seen_at = (f"from: '{place}'" for place in places)
-    own_times = "" if kind == "mcap" else ", time: t_seen"
-    channels = (
-        f"  force: {{unit: N, role: actuator, {force}}}\n"
-        f"  gap: {{unit: m, {gap}}}\n"
-        f"  seen: {{unit: m, {seen_at}{own_times}}}\n"
-    )
-    head, _, rest = HEAD.partition("trace:")
-    _, _, rest = rest.partition("observation:")
-    steps = "/cart" if kind == "mcap" else "time"
-    trace_and_channels = f"trace: {{file: trace.{kind}, time: {steps}}}\nchannels:\n{channels}"
-    (tmp_path / "cart.yaml").write_text(
-        f"{head}{trace_and_channels}observation:{rest}"
-        'hazards: {HIT: {when: "gap <= 0", terminal: true}, SEEN: {when: "seen < 2"}}\n'
-    )
-    manifest = load_manifest(tmp_path / "cart.yaml")
-    path = tmp_path / manifest.trace_file
-    t_seen, seen = np.array([0.5, 3.5]), np.array([5.0, 1.0])
-    if kind == "npz":
-        np.savez(path, time=T, gap=GAP, force=SPEED, t_seen=t_seen, seen=seen)
-    elif kind == "mcap":
-        _write_mcap(path, t_seen, seen)
-    else:
-        frame = pd.DataFrame({"time": T, "gap": GAP, "force": SPEED})
-        frame = frame.join(pd.DataFrame({"t_seen": t_seen, "seen": seen}))
-        frame.to_csv(path, index=False) if kind == "csv" else frame.to_parquet(path)
-    _, found = load_judged(manifest, tmp_path)
-    assert found.hazards == (("HIT", 3.0), ("SEEN", 4.0))
-    trace = load_trace(manifest, tmp_path, manifest.channels)
-    assert trace["gap"].tolist() == GAP.tolist()
-    assert trace["seen@"].tolist() == t_seen.tolist()
-    assert load_record(manifest, tmp_path) == {"hazards": {}, "alerts": []}
-
-
-def test_a_channel_can_be_faster_than_the_steps(write: Write, tmp_path: Path) -> None:
-    """In a CSV trace, rows without a step's time belong to channels with their own times."""
-    fast = "trace: {file: trace.csv, time: time}"
-    text = (tmp_path / "cart.yaml", write("hazards: {}\n"))[0].read_text()
-    text = text.replace("trace: {file: trace.npz, time: time}", fast)
-    text = text.replace("  speed: {unit: m/s, role: truth}\n", "  heat: {unit: degC, time: t_heat}\n")
-    text = text.replace("hazards: {}", 'hazards: {HOT: {when: "heat > 5 and gap > 0"}}')
-    (tmp_path / "cart.yaml").write_text(text)
-    rows = ["time,gap,force,t_heat,heat", "0,3,1,0,1", ",,,0.5,2", "1,2,1,1,3", ",,,1.5,9", "2,1,1,2,9"]
-    (tmp_path / "trace.csv").write_text("\n".join(rows) + "\n")
-    manifest = load_manifest(tmp_path / "cart.yaml")
-    assert load_judged(manifest, tmp_path)[1].hazards == (("HOT", 2.0),)
-    assert load_trace(manifest, tmp_path, manifest.channels)["gap"].tolist() == [3.0, 2.0, 1.0]
-
-
-@pytest.mark.parametrize("times", [[0, 2, 1], [0, 1, np.nan], [0, np.inf, np.inf]])
-def test_times_must_increase(write: Write, tmp_path: Path, times: list[float]) -> None:
-    np.savez(tmp_path / "trace.npz", time=times, gap=GAP[:3], speed=GAP[:3], force=GAP[:3])
-    manifest = write("hazards: {}\n")
-    with pytest.raises(MutatorError, match="times of time that decrease or are missing"):
-        load_trace(manifest, tmp_path, manifest.channels)
-
-
-@pytest.mark.parametrize(
-    ("later", "first", "largest"),
-    [
-        ([0.0, 1.9, 2.5], 1.0, 7.0),  # the value 9 comes at 1.9 s instead of 1 s
-        ([0.0, 1.0, 2.5], 2.0, 4.0),
-        ([0.0, 1.0, 2.0], None, 0.0),
-    ],
-)
-def test_a_value_at_another_time_is_a_difference(
-    later: list[float], first: float | None, largest: float
-) -> None:
-    pedal = Channel(name="pedal", unit="-", role=Role.ACTUATOR, time="t_pedal")
-    values = np.array([2.0, 9.0, 5.0])
-    golden = {"t": T, "pedal": values, "pedal@": np.array([0.0, 1.0, 2.0])}
-    found = compare(golden, golden | {"pedal@": np.array(later)}, [pedal], "t")
-    assert found.t_first == first
-    assert dict(found.max_dev) == {"pedal": largest}
-
-
-def _write_mcap(path: Path, t_seen: np.ndarray, seen: np.ndarray) -> None:
-    import json
-
-    writer_of = pytest.importorskip("mcap.writer")
-    with path.open("wb") as file:
-        writer = writer_of.Writer(file)
-        writer.start()
-        schema = writer.register_schema(name="any", encoding="jsonschema", data=b"{}")
-        cart, cam = (
-            writer.register_channel(topic=t, message_encoding="json", schema_id=schema)
-            for t in ("/cart", "/cam")
-        )
-        rows = [(t, cart, {"force": f, "state": {"gap": g}}) for t, f, g in zip(T, SPEED, GAP, strict=True)]
-        rows += [(t, cam, {"d": d}) for t, d in zip(t_seen, seen, strict=True)]
-        for t, channel, data in sorted(rows, key=lambda row: row[0]):
-            ns = int(t * 1e9)
-            writer.add_message(
-                channel_id=channel, log_time=ns, publish_time=ns, data=json.dumps(data).encode()
-            )
-        writer.finish()
