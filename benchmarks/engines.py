@@ -26,7 +26,7 @@ from mutator.engines.jobs import Engine, Job  # noqa: E402
 from mutator.engines.reference import ReferenceEngine  # noqa: E402
 from mutator.execution.runner import Finished, Goldens, Runner  # noqa: E402
 from mutator.model import Experiment, Record  # noqa: E402
-from mutator.mutants.building import build  # noqa: E402
+from mutator.mutants.mutant_building import build  # noqa: E402
 from mutator.outcomes import golden  # noqa: E402
 from mutator.store.choices import Choices  # noqa: E402
 from mutator.store.run_folder import GoldenRun  # noqa: E402

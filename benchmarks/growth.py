@@ -22,7 +22,7 @@ from mutator.audit.seal import seals_of
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import Plan, make_plan
 from mutator.model import Activation, Experiment, Outcome, Record, Status
-from mutator.mutants.building import build
+from mutator.mutants.mutant_building import build
 from mutator.results import table_building
 from mutator.statistics.results_frame import load
 from mutator.store import digests, plan_file

@@ -29,10 +29,10 @@ from mutator.campaigns.plan import Planning
 from mutator.campaigns.run_provenance import add_stretch
 from mutator.execution.single_run import run_golden
 from mutator.model import Experiment, Record
-from mutator.mutants.building import build
+from mutator.mutants.mutant_building import build
 from mutator.outcomes.golden import load_trace
 from mutator.outcomes.series_sampling import Sampler
-from mutator.preflight import equivalence
+from mutator.preflight import equivalence_check
 from mutator.preflight.preflight_rules import digest_of
 from mutator.store import digests, plan_file
 from mutator.store.blocks import as_block
@@ -69,7 +69,7 @@ def make(size: int, out: Path) -> str:
     patches = patches_of(workspace, first)
     records = made_up_records(workspace, first)
     write_segments(folder, ids, records, patches)
-    equivalence.begin(out)
+    equivalence_check.begin(out)
     write_proof(folder, ids, records, patches)
     write_series(workspace, folder, ids, first)
     add_stretch(
@@ -235,9 +235,10 @@ def write_proof(
     """Write the sample of the equivalence check with the experiments' records."""
     lines = _bodies(records, patches)
     proof = Lines(
-        folder.path / equivalence.FOLDER / "0001-gw0.jsonl", {"plan": folder.head.plan, "schema": SCHEMA}
+        folder.path / equivalence_check.FOLDER / "0001-gw0.jsonl",
+        {"plan": folder.head.plan, "schema": SCHEMA},
     )
-    wanted = set(equivalence.sampled(folder))
+    wanted = set(equivalence_check.sampled(folder))
     counts = [0] * WORKERS
     for number, name in enumerate(ids):
         worker = number // PIECE % WORKERS

@@ -22,8 +22,8 @@ from mutator.campaigns.plan import make_plan
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Experiment
 from mutator.mutants.anchors import parse_file
-from mutator.mutants.building import build, build_directly
-from mutator.operators.chosen import find_mutations, sampled
+from mutator.mutants.mutant_building import build, build_directly
+from mutator.operators.mutation_selection import find_mutations, sampled
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.kinds import always
 from mutator.workspace import Workspace

@@ -31,7 +31,7 @@ from mutator.engines.jobs import Job  # noqa: E402
 from mutator.engines.reference import ReferenceEngine  # noqa: E402
 from mutator.execution.runner import Goldens, Runner  # noqa: E402
 from mutator.model import Experiment, Hold, Trigger  # noqa: E402
-from mutator.mutants.building import build  # noqa: E402
+from mutator.mutants.mutant_building import build  # noqa: E402
 from mutator.store.choices import Choices  # noqa: E402
 from mutator.store.lines import LineWriter  # noqa: E402
 from mutator.store.records import SCHEMA, line_of  # noqa: E402

@@ -21,7 +21,7 @@ from mutator.engines.jobs import Execution, Job
 from mutator.engines.reference import ReferenceEngine
 from mutator.execution.running import run_campaign
 from mutator.model import Experiment, Outcome, Record, Status
-from mutator.preflight import preflight, preflight_cache, preflight_rules
+from mutator.preflight import preflight_cache, preflight_checks, preflight_rules
 from mutator.store.check_results import FILE
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.lines import LineWriter
@@ -68,7 +68,7 @@ def masked(experiment: Experiment) -> Record:
 
 
 def make_up_checks(workspace: Workspace, folder: RunFolder) -> None:
-    looked_at = preflight._Checks(workspace, folder)
+    looked_at = preflight_checks._Checks(workspace, folder)
     goldens = {}
     for one in looked_at.keys:
         key = one.key

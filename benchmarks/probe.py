@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from mutator.engines.base_tree import BaseTree  # noqa: E402
-from mutator.mutants.building import build  # noqa: E402
+from mutator.mutants.mutant_building import build  # noqa: E402
 from mutator.mutants.probe import probe_path  # noqa: E402
 from mutator.triggers.kinds import always  # noqa: E402
 from mutator.workspace import Workspace  # noqa: E402

@@ -24,8 +24,8 @@ from markupsafe import Markup
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import make_plan
 from mutator.model import Experiment, Record, Trigger
-from mutator.mutants.building import build
-from mutator.mutants.readable_diffs import readable
+from mutator.mutants.mutant_building import build
+from mutator.mutants.readable_patches import readable
 from mutator.outcomes.series_sampling import Sampler
 from mutator.report import browse as report_browse
 from mutator.report import page as report_page

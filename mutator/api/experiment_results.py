@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from mutator.api.html import diff_html, facts_html, text_html
 from mutator.figures.run_plot import draw_run, marks_of
 from mutator.model import Experiment, Fault, Outcome, Record, Status, Trigger
-from mutator.mutants.readable_diffs import readable
+from mutator.mutants.readable_patches import readable
 from mutator.outcomes.golden import Trace, on_steps
 from mutator.outcomes.trace_files import own_times
 from mutator.outcomes.verdicts import reaction_time, severity_of, since_activation, since_manifestation

@@ -7,17 +7,17 @@ from pathlib import Path
 
 from mutator._common.shipped import write_library
 from mutator.api.selection import WorkspaceLike, open_workspace
-from mutator.checks import fast_engines, library_check
+from mutator.checks import fast_engine_check, library_check
 from mutator.checks.doctor import examine
-from mutator.checks.draws import unused_draws
-from mutator.checks.drive import check_drive
+from mutator.checks.drive_check import check_drive
 from mutator.checks.findings import Finding
+from mutator.checks.unused_draws import unused_draws
 from mutator.errors import MutatorError
 from mutator.mutants.anchors import parsed
-from mutator.mutants.listed_places import ListedPlace, places_of
-from mutator.onboarding.marks import unfilled
-from mutator.onboarding.new_library import write_library_for
-from mutator.onboarding.survey import look_at
+from mutator.mutants.possible_places import ListedPlace, places_of
+from mutator.onboarding.first_library import write_library_for
+from mutator.onboarding.source_survey import look_at
+from mutator.onboarding.todo_marks import unfilled
 from mutator.stpa.analysis import Analysis
 from mutator.stpa.checks import check_analysis
 from mutator.stpa.drawing import draw
@@ -89,9 +89,9 @@ def check_target(
     found = open_workspace(workspace)
     name = found.target_name(target)
     manifest = found.manifest(name)
-    driven = check_drive(found, name, scenarios) if drive else [fast_engines.loading(manifest)]
+    driven = check_drive(found, name, scenarios) if drive else [fast_engine_check.loading(manifest)]
     unused = unused_draws(found.specs(), found.fault_models())
-    return [*driven, fast_engines.variants(found, manifest), unused]
+    return [*driven, fast_engine_check.variants(found, manifest), unused]
 
 
 def check_hazard_analysis(

@@ -8,8 +8,8 @@ from mutator.api.html import diff_html, text_html
 from mutator.api.selection import Bench, FaultLike, TriggerLike, WorkspaceLike
 from mutator.errors import MutatorError
 from mutator.model import Fault, Trigger
-from mutator.mutants.building import Mutant, build, write_tree
-from mutator.mutants.readable_diffs import readable
+from mutator.mutants.mutant_building import Mutant, build, write_tree
+from mutator.mutants.readable_patches import readable
 from mutator.targets.manifest import TargetManifest
 
 

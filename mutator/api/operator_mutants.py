@@ -8,9 +8,9 @@ from mutator._common.text import counted
 from mutator.api.selection import Bench
 from mutator.errors import MutatorError
 from mutator.model import Fault, Limits
-from mutator.operators.chosen import find_mutations, sampled
-from mutator.operators.executed import GoldenDrive, lines_of
-from mutator.operators.names import operators_named
+from mutator.operators.executed_lines import GoldenDrive, lines_of
+from mutator.operators.mutation_selection import find_mutations, sampled
+from mutator.operators.operator_lookup import operators_named
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -24,7 +24,7 @@ from mutator.exports.write import export
 from mutator.model import OPERATORS
 from mutator.outcomes.fault_free import FaultFreeRun, alerts_by_drive, fault_free_runs, own_alerts
 from mutator.outcomes.golden import load_trace
-from mutator.preflight import equivalence
+from mutator.preflight import equivalence_check
 from mutator.report import building
 from mutator.report.stills import take_stills
 from mutator.results import counting
@@ -202,7 +202,7 @@ class Run(RunContents):
 
     def check_equivalence(self) -> None:
         """Raise CheckFailed if the equivalence check of the run failed."""
-        equivalence.judge(self.folder, self.folder.records())
+        equivalence_check.judge(self.folder, self.folder.records())
 
     def verify(self, *, rerun: int = 0, expect: str | None = None, repair: bool = False) -> Audit:
         """Audit the folder: see `mutator.verify`."""

@@ -20,7 +20,7 @@ from mutator._common.bounded import read_bounded
 from mutator._common.files import read_json
 from mutator._common.hashing import canonical, digest
 from mutator.campaigns.freezing import CSV
-from mutator.preflight.equivalence import FOLDER as PROOF
+from mutator.preflight.equivalence_check import FOLDER as PROOF
 from mutator.store import digests, plan_file
 from mutator.store.approvals import review_digest
 from mutator.store.check_results import FILE as CHECKS

@@ -22,7 +22,7 @@ from mutator.errors import MutatorError
 from mutator.faults.expansion import expand
 from mutator.faults.specs import FaultSpec
 from mutator.model import Experiment, Fault, Method, Trigger
-from mutator.operators.executed import GoldenDrive
+from mutator.operators.executed_lines import GoldenDrive
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.kinds import always, at_time, draw_time
 from mutator.workspace import Workspace

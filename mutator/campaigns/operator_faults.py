@@ -8,10 +8,10 @@ from mutator.campaigns.operator_selection import OperatorSelection, When
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Fault, Limits
-from mutator.operators.chosen import Found, find_mutations, sampled
-from mutator.operators.executed import Executed, GoldenDrive, lines_of
-from mutator.operators.facts import facts_of
+from mutator.operators.executed_lines import Executed, GoldenDrive, lines_of
+from mutator.operators.mutation_selection import Found, find_mutations, sampled
 from mutator.operators.mutations import Mutation
+from mutator.operators.statement_facts import facts_of
 from mutator.targets.manifest import TargetManifest
 
 

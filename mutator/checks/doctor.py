@@ -17,7 +17,7 @@ from packaging.requirements import Requirement
 
 from mutator._common.cores import usable_cores
 from mutator._common.text import counted
-from mutator.checks.fast_engines import loading
+from mutator.checks.fast_engine_check import loading
 from mutator.checks.findings import Finding, Level
 from mutator.engines.sandbox import shortcoming as shortcoming_of_sandbox
 from mutator.errors import MutatorError

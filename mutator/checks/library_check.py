@@ -17,10 +17,10 @@ from mutator.faults.readings import Readings
 from mutator.faults.specs import FaultSpec, Variant
 from mutator.model import Fault
 from mutator.mutants.anchors import parse_file
-from mutator.mutants.building import build
 from mutator.mutants.injection_edits import edits_of, injection_edit
+from mutator.mutants.mutant_building import build
 from mutator.mutants.splicing import apply_edits, in_lines, joined, unsplice
-from mutator.onboarding.marks import unfilled
+from mutator.onboarding.todo_marks import unfilled
 from mutator.stpa.checks import check_analysis
 from mutator.stpa.context_tables import ContextTable
 from mutator.targets.manifest import TargetManifest

@@ -11,7 +11,7 @@ from mutator.api.stored_experiments import StoredExperiment, newest_run, stored_
 from mutator.api.worst import worst_results
 from mutator.cli.console import NO_BREAK, STYLES, Terminal, short_path
 from mutator.errors import MutatorError
-from mutator.mutants.readable_diffs import readable
+from mutator.mutants.readable_patches import readable
 
 if TYPE_CHECKING:
     from mutator.api.experiment_results import ExperimentResult

@@ -14,7 +14,7 @@ from mutator.cli import completion
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json, Manifest, Place, Reading, Run, Seed, Value, Variant, with_place
 from mutator.errors import EXIT_HARNESS_ERRORS, MutatorError
-from mutator.mutants.readable_diffs import readable
+from mutator.mutants.readable_patches import readable
 
 _TRIED = Path("runs/try")
 EXPERIMENT_ID = re.compile(r"[0-9a-f]{4,16}")

@@ -12,7 +12,7 @@ from mutator.cli.console import Terminal
 from mutator.cli.options import Json, Manifest, Place, with_place
 
 if TYPE_CHECKING:
-    from mutator.mutants.listed_places import ListedPlace
+    from mutator.mutants.possible_places import ListedPlace
 
 PLACES_EXAMPLES = """\b
 Examples:

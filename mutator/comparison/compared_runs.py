@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from mutator.campaigns.filters import compile_filter
 from mutator.model import Experiment, Record, Value
-from mutator.preflight import equivalence
+from mutator.preflight import equivalence_check
 from mutator.results.plan_columns import PLAN_COLUMNS, plan_row
 from mutator.results.rows import Row, rows_of
 from mutator.results.table_reader import frame_of
@@ -61,7 +61,7 @@ def read_side(run: Path, only: str | None = None) -> Side:
     """
     folder = RunFolder.open(run)
     records = folder.records()
-    equivalence.judge(folder, records)
+    equivalence_check.judge(folder, records)
     accepts = compile_filter(only, PLAN_COLUMNS) if only else None
     experiments = tuple(e for e in plan_file.read_all(folder.path) if accepts is None or accepts(plan_row(e)))
     faults = {e.fault.id: e.fault for e in experiments}

@@ -13,7 +13,7 @@ from inspect import CO_ASYNC_GENERATOR, CO_COROUTINE, CO_GENERATOR, CO_OPTIMIZED
 from types import CodeType
 
 from mutator.errors import NotSwappable
-from mutator.mutants.imported_names import module_name
+from mutator.mutants.constant_imports import module_name
 from mutator.mutants.injected_lines import sets_values, tag_of
 from mutator.mutants.probe import Probe, probe_path
 from mutator.mutants.splicing import unsplice

@@ -35,7 +35,7 @@ from mutator.engines.run_home import OUTPUT, RunHome, is_disturbance, make_work
 from mutator.engines.threads import too_many, turned_off
 from mutator.errors import ForkServerLost, NotForkable, NotSwappable
 from mutator.model import Limits, Status
-from mutator.mutants.building import Mutant, build
+from mutator.mutants.mutant_building import Mutant, build
 from mutator.mutants.probe import Probe, probe_module, silent_report, state_after
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stopping import stop_source

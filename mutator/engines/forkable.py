@@ -9,7 +9,7 @@ from mutator.engines.registry import not_forkable
 from mutator.errors import ForkServerLost, MutatorError, NotForkable, NotSwappable
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Fault
-from mutator.mutants.building import build
+from mutator.mutants.mutant_building import build
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.kinds import always
 

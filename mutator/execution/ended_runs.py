@@ -4,7 +4,7 @@ from collections import Counter
 from dataclasses import asdict, dataclass
 
 from mutator.audit.seal import Seals
-from mutator.preflight.equivalence import Proof
+from mutator.preflight.equivalence_check import Proof
 from mutator.store import integrity, verified_runs
 from mutator.store.run_folder import RunFolder
 

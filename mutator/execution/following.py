@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 from mutator.execution.session import Session
-from mutator.preflight import equivalence
+from mutator.preflight import equivalence_check
 from mutator.store.progress import Progress, Tail
 
 _NOTIFY_S = 0.5
@@ -38,7 +38,7 @@ def _stages(session: Session) -> Iterator[Progress]:
     while (progress := experiments.poll()).done < progress.total:
         yield progress
     yield progress
-    proof = Tail("proof", folder.path / equivalence.FOLDER, len(equivalence.sampled(folder)))
+    proof = Tail("proof", folder.path / equivalence_check.FOLDER, len(equivalence_check.sampled(folder)))
     while session.proof:
         yield proof.poll()
     while True:

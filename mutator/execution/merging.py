@@ -15,7 +15,7 @@ from mutator.audit.seal import OUTSIDE, without
 from mutator.campaigns.freezing import make_run_folder
 from mutator.campaigns.run_provenance import other_versions
 from mutator.errors import CheckFailed, MutatorError
-from mutator.preflight import equivalence
+from mutator.preflight import equivalence_check
 from mutator.results import table_building
 from mutator.results.ranking import worth
 from mutator.results.table_reader import frame_of
@@ -151,8 +151,8 @@ def _check_complete(folder: RunFolder) -> None:
             expected="a finished shard",
             remedy="resume it with the command that started it",
         )
-    equivalence.judge(folder, records)
-    if left := len(equivalence.left(folder)):
+    equivalence_check.judge(folder, records)
+    if left := len(equivalence_check.left(folder)):
         raise MutatorError(
             f"unfinished: its proof has {counted(left, 'experiment')} left to run",
             where=folder.path,

@@ -18,7 +18,7 @@ from mutator.errors import DiskFull, HarnessErrors, MutatorError, Shortage
 from mutator.execution.stopped_workers import on_stop
 from mutator.execution.worker import Assignment, Worker, bind_to_parent
 from mutator.execution.written_files import Sums
-from mutator.preflight.equivalence import Sample
+from mutator.preflight.equivalence_check import Sample
 
 INPUT = "mutator_campaign"
 PROBLEM = "mutator_problem"

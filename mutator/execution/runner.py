@@ -16,7 +16,7 @@ from mutator.engines.jobs import Engine, Execution, Job, RunMode
 from mutator.errors import BadAddition, BadOutput, InvalidMutant, MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Activation, AfterHazard, Experiment, Record, Status
-from mutator.mutants.building import Mutant, build
+from mutator.mutants.mutant_building import Mutant, build
 from mutator.mutants.probe import activation_of
 from mutator.outcomes import golden
 from mutator.outcomes.blame import assign_blame, error_of

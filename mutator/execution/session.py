@@ -34,8 +34,8 @@ from mutator.execution.ended_runs import Ended, ended_before, keep_end
 from mutator.execution.run_plan import open_frozen
 from mutator.execution.written_files import WrittenFiles
 from mutator.model import Record
-from mutator.preflight import equivalence
-from mutator.preflight.preflight import are_there, run_checks, unreached_triggers
+from mutator.preflight import equivalence_check
+from mutator.preflight.preflight_checks import are_there, describe_unreached_triggers, run_checks
 from mutator.results import table_building
 from mutator.results.ranking import worth
 from mutator.results.table_reader import Results
@@ -68,7 +68,7 @@ class Summary:
     problem: str  #: why the session ended early (disk full, a worker died); else empty
     interrupted: bool  #: whether a signal ended the session
     results: Path | None  #: path of results.csv; None if the disk was full
-    proof: equivalence.Proof | None  #: the equivalence check; None if none was needed
+    proof: equivalence_check.Proof | None  #: the equivalence check; None if none was needed
     seals: Seals  #: the digests to publish: the seal, the results digest and the review digest
     not_forked: (
         str  #: why no experiment was forked; empty if one was, or if the reference engine was requested
@@ -115,7 +115,7 @@ class Session:
         self.accept_versions = accept_versions
         self.notify: Notify = notify or (lambda progress: None)
         self.pending: tuple[Pending, ...] = ()
-        self.proof: tuple[equivalence.Sample, ...] = ()
+        self.proof: tuple[equivalence_check.Sample, ...] = ()
         self.manifest = workspace.manifest(folder.head.target)
         # count the whole plan, so that all shards and an unsharded run agree on whether a proof is needed
         experiments = folder.head.experiments
@@ -148,13 +148,13 @@ class Session:
         self._done_before = sum(one.counts for one in endings(records))
         left = pending(self.folder, records)
         if left and self.engine != REFERENCE:
-            equivalence.begin(self.folder.path)
-        self.proof = equivalence.left(self.folder)
+            equivalence_check.begin(self.folder.path)
+        self.proof = equivalence_check.left(self.folder)
         if left or self.proof or not are_there(self.folder):
             check_requirements(self.manifest)
             check_versions(self.folder, accept=self.accept_versions)
             run_checks(self.workspace, self.folder, workers=self.workers, notify=self.notify)
-            for remark in unreached_triggers(self.workspace, self.folder):
+            for remark in describe_unreached_triggers(self.workspace, self.folder):
                 warnings.warn(remark, MutatorWarning, stacklevel=2)
             self.folder = begin_stretch(
                 self.folder,
@@ -211,12 +211,16 @@ class Session:
             self._close_segments()
             built = table_building.ensure(self.folder.path)
             self._pack_series()
-        proven = equivalence.judge(self.folder, records)
+        proven = equivalence_check.judge(self.folder, records)
         not_forked = "" if proven else self._not_forked
-        if proven and done == self.folder.planned and (why := equivalence.needless(self.folder)) is not None:
+        if (
+            proven
+            and done == self.folder.planned
+            and (why := equivalence_check.needless(self.folder)) is not None
+        ):
             proven, not_forked = None, why
             with self._noting_full_disk():
-                equivalence.drop(self.folder)
+                equivalence_check.drop(self.folder)
         if done == self.folder.planned and (proven is None or proven.whole):
             with self._noting_full_disk():
                 self._close_segments(finished=True)

@@ -17,7 +17,7 @@ from mutator.engines.reference import ReferenceEngine
 from mutator.errors import CheckFailed
 from mutator.execution.runner import Finished, Goldens, Runner
 from mutator.model import Experiment, Limits, Record, Status
-from mutator.mutants.building import Mutant
+from mutator.mutants.mutant_building import Mutant
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest

@@ -8,7 +8,7 @@ from mutator._common.files import ScratchFolder
 from mutator.errors import MutatorError
 from mutator.execution.single_run import manifest_of, run_single
 from mutator.model import Status
-from mutator.preflight import equivalence
+from mutator.preflight import equivalence_check
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -43,7 +43,7 @@ def driven_again(workspace: Workspace, folder: RunFolder, ids: Sequence[str]) ->
             known, found = records[name], single.record
             if known != found:
                 yield MutatorError(
-                    f"{name} rerun: {equivalence.difference(found, known)}",
+                    f"{name} rerun: {equivalence_check.difference(found, known)}",
                     where=folder.path,
                     expected="the record of the campaign",
                 )

@@ -21,8 +21,8 @@ from mutator.engines.registry import make_engine
 from mutator.execution.runner import Finished, Goldens, Runner, without_outcome
 from mutator.execution.written_files import Sums
 from mutator.model import Experiment, Status
-from mutator.preflight import equivalence
-from mutator.preflight.equivalence import Sample
+from mutator.preflight import equivalence_check
+from mutator.preflight.equivalence_check import Sample
 from mutator.store import plan_file
 from mutator.store.planned import Planned
 from mutator.store.run_folder import RunFolder
@@ -96,7 +96,7 @@ class Worker:
         experiment was forked, nothing is run.
         """
         if self._needs_proof is None:
-            self._needs_proof = equivalence.needless(self.folder) is None
+            self._needs_proof = equivalence_check.needless(self.folder) is None
         if not self._needs_proof:
             return []
         if self._prover is None:

@@ -8,13 +8,13 @@ from mutator._common.interrupts import held
 from mutator._common.text import counted, suggestion
 from mutator.errors import MutatorError
 from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS, Anchor, AnchorKind, FaultLocation
-from mutator.mutants.expression_choice import as_written, choose_expression, valid_nth
+from mutator.mutants.constants_and_defaults import FixedValue, choose_fixed, find_fixed
+from mutator.mutants.expression_anchors import as_written, choose_expression, valid_nth
 from mutator.mutants.expressions import Expression, expressions_of
-from mutator.mutants.fixed_values import FixedValue, choose_fixed, find_fixed
-from mutator.mutants.functions_alone import outer_functions
-from mutator.mutants.parsing import import_line, libcst_module, python_tree, reading, refuse_unfit
-from mutator.mutants.places import Place, places_by_ast
-from mutator.mutants.scopes import as_compiled, function_names
+from mutator.mutants.name_scopes import as_compiled, function_names
+from mutator.mutants.node_positions import Place, places_by_ast
+from mutator.mutants.source_parsing import import_line, libcst_module, python_tree, reading, refuse_unfit
+from mutator.mutants.standalone_functions import outer_functions
 from mutator.mutants.statements import Function, Statement, collect
 from mutator.targets.source_tree import SourceTree
 

@@ -15,7 +15,7 @@ import libcst as cst
 
 from mutator.model import AnchorKind
 from mutator.mutants.expression_roles import Found, Role, expressions_in, source_of
-from mutator.mutants.places import Positions
+from mutator.mutants.node_positions import Positions
 
 # line and column, from 0; in `Expression`, columns count bytes, elsewhere characters
 _Point = tuple[int, int]

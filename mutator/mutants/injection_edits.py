@@ -10,13 +10,12 @@ from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel, FaultModels, Needs, SnippetKind
 from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS, AnchorKind, Injection
 from mutator.mutants.anchors import ParsedFile, Site, parsed
+from mutator.mutants.changed_file_reuse import reuse_key
+from mutator.mutants.constant_imports import importers
 from mutator.mutants.expressions import NO_PARTS, Expression, parts_of
-from mutator.mutants.imported_names import importers
 from mutator.mutants.injected_lines import ORIGINAL, asks, asks_for, set_constant, set_default
+from mutator.mutants.name_scopes import as_compiled, moved_names
 from mutator.mutants.probe import injection_id
-from mutator.mutants.rendering import changed_value, snippet
-from mutator.mutants.reusable_changes import reuse_key
-from mutator.mutants.scopes import as_compiled, moved_names
 from mutator.mutants.splicing import (
     Edit,
     ValueEdit,
@@ -28,6 +27,7 @@ from mutator.mutants.splicing import (
     value_change,
 )
 from mutator.mutants.statement_texts import written_out
+from mutator.mutants.template_rendering import changed_value, snippet
 from mutator.targets.locations import check_location
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.source_tree import SourceTree

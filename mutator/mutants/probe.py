@@ -16,7 +16,7 @@ from mutator.config.locations import PROBE_NAME
 from mutator.errors import MutatorError
 from mutator.faults.probe_templates import ProbeTemplates, TemplatePart
 from mutator.model import Activation, Hold, Injection, Trigger
-from mutator.mutants.rendering import render
+from mutator.mutants.template_rendering import render
 from mutator.targets.observation import Observation
 from mutator.triggers.conditions import TIME, check_condition, to_code
 

@@ -14,8 +14,8 @@ from itertools import pairwise
 
 from mutator.errors import MutatorError
 from mutator.mutants.anchors import ParsedFile, Site
+from mutator.mutants.constants_and_defaults import FixedValue
 from mutator.mutants.expressions import Expression
-from mutator.mutants.fixed_values import FixedValue
 from mutator.mutants.injected_lines import asks, changed_value, import_statement, tag_instead, tag_of, tagged
 
 

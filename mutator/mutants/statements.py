@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import libcst as cst
 
 from mutator.config.locations import assignable
-from mutator.mutants.places import Place, Positions, function_place, line_after, statement_place
-from mutator.mutants.scopes import FunctionNames, as_compiled
+from mutator.mutants.name_scopes import FunctionNames, as_compiled
+from mutator.mutants.node_positions import Place, Positions, function_place, line_after, statement_place
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,7 +13,7 @@ from mutator.model import Value
 if TYPE_CHECKING:
     from mutator.mutants.expressions import Expression
     from mutator.mutants.statements import Statement
-    from mutator.operators.facts import Facts
+    from mutator.operators.statement_facts import Facts
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

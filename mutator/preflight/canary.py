@@ -9,7 +9,7 @@ from mutator.engines.jobs import Job
 from mutator.errors import MutatorError
 from mutator.faults.expansion import expand
 from mutator.model import Experiment, Fault, fault_label
-from mutator.mutants.building import build
+from mutator.mutants.mutant_building import build
 from mutator.preflight.preflight_rules import CheckRun
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace

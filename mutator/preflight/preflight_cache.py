@@ -7,7 +7,7 @@ from pathlib import Path
 from mutator._common import caches, kept_folders
 from mutator._common.below import inside
 from mutator._common.hashing import digest
-from mutator.preflight.unreached import FOLDER
+from mutator.preflight.unreached_triggers import FOLDER
 
 
 def entry(key: str) -> Path:

@@ -13,8 +13,8 @@ from mutator._common.files import remove_folder
 from mutator.engines.jobs import Job
 from mutator.engines.reference import ReferenceEngine
 from mutator.model import Experiment
-from mutator.mutants.building import build
-from mutator.preflight import canary, unreached
+from mutator.mutants.mutant_building import build
+from mutator.preflight import canary, unreached_triggers
 from mutator.preflight.preflight_rules import CheckRun, look
 from mutator.store.progress import Pace, Progress
 from mutator.store.run_folder import RunFolder
@@ -102,7 +102,7 @@ class CheckDriver:
             if name[0] == GOLDEN and name[1].seed is not None:
                 caches.make_room(self.manifest.cache_name)
             if name[0] == NULL:
-                unreached.write_observed(self.kept, name[1].key, execution.watched.get("seen", ()))
+                unreached_triggers.write_observed(self.kept, name[1].key, execution.watched.get("seen", ()))
             if name[0] == GOLDEN and not run.problem:
                 place = inside(self.kept / "golden", name[1].key)
                 place.parent.mkdir(parents=True, exist_ok=True)

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from mutator._common.doors import OPERATORS
 from mutator._common.tables import Table
-from mutator.operators.names import find_operator
+from mutator.operators.operator_lookup import find_operator
 from mutator.reference.tables import generated
 from mutator.workspace import Workspace
 

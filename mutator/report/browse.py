@@ -17,7 +17,7 @@ from mutator._common.hashing import plain
 from mutator.config.locations import as_written_at
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Fault
-from mutator.mutants.readable_diffs import readable
+from mutator.mutants.readable_patches import readable
 from mutator.report.answer_parts import warnings_of
 from mutator.report.page_series import series_facts
 from mutator.report.panel import FOLDER

@@ -9,7 +9,7 @@ from functools import lru_cache
 from mutator._common.hashing import content_id
 from mutator.model import FaultLocation
 from mutator.mutants.injected_lines import adds_fault
-from mutator.mutants.readable_diffs import adds_file, file_patches
+from mutator.mutants.readable_patches import adds_file, file_patches
 from mutator.review.entries import Bound
 from mutator.review.patch_shapes import HOLE, without_values
 from mutator.targets.source_tree import SourceTree

@@ -29,9 +29,9 @@ from mutator.engines.reference import ReferenceEngine
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Fault, FaultLocation, Injection, Limits, Status
-from mutator.mutants.building import build
+from mutator.mutants.mutant_building import build
 from mutator.mutants.probe import probe_path
-from mutator.mutants.rendering import snippet
+from mutator.mutants.template_rendering import snippet
 from mutator.review.mutant_groups import Group
 from mutator.review.patch_shapes import parameter_values
 from mutator.targets.manifest import TargetManifest

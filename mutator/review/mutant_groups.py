@@ -20,10 +20,10 @@ from mutator.faults.fault_models import FaultModels
 from mutator.faults.specs import FaultSpec
 from mutator.model import Fault, Injection, Trigger
 from mutator.mutants.anchors import parsed
-from mutator.mutants.building import build
-from mutator.operators.enumeration import mutations_of
-from mutator.operators.facts import facts_of
-from mutator.operators.names import MODELS, operator_of
+from mutator.mutants.mutant_building import build
+from mutator.operators.mutation_listing import mutations_of
+from mutator.operators.operator_lookup import MODELS, operator_of
+from mutator.operators.statement_facts import facts_of
 from mutator.review import patch_shapes
 from mutator.review.called_code import CalledCode
 from mutator.review.decision_basis import Material, diffs_of, fault_hunks, functions_of

@@ -14,8 +14,8 @@ from itertools import chain
 from mutator._common.hashing import content_id
 from mutator.model import Fault, FaultLocation, Hold, Injection, Trigger, Value
 from mutator.mutants.injected_lines import INJECTION_ID, settings, tagged_additions
-from mutator.mutants.readable_diffs import adds_file, file_patches
-from mutator.operators.names import operator_of
+from mutator.mutants.readable_patches import adds_file, file_patches
+from mutator.operators.operator_lookup import operator_of
 from mutator.triggers.conditions import TIME, names_in
 
 Span = tuple[int, int, str]  # position of a value in a patch: begin, end, name (empty: not yet known)

@@ -18,7 +18,7 @@ from mutator._common.hashing import digest
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import make_plan
 from mutator.model import Activation, Experiment, Outcome, Record, Status
-from mutator.mutants.building import build
+from mutator.mutants.mutant_building import build
 from mutator.outcomes.series_sampling import Sampler, keep_series
 from mutator.report import building
 from mutator.report.panels import figures

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from mutator.mutants.building import unsplice
+from mutator.mutants.mutant_building import unsplice
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
 

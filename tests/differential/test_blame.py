@@ -25,7 +25,7 @@ from mutator.model import (
     Trigger,
     Value,
 )
-from mutator.mutants.building import build
+from mutator.mutants.mutant_building import build
 from mutator.triggers.kinds import at_time
 from mutator.workspace import Workspace
 

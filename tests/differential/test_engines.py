@@ -25,7 +25,7 @@ from mutator.model import (
     Value,
 )
 from mutator.mutants.anchors import parsed
-from mutator.mutants.building import build
+from mutator.mutants.mutant_building import build
 from mutator.triggers.kinds import always, at_time
 from mutator.workspace import Workspace
 

@@ -22,7 +22,7 @@ from mutator.execution.cluster.bundle import Bundle, read_inputs
 from mutator.execution.cluster.child import PieceRunner
 from mutator.execution.cluster.site import Site
 from mutator.execution.running import run_campaign
-from mutator.preflight.preflight import run_checks
+from mutator.preflight.preflight_checks import run_checks
 from mutator.store import plan_file
 from mutator.store.records import line_of
 from mutator.store.run_folder import RunFolder

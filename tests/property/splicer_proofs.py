@@ -16,7 +16,7 @@ from mutator.model import AnchorKind, Injection
 from mutator.mutants import splicing
 from mutator.mutants.anchors import ParsedFile, Site, parse_file
 from mutator.mutants.injection_edits import injection_edit
-from mutator.mutants.rendering import snippet
+from mutator.mutants.template_rendering import snippet
 from mutator.workspace import Workspace
 
 from .anchors_by_ast import AFTER, BEFORE, Spot, spots

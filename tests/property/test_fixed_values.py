@@ -12,7 +12,7 @@ import pytest
 
 from mutator.model import Anchor, AnchorKind, FaultLocation, Hold, Injection, Trigger
 from mutator.mutants.anchors import ParsedFile
-from mutator.mutants.fixed_values import FixedValue
+from mutator.mutants.constants_and_defaults import FixedValue
 from mutator.mutants.injection_edits import injection_edit
 from mutator.mutants.probe import probe_of, settings_of
 from mutator.mutants.splicing import apply_edits, in_lines, joined, probe_import, unsplice

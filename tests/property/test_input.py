@@ -18,7 +18,7 @@ from mutator.errors import MutatorError
 from mutator.faults.readings import UNDECLARED
 from mutator.faults.specs import load_spec
 from mutator.mutants.anchors import parse_file
-from mutator.mutants.rendering import literal, signed
+from mutator.mutants.template_rendering import literal, signed
 from mutator.triggers.conditions import check_condition, evaluate
 
 QUIET = [HealthCheck.function_scoped_fixture]

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from mutator.faults.expansion import expand
 from mutator.model import Fault, Hold, Trigger
-from mutator.mutants.building import build
+from mutator.mutants.mutant_building import build
 from mutator.review.patch_shapes import group_label, parameter_values, shapes
 from mutator.workspace import Workspace
 

@@ -19,9 +19,9 @@ from mutator.mutants.anchors import ParsedFile, parse_file
 from mutator.mutants.expressions import Expression
 from mutator.mutants.injection_edits import injection_edit
 from mutator.mutants.splicing import Edit, ValueEdit, apply_edits, in_lines, joined, unsplice
-from mutator.operators.enumeration import mutations_of
-from mutator.operators.facts import facts_of
+from mutator.operators.mutation_listing import mutations_of
 from mutator.operators.mutations import Mutation
+from mutator.operators.statement_facts import facts_of
 from mutator.targets.source_tree import SourceTree
 
 TEMPLATES = Path(__file__).parents[2] / "templates"

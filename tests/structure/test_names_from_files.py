@@ -37,13 +37,13 @@ ALLOWED = {  # joins of names that no file contains
     "execution/cluster/child.py: site.place / f'work-{os.getpid()}'": "a process id",
     "faults/imports.py: root / path": "only shown",
     "mutants/anchors.py: root / path": "only shown",
-    "mutants/imported_names.py: tree.root / path": "only shown",
-    "onboarding/new_library.py: folder / place.format(name=words['name'], entry=words['entry'])": (
+    "mutants/constant_imports.py: tree.root / path": "only shown",
+    "onboarding/first_library.py: folder / place.format(name=words['name'], entry=words['entry'])": (
         "letters, digits and _"
     ),
-    "onboarding/survey.py: Path(place, name)": "names from os.walk",
-    "onboarding/survey.py: root / name": "names from a folder's listing",
-    "operators/executed.py: scratch / 'work' / f'lines-{i}'": "a number",
+    "onboarding/source_survey.py: Path(place, name)": "names from os.walk",
+    "onboarding/source_survey.py: root / name": "names from a folder's listing",
+    "operators/executed_lines.py: scratch / 'work' / f'lines-{i}'": "a number",
     "review/called_code.py: folder / one.value": "only compared with the tree's paths",
     "review/effect_pictures.py: scratch / 'work' / f'pictures-{i}'": "a number",
     "store/cleaning.py: Path(folder, name)": "names from os.walk",

@@ -144,10 +144,10 @@ VIOLATIONS = {
         "mutator/faults/specs.py",
         "def f():\n    from mutator.campaigns import plan",
     ),
-    "cycle": ("mutator/mutants/patches.py", "from mutator.mutants import building"),
+    "cycle": ("mutator/mutants/patch_rendering.py", "from mutator.mutants import mutant_building"),
     "cycle of types": (
-        "mutator/mutants/patches.py",
-        "import typing\nif typing.TYPE_CHECKING:\n    from mutator.mutants import building",
+        "mutator/mutants/patch_rendering.py",
+        "import typing\nif typing.TYPE_CHECKING:\n    from mutator.mutants import mutant_building",
     ),
     "direction in the target": (
         "target/selfdrive/controls/controlsd.py",
@@ -195,7 +195,7 @@ SHOWN_BY_THE_COMMAND_LINE = {
     "mutator.engines.kinds",
     "mutator.execution.phases",
     "mutator.exports",
-    "mutator.mutants.readable_diffs",
+    "mutator.mutants.readable_patches",
     "mutator.review.group_columns",
     "mutator.review.readable_groups",
 }

@@ -14,7 +14,7 @@ from itertools import islice
 from mutator.campaigns.chunks import Pending
 from mutator.execution.cluster.pieces import Kind, Piece
 from mutator.execution.cluster.work_groups import Group, Run, faults_of, golden_of, groups_of
-from mutator.preflight.equivalence import Sample
+from mutator.preflight.equivalence_check import Sample
 from mutator.store import plan_file
 from mutator.store.plan_lines import id_of
 from mutator.store.run_folder import RunFolder

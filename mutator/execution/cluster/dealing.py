@@ -24,7 +24,7 @@ from mutator.execution.cluster.crew import Crew, describe
 from mutator.execution.cluster.intake import Intake
 from mutator.execution.cluster.pieces import Ending, Piece, Result
 from mutator.execution.session import Session
-from mutator.preflight import equivalence
+from mutator.preflight import equivalence_check
 from mutator.store.stretches import Machine
 
 _LOOK_S = 0.5  # between two checks of the present workers
@@ -171,7 +171,7 @@ class Deal:
     def _drop_needless_proof(self) -> None:
         if self._board.ran_all and self._session.proof and not self._forked:
             self._forked = True  # so that this is computed only once
-            if equivalence.needless(self._session.folder) is not None:
+            if equivalence_check.needless(self._session.folder) is not None:
                 self._board.drop_proof()
 
     async def _tend(self, one: _Tended) -> None:

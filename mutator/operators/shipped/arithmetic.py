@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 from mutator.mutants.expressions import Expression
 from mutator.operators import Operator, Rule, rule
-from mutator.operators.facts import Facts, extent
+from mutator.operators.statement_facts import Facts, extent
 
 _OTHERS: dict[type[ast.operator], tuple[str, ...]] = {
     ast.Add: ("-", "*", "/"),

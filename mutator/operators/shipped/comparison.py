@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 from mutator.mutants.expressions import Expression
 from mutator.operators import Operator, Rule, rule
-from mutator.operators.facts import Facts
+from mutator.operators.statement_facts import Facts
 
 _OTHERS: dict[type[ast.cmpop], tuple[str, ...]] = {
     ast.Lt: ("<=", ">", ">=", "==", "!="),

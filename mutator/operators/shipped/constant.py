@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from mutator.model import Value
 from mutator.mutants.expressions import Expression
 from mutator.operators import Operator, Rule, rule
-from mutator.operators.facts import Facts
+from mutator.operators.statement_facts import Facts
 
 
 def _rules(expression: Expression, facts: Facts) -> Iterator[Rule]:

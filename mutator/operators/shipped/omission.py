@@ -2,7 +2,7 @@
 
 from mutator.mutants.statements import Statement
 from mutator.operators import Operator
-from mutator.operators.facts import Facts
+from mutator.operators.statement_facts import Facts
 
 
 def _omits(statement: Statement, facts: Facts) -> bool:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from mutator.model import AnchorKind
 from mutator.mutants.expressions import Expression
 from mutator.operators import Operator, Rule, rule
-from mutator.operators.facts import Facts
+from mutator.operators.statement_facts import Facts
 
 _EMPTY: tuple[tuple[tuple[type[ast.expr], ...], str], ...] = (
     ((ast.List, ast.ListComp), "[]"),

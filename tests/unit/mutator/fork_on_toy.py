@@ -8,7 +8,7 @@ from mutator.engines.fork import ForkEngine
 from mutator.engines.fork_pool import Pool
 from mutator.engines.jobs import Execution, Job
 from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection, Limits, Trigger
-from mutator.mutants.building import build
+from mutator.mutants.mutant_building import build
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.kinds import always
 from mutator.workspace import Workspace

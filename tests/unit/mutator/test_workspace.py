@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from mutator.errors import MutatorError, Outside
-from mutator.onboarding.marks import unfilled
+from mutator.onboarding.todo_marks import unfilled
 from mutator.workspace import Workspace
 
 CLONE = Path(__file__).parents[3]

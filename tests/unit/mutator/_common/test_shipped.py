@@ -10,7 +10,7 @@ from mutator._common import shipped
 from mutator._common.shipped import refuse_shipped, shipped_folder, write_library
 from mutator.errors import MutatorError
 from mutator.faults.expansion import expand
-from mutator.mutants.building import build
+from mutator.mutants.mutant_building import build
 from mutator.triggers.kinds import always
 from mutator.workspace import Workspace
 

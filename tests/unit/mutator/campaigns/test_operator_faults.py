@@ -13,7 +13,7 @@ from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import Plan, load_plan, make_plan
 from mutator.errors import MutatorError
 from mutator.model import Hold, Limits, Method
-from mutator.operators.executed import Executed, GoldenDrive
+from mutator.operators.executed_lines import Executed, GoldenDrive
 from mutator.review.mutant_groups import of_plan
 from mutator.store.choices import Choices
 from mutator.targets.manifest import TargetManifest

@@ -9,7 +9,7 @@ import pytest
 from mutator.checks.library_check import check_library
 from mutator.faults.expansion import expand
 from mutator.model import Fault, Hold
-from mutator.mutants.building import build
+from mutator.mutants.mutant_building import build
 from mutator.mutants.probe import probe_path
 from mutator.mutants.splicing import unsplice
 from mutator.targets.source_tree import matches

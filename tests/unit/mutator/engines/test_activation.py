@@ -8,7 +8,7 @@ import pytest
 
 from mutator.engines.activation import Observed, Start, first_active
 from mutator.model import Hold, Trigger
-from mutator.mutants.building import build
+from mutator.mutants.mutant_building import build
 from mutator.mutants.probe import Probe, state_after
 from mutator.triggers.kinds import always, at_time
 from mutator.workspace import Workspace

@@ -17,7 +17,7 @@ from mutator.engines.jobs import Engine, RunMode
 from mutator.errors import MutatorError
 from mutator.execution.runner import Finished, Goldens, Runner
 from mutator.model import AfterHazard, Experiment, Method, Outcome, Record, Status
-from mutator.mutants.building import build
+from mutator.mutants.mutant_building import build
 from mutator.outcomes.golden import until
 from mutator.targets.stopping import stop_source
 from mutator.triggers import over_time

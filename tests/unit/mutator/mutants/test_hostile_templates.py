@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 
 from mutator.faults.fault_models import SnippetKind
-from mutator.mutants.rendering import render, snippet
 from mutator.mutants.template_language import MOST_CHARACTERS
+from mutator.mutants.template_rendering import render, snippet
 from tests.costs import is_cheap, is_refused
-from tests.unit.mutator.mutants.test_rendering import model
+from tests.unit.mutator.mutants.test_template_rendering import model
 
 SOURCE = "distances(" + ", ".join(f"a{i}" for i in range(2000)) + ")"
 NAMES = {"fi": "ab12", "by": 2.0, "n": 10**9, "target": "x", "original": SOURCE, "arguments": ["a"] * 2000}

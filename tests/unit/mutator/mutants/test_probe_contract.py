@@ -17,9 +17,9 @@ from mutator.faults.fault_model_files import load_fault_models
 from mutator.faults.probe_templates import CODE, SETTINGS
 from mutator.model import Activation, Hold, Trigger
 from mutator.mutants import probe as contract
-from mutator.mutants.building import build
 from mutator.mutants.injected_lines import settings
-from mutator.mutants.rendering import render
+from mutator.mutants.mutant_building import build
+from mutator.mutants.template_rendering import render
 from mutator.workspace import Workspace
 
 TRIGGER = Trigger(name="near", condition="hwt < 2.0 and rs > 0.0", armed_after_s=0.25)

@@ -9,13 +9,13 @@ import pytest
 from mutator._common.doors import OPERATORS
 from mutator.errors import MutatorError
 from mutator.mutants.anchors import parsed
-from mutator.mutants.building import build, build_directly
-from mutator.operators.chosen import Found, find_mutations, sampled
-from mutator.operators.enumeration import mutations_of
-from mutator.operators.equal_code import distinct
-from mutator.operators.facts import facts_of
+from mutator.mutants.mutant_building import build, build_directly
+from mutator.operators.equal_code_filter import distinct
+from mutator.operators.mutation_listing import mutations_of
+from mutator.operators.mutation_selection import Found, find_mutations, sampled
 from mutator.operators.mutations import Mutation
-from mutator.operators.names import find_operator, operators_named
+from mutator.operators.operator_lookup import find_operator, operators_named
+from mutator.operators.statement_facts import facts_of
 from mutator.targets.source_tree import read_tree
 from mutator.triggers.kinds import always
 from mutator.workspace import Workspace

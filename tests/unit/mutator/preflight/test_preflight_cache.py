@@ -15,7 +15,7 @@ from mutator.campaigns.plan import make_plan
 from mutator.engines.jobs import Execution, Job
 from mutator.engines.reference import ReferenceEngine
 from mutator.preflight import preflight_cache
-from mutator.preflight.preflight import run_checks
+from mutator.preflight.preflight_checks import run_checks
 from mutator.preflight.preflight_rules import digest_of
 from mutator.store.choices import Choices
 from mutator.store.run_folder import RunFolder

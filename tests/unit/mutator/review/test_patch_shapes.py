@@ -6,7 +6,7 @@ import pytest
 
 from mutator.faults.expansion import expand
 from mutator.model import Fault, Hold, Trigger
-from mutator.mutants.building import build
+from mutator.mutants.mutant_building import build
 from mutator.review.patch_shapes import Shape, group_label, parameter_values, shapes, without_values
 from mutator.triggers.kinds import always, at_time
 from mutator.workspace import Workspace

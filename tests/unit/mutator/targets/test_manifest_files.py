@@ -8,7 +8,7 @@ from mutator._common import caches
 from mutator.errors import MutatorError, Outside
 from mutator.faults.expansion import expand
 from mutator.model import AnchorKind
-from mutator.mutants.building import build
+from mutator.mutants.mutant_building import build
 from mutator.targets.manifest_files import load_manifest
 from mutator.targets.source_tree import matches, read_tree
 from mutator.triggers.kinds import always

@@ -10,7 +10,7 @@ from mutator.checks.doctor import examine
 from mutator.errors import MutatorError
 from mutator.faults.expansion import expand
 from mutator.model import Outcome
-from mutator.mutants.building import build
+from mutator.mutants.mutant_building import build
 from mutator.report.film import Shot, _show
 from mutator.triggers.kinds import always
 from mutator.workspace import Workspace

@@ -21,7 +21,7 @@ from mutator.engines.base_tree import BaseTree
 from mutator.engines.jobs import Job
 from mutator.engines.reference import ReferenceEngine
 from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection, Limits, Status
-from mutator.mutants.building import build
+from mutator.mutants.mutant_building import build
 from mutator.targets.source_tree import matches
 from mutator.triggers.kinds import at_time
 from mutator.workspace import Workspace

@@ -12,7 +12,7 @@ from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import make_plan
 from mutator.execution.cluster.board import Board
 from mutator.execution.cluster.pieces import Kind, Piece
-from mutator.preflight.equivalence import Sample
+from mutator.preflight.equivalence_check import Sample
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace

@@ -1,0 +1,58 @@
+"""Checks whether a changed file compiles by compiling only its changed functions."""
+
+from collections import defaultdict
+from collections.abc import Iterable
+from dataclasses import replace
+
+from mutator.mutants.anchors import ParsedFile
+from mutator.mutants.changed_file_reuse import ReuseKey
+from mutator.mutants.splicing import Edit, Rank, apply_edits, in_order, joined
+from mutator.mutants.standalone_functions import compiled_alone
+
+
+def compile_changed(file: ParsedFile, edits: Iterable[Edit], key: ReuseKey) -> bool:
+    """Return whether the file certainly compiles with these edits and with all others that have this key.
+
+    True if the changed functions compile, both with these edits and with normalized ones, and the file
+    compiles with the import of the probe. False is inconclusive.
+    """
+    as_they_are = in_order(edits)
+    normalized = [
+        replace(edit, lines=tuple(text.encode(file.encoding).splitlines(keepends=True)))
+        for edit, (*_, text) in zip(as_they_are, key, strict=True)
+    ]
+    return all(_all_compile(file, some) for some in (as_they_are, normalized))
+
+
+def _all_compile(file: ParsedFile, edits: Iterable[Edit]) -> bool:
+    functions: dict[range, list[Edit]] = defaultdict(list)
+    outside: list[Edit] = []
+    for edit in edits:
+        function = file.outer_function(edit.index - 1 if edit.rank is Rank.AFTER else edit.index)
+        if function is None or edit.rank is Rank.AFTER_WHOLE:  # such lines are between functions
+            outside.append(edit)
+        else:
+            functions[function].append(edit)
+    return _compile_with(file, tuple(outside)) and all(
+        _compiles(file, function, own) for function, own in functions.items()
+    )
+
+
+def _compile_with(file: ParsedFile, outside: tuple[Edit, ...]) -> bool:
+    """Return whether the file compiles with `outside`, and `outside` has at most the probe's import."""
+    if len(outside) > 1 or any(edit.index != file.import_line for edit in outside):
+        return False
+    if outside not in file.sound:
+        try:
+            compile(joined(apply_edits(file, outside)), "<import>", "exec", dont_inherit=True)
+        except (SyntaxError, ValueError, RecursionError):
+            return False
+        file.sound.add(outside)
+    return True
+
+
+def _compiles(file: ParsedFile, function: range, edits: Iterable[Edit]) -> bool:
+    alone = replace(file, lines=file.lines[function.start : function.stop])
+    moved = [replace(edit, index=edit.index - function.start) for edit in edits]
+    data = joined(apply_edits(alone, moved))
+    return compiled_alone(data.splitlines(keepends=True), file.encoding) is not None

@@ -1,0 +1,133 @@
+"""Finds modules that import a constant by name, because the constant must be set there, too."""
+
+import ast
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from symtable import symtable
+
+from mutator.errors import MutatorError
+from mutator.mutants.expression_roles import blocks
+from mutator.mutants.name_scopes import set_by_functions
+from mutator.targets.source_tree import SourceTree
+
+_ALL = "*"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Import:
+    """`from module import name as known`, on a line (from 1)."""
+
+    module: str
+    name: str
+    known: str
+    line: int
+    inside: bool  # inside a class
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Imports:
+    path: str
+    module: str
+    names: tuple[_Import, ...]
+    set: frozenset[str]
+    exported: frozenset[str] | None = None  # the names in `__all__`, if they are literal strings
+
+
+def importers(tree: SourceTree, path: str, name: str) -> tuple[str, ...]:
+    """Return `module.NAME` for each import of the constant `name` from the module at `path`.
+
+    MutatorError if an import prevents setting the constant: a star import, an import into a class, or one in
+    a module that also sets the name in another way.
+    """
+    files = [tree.derived(file, _imports) for file in tree.files if file.endswith(".py")]
+    exported = {file.module: file.exported for file in files}
+    found, refused = [(module_name(path), name)], set[str]()
+    for known in found:  # grows during the loop: an imported name can be imported again
+        for file in files:
+            for one in file.names:
+                if (one.module, one.name) not in (known, (known[0], _ALL)):
+                    continue
+                reason = _refused(one, file, known[1], exported.get(known[0]))
+                if reason:
+                    refused.add(f"{file.path}:{one.line} {reason}")
+                elif one.name != _ALL and (file.module, one.known) not in found:
+                    found.append((file.module, one.known))
+    if refused:
+        raise MutatorError(
+            f"the constant '{name}' cannot be set everywhere: {'; '.join(sorted(refused))}",
+            where=tree.root / path,
+            expected="modules that import it by name and never assign to the name",
+            remedy="anchor where the constant is used",
+        )
+    return tuple(".".join(one) for one in found[1:])
+
+
+def _refused(one: _Import, file: _Imports, name: str, exported: frozenset[str] | None) -> str | None:
+    """Return why an import prevents setting the constant. `*` imports `exported`, if known."""
+    if one.name == _ALL:
+        meant = not name.startswith("_") if exported is None else name in exported
+        return "imports *" if meant else None
+    if one.inside:
+        return "imports it into a class"
+    return f"imports it, and also sets {one.known} in another way" if one.known in file.set else None
+
+
+def module_name(path: str) -> str:
+    return path.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+
+
+def _imports(path: str, data: bytes, root: Path) -> _Imports:
+    try:
+        tree, table = ast.parse(data), symtable(data, path, "exec")  # type: ignore[arg-type]  # as `compile`
+    except (SyntaxError, ValueError, RecursionError):
+        return _Imports(path=path, module=module_name(path), names=(), set=frozenset())
+    names = tuple(_of_body(tree.body, path, inside=False))
+    known = Counter(one.known for one in names if not one.inside)
+    assigned = {symbol.get_name() for symbol in table.get_symbols() if symbol.is_assigned()}
+    several = {name for name, count in known.items() if count > 1}
+    return _Imports(
+        path=path,
+        module=module_name(path),
+        names=names,
+        set=set_by_functions(data) | assigned | several,
+        exported=_exported(tree),
+    )
+
+
+def _exported(tree: ast.Module) -> frozenset[str] | None:
+    """Return the names in `__all__` if it is assigned once, as a list or tuple of literal strings."""
+    made = [node for node in ast.walk(tree) if isinstance(node, ast.Name) and node.id == "__all__"]
+    for node in tree.body:
+        if (
+            isinstance(node, ast.Assign)
+            and node.targets == made
+            and isinstance(node.value, ast.List | ast.Tuple)
+        ):
+            texts = [one.value for one in node.value.elts if isinstance(one, ast.Constant)]
+            return frozenset(map(str, texts)) if len(texts) == len(node.value.elts) else None
+    return None
+
+
+def _of_body(body: Iterable[ast.stmt], path: str, *, inside: bool) -> Iterator[_Import]:
+    """Yield the imports of a module and its classes, but not those in functions, which last for one call."""
+    for statement in body:
+        match statement:
+            case ast.ImportFrom(module=module, names=names, level=level, lineno=line):
+                source = ".".join(filter(None, (_package(path, level), module)))
+                for alias in names:
+                    known = alias.asname or alias.name
+                    yield _Import(module=source, name=alias.name, known=known, line=line, inside=inside)
+            case ast.ClassDef(body=inner):
+                yield from _of_body(inner, path, inside=True)
+            case ast.FunctionDef() | ast.AsyncFunctionDef():
+                pass
+            case _:
+                for block in blocks(statement):
+                    yield from _of_body(block, path, inside=inside)
+
+
+def _package(path: str, level: int) -> str:
+    """Return the package where a relative import of this level starts; empty for an absolute one."""
+    return ".".join(path.split("/")[:-level]) if level else ""

@@ -1,0 +1,218 @@
+"""Finds fixed values: constants of modules and classes, and defaults of parameters.
+
+Python computes them once, when it loads the module, before any fault is active. So the probe sets them while
+the fault is active, and restores them afterwards. A tagged line after the statement tells the probe where
+the values are.
+"""
+
+import ast
+import io
+import tokenize
+from bisect import bisect_left
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from mutator._common.text import suggestion
+from mutator.errors import MutatorError
+from mutator.model import AnchorKind, FaultLocation
+from mutator.mutants.expression_roles import blocks
+from mutator.mutants.name_scopes import as_compiled, set_by_functions
+
+_MADE_OTHERWISE = ("Enum", "Flag", "NamedTuple", "TypedDict")  # endings of base class names
+_Function = ast.FunctionDef | ast.AsyncFunctionDef
+_Scope = tuple[ast.ClassDef, ...]  # enclosing classes, from the outermost
+_Owner = ast.stmt | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FixedValue:
+    """A constant or a default, on lines `first` to `last` (from 0, `last` exclusive)."""
+
+    kind: AnchorKind
+    function: str
+    name: str  # `LIMIT`, `Class.LIMIT` or a parameter of `function`
+    first: int
+    last: int
+    index: int  # the tagged line is inserted before this line, indented by `indent`
+    indent: bytes
+    path: str  # dotted path from the module, in the compiler's spelling
+    reason: str | None = None  # why the value cannot be set
+
+
+def find_fixed(data: bytes, tree: ast.Module) -> tuple[FixedValue, ...]:
+    """Return all fixed values of a file, in source order.
+
+    If a constant is assigned several times, the last assignment is used.
+    """
+    found: dict[tuple[AnchorKind, str, str], tuple[FixedValue, _Owner]] = {}
+    for one, owner in _Finder(data).of_body(tree.body, ()):
+        key = (one.kind, one.function, one.name)
+        _, before = found.pop(key, (None, owner))
+        if before is not owner:
+            what = "functions" if one.kind is AnchorKind.DEFAULT else "classes"
+            one = replace(one, reason=f"several {what} have the same name")
+        found[key] = one, owner
+    rebound = set_by_functions(data)
+    return tuple(
+        replace(one, reason="a function also sets it")
+        if one.kind is AnchorKind.CONSTANT and one.path in rebound
+        else one
+        for one, _ in found.values()
+    )
+
+
+def parameters(arguments: ast.arguments) -> Iterator[tuple[str, ast.expr]]:
+    """Yield the parameters that have a default, each with its default."""
+    places = [*arguments.posonlyargs, *arguments.args]
+    with_default = places[len(places) - len(arguments.defaults) :]
+    for argument, value in zip(with_default, arguments.defaults, strict=True):
+        yield argument.arg, value
+    for argument, keyword in zip(arguments.kwonlyargs, arguments.kw_defaults, strict=True):
+        if keyword is not None:
+            yield argument.arg, keyword
+
+
+class _Finder:
+    """Walks the bodies of a module and its classes, and yields each value with its class or function."""
+
+    def __init__(self, data: bytes) -> None:
+        self.lines = data.splitlines(keepends=True)
+        tokens = tokenize.tokenize(io.BytesIO(data).readline)
+        self.ends = [token.start[0] for token in tokens if token.type == tokenize.NEWLINE]
+
+    def of_body(
+        self, body: Sequence[ast.stmt], scope: _Scope, around: ast.stmt | None = None
+    ) -> Iterator[tuple[FixedValue, _Owner]]:
+        for statement in body:
+            whole = around or statement
+            match statement:
+                case ast.ClassDef():
+                    yield from self.of_body(statement.body, (*scope, statement))
+                case ast.FunctionDef() | ast.AsyncFunctionDef():
+                    yield from self.defaults(statement, scope, whole)
+                case ast.Assign(targets=targets, value=value):
+                    yield from self.constants(targets, value, scope, whole)
+                case (
+                    ast.AnnAssign(target=target, value=ast.expr() as value)
+                    | ast.AugAssign(target=target, value=value)
+                ):
+                    yield from self.constants([target], value, scope, whole)
+                case _:
+                    for block in blocks(statement):
+                        yield from self.of_body(block, scope, whole)
+
+    def constants(
+        self, targets: Iterable[ast.expr], value: ast.expr, scope: _Scope, whole: ast.stmt
+    ) -> Iterator[tuple[FixedValue, _Owner]]:
+        for name in (name for target in targets for name in _names(target)):
+            index, indent = self.place(whole)
+            yield (
+                FixedValue(
+                    kind=AnchorKind.CONSTANT,
+                    function="",
+                    name=".".join((*_of(scope), name)),
+                    first=value.lineno - 1,
+                    last=value.end_lineno or 0,
+                    index=index,
+                    indent=indent,
+                    path=_path(scope, name),
+                    reason=_not_a_constant(scope[-1], value) if scope else None,
+                ),
+                scope[-1] if scope else None,
+            )
+
+    def defaults(
+        self, function: _Function, scope: _Scope, whole: ast.stmt
+    ) -> Iterator[tuple[FixedValue, _Owner]]:
+        for name, value in parameters(function.args):
+            index, indent = self.place(whole)
+            yield (
+                FixedValue(
+                    kind=AnchorKind.DEFAULT,
+                    function=".".join((*_of(scope), function.name)),
+                    name=name,
+                    first=value.lineno - 1,
+                    last=value.end_lineno or 0,
+                    index=index,
+                    indent=indent,
+                    path=_path(scope, function.name, name),
+                ),
+                function,
+            )
+
+    def place(self, whole: ast.stmt) -> tuple[int, bytes]:
+        line = self.lines[min(one.lineno for one in (whole, *getattr(whole, "decorator_list", ()))) - 1]
+        end = self.ends[bisect_left(self.ends, whole.end_lineno or 0)]
+        return end, line[: len(line) - len(line.lstrip(b" \t\f"))]
+
+
+def _names(target: ast.expr) -> Iterator[str]:
+    match target:
+        case ast.Name(id=name):
+            yield name
+        case ast.Tuple(elts=elements) | ast.List(elts=elements):
+            for element in elements:
+                yield from _names(element)
+        case ast.Starred(value=value):
+            yield from _names(value)
+
+
+def _of(scope: _Scope) -> Iterator[str]:
+    return (one.name for one in scope)
+
+
+def _path(scope: _Scope, *names: str) -> str:
+    """Return the dotted path from the module, with private names spelled as the compiler spells them."""
+    path, private = list[str](), ""
+    for name in (*_of(scope), *names):
+        hidden = private and name.startswith("__") and not name.endswith("__")
+        path.append(f"_{private}{name}" if hidden else name)
+        if len(path) <= len(scope):
+            private = name.lstrip("_")
+    return ".".join(path)
+
+
+def _not_a_constant(owner: ast.ClassDef, value: ast.expr) -> str | None:
+    for base in owner.bases:
+        name = ast.unparse(base)
+        if name.endswith(_MADE_OTHERWISE):
+            return f"its class derives from {name}, which does not allow a new value"
+    if isinstance(value, ast.Call) and ast.unparse(value.func).endswith("field"):
+        given = {keyword.arg for keyword in value.keywords}
+        if "default_factory" in given or not ({"default", None} & given or value.args):
+            return "the field has no default that is computed once"
+    return None
+
+
+def choose_fixed(known: Sequence[FixedValue], location: FaultLocation, where: Path) -> FixedValue:
+    """Return the constant or default that the location names.
+
+    MutatorError with candidates if there is none, or if it cannot be set.
+    """
+    kind, name = location.anchor.kind, as_compiled(location.anchor.name)
+    function = as_compiled(location.function)
+    alike = [one for one in known if one.kind is kind and one.function == function]
+    found = next((one for one in alike if one.name == name), None)
+    what = f"{kind.value} '{location.anchor.name}'" + (
+        f" in {location.function}" if location.function else ""
+    )
+    if found is None:
+        names = [one.name for one in alike if not one.reason]
+        raise MutatorError(
+            f"no {what}",
+            where=where,
+            expected=f"one of {', '.join(names)}"
+            if names
+            else "another kind of anchor: there is none of this kind",
+            remedy="write the name exactly as in the source" + suggestion(name, names),
+        )
+    if found.reason:
+        raise MutatorError(
+            f"the {what} cannot be set: {found.reason}",
+            where=where,
+            line=found.first + 1,
+            expected="a value that is computed once, when the module is loaded",
+            remedy="anchor where the value is used",
+        )
+    return found

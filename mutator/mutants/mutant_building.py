@@ -1,0 +1,213 @@
+"""Builds mutants: turns a fault and a trigger into changed files, a patch and an id."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from mutator._common.below import inside
+from mutator._common.hashing import content_id
+from mutator.errors import InvalidMutant, MutatorError
+from mutator.faults.fault_models import FaultModels
+from mutator.faults.probe_templates import CODE as PROBE_CODE
+from mutator.model import FIXED_ANCHORS, Fault, Hold, Trigger
+from mutator.mutants.anchors import ParsedFile, parsed
+from mutator.mutants.changed_file_reuse import (
+    Change,
+    ReusableChange,
+    always_compiles,
+    inserted_lines,
+    known_changes,
+    reuse_key,
+)
+from mutator.mutants.compile_check import compile_changed
+from mutator.mutants.injected_lines import OBSERVE_TAG, observe_call
+from mutator.mutants.injection_edits import InjectionEdit, edits_of
+from mutator.mutants.normalized_source import compiles, normalized
+from mutator.mutants.patch_rendering import changed_file, new_file
+from mutator.mutants.probe import Probe, probe_of, probe_path, settings_of
+from mutator.mutants.splicing import (
+    Edit,
+    ValueEdit,
+    apply_edits,
+    in_lines,
+    insertion,
+    joined,
+    probe_import,
+    unsplice,
+)
+from mutator.targets.manifest import TargetManifest
+from mutator.targets.source_tree import SourceTree
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mutant:
+    """A mutated tree, stored as its difference from the target.
+
+    The id depends only on fault, trigger, target and templates.
+    """
+
+    id: str
+    files: dict[str, bytes]  # full new content by path, including the probe
+    patch: str  # git style, a/ and b/ prefixes; applies with `patch -p1` at the root
+    tree_digest: str  # of the whole mutated tree
+    probe: Probe
+    injections: tuple[str, ...]  # ids used in tags and in the probe's report, in the fault's order
+
+    @cached_property
+    def patch_bytes(self) -> bytes:
+        """The patch as bytes, because sources need not be UTF-8."""
+        return self.patch.encode("utf-8", "surrogateescape")
+
+
+def build(manifest: TargetManifest, models: FaultModels, fault: Fault | None, trigger: Trigger) -> Mutant:
+    """Build the mutant of `manifest`'s tree with `fault` under `trigger`; without a fault, the null mutant.
+
+    `fault.hold` overrides `trigger.hold`. MutatorError with candidates if an anchor is missing or ambiguous,
+    InvalidMutant if the result does not compile.
+    """
+    return _build(manifest, models, fault, trigger, _ReusingSplicer(manifest.tree))
+
+
+def build_directly(
+    manifest: TargetManifest, models: FaultModels, fault: Fault | None, trigger: Trigger
+) -> Mutant:
+    """Like `build`, but splice and compile every file without reuse; `build` must return the same bytes."""
+    return _build(manifest, models, fault, trigger, _Splicer())
+
+
+def _build(
+    manifest: TargetManifest, models: FaultModels, fault: Fault | None, trigger: Trigger, splicer: "_Splicer"
+) -> Mutant:
+    injections = fault.injections if fault else ()
+    changes = edits_of(manifest, models, injections)
+    ids = tuple(change.id for change in changes)
+    hold = fault.hold if fault and fault.hold else trigger.hold
+    mutant_id = content_id([manifest.tree.digest, models.digest, fault.id if fault else None, trigger])
+    edits = _edits(manifest, changes)
+    probe_file = probe_path(manifest.package)
+    sets = any(one.location.anchor.kind in FIXED_ANCHORS for one in injections)
+    probe = _probe(manifest, models, mutant_id, trigger, hold, ids, sets)
+    text = probe.text
+    splicer.check_probe(text, (mutant_id, *ids), models.folder / PROBE_CODE)
+    files = {probe_file: text.encode()}
+    patches = {probe_file: new_file(probe_file, text)}
+    for path, file_edits in edits.items():
+        file = parsed(manifest.tree, path)
+        change = splicer.change(file, [probe_import(file, manifest.package), *file_edits], ids)
+        files[path], patches[path] = change.data, change.patch
+    return Mutant(
+        id=mutant_id,
+        files=dict(sorted(files.items())),
+        patch="".join(text for _, text in sorted(patches.items())),
+        tree_digest=manifest.tree.digest_with(files),
+        probe=probe,
+        injections=ids,
+    )
+
+
+def _edits(manifest: TargetManifest, changes: Sequence[InjectionEdit]) -> dict[str, list[Edit]]:
+    edits: dict[str, list[Edit | ValueEdit]] = {manifest.observation.location.path: [_observation(manifest)]}
+    for change in changes:
+        edits.setdefault(change.file.path, []).append(change.edit)
+    return {path: in_lines(parsed(manifest.tree, path), own) for path, own in edits.items()}
+
+
+def _observation(manifest: TargetManifest) -> Edit:
+    observation = manifest.observation
+    file = parsed(manifest.tree, observation.location.path)
+    site = file.resolve(observation.location)
+    return insertion(file, site, [observe_call(observation.expressions)], OBSERVE_TAG)
+
+
+def _probe(
+    manifest: TargetManifest,
+    models: FaultModels,
+    mutant_id: str,
+    trigger: Trigger,
+    hold: Hold,
+    ids: tuple[str, ...],
+    sets: bool,
+) -> Probe:
+    own = probe_path(manifest.package).removesuffix("py")
+    if taken := [path for path in manifest.tree.files if path.startswith((own, f"{own[:-1]}/"))]:
+        raise MutatorError(
+            f"the target has a file {taken[0]}",
+            where=manifest.root,
+            expected="no file of this name, because the probe uses it",
+            remedy="rename the target's file, or point the manifest at the original tree",
+        )
+    observation, step_s = manifest.observation, manifest.step_s
+    settings = settings_of(mutant_id, trigger, hold, ids, observation, step_s, sets=sets)
+    return probe_of(models.probe, settings)
+
+
+def _compile(data: bytes, where: Path) -> None:
+    try:
+        compile(data, str(where), "exec", dont_inherit=True)
+    except (SyntaxError, ValueError, RecursionError) as error:
+        line = error.lineno if isinstance(error, SyntaxError) else None
+        text = data.splitlines()[line - 1].decode("utf-8", "replace").strip() if line else ""
+        raise InvalidMutant(
+            f"the mutated file does not compile: {error.args[0]}" + (f" at `{text}`" if text else ""),
+            where=where,
+            remedy="correct the template, or anchor at another statement",
+        ) from None
+
+
+class _Splicer:
+    """Splices and compiles every file. `ids` are the ids in the injected lines."""
+
+    def check_probe(self, text: str, ids: Sequence[str], where: Path) -> None:
+        _compile(text.encode(), where)
+
+    def change(self, file: ParsedFile, edits: Sequence[Edit], ids: Sequence[str]) -> Change:
+        change = self.spliced(file, edits)
+        _compile(change.data, file.where)
+        return change
+
+    def spliced(self, file: ParsedFile, edits: Sequence[Edit]) -> Change:
+        pieces = apply_edits(file, edits)
+        data = joined(pieces)
+        if unsplice(data) != file.data:
+            raise InvalidMutant(
+                "removing the injected lines from the mutated file does not restore the original",
+                where=file.where,
+                remedy="anchor at another statement",
+            )
+        return Change(data=data, patch=changed_file(file.path, pieces))
+
+
+class _ReusingSplicer(_Splicer):
+    """Reuses a known change of a file if possible; otherwise splices the file and keeps the change."""
+
+    def __init__(self, tree: SourceTree) -> None:
+        self._tree = tree
+
+    def check_probe(self, text: str, ids: Sequence[str], where: Path) -> None:
+        if not compiles(normalized(text, ids).encode()):
+            super().check_probe(text, ids, where)
+
+    def change(self, file: ParsedFile, edits: Sequence[Edit], ids: Sequence[str]) -> Change:
+        known = known_changes(self._tree, file.path)
+        key = reuse_key(file, edits, ids)
+        if key in known:
+            found = known[key]
+            if isinstance(found, Change):  # only on reuse: most changes of values are used once
+                found = known[key] = ReusableChange.of(found)
+            return found.filled(inserted_lines(edits))
+        if compile_changed(file, edits, key):
+            known[key] = change = self.spliced(file, edits)
+            return change
+        change = super().change(file, edits, ids)
+        reusable = ReusableChange.of(change)
+        if always_compiles(file, reusable, key):
+            known[key] = reusable
+        return change
+
+
+def write_tree(manifest: TargetManifest, mutant: Mutant, dest: Path) -> None:
+    for path, data in {**manifest.tree.files, **mutant.files}.items():
+        place = inside(dest, path)
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.write_bytes(data)

@@ -1,0 +1,141 @@
+"""Parses a source file with both Python and LibCST, and refuses it if they disagree."""
+
+import ast
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from itertools import zip_longest
+from pathlib import Path
+
+import libcst as cst
+from libcst.metadata import MetadataWrapper, PositionProvider
+
+from mutator.errors import MutatorError
+from mutator.mutants.injected_lines import instrumented_line
+from mutator.mutants.node_positions import Positions, line_after
+
+MOST_NODES = 50_000  # of a file's syntax tree; LibCST takes about 0.1 ms and 4 kB for each
+MOST_LINKS = 500
+_LONE_CR = re.compile(rb"\r(?!\n)")
+
+
+def refuse_unfit(data: bytes, where: Path) -> None:
+    if found := _LONE_CR.search(data):
+        raise MutatorError(
+            "a line ends in CR alone",
+            where=where,
+            line=data[: found.start()].count(b"\n") + 1,
+            expected="LF or CRLF",
+            remedy="convert the file's line ends",
+        )
+    line = instrumented_line(data)
+    if line is not None:
+        raise MutatorError(
+            "the target uses the name `_fi` or a `# fi:` tag",
+            where=where,
+            line=line + 1,
+            expected="a tree without injected lines",
+            remedy="point the manifest at the original tree, or rename `_fi` in the target",
+        )
+
+
+def python_tree(data: bytes, where: Path) -> ast.Module:
+    try:
+        compile(data, str(where), "exec", dont_inherit=True)
+        tree = ast.parse(data)
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        message, line = (error.msg, error.lineno) if isinstance(error, SyntaxError) else (str(error), None)
+        raise MutatorError(
+            f"not valid Python: {message or 'nested too deeply'}",
+            where=where,
+            line=line,
+            remedy="correct the target's source",
+        ) from None
+    _check_size(tree, where)
+    return tree
+
+
+def _check_size(tree: ast.Module, where: Path) -> None:
+    """Refuse what would take LibCST long, or end the process: it recurses along chains."""
+    for number, node in enumerate(ast.walk(tree), start=1):
+        links = len(node.values) if isinstance(node, ast.BoolOp) else 0
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            names = [alias.name for alias in node.names] + [getattr(node, "module", None) or ""]
+            links = max(name.count(".") for name in names)
+        if number > MOST_NODES or links > MOST_LINKS:
+            long = f"`and`, `or` or a dotted name with {links} parts" if links > MOST_LINKS else "its size"
+            raise MutatorError(
+                f"too large to be changed: {long}",
+                where=where,
+                line=getattr(node, "lineno", None) if links > MOST_LINKS else None,
+                expected=f"at most {MOST_NODES:,} nodes in its syntax tree, and chains of {MOST_LINKS}",
+                remedy="split the file, or inject into another one",
+            )
+
+
+@contextmanager
+def reading(where: Path) -> Iterator[None]:
+    """Turn the errors of LibCST on valid Python into MutatorError."""
+    try:
+        yield
+    except (cst.ParserSyntaxError, SyntaxError, UnicodeError, RecursionError) as error:
+        message, line = str(error), None
+        if isinstance(error, cst.ParserSyntaxError):
+            message = error.message.partition(": expected")[0]
+            # the tokenizer counts lines from the start of a part of the file
+            line = None if message.startswith("tokenizer") else error.raw_line
+        raise MutatorError(
+            f"LibCST cannot parse this file: {message}",
+            where=where,
+            line=line,
+            expected="Python that LibCST can parse, not nested too deeply",
+            remedy="rewrite the code, or inject into another file",
+        ) from None
+
+
+def libcst_module(data: bytes, where: Path) -> tuple[cst.Module, Positions]:
+    """Parse the file with LibCST; MutatorError unless LibCST reproduces the file's bytes."""
+    module = cst.parse_module(data)
+    given = module.bytes
+    if given != data:
+        pairs = zip_longest(data.splitlines(keepends=True), given.splitlines(keepends=True))
+        line = next(i for i, (one, other) in enumerate(pairs) if one != other)
+        text = b"".join(data.splitlines()[line : line + 1]).decode(errors="replace").strip()
+        raise MutatorError(
+            f"LibCST does not reproduce the line `{text}`",
+            where=where,
+            line=line + 1,
+            expected="no line with only a backslash, no form feed before code",
+            remedy="rewrite the code, or inject into another file",
+        )
+    return module, MetadataWrapper(module, unsafe_skip_copy=True).resolve(PositionProvider)
+
+
+def import_line(module: cst.Module, positions: Positions) -> int:
+    """Return the index of the line before which to insert imports: after docstring and `__future__`."""
+    after = None
+    for i, node in enumerate(module.body):
+        if not isinstance(node, cst.SimpleStatementLine):
+            break
+        small = node.body[0]
+        docstring = (
+            i == 0
+            and isinstance(small, cst.Expr)
+            and isinstance(small.value, cst.SimpleString | cst.ConcatenatedString)
+        )
+        future = (
+            isinstance(small, cst.ImportFrom)
+            and isinstance(small.module, cst.Name)
+            and small.module.value == "__future__"
+        )
+        if not (docstring or future):
+            break
+        after = line_after(node, positions)
+    if after is not None:
+        return after
+    return _first_line(module.body[0], positions) if module.body else len(module.header)
+
+
+def _first_line(node: cst.CSTNode, positions: Positions) -> int:
+    decorators = node.decorators if isinstance(node, cst.FunctionDef | cst.ClassDef) else ()
+    return min(positions[n].start.line for n in (node, *decorators)) - 1

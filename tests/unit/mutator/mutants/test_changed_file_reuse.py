@@ -1,0 +1,139 @@
+"""Reusable changes give the same result as splicing, in files of every form."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from mutator.errors import InvalidMutant, MutatorError
+from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection, Value
+from mutator.mutants import splicing
+from mutator.mutants.anchors import parse_file
+from mutator.mutants.changed_file_reuse import (
+    Change,
+    ReusableChange,
+    always_compiles,
+    inserted_lines,
+    known_changes,
+    reuse_key,
+)
+from mutator.mutants.mutant_building import build, build_directly
+from mutator.mutants.patch_rendering import changed_file
+from mutator.triggers.kinds import always
+from mutator.workspace import Workspace
+
+TEXTS = [
+    "def f():\n    x = 1\n    return x\n",
+    "def f():\r\n    x = 1\r\n    return x\r\n",
+    "def f():\n    x = 1",
+    "def f():\r\n    x = 1",
+    "def f():\n\tx = (\n\t  1)\n\treturn x\n",
+    "# coding: latin-1\ndef f():\n    x = '\xe9'\n",
+]
+SENSOR = "toycar/sensor.py"
+
+
+def change(text: str, code: str, name: str, guard: bool) -> tuple[ReusableChange, Change, list[bytes], bool]:
+    """Return the reusable change, the spliced change, the inserted lines, and whether all changes of this
+    kind compile."""
+    file = parse_file("m.py", text.encode("latin-1" if "latin" in text else "utf-8"), Path("root"))
+    kind = AnchorKind.BEFORE_ASSIGN if guard else AnchorKind.AFTER_ASSIGN
+    site = file.resolve(FaultLocation(path="m.py", function="f", anchor=Anchor(kind=kind, name="x")))
+    make = splicing.guard if guard else splicing.insertion
+    edits = [make(file, site, [code], name), splicing.probe_import(file, "pack")]
+    pieces = splicing.apply_edits(file, edits)
+    made = Change(data=splicing.joined(pieces), patch=changed_file("m.py", pieces))
+    reusable = ReusableChange.of(made)
+    compiles = always_compiles(file, reusable, reuse_key(file, edits, [name]))
+    return reusable, made, inserted_lines(edits), compiles
+
+
+@pytest.mark.parametrize("guard", [False, True])
+@pytest.mark.parametrize("text", TEXTS)
+def test_a_reusable_change_equals_the_spliced_one(text: str, guard: bool) -> None:
+    code = "if _fi.active('{}', {}):" if guard else "x = _fi.held('{}', {})"
+    reusable, _, _, compiles = change(text, code.format("00000001", 3.25), "00000001", guard)
+    other, made, lines, _ = change(text, code.format("abcdefab", 1e-300), "abcdefab", guard)
+    assert compiles
+    assert reusable == other
+    assert reusable.filled(lines) == made
+
+
+@pytest.mark.parametrize("text", TEXTS)
+def test_a_change_of_a_value_and_inserted_lines_can_be_reused_together(text: str) -> None:
+    file = parse_file("m.py", text.encode("latin-1" if "latin" in text else "utf-8"), Path("root"))
+
+    def changed(name: str, value: str) -> tuple[ReusableChange, Change, list[bytes]]:
+        anchor = Anchor(kind=AnchorKind.ASSIGNED_VALUE, name="x")
+        value_at = file.resolve_value(FaultLocation(path="m.py", function="f", anchor=anchor))
+        after = Anchor(kind=AnchorKind.AFTER_ASSIGN, name="x")
+        site = file.resolve(FaultLocation(path="m.py", function="f", anchor=after))
+        observes = splicing.insertion(file, site, ["_fi.observe(t=x)"], "observe")
+        edits = splicing.in_lines(file, [observes, splicing.value_change(file, value_at, value, name)])
+        pieces = splicing.apply_edits(file, edits)
+        made = Change(data=splicing.joined(pieces), patch=changed_file("m.py", pieces))
+        reusable = ReusableChange.of(made)
+        assert splicing.unsplice(made.data) == file.data
+        assert always_compiles(file, reusable, reuse_key(file, edits, [name]))
+        return reusable, made, inserted_lines(edits)
+
+    (reusable, *_), (other, made, lines) = changed("00000001", "3.25"), changed("abcdefab", "1e-300")
+    assert reusable == other
+    assert reusable.filled(lines) == made
+
+
+def test_a_change_that_compiles_only_with_some_values_is_not_reused() -> None:
+    assert not change(TEXTS[0], "x = 12345678", "12345678", False)[3]
+
+
+def fault(value: Value, **location: object) -> Fault:
+    anchor = Anchor(kind=AnchorKind.AFTER_ASSIGN, name="gap")
+    place = FaultLocation(**{"path": SENSOR, "function": "Sensor.measure", "anchor": anchor, **location})
+    injection = Injection(location=place, model="stuck", params=(("target", "gap"), ("value", value)))
+    return Fault(
+        spec="s",
+        module="m",
+        fault_type="f",
+        reading="r",
+        value=None,
+        unit="-",
+        aim="H1",
+        injections=(injection,),
+    )
+
+
+def test_a_change_is_reused_for_another_number(toy: Workspace) -> None:
+    """A different sign, a different type or a non-finite value needs a new change."""
+    manifest, models = toy.manifest("toy"), toy.fault_models()
+    known = known_changes(manifest.tree, SENSOR)
+    counts = []
+    for value in (1.0, 2.5, 1e-9, -1.0, float("nan"), 3, None):
+        assert build(manifest, models, fault(value), always()) == build_directly(
+            manifest, models, fault(value), always()
+        )
+        counts.append(len(known))
+    assert counts == [1, 1, 1, 2, 3, 4, 5]
+
+
+def test_a_reused_change_gives_the_same_errors(toy: Workspace, tmp_path: Path) -> None:
+    templates = Path(shutil.copytree(toy.templates, tmp_path / "templates"))
+    (templates / "stuck.py.j2").write_text(
+        "match {{ target }}:\n    case {1: a, {{ value }}: b}:\n        {{ target }} = a\n"
+    )
+    manifest = toy.manifest("toy")
+    models = Workspace(library=toy.library, templates=templates).fault_models()
+    build(manifest, models, fault(2), always())
+    for wrong in (
+        fault(1),
+        fault(2, function="Sensor.mesure"),
+        fault(True),
+        fault(2, path="../x"),
+    ):
+        said = []
+        for way in (build, build_directly):
+            with pytest.raises(MutatorError) as caught:
+                way(manifest, models, wrong, always())
+            said.append((type(caught.value), str(caught.value)))
+        assert said[0] == said[1]
+    with pytest.raises(InvalidMutant, match="does not compile"):
+        build(manifest, models, fault(1), always())

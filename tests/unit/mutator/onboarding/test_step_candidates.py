@@ -1,0 +1,110 @@
+"""How the harness guesses a controller's step function and useful places for faults."""
+
+import ast
+
+import pytest
+
+from mutator.onboarding.source_survey import Module, Survey
+from mutator.onboarding.step_candidates import LoopCandidate, loop_candidates
+
+CAR = '''
+class World:
+    def advance(self, gas):
+        self.speed = self.speed + gas
+        return self.speed
+
+
+class SpeedController:
+    def __init__(self, gain, *, limit, start=0.0):
+        self.gain, self.limit = gain, limit
+        self.i = start
+        self.last = 0.0
+
+    def update(self, speed, wanted, *, dt, trim=0.0):
+        """Gas for a speed."""
+        error = wanted - speed
+        self.i += error * dt
+        gas = self.gain * error + self.i
+        if gas > self.limit:
+            gas = self.limit
+        label = f"{gas} of {self.limit}"
+        self.log[0] = gas - 1
+        self._seen = gas + 1
+        state, other = gas, error
+        return gas
+
+    @property
+    def control(self):
+        x = 1 + 1
+        return x
+
+    def _step(self):
+        x = 2 * 3
+        return x
+
+
+def clip(x):
+    low = min(x, 1.0)
+    return low
+
+
+def run(controller, world):
+    for _ in range(10):
+        world.advance(controller.update(world.speed, 3.0, dt=0.1))
+'''
+
+
+def candidates(**sources: str) -> tuple[LoopCandidate, ...]:
+    modules = tuple(Module(path=f"{name}.py", tree=ast.parse(text)) for name, text in sources.items())
+    return loop_candidates(Survey(root=None, packages=(), modules=modules))  # type: ignore[arg-type]
+
+
+def test_the_controllers_step_ranks_first() -> None:
+    first, *others = candidates(car=CAR)
+    assert (first.name, first.path, first.line) == ("SpeedController.update", "car.py", 14)
+    assert {one.name for one in others} == {"World.advance", "clip", "run"}
+
+
+def test_required_arguments_are_listed() -> None:
+    first, *_ = candidates(car=CAR)
+    assert first.needs == ("speed", "wanted", "dt")
+    assert first.builds == ("gain", "limit")
+
+
+def test_only_numbers_with_a_name_are_listed_as_values() -> None:
+    first, *_ = candidates(car=CAR)
+    assert [(value.name, value.line, value.nth) for value in first.values] == [
+        ("error", 16, None),
+        ("self.i", 17, None),
+        ("self._seen", 23, None),
+        ("gas", 18, 1),
+        ("gas", 20, 2),
+    ]
+
+
+def test_values_of_inner_functions_are_left_out() -> None:
+    (step,) = candidates(
+        a="def step(x):\n    def inner():\n        deep = x + 1\n    while x:\n        x = x - 1\n    try:\n"
+        "        y = abs(x)\n    except ValueError:\n        z = x * 2\n    return inner\n"
+    )
+    assert {value.name for value in step.values} == {"x", "y", "z"}
+
+
+def test_a_function_in_a_file_named_like_a_controller_ranks_first() -> None:
+    source = "def step(x):\n    y = x + 1\n    return y\n"
+    assert [one.path for one in candidates(a=source, pilot=source)] == ["pilot.py", "a.py"]
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "",
+        "x = 1\n",
+        "def step(x):\n    '''Only words.'''\n",
+        "class A:\n    pass\n",
+        "async def step(x):\n    y = x + 1\n    return y\n",
+    ],
+)
+def test_modules_without_a_step_have_no_candidate(source: str) -> None:
+    """A coroutine is not a candidate, because calling it runs nothing."""
+    assert candidates(a=source) == ()

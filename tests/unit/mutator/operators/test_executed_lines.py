@@ -1,0 +1,59 @@
+"""The lines that a golden run executes."""
+
+from pathlib import Path
+
+import pytest
+
+from mutator._common import caches
+from mutator.engines.jobs import Job
+from mutator.engines.reference import ReferenceEngine
+from mutator.errors import MutatorError
+from mutator.model import Limits, Status
+from mutator.operators import executed_lines
+from mutator.operators.executed_lines import GoldenDrive, lines_of
+from mutator.workspace import Workspace
+
+LIMITS = Limits(cpu_s=20, wall_s=60, memory_mb=1024, steps=500)
+
+
+def _number(path: Path, text: str) -> int:
+    return next(i for i, line in enumerate(path.read_text().splitlines(), 1) if text in line)
+
+
+def test_lines_are_recorded_from_the_first_observation(toycar: Workspace, tmp_path: Path) -> None:
+    manifest = toycar.manifest("toycar")
+    engine = ReferenceEngine(manifest, tmp_path, LIMITS)
+    plain, noted = (
+        engine.execute(
+            Job(name=name, scenario=toycar.scenario("A"), seed=7, lines=name == "noted"), tmp_path / name
+        )
+        for name in ("plain", "noted")
+    )
+    assert plain.status is noted.status is Status.OK
+    assert (plain.out / "log.npz").read_bytes() == (noted.out / "log.npz").read_bytes()
+    assert not plain.lines
+    sensing = manifest.root / "toycar" / "sensing.py"
+    lines = noted.lines["toycar/sensing.py"]
+    assert _number(sensing, "gap = world.gap") in lines
+    assert _number(sensing, "self.reading = (100.0") not in lines
+    assert "toycar/show.py" not in noted.lines
+
+
+def test_executed_lines_are_cached(
+    toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    manifest = toycar.manifest("toycar")
+    drive = GoldenDrive(scenario=toycar.scenario("A"), changes=(), seed=7)
+    runs: list[str] = []
+    measured = executed_lines._measured
+    monkeypatch.setattr(executed_lines, "_measured", lambda *given: (runs.append("run"), measured(*given))[1])
+    [first] = lines_of(manifest, [drive], LIMITS)
+    assert [first] == lines_of(manifest, [drive], LIMITS) and len(runs) == 1
+    [entry] = caches.of_lines().iterdir()
+    entry.write_text(entry.read_text().replace("[", "[1,", 1))
+    assert [first] == lines_of(manifest, [drive], LIMITS) and len(runs) == 2
+    broken = tmp_path / "broken.yaml"
+    broken.write_text("steps: many\n")
+    with pytest.raises(MutatorError, match="the golden run of broken"):
+        lines_of(manifest, [GoldenDrive(scenario=broken, changes=(), seed=7)], LIMITS)

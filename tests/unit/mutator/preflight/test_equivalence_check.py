@@ -1,0 +1,212 @@
+"""The equivalence check."""
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from mutator.api.audits import verify
+from mutator.engines.registry import choose_engine
+from mutator.errors import CheckFailed, MutatorError
+from mutator.execution.running import run_campaign
+from mutator.model import Experiment
+from mutator.preflight import equivalence_check
+from mutator.store import digests
+from mutator.store.choices import Choices
+from mutator.store.lines import LineWriter, read_segment
+from mutator.store.records import SCHEMA, read_records
+from mutator.store.run_folder import RunFolder
+from mutator.workspace import Workspace
+
+Reseal = Callable[..., None]
+
+
+def test_the_sample_has_every_fault_type_and_scenario(experiment: Callable[..., Experiment]) -> None:
+    many = [experiment(value, f"S{value % 5:.0f}") for value in range(3000)]
+    rare = experiment(1.0, "S9", spec="vision/rain/rate")
+    sample = equivalence_check.sample([*many, rare], 1)
+    assert 31 <= len(sample) <= 32
+    assert rare in sample
+    assert {e.scenario for e in sample} == {"S0", "S1", "S2", "S3", "S4", "S9"}
+    assert sample == equivalence_check.sample([*many, rare], 1)
+    assert sample != equivalence_check.sample([*many, rare], 2)
+    assert len(equivalence_check.sample(many[:100], 1)) == 20
+    assert set(equivalence_check.sample(many[:7], 1)) == set(many[:7])
+
+
+@pytest.fixture
+def proven(toycar: Workspace, tmp_path: Path) -> Path:
+    """A run folder with two experiments from the fork engine and their equivalence check."""
+    summary = run_campaign(toycar, "small", tmp_path / "run", engine="fork", choices=Choices(limit=2))
+    assert summary.proof == equivalence_check.Proof(sampled=2, same=2)
+    assert summary.exit_code == 0
+    return tmp_path / "run"
+
+
+@pytest.mark.slow
+def test_a_record_that_differs_fails_the_campaign(toycar: Workspace, proven: Path, reseal: Reseal) -> None:
+    (path,) = (proven / "records").iterdir()
+    lines = path.read_text().splitlines()
+    record = json.loads(lines[1])
+    path.write_text("\n".join([lines[0], json.dumps(record | {"trace_digest": "0" * 64}), *lines[2:], ""]))
+    reseal(proven)
+    with pytest.raises(CheckFailed, match=f"experiment {record['experiment_id']} .*trace_digest '000"):
+        run_campaign(toycar, "small", proven)
+
+
+@pytest.mark.slow
+def test_an_incomplete_check_is_resumed(toycar: Workspace, proven: Path, reseal: Reseal) -> None:
+    (path,) = (proven / "proof").iterdir()
+    path.write_text(path.read_text().splitlines()[0] + "\n")
+    reseal(proven, finished=False)
+    folder = RunFolder.open(proven)
+    assert len(equivalence_check.left(folder)) == 2
+    records = read_records(proven)
+    assert equivalence_check.judge(folder, records) == equivalence_check.Proof(sampled=2, same=0)
+    summary = run_campaign(toycar, "small", proven, engine="reference")
+    assert (summary.proof, summary.ran, summary.exit_code) == (
+        equivalence_check.Proof(sampled=2, same=2),
+        0,
+        0,
+    )
+    assert equivalence_check.left(folder) == ()
+
+
+@pytest.mark.slow
+def test_the_reference_engine_needs_no_proof(toycar: Workspace, tmp_path: Path) -> None:
+    summary = run_campaign(toycar, "small", tmp_path / "run", choices=Choices(limit=1))
+    assert summary.proof is None
+    assert not (tmp_path / "run" / "proof").exists()
+
+
+_BELIEVE = """
+    drive = Drive(case)
+    known = "0 0" if "--forget" in arguments else Path("{kept}").read_text()
+    drive.world.since, drive.world.more = map(float, known.split())
+    return drive
+"""
+
+
+@pytest.fixture
+def sharing(toycar: Workspace, tmp_path: Path) -> Workspace:
+    """A toy whose runs read the start and the rate of the car's drift from a shared file, unless `--forget`
+    is given."""
+    go, world = (tmp_path / "toy/tree/toycar" / name for name in ("go.py", "world.py"))
+    believe = _BELIEVE.replace("{kept}", str(tmp_path / "kept"))
+    go.write_text(go.read_text().replace("\n    return Drive(case)\n", believe))
+    line = "        self.frame += 1\n"
+    misled = line + "        self.offset += self.more * (now > self.since)\n"
+    world.write_text(world.read_text().replace(line, misled))
+    (path,) = (toycar.library / "targets").iterdir()
+    path.write_text(path.read_text().replace("entry:\n", "entry:\n  independent: [--forget]\n"))
+    return toycar
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("kept", "told"),
+    [
+        ("0.0 0.0", ""),
+        ("5.7 0.01", "differs on the reference engine"),
+        ("0.5 0.01", "in the proof: differs from the golden run at 0."),
+    ],
+)
+def test_an_error_that_runs_share_fails_the_campaign(
+    sharing: Workspace, tmp_path: Path, kept: str, told: str
+) -> None:
+    (tmp_path / "kept").write_text(kept)
+    out = tmp_path / "run"
+    try:
+        summary = run_campaign(sharing, "small", out, engine="fork", choices=Choices(limit=1))
+        found, code = " ".join(map(": ".join, summary.harness_errors)), summary.exit_code
+    except CheckFailed as err:
+        found, code = str(err), err.exit_code
+    (name,) = read_records(out)
+    if told:
+        assert code and name in found and told in found
+    else:
+        assert (code, found) == (0, "")
+
+
+def test_only_large_campaigns_fork_by_default(toycar: Workspace) -> None:
+    manifest = toycar.manifest("toycar")
+    assert choose_engine(None, manifest, 1000) == "fork"
+    assert choose_engine(None, manifest, 10) == "reference"
+    assert choose_engine("fork", manifest, 10) == "fork"
+    assert choose_engine("reference", manifest, 1000) == "reference"
+    plain = replace(manifest, stepwise=None)
+    assert choose_engine(None, plain, 1000) == "reference"
+    for asked, told in (("fork", "names no `entry.stepwise`"), ("turbo", "engine 'turbo'")):
+        with pytest.raises(MutatorError, match=told):
+            choose_engine(asked, plain, 1000)
+
+
+@pytest.fixture
+def threaded(toycar: Workspace, tmp_path: Path) -> Workspace:
+    """A toy that cannot be forked, because it starts a thread when it is loaded."""
+    go = tmp_path / "toy/tree/toycar/go.py"
+    wait = "wait = threading.Event().wait\nthreading.Thread(target=wait, name='poll', daemon=True).start()"
+    go.write_text(go.read_text().replace("class Drive:", f"import threading\n\n{wait}\n\n\nclass Drive:"))
+    return toycar
+
+
+@pytest.mark.slow
+def test_without_forks_there_is_no_equivalence_check(threaded: Workspace, tmp_path: Path) -> None:
+    summary = run_campaign(threaded, "small", tmp_path / "run", engine="fork", choices=Choices(limit=1))
+    assert (summary.proof, summary.exit_code) == (None, 0)
+    assert summary.not_forked.endswith("only one can be forked: besides the main one, 'poll'")
+    assert not (tmp_path / "run" / "proof").exists()
+    assert verify(tmp_path / "run", workspace=threaded).passed
+    other = run_campaign(threaded, "small", tmp_path / "other", engine="reference", choices=Choices(limit=1))
+    assert summary.seal == other.seal
+
+
+@pytest.mark.parametrize(
+    ("engine", "note"),
+    [
+        (
+            None,
+            "none is needed, because no experiment was forked: "
+            "forking pays off only with 40 or more experiments",
+        ),
+        pytest.param("reference", "", marks=pytest.mark.slow),
+    ],
+)
+def test_the_summary_says_that_a_campaign_is_too_small_to_fork(
+    toycar: Workspace, tmp_path: Path, engine: str | None, note: str
+) -> None:
+    summary = run_campaign(toycar, "small", tmp_path / "run", engine=engine, choices=Choices(limit=1))
+    assert (summary.proof, summary.proof_note) == (None, note)
+
+
+@pytest.mark.slow
+def test_runs_of_an_unneeded_check_are_deleted(threaded: Workspace, tmp_path: Path) -> None:
+    """If these runs stayed, the seal would depend on timing."""
+    run = tmp_path / "run"
+    seal = run_campaign(threaded, "small", run, engine="fork", choices=Choices(limit=2)).seal
+    folder = RunFolder.open(run)
+    (path,) = (run / "records").iterdir()
+    (run / "proof").mkdir()
+    lines = list(read_segment(path).objects(SCHEMA))
+    writer = LineWriter(run / "proof" / path.name, {"schema": SCHEMA, "plan": folder.head.plan})
+    for _, line in lines[:1]:
+        writer.append(line)
+    writer.close()
+    digests.close_segments(run)
+    assert equivalence_check.left(folder) == ()
+    summary = run_campaign(threaded, "small", run, engine="fork")
+    assert (summary.proof, summary.seal) == (None, seal)
+    assert not (run / "proof").exists()
+
+
+@pytest.mark.slow
+def test_an_experiment_that_must_run_again_can_be_forked(toycar: Workspace, tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    run_campaign(toycar, "small", run, engine="reference", choices=Choices(limit=2))
+    folder = RunFolder.open(run)
+    assert equivalence_check.needless(folder) is not None
+    for path in (run / "records").iterdir():
+        path.write_bytes(b"".join(path.read_bytes().splitlines(keepends=True)[:-1]))
+    assert equivalence_check.needless(RunFolder.unverified(run)) is None

@@ -1,0 +1,179 @@
+"""The checks before a campaign."""
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from mutator.campaigns import run_environment
+from mutator.campaigns.freezing import freeze
+from mutator.campaigns.plan import load_plan, make_plan
+from mutator.engines.reference import ReferenceEngine
+from mutator.errors import CheckFailed
+from mutator.preflight.canary import judge
+from mutator.preflight.preflight_checks import run_checks
+from mutator.preflight.preflight_rules import CheckRun
+from mutator.store.lines import LineWriter
+from mutator.store.progress import Progress
+from mutator.store.records import SCHEMA
+from mutator.store.run_folder import RunFolder
+from mutator.workspace import Workspace
+
+
+def frozen(toycar: Workspace, tmp_path: Path) -> RunFolder:
+    return freeze(make_plan(toycar, "small"), tmp_path / "run", toycar)
+
+
+def change(toycar: Workspace, old: str, new: str, name: str = "go") -> None:
+    path = toycar.library.parent / "tree" / "toycar" / f"{name}.py"
+    assert old in path.read_text()
+    path.write_text(path.read_text().replace(old, new))
+
+
+def test_a_sound_target_passes_and_is_not_checked_again(
+    toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = frozen(toycar, tmp_path)
+    told: list[Progress] = []
+    results = run_checks(toycar, folder, workers=2, notify=told.append)
+    assert {r.name for r in results} == {
+        "anchors",
+        "golden A",
+        "golden A+alone",
+        "null mutant A",
+        "null mutant A+alone",
+        "canary",
+    }
+    assert all(r.passed for r in results)
+    stages = [(one.stage, one.done, one.total) for one in told]
+    checks = [("checks", done, 3) for done in range(4)]
+    assert stages == checks + [("golden", done, 4) for done in range(5)]
+    assert load_plan(folder).cost(2).measured
+    monkeypatch.setattr(ReferenceEngine, "execute", None)
+    assert run_checks(toycar, folder) == results
+
+
+def test_a_damaged_golden_run_is_replaced(toycar: Workspace, tmp_path: Path) -> None:
+    folder = frozen(toycar, tmp_path)
+    run_checks(toycar, folder)
+    trace = folder.golden("A") / "log.npz"
+    good = trace.read_bytes()
+    trace.write_bytes(b"")
+    run_checks(toycar, folder)
+    assert trace.read_bytes() == good
+    shutil.rmtree(folder.golden("A", ("alone",)))
+    run_checks(toycar, folder)
+    assert folder.golden("A", ("alone",)).is_dir()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("case[\"gap\"] += number", "case[\"gap\"] += hash('x') % 9 + number", "nothing but PYTHONHASHSEED"),
+        ("npy(column))", "npy(column) + __import__('os').urandom(1))", "different bytes"),
+        ("case[\"gap\"] += number", "case[\"gap\"] -= 39.9 + number", "reaches H1 at 0 s without"),
+        ("import json\n", "import json\nimport nosuch\n", "crashed: ModuleNotFoundError"),
+        ("ZipFile(to / \"log.npz\"", "ZipFile(to / \"other.npz\"", "not a readable trace"),
+        ("now = world.advance", "now = 0\n        now = world.advance", "matches 2 statements"),
+        ("(to / \"said.json\")", "names = sorted(__import__('os').listdir(Path(__file__).parent))\n"
+         "        said['files'] = len([n for n in names if n.endswith('.py')])\n        (to / \"said.json\")",
+         "the probe alone changes what the target does"),
+    ],
+    ids=["hash order", "random", "hazard", "import", "no trace", "anchor", "sees the probe"],
+)  # fmt: skip
+def test_an_unsound_target_is_refused(
+    toycar: Workspace, tmp_path: Path, old: str, new: str, told: str
+) -> None:
+    change(toycar, old, new)
+    folder = frozen(toycar, tmp_path)
+    with pytest.raises(CheckFailed, match=re.escape(told)):
+        run_checks(toycar, folder)
+
+
+@pytest.mark.slow
+def test_an_observation_that_is_not_reached_is_refused(toycar: Workspace, tmp_path: Path) -> None:
+    change(toycar, "        drive.step()", "        Drive.other(drive)")
+    change(toycar, "    def step(self):", "    def step(self):\n        now = 0\n\n    def other(self):")
+    manifest = toycar.library / "targets" / "toycar.yaml"
+    manifest.write_text(
+        manifest.read_text()
+        .replace("d_rel: world.gap", "d_rel: now")
+        .replace("v_ego: world.speed", "v_ego: now")
+        .replace("v_lead: world.lead_speed", "v_lead: now")
+    )
+    with pytest.raises(CheckFailed, match="its trigger never fired"):
+        run_checks(toycar, frozen(toycar, tmp_path))
+
+
+def test_a_harmless_canary_is_refused(toycar: Workspace, tmp_path: Path) -> None:
+    """A harness that misses hazards would not notice them in a campaign either."""
+    path = toycar.campaign("small")
+    path.write_text(path.read_text().replace("at_s: 1.0", "at_s: 5.9"))
+    folder = frozen(toycar, tmp_path)
+    with pytest.raises(CheckFailed, match="canary: did not reach H3 with any of its values: ") as error:
+        run_checks(toycar, folder)
+    assert error.value.exit_code == 1
+    (spec,) = (spec for spec in toycar.specs() if spec.name == "sensor/lane")
+    faults = toycar.faults("sensor/lane", seed=3)
+    values = sorted((fault.value for fault in faults), reverse=True)
+    assert len(values) == spec.count == 4
+    assert error.value.got.endswith(", ".join(f"{value} m" for value in values))
+
+
+def test_a_canary_that_does_harm_with_another_value_passes(toycar: Workspace, tmp_path: Path) -> None:
+    change(toycar, "offset = world.offset", "shown = world.offset\n        offset = shown", "sensing")
+    change(toycar, "closing, offset))", "closing, shown if offset > 2.0 else offset))", "sensing")
+    results = run_checks(toycar, frozen(toycar, tmp_path))
+    (canary,) = (result for result in results if result.name == "canary")
+    assert canary.passed
+    assert re.fullmatch(r"reached H3 with 1\.\d+ m, and not with 2\.\d+ m", canary.detail)
+
+
+def test_a_missing_anchor_is_reported_before_any_run(
+    toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    change(toycar, "offset = world.offset", "shift = world.offset", "sensing")
+    change(toycar, "closing, offset))", "closing, shift))", "sensing")
+    folder = frozen(toycar, tmp_path)
+    monkeypatch.setattr(ReferenceEngine, "execute", None)
+    with pytest.raises(CheckFailed, match=r"anchors: sensor/lane/shifted: .*sensing\.py"):
+        run_checks(toycar, folder)
+
+
+@pytest.mark.slow
+def test_changed_golden_runs_are_refused(
+    toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = frozen(toycar, tmp_path)
+    run_checks(toycar, folder)
+    LineWriter(
+        folder.path / "records" / "0001-gw0.jsonl", {"schema": SCHEMA, "plan": folder.head.plan}
+    ).close()
+    monkeypatch.setattr(run_environment, "cpu", lambda: "another")
+    assert all(result.passed for result in run_checks(toycar, folder))
+    shutil.rmtree(folder.work)
+    before = {path: path.read_bytes() for path in folder.path.rglob("*") if path.is_file()}
+    monkeypatch.setattr(run_environment, "cpu", lambda: "a third")
+    original = ReferenceEngine.execute
+
+    def other(self: ReferenceEngine, job, folder):  # type: ignore[no-untyped-def]
+        execution = original(self, job, folder)
+        with (execution.out / "said.json").open("a") as file:
+            file.write(" ")
+        return execution
+
+    monkeypatch.setattr(ReferenceEngine, "execute", other)
+    with pytest.raises(CheckFailed, match="differs from the one this run began with"):
+        run_checks(toycar, folder)
+    shutil.rmtree(folder.work)
+    assert {path: path.read_bytes() for path in folder.path.rglob("*") if path.is_file()} == before
+
+
+def test_a_canary_whose_run_was_killed_is_run_again_once(toycar: Workspace, tmp_path: Path) -> None:
+    canary = frozen(toycar, tmp_path).canary
+    fine = CheckRun(problem="", hazards=(("H3", 1.0),))
+    runs = iter([CheckRun(problem="crashed: killed by SIGHUP"), fine])
+    assert judge([canary], lambda _: next(runs), "H3") == ("", "reached H3")
+    ended = iter([CheckRun(problem="crashed")] * 2)  # a third run is not allowed
+    assert "(crashed)" in judge([canary], lambda _: next(ended), "H3")[0]
