@@ -11,7 +11,7 @@ from mutator.checks import fast_engine_check, library_check
 from mutator.checks.doctor import examine
 from mutator.checks.drive_check import check_drive
 from mutator.checks.findings import Finding
-from mutator.checks.unused_draws import unused_draws
+from mutator.checks.unused_draws import unused_draws_finding
 from mutator.errors import MutatorError
 from mutator.mutants.anchors import parsed
 from mutator.mutants.possible_places import ListedPlace, places_of
@@ -90,7 +90,7 @@ def check_target(
     name = found.target_name(target)
     manifest = found.manifest(name)
     driven = check_drive(found, name, scenarios) if drive else [fast_engine_check.loading(manifest)]
-    unused = unused_draws(found.specs(), found.fault_models())
+    unused = unused_draws_finding(found.specs(), found.fault_models())
     return [*driven, fast_engine_check.variants(found, manifest), unused]
 
 

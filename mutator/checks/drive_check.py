@@ -18,7 +18,7 @@ from mutator.campaigns.campaign_expansion import Expansion
 from mutator.campaigns.campaign_files import Campaign, load_campaign
 from mutator.checks import fast_engine_check, nondeterminism_causes
 from mutator.checks.findings import Finding, Level
-from mutator.checks.first_difference import first_difference
+from mutator.checks.first_difference import describe_first_difference
 from mutator.checks.reachability import Reach
 from mutator.engines import forkable
 from mutator.engines.fork import ForkEngine
@@ -161,7 +161,7 @@ class _Drive:
         return self._not_deterministic(name, golden, by_hash=same.digest == first.digest)
 
     def _not_deterministic(self, name: str, golden: _Golden, *, by_hash: bool) -> Finding:
-        where = first_difference(self.manifest, golden.first.out, golden.again.out)
+        where = describe_first_difference(self.manifest, golden.first.out, golden.again.out)
         places, remedy = nondeterminism_causes.likely(self.manifest, self._noted(golden), by_hash=by_hash)
         which = ", but only if their hash seeds differ" if by_hash else ""
         likely = f"; likely {'cause' if len(places) == 1 else 'causes'}:" if places else ""

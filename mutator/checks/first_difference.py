@@ -13,7 +13,7 @@ from mutator.outcomes import golden
 from mutator.targets.manifest import TargetManifest
 
 
-def first_difference(manifest: TargetManifest, one: Path, other: Path) -> str:
+def describe_first_difference(manifest: TargetManifest, one: Path, other: Path) -> str:
     """Describe the first difference between two output folders; empty if there is none.
 
     The text names the channel, step and time, or the key of the record, and both values.

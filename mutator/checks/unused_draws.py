@@ -16,7 +16,7 @@ from mutator.faults.specs import FaultSpec
 _NAME = "draws"
 
 
-def unused_draws(specs: tuple[FaultSpec, ...], models: FaultModels) -> Finding:
+def unused_draws_finding(specs: tuple[FaultSpec, ...], models: FaultModels) -> Finding:
     places = [*_of_specs(specs, models), *_of_models(models)]
     if not places:
         return Finding(name=_NAME, level=Level.OK, found="all drawn values are used")
