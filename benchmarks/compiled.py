@@ -19,7 +19,7 @@ import cv2  # noqa: E402
 from selfdrive.common import compiled  # noqa: E402
 from selfdrive.sim.compile_helpers import compile_helpers  # noqa: E402
 from selfdrive.sim.detection_memory import FILE  # noqa: E402
-from selfdrive.sim.pictures import DETECTORS, Pictures  # noqa: E402
+from selfdrive.sim.picture_options import DETECTORS, Pictures  # noqa: E402
 from selfdrive.sim.run import simulate  # noqa: E402
 from selfdrive.sim.scenario import load_scenario  # noqa: E402
 from selfdrive.sim.trace_file import pieces  # noqa: E402

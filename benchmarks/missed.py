@@ -23,7 +23,7 @@ from selfdrive.sim.picture import Picture  # noqa: E402
 from selfdrive.sim.road_renderer import RoadRenderer  # noqa: E402
 from selfdrive.visiond.robust_detector import RobustDetector  # noqa: E402
 from selfdrive.visiond_lab.evaluate import TUSIMPLE, UDACITY  # noqa: E402
-from selfdrive.visiond_lab.looks import random_look  # noqa: E402
+from selfdrive.visiond_lab.random_looks import random_look  # noqa: E402
 
 CAMERAS = CameraModel(), UDACITY, TUSIMPLE
 EFFECTS: tuple[type[Effect], ...] = PaperRain, PaperSnow, PaperOcclusion

@@ -92,21 +92,26 @@ def answers(cache: Path) -> Iterator[object]:
 
 def choices() -> ModuleType:
     """Return the module of a version that lists its detectors and translations."""
-    name = "selfdrive.sim.pictures"
-    return import_module(name if find_spec(name) else "selfdrive.sim.vision")  # the latter in older versions
+    return first_module("picture_options", "pictures", "vision")
+
+
+def first_module(*names: str) -> ModuleType:
+    """Return the first module of the simulator that this version has; older versions have the later names."""
+    paths = (f"selfdrive.sim.{name}" for name in names)
+    return next(import_module(path) for path in paths if find_spec(path))
 
 
 class Drive:
     """Frames with an effect, from a moving car that never repeats a pose."""
 
     def __init__(self, detector: str, effect: str, cache: Path) -> None:
-        from selfdrive.sim import effects, vision
+        from selfdrive.sim import effects
         from selfdrive.sim.road import Road
 
         coded = detector == "as_coded"
         move = "as_coded" if coded else choices().GROUND
         pictures = choices().Pictures(detector=detector, cache=cache, translation=move)
-        self._seen = vision.build_vision(pictures, Road(None, None), 0)
+        self._seen = first_module("camera_and_detector", "vision").build_vision(pictures, Road(None, None), 0)
         self._offset = 0.1 * list(EFFECTS).index(effect)  # cases share no poses
         self._number = 0
         self._effect = None

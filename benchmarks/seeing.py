@@ -33,7 +33,7 @@ from selfdrive.sim.effects.levels import LEVELS  # noqa: E402
 from selfdrive.sim.moved_picture import CodedView  # noqa: E402
 from selfdrive.sim.picture import Picture  # noqa: E402
 from selfdrive.sim.picture_camera import PictureCamera  # noqa: E402
-from selfdrive.sim.pictures import Pictures  # noqa: E402
+from selfdrive.sim.picture_options import Pictures  # noqa: E402
 from selfdrive.sim.reference_plant import ReferencePlant  # noqa: E402
 from selfdrive.sim.scenario import REFERENCE, load_scenario, on_plant  # noqa: E402
 from selfdrive.sim.truth import GroundTruth  # noqa: E402

@@ -22,7 +22,7 @@ from selfdrive.sim.detection_memory import FILE  # noqa: E402
 from selfdrive.sim.image_library import SPACING, open_library  # noqa: E402
 from selfdrive.sim.moved_picture import GroundView, ShiftedView  # noqa: E402
 from selfdrive.sim.picture import Picture  # noqa: E402
-from selfdrive.sim.pictures import DETECTORS, Pictures  # noqa: E402
+from selfdrive.sim.picture_options import DETECTORS, Pictures  # noqa: E402
 from selfdrive.sim.road_renderer import RoadRenderer  # noqa: E402
 from selfdrive.sim.run import simulate  # noqa: E402
 from selfdrive.sim.scenario import load_scenario  # noqa: E402

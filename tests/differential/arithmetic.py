@@ -15,12 +15,12 @@ import numpy as np
 from selfdrive.common import compiled
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.messages import CameraView
-from selfdrive.sim import vision
+from selfdrive.sim import camera_and_detector
 from selfdrive.sim.effects.effect import Moment
 from selfdrive.sim.effects.levels import LEVELS
 from selfdrive.sim.moved_picture import CodedView, GroundView, ShiftedView
 from selfdrive.sim.picture import Picture
-from selfdrive.sim.pictures import AS_CODED, CODED, DASHED, DETECTORS, Pictures
+from selfdrive.sim.picture_options import AS_CODED, CODED, DASHED, DETECTORS, Pictures
 from selfdrive.sim.road_look import Look, Paint
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.sim.run import simulate
@@ -77,7 +77,7 @@ def seen(detector: str, level: int) -> Iterator[tuple[str, str]]:
     for effect, amounts in LEVELS.items():
         made = effect(amounts[min(level, len(amounts) - 1)], 3, model)
         shown = [made.apply(frame, moment) for frame, moment in zip(frames, MOMENTS, strict=True)]
-        eyes = vision.build_detector(detector, model)
+        eyes = camera_and_detector.build_detector(detector, model)
         lines = [eyes.detect(view(picture)) for picture in shown]
         name = f"{effect.__name__} {made.amount:g}"
         yield name, digest(np.array(shown))

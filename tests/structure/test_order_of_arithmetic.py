@@ -13,8 +13,8 @@ TARGET = Path(__file__).parents[2] / "target"
 NO_RESULT = (  # files that draw, compare or train; CasADi computes symbols in the given order
     "selfdrive/sim/film/*",
     "selfdrive/sim/compare/*",
-    "selfdrive/sim/effects/page.py",
-    "selfdrive/sim/effects/severity.py",
+    "selfdrive/sim/effects/effects_page.py",
+    "selfdrive/sim/effects/degradation.py",
     "selfdrive/visiond_lab/*",
     "selfdrive/controls/lib/lateral_ocp.py",
     "selfdrive/controls/lib/mpc_solver.py",

@@ -158,8 +158,8 @@ VIOLATIONS = {
         "def f():\n    from selfdrive.sim import road_look",
     ),
     "cycle in the target": (
-        "target/selfdrive/sim/pictures.py",
-        "def f():\n    from selfdrive.sim import vision",
+        "target/selfdrive/sim/picture_options.py",
+        "def f():\n    from selfdrive.sim import camera_and_detector",
     ),
     "new package in the target": ("target/selfdrive/novel.py", "X = 1"),
     "target": ("mutator/engines/reference.py", "import selfdrive.sim.run"),

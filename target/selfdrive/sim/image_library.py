@@ -20,7 +20,7 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim import image_folder, lead_picture, road_look, road_renderer, road_texture
 from selfdrive.sim.image_folder import ImageFolder
 from selfdrive.sim.picture import Picture
-from selfdrive.sim.pictures import Pictures
+from selfdrive.sim.picture_options import Pictures
 from selfdrive.sim.road_look import DASH_PERIOD
 from selfdrive.sim.road_renderer import RoadRenderer
 

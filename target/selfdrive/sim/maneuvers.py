@@ -10,10 +10,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from selfdrive.common.errors import ConfigError
-from selfdrive.sim.compare import runs
-from selfdrive.sim.compare.differences import compare
-from selfdrive.sim.compare.page import Maneuver, page
+from selfdrive.sim.compare import finished_runs
+from selfdrive.sim.compare.maneuvers_page import Maneuver, page
 from selfdrive.sim.compare.tolerances import Tolerances, load_tolerances
+from selfdrive.sim.compare.trace_comparison import compare
 from selfdrive.sim.compare.trace_csv import Reference, read_reference
 from selfdrive.sim.replay import TOLERANCES, reference_names
 from selfdrive.sim.run import EXIT_INPUT
@@ -32,7 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         maneuvers = []
         for name, scenario in scenarios.items():
             print(f"{len(maneuvers) + 1}/{len(scenarios)} {name}", flush=True)
-            maneuvers.append(_maneuver(runs.drive(name, scenario), references.get(name), tolerances))
+            maneuvers.append(_maneuver(finished_runs.drive(name, scenario), references.get(name), tolerances))
         path = _write(options.out, page(maneuvers, options.plant))
     except ConfigError as error:
         print(f"error: {error}", file=sys.stderr)
@@ -41,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _maneuver(run: runs.Run, reference: Reference | None, tolerances: Tolerances) -> Maneuver:
+def _maneuver(run: finished_runs.Run, reference: Reference | None, tolerances: Tolerances) -> Maneuver:
     if reference is None:
         return Maneuver(run=run, reference=None, comparison=None)
     comparison = compare(reference, run.trace, tolerances, free_road=run.free_road)
@@ -52,7 +52,7 @@ def _scenarios(options: argparse.Namespace, known: list[str]) -> dict[str, Scena
     names = options.names or _all_names(options.scenarios, known)
     scenarios = {}
     for name in names:
-        scenario = runs.find(name, options.scenarios)
+        scenario = finished_runs.find(name, options.scenarios)
         try:
             scenarios[name] = on_plant(scenario, options.plant)
         except ConfigError as error:
@@ -71,7 +71,7 @@ def _all_names(scenarios: Path, known: list[str]) -> list[str]:
             expected="a folder of scenario files",
             remedy="choose another --scenarios",
         )
-    variants = {name for name in known if name.removesuffix(runs.NO_LEAD) in found}
+    variants = {name for name in known if name.removesuffix(finished_runs.NO_LEAD) in found}
     return sorted(found | variants, key=lambda name: (not name.startswith("S"), name))
 
 
@@ -99,7 +99,7 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     add("--out", type=Path, required=True, metavar="DIR", help="folder for index.html")
     add("--plant", choices=PLANTS, default=STANDARD, help="the plant to run on (%(default)s)")
     add("--references", type=Path, metavar="DIR", help="reference traces as CSV, drawn beneath the runs")
-    add("--scenarios", type=Path, default=runs.SCENARIOS, metavar="DIR", help="the scenario files")
+    add("--scenarios", type=Path, default=finished_runs.SCENARIOS, metavar="DIR", help="the scenario files")
     add("--tolerances", type=Path, default=TOLERANCES, metavar="FILE", help="the tolerance table")
     return parser.parse_args(arguments)
 

@@ -5,7 +5,7 @@ from selfdrive.messages import CameraView
 from selfdrive.sim.camera import Camera
 from selfdrive.sim.image_library import ImageLibrary
 from selfdrive.sim.moved_picture import CodedView, GroundView, ShiftedView
-from selfdrive.sim.pictures import GROUND, SHIFT
+from selfdrive.sim.picture_options import GROUND, SHIFT
 from selfdrive.sim.truth import GroundTruth
 
 

@@ -11,16 +11,16 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from selfdrive.common.errors import ConfigError
-from selfdrive.sim.compare import report, runs
-from selfdrive.sim.compare.differences import compare
+from selfdrive.sim.compare import comparison_text, finished_runs
 from selfdrive.sim.compare.tolerances import load_tolerances
+from selfdrive.sim.compare.trace_comparison import compare
 from selfdrive.sim.compare.trace_csv import read_reference, write_reference
 from selfdrive.sim.run import EXIT_INPUT
 from selfdrive.sim.scenario import PLANTS, REFERENCE, on_plant
 
 EXIT_BEYOND = 1
 
-TOLERANCES = runs.SCENARIOS.parent / "references" / "tolerances.yaml"
+TOLERANCES = finished_runs.SCENARIOS.parent / "references" / "tolerances.yaml"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -54,7 +54,7 @@ def _compare(options: argparse.Namespace) -> int:
     beyond = []
     for reference, run in zip(references, _runs(names, options), strict=True):
         result = compare(reference, run.trace, tolerances, free_road=run.free_road)
-        print("\n".join(report.lines(result, long=options.long)), flush=True)
+        print("\n".join(comparison_text.lines(result, long=options.long)), flush=True)
         if not result.good:
             beyond.append(reference.name)
     print(f"{len(references) - len(beyond)} of {len(references)} within tolerance", end="")
@@ -71,12 +71,12 @@ def _update(options: argparse.Namespace) -> int:
     return 0
 
 
-def _runs(names: list[str], options: argparse.Namespace) -> Iterator[runs.Run]:
+def _runs(names: list[str], options: argparse.Namespace) -> Iterator[finished_runs.Run]:
     if options.runs is not None:
-        yield from (runs.load(options.runs / name, options.plant) for name in names)
+        yield from (finished_runs.load(options.runs / name, options.plant) for name in names)
         return
-    scenarios = [on_plant(runs.find(name, options.scenarios), options.plant) for name in names]
-    yield from map(runs.drive, names, scenarios)
+    scenarios = [on_plant(finished_runs.find(name, options.scenarios), options.plant) for name in names]
+    yield from map(finished_runs.drive, names, scenarios)
 
 
 def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
@@ -86,7 +86,7 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     add = parser.add_argument
     add("names", nargs="*", metavar="NAME", help="a reference, such as S1 or S1_nolead (default: all)")
     add("--references", type=Path, required=True, metavar="DIR", help="the references' CSV files")
-    add("--scenarios", type=Path, default=runs.SCENARIOS, metavar="DIR", help="the scenario files")
+    add("--scenarios", type=Path, default=finished_runs.SCENARIOS, metavar="DIR", help="the scenario files")
     add("--tolerances", type=Path, default=TOLERANCES, metavar="FILE", help="the tolerance table")
     add("--plant", choices=PLANTS, default=REFERENCE, help="the plant to run on (%(default)s)")
     add("--runs", type=Path, metavar="DIR", help="compare the finished runs DIR/NAME/ instead of running")

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from selfdrive.common import compiled
 from selfdrive.common.errors import ConfigError, writing
-from selfdrive.sim.pictures import DETECTORS, GROUND, MARKS, PAPER, SOLID, TRANSLATIONS, Pictures
+from selfdrive.sim.picture_options import DETECTORS, GROUND, MARKS, PAPER, SOLID, TRANSLATIONS, Pictures
 from selfdrive.sim.scenario import PLANTS, Scenario, load_scenario, on_plant
 from selfdrive.sim.simulator import SimulationResult, Simulator
 from selfdrive.sim.trace_file import pieces

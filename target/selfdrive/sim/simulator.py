@@ -10,10 +10,11 @@ from selfdrive.car.honda.radar_interface import RadarInterface
 from selfdrive.manager import Manager
 from selfdrive.messages import Actuators, CanFrame
 from selfdrive.sim.actuators import ActuatorReceiver
-from selfdrive.sim.film.recorder import Film
+from selfdrive.sim.camera_and_detector import build_vision
+from selfdrive.sim.film.film_recorder import Film
 from selfdrive.sim.hazards import HazardMonitor
 from selfdrive.sim.lead import LeadVehicle
-from selfdrive.sim.pictures import Pictures
+from selfdrive.sim.picture_options import Pictures
 from selfdrive.sim.plant import Plant
 from selfdrive.sim.radar import RadarSensor
 from selfdrive.sim.recorder import Recorder
@@ -22,7 +23,6 @@ from selfdrive.sim.road import Road
 from selfdrive.sim.scenario import REFERENCE, STANDARD, Scenario
 from selfdrive.sim.sensors import CarSensors
 from selfdrive.sim.truth import GroundTruth
-from selfdrive.sim.vision import build_vision
 from selfdrive.visiond.detector import MirroredDetector
 from selfdrive.visiond.visiond import Visiond
 

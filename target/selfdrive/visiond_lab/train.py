@@ -17,7 +17,7 @@ from sklearn.neural_network import MLPClassifier
 from threadpoolctl import threadpool_limits
 
 from selfdrive.visiond.lane_net import HIDDEN, WEIGHTS, LaneNet
-from selfdrive.visiond_lab.windows import labelled_windows
+from selfdrive.visiond_lab.training_windows import labelled_windows
 
 FULL, SMALL = (600, 60), (12, 4)  # roads for training and testing
 EPOCHS = 25

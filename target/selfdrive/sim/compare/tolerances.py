@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from selfdrive.common.errors import ConfigError
-from selfdrive.sim.compare.figures import FIGURES
+from selfdrive.sim.compare.key_figures import FIGURES
 from selfdrive.sim.compare.trace_csv import BY_CHANNEL
 from selfdrive.sim.yaml_section import Section, read_yaml
 

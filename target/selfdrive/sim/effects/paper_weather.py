@@ -1,8 +1,8 @@
 """Rain, fog and snow as in the paper, by `thickness` from 1 to 10.
 
 Numbers are from the paper's table of effects and its text. Where the paper gives a range, thickness 1 is the
-mild end and 10 the strong end. What the paper leaves open follows from the weather in `visibility`. Streaks
-and flakes lie in layers; in farther layers, they are shorter and slower. They fall across the picture, faster
+mild end and 10 the strong end. What the paper leaves open follows from `weather_of_levels`. Streaks and
+flakes lie in layers; in farther layers, they are shorter and slower. They fall across the picture, faster
 when the car drives faster, and wrap around, so their number is constant.
 """
 

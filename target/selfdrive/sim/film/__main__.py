@@ -13,9 +13,9 @@ import cv2
 
 from selfdrive.common.errors import ConfigError
 from selfdrive.sim.film.encode import write_still, write_video
-from selfdrive.sim.film.events import read_events
-from selfdrive.sim.film.reel import read_reel
-from selfdrive.sim.film.sheet import Sheet
+from selfdrive.sim.film.film_events import read_events
+from selfdrive.sim.film.recorded_film import read_reel
+from selfdrive.sim.film.side_by_side import Sheet
 
 EXIT_INPUT = 2
 

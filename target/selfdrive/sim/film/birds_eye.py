@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 
 from selfdrive.sim.camera import LANE_WIDTH
-from selfdrive.sim.film import pen
-from selfdrive.sim.film.recorder import KNOTS
-from selfdrive.sim.film.reel import Frame
+from selfdrive.sim.film import drawing
+from selfdrive.sim.film.film_recorder import KNOTS
+from selfdrive.sim.film.recorded_film import Frame
 from selfdrive.sim.hazards import CAR_WIDTH
 from selfdrive.sim.lead_picture import LENGTH
 
@@ -26,7 +26,7 @@ LINE_WIDTH, FAR_LINE_WIDTH = 2, 1  # pixels
 class BirdsEye:
     """Draws frames into strips of `width` x `height` pixels with three lanes; the car has `colour`."""
 
-    def __init__(self, width: int, height: int, colour: pen.Colour) -> None:
+    def __init__(self, width: int, height: int, colour: drawing.Colour) -> None:
         self._size, self._colour = (width, height), colour
         self._shift = 0.0  # m, shift of the strip to follow a car that leaves the road
         self._scale = height / (3.0 * LANE_WIDTH + 2.0 * (SHOULDER + 0.3))
@@ -46,53 +46,53 @@ class BirdsEye:
     def _draw_road(self, strip: np.ndarray, position: float) -> None:
         edge = 1.5 * LANE_WIDTH + SHOULDER
         ends = np.array([-BEHIND, self.ahead])
-        pen.fill(strip, self._places([*ends, *ends[::-1]], [edge, edge, -edge, -edge]), ROAD)
+        drawing.fill(strip, self._places([*ends, *ends[::-1]], [edge, edge, -edge, -edge]), ROAD)
         half = 0.5 * LANE_WIDTH
         for y, colour in ((half, YELLOW), (-half, PAINT)):
-            pen.stroke(strip, self._places(ends, [y, y]), colour, LINE_WIDTH)
+            drawing.stroke(strip, self._places(ends, [y, y]), colour, LINE_WIDTH)
         first = -((position - BEHIND) % PERIOD) - BEHIND
         for y in (3.0 * half, -3.0 * half):
             for start in np.arange(first, self.ahead, PERIOD):
-                pen.stroke(strip, self._places([start, start + DASH], [y, y]), PAINT, FAR_LINE_WIDTH)
+                drawing.stroke(strip, self._places([start, start + DASH], [y, y]), PAINT, FAR_LINE_WIDTH)
 
     def _draw_seen(self, strip: np.ndarray, frame: Frame) -> None:
         seen = [line for line in (frame.lines or {}).values() if line.drawable]
-        lines = [(line.y, pen.line_colour(line.prob), LINE_WIDTH) for line in seen]
+        lines = [(line.y, drawing.line_colour(line.prob), LINE_WIDTH) for line in seen]
         if np.isfinite(frame.plan).all():
-            lines.append((frame.plan, pen.PATH, 1))
+            lines.append((frame.plan, drawing.PATH, 1))
         for y, colour, thickness in lines:
             places = self._places(KNOTS, np.array(y) - frame.bend - frame.middle)
-            pen.stroke(strip, places, colour, thickness)
+            drawing.stroke(strip, places, colour, thickness)
 
     def _draw_car(
-        self, strip: np.ndarray, front: float, offset: float, heading: float, colour: pen.Colour
+        self, strip: np.ndarray, front: float, offset: float, heading: float, colour: drawing.Colour
     ) -> None:
         for x, y, tone in (
             ([0.0, 0.0, -LENGTH, -LENGTH], 1.0, colour),
-            ([-1.2, -1.2, -1.9, -1.9], 0.8, pen.PAPER),
+            ([-1.2, -1.2, -1.9, -1.9], 0.8, drawing.PAPER),
         ):
             along = np.array(x)
             across = 0.5 * CAR_WIDTH * y * np.array([1.0, -1.0, -1.0, 1.0])
             c, s = cos(heading), sin(heading)
-            pen.fill(
+            drawing.fill(
                 strip, self._places(front + along * c - across * s, offset + along * s + across * c), tone
             )
 
     def _draw_distances(self, strip: np.ndarray, frame: Frame) -> None:
         for name, distance, colour, side in (
-            ("radar", frame.radar, pen.FAULTY, 1.0),
-            ("camera", frame.camera_lead if frame.d_rel is not None else None, pen.DOUBTED, -1.0),
+            ("radar", frame.radar, drawing.FAULTY, 1.0),
+            ("camera", frame.camera_lead if frame.d_rel is not None else None, drawing.DOUBTED, -1.0),
         ):
             if distance is None or not 0.0 < distance < self.ahead:
                 continue
             ends = self._places([distance, distance], [0.0, side * LANE_WIDTH])
-            pen.stroke(strip, ends, colour, 1)
+            drawing.stroke(strip, ends, colour, 1)
             column, row = ends[1].astype(int).tolist()
             cv2.circle(strip, (column, row), 3, colour, cv2.FILLED, cv2.LINE_AA)
             words = f"{name} {distance:.1f} m"
-            room = self._size[0] - pen.width(words, pen.SMALL)
-            left = column + 7 if column + 7 <= room else column - 7 - pen.width(words, pen.SMALL)
-            pen.write(strip, words, (left, row + 5), colour, pen.SMALL)
+            room = self._size[0] - drawing.width(words, drawing.SMALL)
+            left = column + 7 if column + 7 <= room else column - 7 - drawing.width(words, drawing.SMALL)
+            drawing.write(strip, words, (left, row + 5), colour, drawing.SMALL)
 
     def _places(self, x: object, y: object) -> np.ndarray:
         columns = (np.asarray(x, float) + BEHIND) * self._scale

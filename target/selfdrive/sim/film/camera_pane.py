@@ -8,9 +8,9 @@ import cv2
 import numpy as np
 
 from selfdrive.common.camera_model import CameraModel
-from selfdrive.sim.film import pen
-from selfdrive.sim.film.recorder import KNOTS
-from selfdrive.sim.film.reel import Frame, SeenLine
+from selfdrive.sim.film import drawing
+from selfdrive.sim.film.film_recorder import KNOTS
+from selfdrive.sim.film.recorded_film import Frame, SeenLine
 from selfdrive.sim.lead_picture import CAMERA_TO_BUMPER, FURTHEST, NEAREST, draw_lead
 from selfdrive.sim.road_renderer import RoadRenderer
 
@@ -36,7 +36,7 @@ class CameraPane:
     def draw(self, frame: Frame) -> np.ndarray:
         pane = self._fitted(self._picture(frame))
         if np.isfinite(frame.plan).all():
-            pen.glaze(pane, self._strip(frame.plan, PATH_HALF), pen.PATH, PATH_SHARE)
+            drawing.glaze(pane, self._strip(frame.plan, PATH_HALF), drawing.PATH, PATH_SHARE)
         for line in (frame.lines or {}).values():
             self._draw_line(pane, line)
         self._draw_leads(pane, frame)
@@ -81,22 +81,22 @@ class CameraPane:
         scaled = cv2.resize(picture, (width, rows), interpolation=cv2.INTER_LINEAR)
         if self._top <= 0:
             return np.ascontiguousarray(scaled[-self._top :])
-        return np.concatenate([np.full((self._top, width, 3), pen.PANEL, np.uint8), scaled])
+        return np.concatenate([np.full((self._top, width, 3), drawing.PANEL, np.uint8), scaled])
 
     def _draw_line(self, pane: np.ndarray, line: SeenLine) -> None:
         if line.drawable:
-            pen.glaze(pane, self._strip(line.y, LINE_HALF), pen.line_colour(line.prob), LINE_SHARE)
+            drawing.glaze(pane, self._strip(line.y, LINE_HALF), drawing.line_colour(line.prob), LINE_SHARE)
 
     def _draw_leads(self, pane: np.ndarray, frame: Frame) -> None:
         told = frame.camera_lead
         if frame.d_rel is not None:
-            self._frame_lead(pane, frame, frame.d_rel, pen.INK, f"{frame.d_rel:.1f} m")
+            self._frame_lead(pane, frame, frame.d_rel, drawing.INK, f"{frame.d_rel:.1f} m")
         wrong = told is not None and isfinite(told) and frame.d_rel is not None
         if wrong and abs(told - frame.d_rel) > WRONG_DISTANCE:
-            self._frame_lead(pane, frame, told, pen.DOUBTED, f"seen at {told:.1f} m")
+            self._frame_lead(pane, frame, told, drawing.DOUBTED, f"seen at {told:.1f} m")
 
     def _frame_lead(
-        self, pane: np.ndarray, frame: Frame, distance: float, colour: pen.Colour, label: str
+        self, pane: np.ndarray, frame: Frame, distance: float, colour: drawing.Colour, label: str
     ) -> None:
         x = distance + CAMERA_TO_BUMPER
         if not NEAREST <= x <= FURTHEST:
@@ -112,8 +112,8 @@ class CameraPane:
             for end in (top, bottom):
                 up = arm if end == top else -arm
                 shape = np.array([(at + way * arm, end), (at, end), (at, end + up)], float)
-                pen.stroke(pane, shape, colour, 1)
-        pen.tag(pane, label, (right + 8, top + 10), colour)
+                drawing.stroke(pane, shape, colour, 1)
+        drawing.tag(pane, label, (right + 8, top + 10), colour)
 
     def _sideways(self, frame: Frame, distance: float) -> float:
         beyond = max(0.0, distance - KNOTS[-1]) * (frame.bend[-1] - frame.bend[-2]) / (KNOTS[-1] - KNOTS[-2])

@@ -9,7 +9,7 @@ import numpy as np
 from PIL import Image
 
 from selfdrive.common.errors import ConfigError, writing
-from selfdrive.sim.film import pen
+from selfdrive.sim.film import drawing
 
 PICTURES_PER_S = 20
 GIF_EVERY = 4  # a GIF has only every fourth picture, to limit its size
@@ -75,8 +75,8 @@ def _write_gif(pictures: Iterable[np.ndarray], path: Path) -> None:
             rows = round(picture.shape[0] * GIF_WIDTH / picture.shape[1])
             scaled = cv2.resize(picture, (GIF_WIDTH, rows), interpolation=cv2.INTER_AREA)
             small.append(Image.fromarray(cv2.cvtColor(scaled, cv2.COLOR_BGR2RGB)))
-    own = [part for colour in pen.COLOURS for part in reversed(colour)]
-    middle = small[len(small) // 2].quantize(GIF_COLOURS - len(pen.COLOURS))
+    own = [part for colour in drawing.COLOURS for part in reversed(colour)]
+    middle = small[len(small) // 2].quantize(GIF_COLOURS - len(drawing.COLOURS))
     palette = Image.new("P", (1, 1))
     palette.putpalette([*own, *middle.getpalette()])
     indexed = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in small]

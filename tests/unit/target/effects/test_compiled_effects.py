@@ -28,7 +28,7 @@ from selfdrive.sim.effects.gaussian import Gaussian
 from selfdrive.sim.effects.levels import LEVELS
 from selfdrive.sim.picture import Picture, Region
 from selfdrive.sim.picture_camera import PictureCamera
-from selfdrive.sim.pictures import AS_CODED, PAPER, Pictures
+from selfdrive.sim.picture_options import AS_CODED, PAPER, Pictures
 from selfdrive.sim.run import simulate, write
 from selfdrive.sim.scenario import load_scenario
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import cv2
 import pytest
 from selfdrive.common.camera_model import CameraModel
-from selfdrive.sim.film.reel import Frame, Reel, SeenLine
+from selfdrive.sim.film.recorded_film import Frame, Reel, SeenLine
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.sim.run import main
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 from selfdrive.common.errors import ConfigError
-from selfdrive.sim.film import pen
+from selfdrive.sim.film import drawing
 from selfdrive.sim.film.__main__ import main
 from selfdrive.sim.film.encode import write_still, write_video
 
@@ -24,7 +24,7 @@ EVENTS = {
 def pictures(count=8):
     for number in range(count):
         picture = np.full((180, 320, 3), 60 + 10 * number, np.uint8)
-        picture[:40] = pen.FAULTY
+        picture[:40] = drawing.FAULTY
         yield picture
 
 
@@ -51,7 +51,7 @@ def test_a_gif_plays_at_the_same_speed(tmp_path):
     write_video(pictures(), tmp_path / "a.gif")
     with Image.open(tmp_path / "a.gif") as gif:
         assert (gif.n_frames, gif.info["duration"], gif.size) == (2, 200, (800, 450))
-        assert gif.convert("RGB").getpixel((400, 20)) == pen.FAULTY[::-1]
+        assert gif.convert("RGB").getpixel((400, 20)) == drawing.FAULTY[::-1]
 
 
 def test_other_formats_are_refused(tmp_path):

@@ -13,7 +13,7 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.errors import ConfigError
 from selfdrive.sim.image_folder import ImageFolder
 from selfdrive.sim.image_library import open_library
-from selfdrive.sim.pictures import Pictures
+from selfdrive.sim.picture_options import Pictures
 
 PAGE = Path(__file__).parents[4] / "docs" / "how-to" / "use-your-own-frames.md"
 VIEW = """\

@@ -12,7 +12,7 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.errors import ConfigError
 from selfdrive.sim import image_library
 from selfdrive.sim.image_library import FRAMES, SPACING, ImageLibrary, cached, open_library
-from selfdrive.sim.pictures import DASHED, Pictures
+from selfdrive.sim.picture_options import DASHED, Pictures
 from selfdrive.sim.road_look import DASH_PERIOD
 from selfdrive.sim.road_renderer import RoadRenderer
 

@@ -5,7 +5,7 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-from selfdrive.sim.compare.svg import Line, Mark, Panel, draw, simplify
+from selfdrive.sim.compare.svg_plots import Line, Mark, Panel, draw, simplify
 from selfdrive.sim.maneuvers import main
 from selfdrive.sim.replay import main as replay
 

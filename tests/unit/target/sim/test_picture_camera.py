@@ -7,13 +7,13 @@ import pytest
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.errors import ConfigError
 from selfdrive.sim.camera import Camera
+from selfdrive.sim.camera_and_detector import build_vision
 from selfdrive.sim.image_library import SPACING, ImageLibrary
 from selfdrive.sim.moved_picture import HEADING_STEP, OFFSET_STEP, SHIFT_DISTANCE
 from selfdrive.sim.picture_camera import PictureCamera
-from selfdrive.sim.pictures import CODED, GROUND, SHIFT, Pictures
+from selfdrive.sim.picture_options import CODED, GROUND, SHIFT, Pictures
 from selfdrive.sim.road import Road
 from selfdrive.sim.road_renderer import RoadRenderer, first_road_row
-from selfdrive.sim.vision import build_vision
 
 CALTECH = CameraModel()
 UDACITY = CameraModel.from_view(width=640, rows=480, horizon=200.0, focal=600.0, height=1.22)

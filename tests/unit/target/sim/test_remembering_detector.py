@@ -18,7 +18,7 @@ from selfdrive.sim.effects.effect import Effect
 from selfdrive.sim.image_library import SPACING, ImageLibrary
 from selfdrive.sim.picture import Picture
 from selfdrive.sim.picture_camera import PictureCamera
-from selfdrive.sim.pictures import GROUND, SHIFT
+from selfdrive.sim.picture_options import GROUND, SHIFT
 from selfdrive.sim.remembering_detector import SEEING, RememberingDetector, seeing_digest
 from selfdrive.sim.road import Road
 from selfdrive.sim.road_renderer import RoadRenderer

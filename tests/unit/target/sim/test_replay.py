@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from selfdrive.common.conversions import KPH_TO_MS
 from selfdrive.common.errors import ConfigError
-from selfdrive.sim.compare.differences import compare, crossings, time_lag
-from selfdrive.sim.compare.figures import difference, key_figures
+from selfdrive.sim.compare.key_figures import difference, key_figures
 from selfdrive.sim.compare.tolerances import Tolerances, load_tolerances
+from selfdrive.sim.compare.trace_comparison import compare, crossings, time_lag
 from selfdrive.sim.compare.trace_csv import COLUMNS, read_reference, write_reference
 from selfdrive.sim.recorder import CHANNELS, INTEGER_CHANNELS, PLAN_SOURCES
 from selfdrive.sim.replay import TOLERANCES, main

@@ -11,13 +11,13 @@ import pytest
 import selfdrive
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.messages import CameraView
-from selfdrive.sim import detection_memory, vision
+from selfdrive.sim import camera_and_detector, detection_memory
 from selfdrive.sim.detection_memory import ENTRY, FILE, DetectionMemory
 from selfdrive.sim.effects import PaperRain
 from selfdrive.sim.image_library import SPACING
 from selfdrive.sim.picture import Picture
 from selfdrive.sim.picture_camera import PictureCamera
-from selfdrive.sim.pictures import AS_CODED, CODED, GROUND, PAPER, ROBUST, SHIFT, Pictures
+from selfdrive.sim.picture_options import AS_CODED, CODED, GROUND, PAPER, ROBUST, SHIFT, Pictures
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.sim.run import main, simulate, write
 from selfdrive.sim.scenario import REFERENCE, STANDARD, load_scenario, on_plant
@@ -90,7 +90,7 @@ def brought_aside(scenarios, steps):
 def test_a_car_that_sees_only_frames_returns_to_the_middle(
     monkeypatch, scenarios, frames, tmp_path, translation, left_over
 ):
-    monkeypatch.setattr(vision, "_detector", lambda pictures, library: LineReader(library.model))
+    monkeypatch.setattr(camera_and_detector, "_detector", lambda pictures, library: LineReader(library.model))
     pictures = Pictures(frames=frames, translation=translation, cache=tmp_path / "cache")
     result = simulate(brought_aside(scenarios, 1000), 0, pictures)
     offset = np.abs(result.trace["lateral_offset"])
@@ -164,7 +164,7 @@ def test_a_run_on_frames_has_one_thread(scenarios, frames, tmp_path):
     code = (
         "import os, sys; from pathlib import Path; from dataclasses import replace\n"
         "from selfdrive.sim.run import simulate; from selfdrive.sim.scenario import load_scenario\n"
-        "from selfdrive.sim.pictures import Pictures\n"
+        "from selfdrive.sim.picture_options import Pictures\n"
         "scenario = replace(load_scenario(Path(sys.argv[1])), steps=20)\n"
         "simulate(scenario, 0, Pictures(frames=Path(sys.argv[2]), cache=Path(sys.argv[3])))\n"
         "print(len(os.listdir('/proc/self/task')))"
@@ -196,7 +196,7 @@ def test_runs_with_ideal_vision_do_not_import_the_slow_libraries():
 def test_all_scenarios_run_without_alerts_on_the_rendered_road(
     monkeypatch, scenarios, tmp_path_factory, translation
 ):
-    monkeypatch.setattr(vision, "_detector", lambda pictures, library: LineReader(library.model))
+    monkeypatch.setattr(camera_and_detector, "_detector", lambda pictures, library: LineReader(library.model))
     pictures = Pictures(translation=translation, cache=tmp_path_factory.getbasetemp() / "pictures")
     for name in ("S1", "S2", "S3", "S4", "S5"):
         result = simulate(load_scenario(scenarios / f"{name}.yaml"), 0, pictures)

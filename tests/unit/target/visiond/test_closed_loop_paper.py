@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from selfdrive.sim.pictures import Pictures
+from selfdrive.sim.picture_options import Pictures
 from selfdrive.sim.scenario import load_scenario
 from selfdrive.sim.simulator import Simulator
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from selfdrive.sim.pictures import ROBUST, Pictures
+from selfdrive.sim.picture_options import ROBUST, Pictures
 from selfdrive.sim.run import simulate
 from selfdrive.sim.scenario import load_scenario
 

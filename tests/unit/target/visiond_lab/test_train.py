@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from selfdrive.visiond.lane_net import LaneNet
 from selfdrive.visiond_lab import train
-from selfdrive.visiond_lab.windows import EACH, labelled_windows
+from selfdrive.visiond_lab.training_windows import EACH, labelled_windows
 
 
 @pytest.fixture(scope="module")

@@ -9,8 +9,8 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim.lead_picture import draw_car
 from selfdrive.sim.road_look import Look, Paint
 from selfdrive.sim.road_renderer import RoadRenderer
-from selfdrive.visiond_lab.flaws import Ground, bent, taken
-from selfdrive.visiond_lab.looks import random_camera, random_look
+from selfdrive.visiond_lab.picture_flaws import Ground, bent, taken
+from selfdrive.visiond_lab.random_looks import random_camera, random_look
 
 PERIODS = 4  # of 12.2 m, length of a scene's road
 VIEWS = 6  # pictures of each scene

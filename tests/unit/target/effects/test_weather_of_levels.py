@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim.effects import Rain, Snow
-from selfdrive.sim.effects.visibility import BLOCK, DROP, REACH, fog, rain, snow
+from selfdrive.sim.effects.weather_of_levels import BLOCK, DROP, REACH, fog, rain, snow
 
 
 def test_rain_has_the_papers_number_of_near_drops(camera):

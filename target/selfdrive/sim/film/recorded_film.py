@@ -11,7 +11,7 @@ import numpy as np
 
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.errors import ConfigError
-from selfdrive.sim.film.recorder import INDEX, SCHEMA
+from selfdrive.sim.film.film_recorder import INDEX, SCHEMA
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

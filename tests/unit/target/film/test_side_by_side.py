@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.errors import ConfigError
-from selfdrive.sim.film import pen
+from selfdrive.sim.film import drawing
 from selfdrive.sim.film.camera_pane import CameraPane
-from selfdrive.sim.film.events import Events, Mark, read_events
-from selfdrive.sim.film.reel import SeenLine
-from selfdrive.sim.film.sheet import HEADING, HEIGHT, MARGIN, PANE, WIDTH, Sheet
+from selfdrive.sim.film.film_events import Events, Mark, read_events
+from selfdrive.sim.film.recorded_film import SeenLine
+from selfdrive.sim.film.side_by_side import HEADING, HEIGHT, MARGIN, PANE, WIDTH, Sheet
 
 EVENTS = Events(title="a fault", outcome="hazard", active=None, marks=(), names={"H3": "out of lane"})
 
@@ -69,7 +69,7 @@ def test_impossible_values_can_be_drawn(reel):
 def test_hazards_and_alerts_are_shown_on_the_side_of_their_run(reel):
     faulty = reel({}, {"hazards": ("H3",)}, {"alerts": ("steer_saturated",), "text": "Take control"})
     sheet = Sheet(reel({}, {}, {}), faulty, EVENTS)
-    for index, colour in ((1, pen.HAZARD), (2, pen.ALERT)):
+    for index, colour in ((1, drawing.HAZARD), (2, drawing.ALERT)):
         foot = {side: pane_of(sheet.draw(index), side)[-24:-6] for side in ("golden", "faulty")}
         assert is_drawn(foot["faulty"], colour)
         assert not is_drawn(foot["golden"], colour)
@@ -85,7 +85,7 @@ def test_the_sheet_marks_the_time_when_the_fault_is_active(reel):
     events = Events(title="", outcome="sdc", active=(0.05, 0.05), marks=(), names={})
     sheet = Sheet(reel({}, {}, {}), reel({}, {}, {}), events)
     corners = [pane_of(sheet.draw(i), "faulty")[9:11, -100:-10] for i in range(3)]
-    assert [bool((corner == pen.TRIGGER).all()) for corner in corners] == [False, True, False]
+    assert [bool((corner == drawing.TRIGGER).all()) for corner in corners] == [False, True, False]
 
 
 def test_the_last_frame_of_a_shorter_film_stays(reel):
@@ -132,7 +132,7 @@ def test_frames_of_another_shape_fit_the_sheet(reel, tmp_path, frame):
     model = CameraModel.from_view(width=1280, rows=720, horizon=300.0, focal=1000.0, height=1.4)
     wide = replace(reel({"picture": tmp_path / "a.jpg", "d_rel": None}), camera=model)
     pane = pane_of(Sheet(wide, wide, EVENTS).draw(0), "golden")
-    assert (pane[40] == pen.PANEL).all()
+    assert (pane[40] == drawing.PANEL).all()
     assert abs(int(pane[70, 5, 0]) - 128) < 3
 
 

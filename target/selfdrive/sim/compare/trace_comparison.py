@@ -6,7 +6,7 @@ from math import inf
 import numpy as np
 
 from selfdrive.common.errors import ConfigError
-from selfdrive.sim.compare import figures
+from selfdrive.sim.compare import key_figures
 from selfdrive.sim.compare.tolerances import Limits, Tolerances
 from selfdrive.sim.compare.trace_csv import BY_CHANNEL, STEPS_PER_SECOND, Column, Reference, channels_of
 
@@ -51,13 +51,13 @@ class ChannelResult:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FigureResult:
     name: str
-    reference: figures.Value
-    ours: figures.Value
+    reference: key_figures.Value
+    ours: key_figures.Value
     limit: float | None
 
     @property
     def difference(self) -> float:
-        return figures.difference(self.name, self.reference, self.ours)
+        return key_figures.difference(self.name, self.reference, self.ours)
 
     @property
     def failed(self) -> bool:
@@ -114,7 +114,7 @@ def _same_time(reference: Reference, steps: int) -> None:
 
 def _complete(reference: Reference, tolerances: Tolerances) -> None:
     needed = {name: (name,) for name in tolerances.channels}
-    needed |= {name: figures.CHANNELS[name] for name in tolerances.figures}
+    needed |= {name: key_figures.CHANNELS[name] for name in tolerances.figures}
     for limited, channels in needed.items():
         for channel in channels:
             values = reference.channels.get(channel)
@@ -132,11 +132,11 @@ def _figures(
     reference: Reference, ours: dict[str, np.ndarray], limits: dict[str, float]
 ) -> tuple[FigureResult, ...]:
     """Use the reference's rows for both; only our time of engaging uses every step."""
-    theirs = figures.key_figures(reference.steps, reference.channels)
+    theirs = key_figures.key_figures(reference.steps, reference.channels)
     rows = {name: values[reference.steps] for name, values in ours.items()}
-    mine = figures.key_figures(reference.steps, rows)
+    mine = key_figures.key_figures(reference.steps, rows)
     every = np.arange(len(ours["engaged"]))
-    mine["engaged_s"] = figures.key_figures(every, {"engaged": ours["engaged"]})["engaged_s"]
+    mine["engaged_s"] = key_figures.key_figures(every, {"engaged": ours["engaged"]})["engaged_s"]
     return tuple(
         FigureResult(name=name, reference=value, ours=mine[name], limit=limits.get(name))
         for name, value in theirs.items()

@@ -6,11 +6,11 @@ import json
 import cv2
 import numpy as np
 import pytest
+from selfdrive.sim.effects.effects_page import SMALL, TITLE
 from selfdrive.sim.effects.levels import LEVELS
-from selfdrive.sim.effects.page import SMALL, TITLE
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.visiond_lab.evaluate import EXIT_INPUT, SOURCES, UDACITY
-from selfdrive.visiond_lab.under_effects import HEADS, IN_A_ROW, main
+from selfdrive.visiond_lab.evaluate_under_effects import HEADS, IN_A_ROW, main
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,7 @@
 """Writes the reference page of image effects: pictures with detected lanes, and measured severity.
 
-`python -m selfdrive.sim.effects.page [--out docs/reference]` writes image-effects.md and the folder
-image-effects with a picture for each effect.
+`python -m selfdrive.sim.effects.effects_page [--out docs/reference]` writes image-effects.md and the
+folder image-effects with a picture for each effect.
 """
 
 import argparse
@@ -15,10 +15,10 @@ import numpy as np
 
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.messages import CameraView
-from selfdrive.sim.effects import PaperFog, PaperOcclusion, PaperRain, PaperSnow, visibility
+from selfdrive.sim.effects import PaperFog, PaperOcclusion, PaperRain, PaperSnow, weather_of_levels
+from selfdrive.sim.effects.degradation import RoadGauge, Severity
 from selfdrive.sim.effects.effect import Effect, Moment
 from selfdrive.sim.effects.levels import CODED, PAPER, PHYSICAL
-from selfdrive.sim.effects.severity import RoadGauge, Severity
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.visiond.coded_detector import CodedDetector
 from selfdrive.visiond.detector import LaneDetector, LaneLines
@@ -36,13 +36,13 @@ DETECTORS: dict[str, tuple[type, tuple[int, int, int], int]] = {  # with colour 
 AHEAD, ERROR = 10.0, 0.3  # m: a line is found if it is at most this far off
 SMALL, TITLE = (320, 240), 20  # px
 GREY = 100  # grey level of the picture in which coverage is measured
-REAL = "real-frames.csv"  # in the folder of pictures; counted by `selfdrive.visiond.under_effects`
+REAL = "real-frames.csv"  # in the folder of pictures; counted by `visiond_lab.evaluate_under_effects`
 TEXT = """\
 # Image effects
 
 This page shows the weather, dirt and light that a fault can put between the road and the camera. The fault
-model [image_effect](fault-models.md#image_effect) applies an effect. `python -m selfdrive.sim.effects.page`
-writes this page.
+model [image_effect](fault-models.md#image_effect) applies an effect. This page is written by
+`python -m selfdrive.sim.effects.effects_page`.
 
 An effect has an amount, a seed and a camera model. These and the moment (time, distance driven, speed)
 determine how it changes a picture, so pictures can be computed in any order. Drops and flakes fall and come
@@ -69,8 +69,8 @@ strongest. Lines show what the detectors find: **broad red** for `paper`, **narr
   (from Udacity's first project on lane finding, MIT licence). Random effects are applied with 20 seeds. The
   detectors have no memory of earlier pictures. The counts are not independent, because they come from only
   six roads. The repository contains [the counts](image-effects/real-frames.csv), but not the frames. For your
-  own frames, `python -m selfdrive.visiond_lab.under_effects FRAMES TRUTH` counts the misses and, with
-  `--strips`, shows all levels. The detectors were tuned only for rain and snow on rendered roads.
+  own frames, `python -m selfdrive.visiond_lab.evaluate_under_effects FRAMES TRUTH` counts the misses and,
+  with `--strips`, shows all levels. The detectors were tuned only for rain and snow on rendered roads.
 
 ## What a level of the paper's effects represents
 
@@ -220,12 +220,12 @@ def stands_for(measured: dict[type[Effect], list[Row]], model: CameraModel) -> s
     heads += ("snow (mm/h)", "range (m)", "road covered", "occlusion: road covered")
     lines = [f"| level | {' | '.join(heads)} |", "|---|" + "---|" * len(heads)]
     for level in range(1, 11):
-        rain, snow = visibility.rain(level, model), visibility.snow(level, model)
+        rain, snow = weather_of_levels.rain(level, model), weather_of_levels.snow(level, model)
         contrast = PaperFog(level, 0, model).contrast
         shown = (PaperRain, PaperSnow, PaperOcclusion)
         covered = {kind: f"{measured[kind][level - 1].covered:.0%}" for kind in shown}
         cells = [f"{rain.rate:.0f}", f"{rain.range:.0f}", covered[PaperRain]]
-        cells += [f"{contrast:.2f}", f"{visibility.fog(contrast).range:.0f}"]
+        cells += [f"{contrast:.2f}", f"{weather_of_levels.fog(contrast).range:.0f}"]
         cells += [f"{snow.rate:.1f}", f"{snow.range:.0f}", covered[PaperSnow], covered[PaperOcclusion]]
         lines.append(f"| {level} | {' | '.join(cells)} |")
     return "\n".join(lines)

@@ -1,6 +1,6 @@
 """Measures how well detectors find real lanes in bad weather.
 
-`python -m selfdrive.visiond_lab.under_effects FRAMES TRUTH` takes the same input as
+`python -m selfdrive.visiond_lab.evaluate_under_effects FRAMES TRUTH` takes the same input as
 `selfdrive.visiond_lab.evaluate`. Each frame is changed by each level of each effect, once per seed. The
 result is the number of pictures in which a detector misses a line; these counts are not independent, because
 a frame always shows the same road.
@@ -18,8 +18,8 @@ import numpy as np
 
 from selfdrive.common.errors import ConfigError, writing
 from selfdrive.sim.effects.effect import Effect, Moment
+from selfdrive.sim.effects.effects_page import panel
 from selfdrive.sim.effects.levels import LEVELS
-from selfdrive.sim.effects.page import panel
 from selfdrive.visiond.paper_detector import PaperDetector
 from selfdrive.visiond.robust_detector import RobustDetector
 from selfdrive.visiond_lab.evaluate import EXIT_INPUT, PAPER, ROBUST, Finding, Frame, build, look, read_frames
@@ -128,7 +128,7 @@ def _write_strips(folder: Path, frames: Sequence[Frame], kinds: Sequence[type[Ef
 
 def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
-        prog="selfdrive.visiond_lab.under_effects",
+        prog="selfdrive.visiond_lab.evaluate_under_effects",
         description="Count the real frames in which detectors miss a line behind image effects.",
     )
     parser.add_argument("frames", type=Path, metavar="FRAMES", help="folder of frames")

@@ -13,9 +13,9 @@ import numpy as np
 
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.ordered import total
+from selfdrive.sim.effects.degradation import FAR, NEAR
 from selfdrive.sim.effects.paper_weather import BLOCKS, REACH, STREAKS
 from selfdrive.sim.effects.precipitation import Rain, Snow
-from selfdrive.sim.effects.severity import FAR, NEAR
 
 LEFT = 0.05  # share of the contrast that remains at the meteorological range
 DROP = 1.0  # mm; smaller drops make no streak

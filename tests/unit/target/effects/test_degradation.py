@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from selfdrive.sim.effects import page
+from selfdrive.sim.effects import effects_page
+from selfdrive.sim.effects.degradation import RoadGauge
 from selfdrive.sim.effects.levels import LEVELS
-from selfdrive.sim.effects.severity import RoadGauge
 
 REFERENCE = Path(__file__).parents[4] / "docs" / "reference"
 
@@ -67,7 +67,7 @@ def test_the_page_has_every_effect_and_level():
 
 @pytest.mark.slow
 def test_the_page_is_what_the_command_writes(tmp_path):
-    """After a change of effects or detectors, run `python -m selfdrive.sim.effects.page`."""
-    page.write(tmp_path)
+    """After a change of effects or detectors, run `python -m selfdrive.sim.effects.effects_page`."""
+    effects_page.write(tmp_path)
     made, kept = (folder / "image-effects.md" for folder in (tmp_path, REFERENCE))
     assert made.read_text(encoding="utf-8") == kept.read_text(encoding="utf-8")

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 from selfdrive.common.errors import ConfigError
-from selfdrive.sim.film.reel import read_reel
+from selfdrive.sim.film.recorded_film import read_reel
 from selfdrive.sim.run import main
 from selfdrive.visiond.visiond import Visiond
 

@@ -5,10 +5,10 @@ from html import escape
 
 import numpy as np
 
-from selfdrive.sim.compare import figures
-from selfdrive.sim.compare.differences import Comparison
-from selfdrive.sim.compare.runs import Run
-from selfdrive.sim.compare.svg import Line, Mark, Panel, draw
+from selfdrive.sim.compare import key_figures
+from selfdrive.sim.compare.finished_runs import Run
+from selfdrive.sim.compare.svg_plots import Line, Mark, Panel, draw
+from selfdrive.sim.compare.trace_comparison import Comparison
 from selfdrive.sim.compare.trace_csv import ROW_STEPS, STEPS_PER_SECOND, Reference, channels_of
 
 _STYLE = """
@@ -67,7 +67,7 @@ class Maneuver:
 
 def page(maneuvers: list[Maneuver], plant: str) -> str:
     rows = "".join(_overview_row(one) for one in maneuvers)
-    head = "".join(f"<th>{_TITLES[name]}</th>" for name in figures.FIGURES)
+    head = "".join(f"<th>{_TITLES[name]}</th>" for name in key_figures.FIGURES)
     return (
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width,initial-scale=1">'
@@ -82,7 +82,9 @@ def page(maneuvers: list[Maneuver], plant: str) -> str:
 
 def _overview_row(one: Maneuver) -> str:
     name = escape(one.run.name)
-    cells = "".join(f"<td>{figures.text(key, value)}</td>" for key, value in _own_figures(one.run).items())
+    cells = "".join(
+        f"<td>{key_figures.text(key, value)}</td>" for key, value in _own_figures(one.run).items()
+    )
     verdict, kind = "-", ""
     if one.comparison:
         verdict, kind = ("within tolerance", "good") if one.comparison.good else ("beyond tolerance", "bad")
@@ -112,8 +114,8 @@ def _comparison_table(comparison: Comparison | None) -> str:
     rows = [
         (
             _TITLES[one.name],
-            figures.text(one.name, one.ours),
-            figures.text(one.name, one.reference),
+            key_figures.text(one.name, one.ours),
+            key_figures.text(one.name, one.reference),
             one.limit,
             one.failed,
         )
@@ -175,9 +177,9 @@ def _legend(panel: Panel) -> str:
     return f'<div class="key">{keys}</div>'
 
 
-def _own_figures(run: Run) -> dict[str, figures.Value]:
+def _own_figures(run: Run) -> dict[str, key_figures.Value]:
     channels = channels_of(run.trace)
-    return figures.key_figures(np.arange(len(channels["t"])), channels)
+    return key_figures.key_figures(np.arange(len(channels["t"])), channels)
 
 
 def _marks(run: Run) -> tuple[Mark, ...]:

@@ -1,4 +1,4 @@
-"""Finds the threshold of the detector as coded: `python -m selfdrive.visiond_lab.coded_threshold`.
+"""Finds the threshold of the detector as coded: `python -m selfdrive.visiond_lab.calibrate_as_coded`.
 
 Considers thresholds that mistake at most ALLOWED of the windows inside the lane for marks. Of those that
 misplace a line by more than OFF in the fewest pictures, the middle one is printed. All pictures are clean.

@@ -5,7 +5,7 @@ import numpy as np
 
 from selfdrive.visiond.hog import FEATURES, STRIDE, WINDOW, Hog, windows
 from selfdrive.visiond.road_region import RoadRegion
-from selfdrive.visiond_lab.scenes import VIEWS, View, views
+from selfdrive.visiond_lab.training_scenes import VIEWS, View, views
 
 EACH = 12  # largest number of windows per picture with a mark, and without one
 LEAST_PAINT = 40.0  # pixels of paint in a mark; windows between NO_PAINT and this are not used

@@ -2,18 +2,18 @@
 
 import pytest
 from selfdrive.visiond import coded_detector
-from selfdrive.visiond_lab import coded_threshold
+from selfdrive.visiond_lab import calibrate_as_coded
 
 
 @pytest.fixture(autouse=True)
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(coded_threshold, "PICTURES", 3)
-    monkeypatch.setattr(coded_threshold, "TRIED", [-50.0, 3.5, 4.0, 4.5, 50.0])
+    monkeypatch.setattr(calibrate_as_coded, "PICTURES", 3)
+    monkeypatch.setattr(calibrate_as_coded, "TRIED", [-50.0, 3.5, 4.0, 4.5, 50.0])
 
 
 def test_the_lowest_threshold_marks_all_windows_and_the_highest_none() -> None:
-    found = coded_threshold.thresholds()
-    assert [row[0] for row in found] == coded_threshold.TRIED
+    found = calibrate_as_coded.thresholds()
+    assert [row[0] for row in found] == calibrate_as_coded.TRIED
     marked = [row[1] for row in found]
     assert marked == sorted(marked, reverse=True)
     assert (marked[0], marked[-1]) == (1.0, 0.0)
@@ -27,8 +27,8 @@ def test_the_middle_of_the_acceptable_thresholds_is_printed(
     misreads more lines than others.
     """
     rows = [(1.0, 0.004, 0.0), (2.0, 0.003, 0.1), (3.0, 0.002, 0.02), (4.0, 0.001, 0.02), (5.0, 0.0, 0.02)]
-    monkeypatch.setattr(coded_threshold, "thresholds", lambda: rows)
-    coded_threshold.main()
+    monkeypatch.setattr(calibrate_as_coded, "thresholds", lambda: rows)
+    calibrate_as_coded.main()
     *told, chosen = capsys.readouterr().out.splitlines()
     assert (len(told), chosen) == (5, "4.00")
     assert told[0] == " 1.00: 0.40% of the windows inside the lane marked, 0.0% of the pictures off"
@@ -40,5 +40,5 @@ def test_the_stored_threshold_is_the_one_that_the_search_finds(
 ) -> None:
     """After a change of the net, the road or the rule, search again."""
     monkeypatch.undo()
-    coded_threshold.main()
+    calibrate_as_coded.main()
     assert float(capsys.readouterr().out.splitlines()[-1]) == coded_detector.THRESHOLD

@@ -2,8 +2,8 @@
 
 from math import isfinite
 
-from selfdrive.sim.compare import figures
-from selfdrive.sim.compare.differences import ChannelResult, Comparison, FigureResult
+from selfdrive.sim.compare import key_figures
+from selfdrive.sim.compare.trace_comparison import ChannelResult, Comparison, FigureResult
 
 _SMALLEST = 5e-5  # smaller differences are rounded to 0 and have no time
 
@@ -24,7 +24,7 @@ def lines(comparison: Comparison, *, long: bool) -> list[str]:
 
 
 def figure_line(result: FigureResult) -> str:
-    ours, theirs = figures.text(result.name, result.ours), figures.text(result.name, result.reference)
+    ours, theirs = key_figures.text(result.name, result.ours), key_figures.text(result.name, result.reference)
     limit = "" if result.limit is None else f", limit {result.limit:g}"
     apart = f"{result.difference:.3f}" if isfinite(result.difference) else "not comparable"
     flag = "  <-- beyond" if result.failed else ""

@@ -11,7 +11,7 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.errors import ConfigError
 from selfdrive.messages import CameraView
 from selfdrive.sim.camera import Camera
-from selfdrive.sim.pictures import AS_CODED, PAPER, Pictures
+from selfdrive.sim.picture_options import AS_CODED, PAPER, Pictures
 from selfdrive.sim.road import Road
 from selfdrive.sim.truth import GroundTruth
 from selfdrive.visiond.detector import IdealDetector, LaneDetector
