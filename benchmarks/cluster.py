@@ -36,11 +36,11 @@ from mutator.execution.cluster.board import Board
 from mutator.execution.cluster.bundle import Bundle
 from mutator.execution.cluster.pieces import Ending, Piece, Result
 from mutator.execution.cluster.where import parse
-from mutator.store.blocks import as_block
-from mutator.store.patches import packed_patches
+from mutator.store.checksummed_blocks import as_block
+from mutator.store.patch_files import packed_patches
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_packing import EXPERIMENT
-from mutator.store.stretches import Stretch
+from mutator.store.work_stretches import Stretch
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[1]

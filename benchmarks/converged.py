@@ -23,10 +23,10 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from mutator.model import Record, Status  # noqa: E402
-from mutator.outcomes.golden import trace_digest  # noqa: E402
+from mutator.outcomes.golden_comparison import trace_digest  # noqa: E402
 from mutator.store import plan_file  # noqa: E402
 from mutator.store.run_folder import RunFolder  # noqa: E402
-from mutator.store.series import SeriesFolder  # noqa: E402
+from mutator.store.series_folder import SeriesFolder  # noqa: E402
 from mutator.store.series_format import Series  # noqa: E402
 from mutator.workspace import Workspace  # noqa: E402
 

@@ -27,8 +27,8 @@ from mutator.engines.reference import ReferenceEngine  # noqa: E402
 from mutator.execution.runner import Finished, Goldens, Runner  # noqa: E402
 from mutator.model import Experiment, Record  # noqa: E402
 from mutator.mutants.mutant_building import build  # noqa: E402
-from mutator.outcomes import golden  # noqa: E402
-from mutator.store.choices import Choices  # noqa: E402
+from mutator.outcomes import golden_comparison  # noqa: E402
+from mutator.store.plan_choices import Choices  # noqa: E402
 from mutator.store.run_folder import GoldenRun  # noqa: E402
 from mutator.triggers.kinds import always  # noqa: E402
 from mutator.workspace import Workspace  # noqa: E402
@@ -69,7 +69,7 @@ class Bench:
 
     def steps(self, experiment: Experiment) -> int:
         """Return the number of steps of every run that ends normally."""
-        trace = golden.load_trace(self.manifest, self.golden(experiment))
+        trace = golden_comparison.load_trace(self.manifest, self.golden(experiment))
         return len(trace[self.manifest.time_channel])
 
     def _drive_goldens(self, engine: ReferenceEngine) -> None:

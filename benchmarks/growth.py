@@ -25,11 +25,11 @@ from mutator.model import Activation, Experiment, Outcome, Record, Status
 from mutator.mutants.mutant_building import build
 from mutator.results import table_building
 from mutator.statistics.results_frame import load
-from mutator.store import digests, plan_file
+from mutator.store import file_digests, plan_file
 from mutator.store.check_results import FILE as CHECKS
-from mutator.store.digests import Digest
-from mutator.store.lines import LineWriter
-from mutator.store.patches import PatchWriter
+from mutator.store.checksummed_lines import LineWriter
+from mutator.store.file_digests import Digest
+from mutator.store.patch_files import PatchWriter
 from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -148,12 +148,12 @@ def opening(size: int, out: Path) -> dict[str, float]:
     paths = [golden / name for golden in goldens for name in head.golden_files]
     names = [path.relative_to(folder.path).as_posix() for path in paths]
     checks = b'{"schema": "checks/1", "results": []}'
-    with digests.rewriting(out, dict.fromkeys(names, Digest.of(data)) | {CHECKS: Digest.of(checks)}):
+    with file_digests.rewriting(out, dict.fromkeys(names, Digest.of(data)) | {CHECKS: Digest.of(checks)}):
         for path in paths:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(data)
         (out / CHECKS).write_bytes(checks)
-    digests.close_segments(out, finished=True)
+    file_digests.close_segments(out, finished=True)
     opened, sealed = [], []
     for _ in range(3):
         start = process_time()

@@ -30,23 +30,23 @@ from mutator.campaigns.run_provenance import add_stretch
 from mutator.execution.single_run import run_golden
 from mutator.model import Experiment, Record
 from mutator.mutants.mutant_building import build
-from mutator.outcomes.golden import load_trace
+from mutator.outcomes.golden_comparison import load_trace
 from mutator.outcomes.series_sampling import Sampler
 from mutator.preflight import equivalence_check
 from mutator.preflight.preflight_rules import digest_of
-from mutator.store import digests, plan_file
-from mutator.store.blocks import as_block
+from mutator.store import file_digests, plan_file
 from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
-from mutator.store.digests import Digest
-from mutator.store.patches import _Packer
+from mutator.store.checksummed_blocks import as_block
+from mutator.store.file_digests import Digest
+from mutator.store.patch_files import _Packer
 from mutator.store.records import SCHEMA, line_of
 from mutator.store.run_folder import GoldenRun, RunFolder
-from mutator.store.series import INDEX, Index, write_index
+from mutator.store.series_folder import INDEX, Index, write_index
 from mutator.store.series_format import encode
 from mutator.store.series_script import name_of, write_script
-from mutator.store.stretches import Stretch
 from mutator.store.timings import TIMINGS_SCHEMA
+from mutator.store.work_stretches import Stretch
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -85,7 +85,7 @@ def make(size: int, out: Path) -> str:
             records="0001-*",
         ),
     )
-    digests.close_segments(out, finished=True)
+    file_digests.close_segments(out, finished=True)
     return seals_of(RunFolder(out)).seal or ""
 
 
@@ -139,7 +139,7 @@ def goldens(workspace: Workspace, folder: RunFolder, experiments: Sequence[Exper
     data = json.dumps(checks | {"packages": [], "run_cpu_s": 1.0}).encode()
     files = [path for path in (run / "golden").rglob("*") if path.is_file()]
     coming = {path.relative_to(run).as_posix(): Digest.of(path.read_bytes()) for path in files}
-    with digests.rewriting(run, coming | {CHECKS: Digest.of(data)}):
+    with file_digests.rewriting(run, coming | {CHECKS: Digest.of(data)}):
         (run / CHECKS).write_bytes(data)
 
 

@@ -32,8 +32,8 @@ from mutator.engines.reference import ReferenceEngine  # noqa: E402
 from mutator.execution.runner import Goldens, Runner  # noqa: E402
 from mutator.model import Experiment, Hold, Trigger  # noqa: E402
 from mutator.mutants.mutant_building import build  # noqa: E402
-from mutator.store.choices import Choices  # noqa: E402
-from mutator.store.lines import LineWriter  # noqa: E402
+from mutator.store.checksummed_lines import LineWriter  # noqa: E402
+from mutator.store.plan_choices import Choices  # noqa: E402
 from mutator.store.records import SCHEMA, line_of  # noqa: E402
 from mutator.triggers.kinds import always  # noqa: E402
 from mutator.workspace import Workspace  # noqa: E402

@@ -24,7 +24,7 @@ from mutator.model import Experiment, Outcome, Record, Status
 from mutator.preflight import preflight_cache, preflight_checks, preflight_rules
 from mutator.store.check_results import FILE
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
-from mutator.store.lines import LineWriter
+from mutator.store.checksummed_lines import LineWriter
 from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace

@@ -13,8 +13,8 @@ from time import process_time
 
 import mutator
 from mutator.outcomes.channel_departures import departures
-from mutator.outcomes.golden import compare, load_trace
-from mutator.outcomes.judging import load_channels
+from mutator.outcomes.golden_comparison import compare, load_trace
+from mutator.outcomes.hazards_and_metrics import load_channels
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -37,9 +37,9 @@ from mutator.report.seen import PLACE, UNTIMED_PATH
 from mutator.report.studies import ReportedRun
 from mutator.report.words import words_of
 from mutator.results import table_building
-from mutator.results.counting import outcome_counts
+from mutator.results.outcome_counting import outcome_counts
 from mutator.review.patch_shapes import shapes
-from mutator.store.lines import LineWriter
+from mutator.store.checksummed_lines import LineWriter
 from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_format import encode

@@ -21,10 +21,10 @@ sys.path.insert(0, str(ROOT))
 
 from mutator.execution import runner  # noqa: E402
 from mutator.execution.running import run_campaign  # noqa: E402
-from mutator.store.choices import Choices  # noqa: E402
-from mutator.store.patches import PatchWriter  # noqa: E402
+from mutator.store.patch_files import PatchWriter  # noqa: E402
+from mutator.store.plan_choices import Choices  # noqa: E402
 from mutator.store.run_folder import RunFolder  # noqa: E402
-from mutator.store.series import SeriesFolder  # noqa: E402
+from mutator.store.series_folder import SeriesFolder  # noqa: E402
 from mutator.store.series_packing import SeriesWriter  # noqa: E402
 from mutator.workspace import Workspace  # noqa: E402
 

@@ -43,8 +43,8 @@ HOMES = {
     "mutator.model": ("Experiment", "Fault", "Outcome", "Record", "Status", "Trigger"),
     "mutator.report.film": ("Shot",),
     "mutator.report.history": ("History",),
-    "mutator.store.choices": ("Choices",),
-    "mutator.store.progress": ("Progress",),
+    "mutator.store.plan_choices": ("Choices",),
+    "mutator.store.run_progress": ("Progress",),
     "mutator.audit.seal": ("Seals",),
     "mutator.workspace": ("Workspace",),
 }

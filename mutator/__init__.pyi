@@ -48,8 +48,8 @@ from mutator.model import Status as Status
 from mutator.model import Trigger as Trigger
 from mutator.report.film import Shot as Shot
 from mutator.report.history import History as History
-from mutator.store.choices import Choices as Choices
-from mutator.store.progress import Progress as Progress
+from mutator.store.plan_choices import Choices as Choices
+from mutator.store.run_progress import Progress as Progress
 from mutator.workspace import Workspace as Workspace
 
 HOMES: dict[str, tuple[str, ...]]

@@ -31,15 +31,15 @@ from mutator.model import (
     Trigger,
 )
 from mutator.mutants.anchors import ParsedFile, parsed
-from mutator.store import digests
-from mutator.store.choices import Choices
-from mutator.store.digests import Digest
-from mutator.store.lines import LineWriter, read_segment
-from mutator.store.patches import Patches, PatchWriter, rewrite
+from mutator.store import file_digests
+from mutator.store.checksummed_lines import LineWriter, read_segment
+from mutator.store.file_digests import Digest
+from mutator.store.patch_files import Patches, PatchWriter, rewrite
+from mutator.store.plan_choices import Choices
 from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
-from mutator.store.stretches import Stretch
 from mutator.store.timings import TIMINGS_SCHEMA
+from mutator.store.work_stretches import Stretch
 from mutator.triggers.kinds import always
 from mutator.workspace import Workspace
 
@@ -367,7 +367,7 @@ def write_finished(write_run: Callable[..., Path]) -> Callable[..., Path]:
 
     def write(workspace: Workspace, out: Path, **given: Any) -> Path:
         patch = b"diff --git a/a.py b/a.py\n"
-        write_run(workspace, out, lambda experiment: {"patch": digests.digest(patch)}, **given)
+        write_run(workspace, out, lambda experiment: {"patch": file_digests.digest(patch)}, **given)
         folder = RunFolder.unverified(out)
         lines = [line for _, line in read_segment(out / "records" / "0001-a.jsonl").objects(SCHEMA)]
         patches = PatchWriter(out, "0001-a")
@@ -386,12 +386,12 @@ def write_finished(write_run: Callable[..., Path]) -> Callable[..., Path]:
         for scenario, changes in folder.head.goldens:
             place = folder.golden(scenario, tuple(changes)).relative_to(folder.path)
             new |= {f"{place}/{name}": name.encode() for name in folder.head.golden_files}
-        with digests.rewriting(out, {name: Digest.of(data) for name, data in new.items()}):
+        with file_digests.rewriting(out, {name: Digest.of(data) for name, data in new.items()}):
             for name, data in new.items():
                 (out / name).parent.mkdir(parents=True, exist_ok=True)
                 (out / name).write_bytes(data)
         add_stretch(folder, Stretch(python="CPython 3.11.7", packages={"numpy": "2.4.6"}, platform="Linux"))
-        digests.close_segments(out, finished=True)
+        file_digests.close_segments(out, finished=True)
         return out
 
     return write
@@ -410,10 +410,10 @@ def reseal() -> Callable[..., None]:
             for line in content:
                 writer.append(line)
             writer.close()
-        known = digests.read(run)
+        known = file_digests.read(run)
         names = [name for name, one in known.files.items() if one.lines is None and (run / name).exists()]
         files = {name: Digest.of((run / name).read_bytes()) for name in names}
-        digests.write(run, dataclasses.replace(known, files=files))
-        digests.close_segments(run, finished=finished)
+        file_digests.write(run, dataclasses.replace(known, files=files))
+        file_digests.close_segments(run, finished=finished)
 
     return compute

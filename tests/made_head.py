@@ -3,7 +3,7 @@
 from typing import Any
 
 from mutator.model import Limits
-from mutator.store.choices import Choices
+from mutator.store.plan_choices import Choices
 from mutator.store.run_head import SCHEMA, Provenance, RunHead
 
 HEAD = RunHead(

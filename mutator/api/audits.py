@@ -20,7 +20,7 @@ from mutator.errors import CheckFailed, MutatorError
 from mutator.execution.spot_check import drawn, driven_again
 from mutator.report.audited_pages import pages
 from mutator.store.run_folder import RunFolder
-from mutator.store.stretches import package_versions, told
+from mutator.store.work_stretches import package_versions, told
 from mutator.workspace import Workspace
 
 SHOWN = 20  # differences listed in the text of an audit

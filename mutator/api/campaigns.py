@@ -11,7 +11,7 @@ from mutator.errors import IncompleteRun
 from mutator.execution.distribution import distributor
 from mutator.execution.running import run_campaign
 from mutator.execution.session import Notify, Summary
-from mutator.store.choices import Choices
+from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
 
 

@@ -9,9 +9,9 @@ from mutator.api.html import diff_html, facts_html, text_html
 from mutator.figures.run_plot import draw_run, marks_of
 from mutator.model import Experiment, Fault, Outcome, Record, Status, Trigger
 from mutator.mutants.readable_patches import readable
-from mutator.outcomes.golden import Trace, on_steps
+from mutator.outcomes.golden_comparison import Trace, on_steps
 from mutator.outcomes.trace_files import own_times
-from mutator.outcomes.verdicts import reaction_time, severity_of, since_activation, since_manifestation
+from mutator.outcomes.verdict_rules import reaction_time, severity_of, since_activation, since_manifestation
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.severity import Scale
 from mutator.targets.target_facts import ChannelFacts

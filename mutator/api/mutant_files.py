@@ -16,7 +16,7 @@ from mutator.campaigns.plan import make_plan
 from mutator.errors import MutatorError
 from mutator.model import Fault, Trigger
 from mutator.mutants.mutant_building import write_tree
-from mutator.store.choices import Choices
+from mutator.store.plan_choices import Choices
 from mutator.triggers.kinds import always
 from mutator.workspace import Workspace
 

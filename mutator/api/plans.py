@@ -6,7 +6,7 @@ from mutator.api.selection import WorkspaceLike, open_workspace
 from mutator.campaigns.freezing import freeze_and_tell
 from mutator.campaigns.plan import Plan, Planning, load_plan, make_plan
 from mutator.engines.forkable import not_forked
-from mutator.store.choices import Choices
+from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
 
 

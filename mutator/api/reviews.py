@@ -18,7 +18,7 @@ from mutator.review.effect_pictures import of_groups
 from mutator.review.group_columns import COLUMNS
 from mutator.review.mutant_groups import Group
 from mutator.review.review_page import write_page
-from mutator.store.choices import Choices
+from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
 
 Written = dict[str, dict[str, str]]  # by group: the file of each picture, by name

@@ -10,7 +10,7 @@ from mutator.campaigns.plan import Plan, load_plan
 from mutator.errors import MutatorError
 from mutator.execution.traces import Traces
 from mutator.model import Status
-from mutator.results import counting
+from mutator.results import outcome_counting
 from mutator.results.table_reader import Results
 from mutator.workspace import Workspace
 
@@ -56,7 +56,7 @@ class RunContents(StoredRun):
     @property
     def endings(self) -> dict[str, int]:
         """Number of experiments by ending: the outcome of runs that ended normally, the status of others."""
-        return counting.outcome_counts(self._frame)
+        return outcome_counting.outcome_counts(self._frame)
 
     @property
     def harness_errors(self) -> dict[str, str]:

@@ -11,7 +11,7 @@ from mutator.api.stored_experiments import StoredExperiment
 from mutator.api.trials import Trial, trial_of
 from mutator.errors import MutatorError
 from mutator.execution.single_run import rerun
-from mutator.outcomes.golden import Trace, load_trace
+from mutator.outcomes.golden_comparison import Trace, load_trace
 from mutator.outcomes.series_sampling import keep_series
 from mutator.report.film import Filming, Shot
 

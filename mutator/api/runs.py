@@ -22,12 +22,12 @@ from mutator.exports import Format, Parts, find_export
 from mutator.exports import Table as ExportedTable
 from mutator.exports.write import export
 from mutator.model import OPERATORS
-from mutator.outcomes.fault_free import FaultFreeRun, alerts_by_drive, fault_free_runs, own_alerts
-from mutator.outcomes.golden import load_trace
+from mutator.outcomes.fault_free_runs import FaultFreeRun, alerts_by_drive, fault_free_runs, own_alerts
+from mutator.outcomes.golden_comparison import load_trace
 from mutator.preflight import equivalence_check
 from mutator.report import building
 from mutator.report.stills import take_stills
-from mutator.results import counting
+from mutator.results import outcome_counting
 from mutator.results import table_building as results_table
 from mutator.statistics.mutation_score import score_sheet, totals
 from mutator.statistics.results_frame import prepare
@@ -94,8 +94,13 @@ class Run(RunContents):
     def counts(self) -> Table:
         """Count how the experiments of each fault type ended."""
         frame = self._frame
-        hazards, counts = counting.hazard_names(frame), counting.counts_by(frame, counting.kinds(frame))
-        heads, rows = counting.count_table(counts, "fault type", hazards, alerts=self.folder.has_alerts)
+        hazards, counts = (
+            outcome_counting.hazard_names(frame),
+            outcome_counting.counts_by(frame, outcome_counting.kinds(frame)),
+        )
+        heads, rows = outcome_counting.count_table(
+            counts, "fault type", hazards, alerts=self.folder.has_alerts
+        )
         return Table(heads=heads, rows=rows, right=range(1, len(heads)))
 
     def mutation_score(self) -> Sheet:

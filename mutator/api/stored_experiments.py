@@ -14,12 +14,12 @@ from mutator.api.selection import Bench
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Fault, Record
 from mutator.outcomes.fault_paths import FaultPath, FaultPaths, fault_paths_of
-from mutator.outcomes.golden import Trace
+from mutator.outcomes.golden_comparison import Trace
 from mutator.outcomes.series_sampling import sampled_traces
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
-from mutator.store.series import SeriesFolder, making_again
-from mutator.store.stretches import Stretch
+from mutator.store.series_folder import SeriesFolder, making_again
+from mutator.store.work_stretches import Stretch
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.severity import Scale
 from mutator.targets.target_facts import ChannelFacts

@@ -14,8 +14,8 @@ from mutator.errors import MutatorError
 from mutator.execution.single_run import Single, run_single
 from mutator.figures.run_plot import save
 from mutator.model import Experiment, Method, Record
-from mutator.outcomes.golden import Trace, load_trace
-from mutator.outcomes.judging import load_judged
+from mutator.outcomes.golden_comparison import Trace, load_trace
+from mutator.outcomes.hazards_and_metrics import load_judged
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.severity import Scale
 from mutator.targets.target_facts import ChannelFacts, channel_facts

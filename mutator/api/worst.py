@@ -4,7 +4,7 @@ from pathlib import Path
 
 from mutator.campaigns.filters import compile_filter
 from mutator.results.ranking import places
-from mutator.results.rows import Row, cells_by_row, rows_of
+from mutator.results.result_rows import Row, cells_by_row, rows_of
 from mutator.results.table_reader import Results
 from mutator.store import plan_file
 

@@ -13,8 +13,8 @@ from mutator.campaigns.freezing import target_facts
 from mutator.campaigns.shared_runs import run_key
 from mutator.errors import MutatorError
 from mutator.model import Outcome
-from mutator.outcomes.golden import trace_digest
-from mutator.store import digests, plan_file
+from mutator.outcomes.golden_comparison import trace_digest
+from mutator.store import file_digests, plan_file
 from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.run_folder import RunFolder
@@ -54,7 +54,7 @@ def seeds_and_sessions(folder: RunFolder) -> Problems:
         got = f"choice of the reading {folder.head.choices.reading}"
         yield MutatorError(got, where=folder.path / HEAD, expected=_of(folder, "reading"))
     patterns = [stretch.records for stretch in folder.stretches]
-    for name in digests.segments(folder.path):
+    for name in file_digests.segments(folder.path):
         stem = name.partition("/")[2].removesuffix(".jsonl")
         if not any(fnmatchcase(stem, pattern) for pattern in patterns):
             yield MutatorError(

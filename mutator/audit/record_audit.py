@@ -13,10 +13,10 @@ from mutator.errors import InvalidMutant, MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Activation, Fault, Record, Status, Trigger
 from mutator.mutants.mutant_building import build
-from mutator.outcomes.verdicts import Events, judge
+from mutator.outcomes.verdict_rules import Events, judge
 from mutator.preflight import equivalence_check
 from mutator.store import plan_file
-from mutator.store.lines import read_segment
+from mutator.store.checksummed_lines import read_segment
 from mutator.store.records import record_from
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import RunHead

@@ -26,11 +26,11 @@ from mutator.campaigns.plan import load_plan
 from mutator.campaigns.plan_parts import plan_digest
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.errors import MutatorError
-from mutator.store import digests, plan_file
-from mutator.store.blocks import read_blocks
+from mutator.store import file_digests, plan_file
 from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
-from mutator.store.digests import Digest
+from mutator.store.checksummed_blocks import read_blocks
+from mutator.store.file_digests import Digest
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN, HEAD
 from mutator.workspace import Workspace
@@ -114,7 +114,7 @@ def audit_checks(folder: RunFolder, workspace: Workspace | None) -> list[Check]:
 def _files(folder: RunFolder) -> int:
     """Return the number of files with digests."""
     try:
-        return len(digests.read(folder.path).names)
+        return len(file_digests.read(folder.path).names)
     except MutatorError:
         return 0
 

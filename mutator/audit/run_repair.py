@@ -22,12 +22,12 @@ from mutator.campaigns.freezing import CSV, plan_csv
 from mutator.campaigns.plan import load_plan
 from mutator.errors import MutatorError, Outside, TooLarge
 from mutator.model import Status
-from mutator.store import digests, integrity
-from mutator.store.blocks import read_blocks
-from mutator.store.digests import Digest, Ledger
-from mutator.store.folder_contents import ASIDE
-from mutator.store.lines import Segment, read_segment, written
-from mutator.store.patches import rewrite
+from mutator.store import file_digests, integrity
+from mutator.store.allowed_contents import ASIDE
+from mutator.store.checksummed_blocks import read_blocks
+from mutator.store.checksummed_lines import Segment, read_segment, written
+from mutator.store.file_digests import Digest, Ledger
+from mutator.store.patch_files import rewrite
 from mutator.store.records import LINE_SCHEMAS
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -43,7 +43,7 @@ def repair(folder: RunFolder, workspace: Workspace | None = None) -> list[str]:
     """
     with owned(folder.path, patience_s=0.0), raising_disk_full(folder.path):
         renewed = list(_renewed_ledger(folder))
-        ledger = digests.settled(folder.path)
+        ledger = file_digests.settled(folder.path)
         lost = _lost_patches(folder)
         changes = [*_files(folder, ledger), *_segments(folder, ledger, lost)]
         for name, *_ in changes:
@@ -61,16 +61,16 @@ def _renewed_ledger(folder: RunFolder) -> Iterator[str]:
     """If the ledger itself is damaged, write a new one from the current files."""
     run = folder.path
     try:
-        digests.read(run)
+        file_digests.read(run)
     except Outside:
         raise  # somebody wrote this on purpose
     except MutatorError:
         below = (path for name in ("plan", "golden") for path in (run / name).rglob("*"))
         names = [*integrity.TOP, *(path.relative_to(run).as_posix() for path in below)]
-        found = digests.of_files(run, [name for name in names if digests.may_name(name)])
-        _put_aside(run, digests.FILE)
-        digests.write(run, Ledger(files={name: one for name, one in found.items() if one}))
-        yield f"{digests.FILE} rebuilt from the current files: only an earlier seal can confirm them"
+        found = file_digests.of_files(run, [name for name in names if file_digests.may_name(name)])
+        _put_aside(run, file_digests.FILE)
+        file_digests.write(run, Ledger(files={name: one for name, one in found.items() if one}))
+        yield f"{file_digests.FILE} rebuilt from the current files: only an earlier seal can confirm them"
 
 
 def _files(folder: RunFolder, ledger: Ledger) -> Iterator[_Change]:
@@ -219,10 +219,10 @@ def _carry_out(run: Path, changes: list[_Change], ledger: Ledger) -> None:
         if not name.startswith("timings/")
     }
     finished = ledger.finished and {*coming} <= {CSV}
-    with digests.rewriting(run, coming, finished=finished):
+    with file_digests.rewriting(run, coming, finished=finished):
         for name, data, _ in changes:
             if data is None:
                 unlink_below(run, name)
             else:
                 write_below(run, name, data)
-    digests.close_segments(run)
+    file_digests.close_segments(run)

@@ -21,15 +21,15 @@ from mutator._common.files import read_json
 from mutator._common.hashing import canonical, digest
 from mutator.campaigns.freezing import CSV
 from mutator.preflight.equivalence_check import FOLDER as PROOF
-from mutator.store import digests, plan_file
+from mutator.store import file_digests, plan_file
 from mutator.store.approvals import review_digest
 from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
-from mutator.store.lines import bare_segment, intact_lines
+from mutator.store.checksummed_lines import bare_segment, intact_lines
 from mutator.store.records import ending_on
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN, HEAD
-from mutator.store.stretches import told
+from mutator.store.work_stretches import told
 
 SCHEMA, RESULTS_SCHEMA = "seal/2", "results-digest/2"
 _RUNS_SCHEMA = "results-digest/1"  # of the plan and its runs, as the seal includes them
@@ -135,7 +135,7 @@ def golden_files(folder: RunFolder) -> dict[str, str]:
 
 
 def _sha256(folder: RunFolder, names: Sequence[str]) -> dict[str, str]:
-    found = digests.of_files(folder.path, names)
+    found = file_digests.of_files(folder.path, names)
     return {name: one.sha256 for name, one in found.items() if one}
 
 

@@ -6,12 +6,13 @@ import numpy as np
 
 from mutator._common.below import inside
 from mutator.errors import MutatorError
-from mutator.outcomes.judging import load_channels
+from mutator.outcomes.hazards_and_metrics import load_channels
 from mutator.outcomes.series_sampling import Sampler
 from mutator.store import plan_file
-from mutator.store.blocks import read_blocks
+from mutator.store.checksummed_blocks import read_blocks
 from mutator.store.run_folder import RunFolder
-from mutator.store.series import (
+from mutator.store.series_check import check_values
+from mutator.store.series_folder import (
     INDEX,
     Index,
     SeriesFolder,
@@ -22,7 +23,6 @@ from mutator.store.series import (
 )
 from mutator.store.series_format import Series, decode
 from mutator.store.series_packing import segments
-from mutator.store.series_sizes import check_values
 from mutator.targets.manifest import TargetManifest
 
 _ROUNDING = 1e-5  # relative; values have six digits

@@ -10,10 +10,10 @@ from pathlib import Path
 from mutator._common.below import check_name, inside, unlink_below, write_below
 from mutator.audit.series_audit import series
 from mutator.errors import MutatorError
-from mutator.outcomes.judging import load_channels
+from mutator.outcomes.hazards_and_metrics import load_channels
 from mutator.outcomes.series_sampling import Sampler
 from mutator.store.run_folder import RunFolder
-from mutator.store.series import INDEX, Index, SeriesFolder, making_again
+from mutator.store.series_folder import INDEX, Index, SeriesFolder, making_again
 from mutator.store.series_packing import SUFFIX, pack_again
 from mutator.store.series_script import name_of, script_of
 from mutator.workspace import Workspace

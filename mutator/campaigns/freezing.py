@@ -24,9 +24,9 @@ from mutator.campaigns.run_provenance import check_sources, check_version
 from mutator.errors import MutatorError
 from mutator.model import Experiment
 from mutator.results.plan_columns import PLAN_COLUMNS, plan_row
-from mutator.store import digests, plan_file
-from mutator.store.digests import Digest, DigestingFile, Ledger
-from mutator.store.folder_contents import check_contents
+from mutator.store import file_digests, plan_file
+from mutator.store.allowed_contents import check_contents
+from mutator.store.file_digests import Digest, DigestingFile, Ledger
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN, HEAD, SCHEMA, Provenance, RunHead
 from mutator.targets.manifest import TargetManifest
@@ -34,7 +34,14 @@ from mutator.targets.target_facts import TargetFacts, channel_facts, hazard_fact
 from mutator.workspace import Workspace
 
 CSV = "plan.csv"
-_OURS = ("owner.lock", "workers", "plan", CSV, CAMPAIGN, digests.FILE)  # files that a killed freeze can leave
+_OURS = (
+    "owner.lock",
+    "workers",
+    "plan",
+    CSV,
+    CAMPAIGN,
+    file_digests.FILE,
+)  # files that a killed freeze can leave
 
 
 def freeze(plan: Plan | Planning, out: Path, workspace: Workspace) -> RunFolder:
@@ -94,7 +101,7 @@ def freeze_owned(plan: Plan | Planning, out: Path, workspace: Workspace) -> tupl
         return folder, tally
     tally, found, places, files = _written(plan, out)
     head = _head(plan, tally, found, workspace, places).as_json()
-    digests.write(out, Ledger(files=files | {HEAD: Digest.of(head)}))
+    file_digests.write(out, Ledger(files=files | {HEAD: Digest.of(head)}))
     write_atomic(out / HEAD, head)  # last, because this file makes the folder a run folder
     return RunFolder.open(out), tally
 

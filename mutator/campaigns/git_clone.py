@@ -20,7 +20,7 @@ from tempfile import TemporaryDirectory, TemporaryFile
 
 from mutator._common.below import open_below
 from mutator.errors import MutatorError
-from mutator.store.stretches import CloneState
+from mutator.store.work_stretches import CloneState
 
 _PATIENCE_S = 10.0  # for one answer
 _MOST_SAID = 32 << 20  # bytes of an answer; a tiny repository can list billions of files

@@ -25,7 +25,7 @@ from mutator.model import AfterHazard, Experiment
 from mutator.results.plan_columns import PLAN_COLUMNS, plan_row
 from mutator.store import plan_file
 from mutator.store.check_results import measured_cpu_s
-from mutator.store.choices import Choices
+from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.store.run_head import CAMPAIGN
 from mutator.store.shards import Shard

@@ -16,7 +16,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 from mutator.engines.processes import environment
-from mutator.store.stretches import Blas
+from mutator.store.work_stretches import Blas
 from mutator.targets.environment import THREADS
 
 _BLAS = "import json, numpy, threadpoolctl; print(json.dumps(threadpoolctl.threadpool_info()))"

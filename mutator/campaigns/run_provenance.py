@@ -13,11 +13,11 @@ from mutator._common.version import VERSION
 from mutator.campaigns import run_environment
 from mutator.campaigns.git_clone import clone_state
 from mutator.errors import MutatorError
-from mutator.store import digests
+from mutator.store import file_digests
 from mutator.store.check_results import loaded_packages
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import HEAD, SCHEMA
-from mutator.store.stretches import Machine, Stretch, differences
+from mutator.store.work_stretches import Machine, Stretch, differences
 
 if TYPE_CHECKING:
     from mutator.workspace import Workspace
@@ -124,5 +124,5 @@ def add_machine(folder: RunFolder, machine: Machine) -> RunFolder:
 
 def _with_stretches(folder: RunFolder, stretches: tuple[Stretch, ...]) -> RunFolder:
     """Write run.json with these stretches of work, and return the folder as it is then."""
-    digests.rewrite(folder.path, HEAD, replace(folder.head, stretches=stretches).as_json())
+    file_digests.rewrite(folder.path, HEAD, replace(folder.head, stretches=stretches).as_json())
     return RunFolder(folder.path)

@@ -9,7 +9,7 @@ from mutator._common.below import inside
 from mutator._common.bounded import read_bounded
 from mutator._common.text import shown
 from mutator.errors import BadOutput
-from mutator.outcomes import golden
+from mutator.outcomes import golden_comparison
 from mutator.targets.manifest import TargetManifest
 
 
@@ -28,7 +28,9 @@ def describe_first_difference(manifest: TargetManifest, one: Path, other: Path) 
 
 def _in_traces(manifest: TargetManifest, one: Path, other: Path) -> str:
     try:
-        first, second = (golden.load_trace(manifest, out, manifest.channels) for out in (one, other))
+        first, second = (
+            golden_comparison.load_trace(manifest, out, manifest.channels) for out in (one, other)
+        )
     except BadOutput as error:
         return f"in a trace that cannot be compared ({error.got})"
     time = manifest.time_channel
@@ -40,7 +42,7 @@ def _in_traces(manifest: TargetManifest, one: Path, other: Path) -> str:
         unlike = np.flatnonzero((a != b) & ((a == a) | (b == b)))  # NaN equals NaN
         if unlike.size:
             step = int(unlike[0])
-            t = float(golden.times_of(first, name, time)[step])
+            t = float(golden_comparison.times_of(first, name, time)[step])
             least = (t, step, name) if least is None or t < least[0] else least
     if least is None:
         return "" if steps[0] == steps[1] else f"in their length: {steps[0]} and {steps[1]} steps"

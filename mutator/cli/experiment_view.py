@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from mutator.api.trials import Trial
     from mutator.model import Experiment, Record
     from mutator.outcomes.fault_paths import PathComponent
-    from mutator.results.rows import Row
+    from mutator.results.result_rows import Row
     from mutator.targets.manifest import TargetManifest
     from mutator.workspace import Workspace
 

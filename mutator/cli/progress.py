@@ -9,7 +9,7 @@ from mutator.cli.console import Terminal
 from mutator.execution.phases import Lines, count, endings, rate, remaining, title
 
 if TYPE_CHECKING:
-    from mutator.store.progress import Progress
+    from mutator.store.run_progress import Progress
 
 
 @contextmanager

@@ -8,7 +8,7 @@ from mutator.campaigns.filters import compile_filter
 from mutator.model import Experiment, Record, Value
 from mutator.preflight import equivalence_check
 from mutator.results.plan_columns import PLAN_COLUMNS, plan_row
-from mutator.results.rows import Row, rows_of
+from mutator.results.result_rows import Row, rows_of
 from mutator.results.table_reader import frame_of
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder

@@ -15,7 +15,7 @@ from mutator.comparison.input_differences import Fact
 from mutator.comparison.pairs import Change, Pair, time_to_hazard
 from mutator.comparison.run_comparison import Comparison, Gate, ending_change
 from mutator.results.plan_columns import plan_row
-from mutator.results.rows import Row
+from mutator.results.result_rows import Row
 from mutator.web import asset, load_order
 
 LISTED = 50  # number of experiments that the Markdown lists for each change; the page and the CSV list all

@@ -8,8 +8,8 @@ from mutator._common.hashing import plain
 from mutator.comparison.compared_runs import Side
 from mutator.comparison.pairs import Matching, Pair
 from mutator.store.run_folder import RunFolder
-from mutator.store.stretches import package_versions
-from mutator.store.stretches import told as ran_with
+from mutator.store.work_stretches import package_versions
+from mutator.store.work_stretches import told as ran_with
 
 _SHORT = 12  # shown digits of a digest
 _HEAD = ("campaign", "target", "seed", "reading")

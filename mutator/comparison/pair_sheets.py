@@ -9,7 +9,7 @@ import pandas as pd
 
 from mutator.comparison.pairs import Change, Pair, time_to_hazard
 from mutator.model import Outcome, Status
-from mutator.results.rows import Row
+from mutator.results.result_rows import Row
 from mutator.statistics.guided_against_random import holm
 from mutator.statistics.paired_statistics import mcnemar, rate_difference, times
 from mutator.statistics.shares import share

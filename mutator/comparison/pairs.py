@@ -8,7 +8,7 @@ from functools import cached_property
 
 from mutator.comparison.compared_runs import Side, key_of
 from mutator.model import Experiment, Outcome, Status
-from mutator.results.rows import Row
+from mutator.results.result_rows import Row
 
 _HARM = {Outcome.NOT_ACTIVATED: 0, Outcome.MASKED: 0, Outcome.SDC: 1, Outcome.HAZARD: 2}
 _TIME_DIGITS = 6  # decimals of a time from activation; absorbs rounding errors

@@ -28,7 +28,7 @@ from mutator.comparison.pair_sheets import (
 from mutator.comparison.pairs import Change, Matching, Pair, match, time_to_hazard
 from mutator.errors import MutatorError
 from mutator.model import Experiment
-from mutator.results.rows import Row
+from mutator.results.result_rows import Row
 from mutator.statistics.statistics_sheet import Sheet
 
 

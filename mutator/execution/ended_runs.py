@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass
 
 from mutator.audit.seal import Seals
 from mutator.preflight.equivalence_check import Proof
-from mutator.store import integrity, verified_runs
+from mutator.store import integrity, verified_runs_cache
 from mutator.store.run_folder import RunFolder
 
 
@@ -22,14 +22,14 @@ def keep_end(folder: RunFolder, ended: Ended) -> None:
     if key := integrity.content_key(folder.path):
         proof = ended.proof and {"sampled": ended.proof.sampled, "same": ended.proof.same}
         told = {"outcomes": dict(ended.outcomes), "proof": proof, "seals": asdict(ended.seals)}
-        verified_runs.remember(key, ended=told)
+        verified_runs_cache.remember(key, ended=told)
 
 
 def ended_before(folder: RunFolder) -> Ended | None:
     """Return the stored outcome of a finished run whose verified bytes have not changed; else None."""
     if not folder.finished or not (key := integrity.content_key(folder.path)):
         return None
-    known = verified_runs.recall(key)
+    known = verified_runs_cache.recall(key)
     if not known.get("verified") or "ended" not in known:
         return None
     told = known["ended"]

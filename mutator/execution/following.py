@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from mutator.execution.session import Session
 from mutator.preflight import equivalence_check
-from mutator.store.progress import Progress, Tail
+from mutator.store.run_progress import Progress, Tail
 
 _NOTIFY_S = 0.5
 

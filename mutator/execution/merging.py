@@ -19,20 +19,20 @@ from mutator.preflight import equivalence_check
 from mutator.results import table_building
 from mutator.results.ranking import worth
 from mutator.results.table_reader import frame_of
-from mutator.store import cleaning, digests, integrity, plan_file
+from mutator.store import cleaning, file_digests, integrity, plan_file
+from mutator.store.allowed_contents import check_contents
 from mutator.store.approvals import FILE as REVIEWED
 from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
-from mutator.store.digests import Digest, Ledger
-from mutator.store.folder_contents import check_contents
-from mutator.store.patches import PatchWriter
+from mutator.store.file_digests import Digest, Ledger
+from mutator.store.patch_files import PatchWriter
 from mutator.store.records import endings
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import HEAD
 from mutator.store.run_writer import copy_lines
-from mutator.store.series import FOLDER as SERIES
+from mutator.store.series_folder import FOLDER as SERIES
 from mutator.store.series_packing import pack
-from mutator.store.stretches import Stretch, differences
+from mutator.store.work_stretches import Stretch, differences
 
 _MARK = f".{HEAD}."  # followed by a process id: marks an unfinished merge
 _REMEDY = "give the folder of each shard of one plan exactly once"
@@ -194,7 +194,7 @@ def _stretches(folders: Sequence[RunFolder], *, accept: bool) -> Iterator[Stretc
 def _copy(folders: Sequence[RunFolder], out: Path, stretches: Sequence[Stretch]) -> None:
     """Copy all content. The head is written last, so that an unfinished copy is not a run folder."""
     first = folders[0]
-    ledger = digests.settled(first.path)
+    ledger = file_digests.settled(first.path)
     reviewed = all((folder.path / REVIEWED).exists() for folder in folders)
     files = {
         name: one
@@ -213,8 +213,8 @@ def _copy(folders: Sequence[RunFolder], out: Path, stretches: Sequence[Stretch])
     _pack_series(folders, out)
     choices = replace(first.head.choices, shard=None)
     head = replace(first.head, choices=choices, stretches=tuple(stretches)).as_json()
-    digests.write(out, Ledger(files=files | {HEAD: Digest.of(head)}))
-    digests.close_segments(out, finished=True)
+    file_digests.write(out, Ledger(files=files | {HEAD: Digest.of(head)}))
+    file_digests.close_segments(out, finished=True)
     write_atomic(out / HEAD, head)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from mutator.store.progress import Progress
+    from mutator.store.run_progress import Progress
 
 LINE_EVERY_S = 15.0  # so that a log shows that the run is alive
 

@@ -20,7 +20,7 @@ from mutator.execution.pytest_worker import INPUT, PROBLEM, WRITTEN, CampaignIte
 from mutator.execution.session import Notify, Session, Summary, open_session
 from mutator.execution.stopped_workers import Continuing
 from mutator.execution.worker import Assignment, dying_python
-from mutator.store.choices import Choices
+from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
 
 

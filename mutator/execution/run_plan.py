@@ -12,7 +12,7 @@ from mutator.campaigns.run_provenance import check_sources, check_version
 from mutator.errors import MutatorError
 from mutator.review import approval_gate
 from mutator.store.approvals import write_approvals
-from mutator.store.choices import Choices
+from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 

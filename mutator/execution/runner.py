@@ -18,13 +18,13 @@ from mutator.faults.fault_models import FaultModels
 from mutator.model import Activation, AfterHazard, Experiment, Record, Status
 from mutator.mutants.mutant_building import Mutant, build
 from mutator.mutants.probe import activation_of
-from mutator.outcomes import golden
-from mutator.outcomes.blame import assign_blame, error_of
+from mutator.outcomes import golden_comparison
 from mutator.outcomes.channel_departures import departures
-from mutator.outcomes.golden import Trace
-from mutator.outcomes.judging import Judged, load_channels, load_judged
+from mutator.outcomes.failure_cause import assign_blame, error_of
+from mutator.outcomes.golden_comparison import Trace
+from mutator.outcomes.hazards_and_metrics import Judged, load_channels, load_judged
 from mutator.outcomes.series_sampling import Sampler
-from mutator.outcomes.verdicts import first_events, judge
+from mutator.outcomes.verdict_rules import first_events, judge
 from mutator.preflight.preflight_rules import digest_of
 from mutator.store.run_folder import GoldenRun
 from mutator.store.series_format import encode
@@ -255,9 +255,9 @@ class Runner:
             if judged.t_end is None:
                 why = "was stopped, but no terminal hazard is in its trace"
                 return _bare(experiment, Status.HARNESS_ERROR, why, built)
-            reference = golden.until(reference, faulty[time][-1], time)
-        faulty = golden.sharing_times(reference, faulty, time)
-        difference = golden.compare(reference, faulty, self.manifest.compared, time, judged.t_end)
+            reference = golden_comparison.until(reference, faulty[time][-1], time)
+        faulty = golden_comparison.sharing_times(reference, faulty, time)
+        difference = golden_comparison.compare(reference, faulty, self.manifest.compared, time, judged.t_end)
         if problem := _not_by_the_fault(difference.t_first, activation):
             return _bare(experiment, Status.HARNESS_ERROR, problem, built)
         hazards = first_events(judged.hazards, activation)
@@ -272,7 +272,7 @@ class Runner:
             max_dev=difference.max_dev,
             hazards=tuple(hazards),
             alerts=tuple(first_events(judged.alerts, activation)),
-            trace_digest=golden.trace_digest(self.manifest, execution.out),
+            trace_digest=golden_comparison.trace_digest(self.manifest, execution.out),
             patch=digest(built.patch_bytes),
             t_end=judged.t_end,
             dev=() if judged.t_end is None else difference.dev,

@@ -12,7 +12,7 @@ from mutator.execution.following import followed
 from mutator.execution.left_files import LeftFiles
 from mutator.execution.local import LocalWorkers
 from mutator.execution.session import Notify, Summary, open_session
-from mutator.store.choices import Choices
+from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
 
 LOCAL = LocalWorkers()

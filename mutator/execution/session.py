@@ -39,14 +39,14 @@ from mutator.preflight.preflight_checks import are_there, describe_unreached_tri
 from mutator.results import table_building
 from mutator.results.ranking import worth
 from mutator.results.table_reader import Results
-from mutator.store import digests
+from mutator.store import file_digests
 from mutator.store.check_results import golden_digests
-from mutator.store.choices import Choices
-from mutator.store.progress import Progress, label
+from mutator.store.plan_choices import Choices
 from mutator.store.records import LINE_SCHEMAS, endings
 from mutator.store.run_folder import RunFolder
+from mutator.store.run_progress import Progress, label
 from mutator.store.series_packing import pack, segments
-from mutator.store.stretches import Machine
+from mutator.store.work_stretches import Machine
 from mutator.targets.requirements import check_requirements
 from mutator.workspace import Workspace
 
@@ -126,7 +126,7 @@ class Session:
         self.secret = token_bytes(_SECRET_BYTES)
         self.golden_digests: Mapping[str, str] = {}
         self.written = WrittenFiles()
-        self._ledger: digests.Ledger | None = None  # as it was when the work began
+        self._ledger: file_digests.Ledger | None = None  # as it was when the work began
         self.working = ""  # the present workers, if known
         self._began = time.monotonic()
         self._done_before = 0
@@ -164,13 +164,13 @@ class Session:
                 accept=self.accept_versions,
             )
             self.golden_digests = golden_digests(self.folder)
-            self._ledger = digests.read(self.folder.path)
+            self._ledger = file_digests.read(self.folder.path)
         self.pending = left
         self._records = None if left else records
 
     def note_machine(self, machine: Machine) -> None:
         self.folder = add_machine(self.folder, machine)
-        self._ledger = digests.read(self.folder.path)
+        self._ledger = file_digests.read(self.folder.path)
 
     def worker_name(self, name: str) -> str:
         """Return a name for a worker's files that no session used before."""
@@ -252,9 +252,9 @@ class Session:
             return
         with self._noting_full_disk():
             changed = []
-            if not digests.is_as(run, self._ledger):
-                digests.write(run, self._ledger)
-                changed.append(digests.FILE)
+            if not file_digests.is_as(run, self._ledger):
+                file_digests.write(run, self._ledger)
+                changed.append(file_digests.FILE)
             changed += self.written.set_others_aside(run)
             if changed and not self.problem:
                 self.problem = (
@@ -292,7 +292,7 @@ class Session:
 
     def _close_segments(self, *, finished: bool | None = None) -> None:
         if not wait_for_workers(self.folder.path):
-            digests.close_segments(self.folder.path, finished=finished)
+            file_digests.close_segments(self.folder.path, finished=finished)
 
     def _pack_series(self) -> None:
         """Pack the workers' series. While a worker is still running, leave this to the next session."""
@@ -330,7 +330,7 @@ def open_session(
             if is_new and not RunFolder.exists(out):  # nothing was planned, so nothing is worth keeping
                 shutil.rmtree(out, ignore_errors=True)
             raise
-        digests.close_segments(folder.path)
+        file_digests.close_segments(folder.path)
         clear_place(folder.work)
         folders = ("plan", "report", "series", "patches")
         written = (folder.path.iterdir(), *((folder.path / name).rglob("*") for name in folders))

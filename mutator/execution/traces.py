@@ -8,11 +8,11 @@ from mutator._common.below import inside
 from mutator.errors import MutatorError
 from mutator.execution.single_run import rerun
 from mutator.model import Experiment, Record
-from mutator.outcomes.golden import Trace, load_trace, trace_digest
+from mutator.outcomes.golden_comparison import Trace, load_trace, trace_digest
 from mutator.outcomes.series_sampling import keep_series, sampled_traces
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
-from mutator.store.series import SeriesFolder, making_again
+from mutator.store.series_folder import SeriesFolder, making_again
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 

@@ -24,7 +24,7 @@ from mutator.model import Experiment, Status
 from mutator.preflight import equivalence_check
 from mutator.preflight.equivalence_check import Sample
 from mutator.store import plan_file
-from mutator.store.planned import Planned
+from mutator.store.planned_experiments import Planned
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_writer import RunWriter
 

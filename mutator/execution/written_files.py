@@ -6,7 +6,7 @@ from pathlib import Path
 
 from mutator._common.below import open_below, read_below, unlink_below, write_below
 from mutator._common.files import raising_disk_full
-from mutator.store import digests
+from mutator.store import file_digests
 
 ASIDE = "damaged"
 Sums = Mapping[str, str]  # SHA-256 by the name of a file of lines in the run folder
@@ -32,8 +32,8 @@ class WrittenFiles:
 
     def set_others_aside(self, run: Path) -> list[str]:
         """Move new files of lines that no worker wrote so to `damaged/`; return their names."""
-        known = digests.read(run).files
-        found = [name for name in digests.segments(run) if name not in known]
+        known = file_digests.read(run).files
+        found = [name for name in file_digests.segments(run) if name not in known]
         lost = [name for name in self._sums if name not in found]
         others = [name for name in found if not self._is_as_written(run, name)]
         with raising_disk_full(run):

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mutator.outcomes.golden import Trace, deviation, end_of_shorter
+from mutator.outcomes.golden_comparison import Trace, deviation, end_of_shorter
 from mutator.targets.channels import Channel
 
 Departure = tuple[str, float, float]  # channel, first time (s), largest deviation

@@ -15,7 +15,7 @@ from typing import NamedTuple
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Fault, Outcome, Record
 from mutator.outcomes.channel_departures import Departure
-from mutator.outcomes.topology import PossibleRoute, chained, links_of, steps_from, structured
+from mutator.outcomes.fault_routes import PossibleRoute, chained, links_of, steps_from, structured
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import HEAD, REMEDY
 from mutator.stpa.analysis import Kind, StructureModel

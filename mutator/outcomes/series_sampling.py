@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from mutator.model import Record
-from mutator.outcomes.golden import Trace, on_steps
+from mutator.outcomes.golden_comparison import Trace, on_steps
 from mutator.outcomes.trace_files import own_times
-from mutator.store.series import SeriesFolder, run_facts, write_kept
+from mutator.store.series_folder import SeriesFolder, run_facts, write_kept
 from mutator.store.series_format import Points, Series, encode
 from mutator.targets.channels import Channel, Role
 from mutator.targets.manifest import TargetManifest

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from mutator._common.bounded import read_bounded
 from mutator._common.text import counted
 from mutator.config.yaml_files import MAX_BYTES
-from mutator.outcomes.fault_free import own_alerts
+from mutator.outcomes.fault_free_runs import own_alerts
 from mutator.paper import observations, observations_page, seeds
 from mutator.paper.observations import Verdict
 from mutator.paper.published import has_paper, load_paper

@@ -19,7 +19,7 @@ from mutator.campaigns.sampling import pick
 from mutator.engines.jobs import RunMode
 from mutator.errors import CheckFailed
 from mutator.model import Experiment, Record, Status
-from mutator.store import digests, plan_file
+from mutator.store import file_digests, plan_file
 from mutator.store.records import PROOF, endings
 from mutator.store.run_folder import RunFolder
 
@@ -120,8 +120,8 @@ def needless(folder: RunFolder) -> str | None:
 
 def drop(folder: RunFolder) -> None:
     """Remove a proof that is no longer needed."""
-    gone = {name: None for name in digests.segments(folder.path) if name.startswith(f"{FOLDER}/")}
-    with digests.rewriting(folder.path, gone):
+    gone = {name: None for name in file_digests.segments(folder.path) if name.startswith(f"{FOLDER}/")}
+    with file_digests.rewriting(folder.path, gone):
         remove_folder(folder.path / FOLDER)
 
 

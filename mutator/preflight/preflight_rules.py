@@ -11,8 +11,8 @@ from mutator.engines.jobs import Execution
 from mutator.errors import BadOutput
 from mutator.model import Status
 from mutator.mutants.probe import was_triggered
-from mutator.outcomes import golden
-from mutator.outcomes.judging import load_judged
+from mutator.outcomes import golden_comparison
+from mutator.outcomes.hazards_and_metrics import load_judged
 from mutator.targets.manifest import TargetManifest
 
 
@@ -45,7 +45,7 @@ def look(manifest: TargetManifest, execution: Execution) -> CheckRun:
     return CheckRun(
         problem="",
         digest=digest_of(manifest, execution.out),
-        trace=golden.trace_digest(manifest, execution.out),
+        trace=golden_comparison.trace_digest(manifest, execution.out),
         alerts=judged.alerts,
         hazards=judged.hazards,
         triggered=was_triggered(execution.probe),

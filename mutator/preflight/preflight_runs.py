@@ -16,8 +16,8 @@ from mutator.model import Experiment
 from mutator.mutants.mutant_building import build
 from mutator.preflight import canary, unreached_triggers
 from mutator.preflight.preflight_rules import CheckRun, look
-from mutator.store.progress import Pace, Progress
 from mutator.store.run_folder import RunFolder
+from mutator.store.run_progress import Pace, Progress
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.kinds import always
 from mutator.workspace import Workspace

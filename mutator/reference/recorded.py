@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator
 from mutator._common.tables import Table
 from mutator.reference.tables import generated
 from mutator.results.plan_columns import PLAN_COLUMNS
-from mutator.results.propagation import COLUMNS as PROPAGATION
+from mutator.results.propagation_columns import COLUMNS as PROPAGATION
 from mutator.results.table_columns import TIMINGS, result_columns, severity_columns
 from mutator.results.table_files import ARROW_TYPES, Column
 from mutator.targets.channels import Channel

@@ -9,7 +9,7 @@ from urllib.parse import quote
 import numpy as np
 import pandas as pd
 
-from mutator.results.counting import hazard_times
+from mutator.results.outcome_counting import hazard_times
 
 FIRST = "alert before the hazard"
 NO_ALERT, LATE = "no alert at all", "alert only after the hazard"

@@ -28,7 +28,7 @@ from mutator.report.dangers import dangerous, worst_of
 from mutator.report.fix_order import first_to_fix
 from mutator.report.seen import PLACE, UNTIMED_PATH
 from mutator.report.studies import ReportedRun
-from mutator.results.rows import Row, rows_of
+from mutator.results.result_rows import Row, rows_of
 
 TYPES = 6  # maximum number of fault types that an answer lists
 

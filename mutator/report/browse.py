@@ -27,8 +27,8 @@ from mutator.report.source_lines import SourceLines
 from mutator.report.studies import ReportedRun
 from mutator.report.whole_map import map_of
 from mutator.report.words import meanings_of
-from mutator.results.counting import endings, hazard_names, hazard_times, hazards_joined, kinds
-from mutator.results.rows import Row, rows_of
+from mutator.results.outcome_counting import endings, hazard_names, hazard_times, hazards_joined, kinds
+from mutator.results.result_rows import Row, rows_of
 from mutator.review.patch_shapes import Shape, shapes
 from mutator.statistics.mutation_score import PERMANENT, TRANSIENT
 from mutator.store.run_folder import RunFolder

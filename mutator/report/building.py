@@ -19,7 +19,7 @@ from mutator.report.panels.answers import answers_panel
 from mutator.report.stamp import is_current, made_from, write_files
 from mutator.report.studies import ReportedRun
 from mutator.report.words import words_of
-from mutator.results.counting import outcome_counts
+from mutator.results.outcome_counting import outcome_counts
 from mutator.results.table_reader import Results
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace

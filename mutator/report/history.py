@@ -16,7 +16,7 @@ from mutator.errors import MutatorError
 from mutator.execution.phases import duration
 from mutator.model import Outcome
 from mutator.report.panel import FOLDER, rendered
-from mutator.results.rows import Row
+from mutator.results.result_rows import Row
 from mutator.results.table_reader import Results
 from mutator.store.run_folder import RunFolder
 from mutator.web import asset

@@ -8,7 +8,7 @@ from mutator.execution.traces import Traces
 from mutator.outcomes.series_sampling import keep_series
 from mutator.results.table_columns import deviation_columns
 from mutator.store.run_folder import RunFolder
-from mutator.store.series import SeriesFolder
+from mutator.store.series_folder import SeriesFolder
 
 if TYPE_CHECKING:
     from mutator.workspace import Workspace

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from mutator.errors import MutatorError
 from mutator.model import OPERATORS, Fault, Outcome, Status
 from mutator.mutants.anchors import ParsedFile, parsed
-from mutator.results.counting import endings
+from mutator.results.outcome_counting import endings
 from mutator.statistics.mutation_score import PERMANENT, TRANSIENT
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest

@@ -12,9 +12,9 @@ from mutator._common.version import VERSION
 from mutator.errors import MutatorError
 from mutator.report.page_series import series_facts
 from mutator.report.panel import FOLDER
-from mutator.store import digests
-from mutator.store import series as series_store
-from mutator.store.folder_contents import ASIDE, SCRATCH, SIGNATURE, TRACES, belongs
+from mutator.store import file_digests
+from mutator.store import series_folder as series_store
+from mutator.store.allowed_contents import ASIDE, SCRATCH, SIGNATURE, TRACES, belongs
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -28,7 +28,10 @@ _LINKED = (".mp4", ".gif")  # the report contains only the names of such files
 def made_from(folder: RunFolder, workspace: Workspace | None) -> str:
     """Return the digest of all inputs of a report, including the sources of mutator."""
     run = folder.path
-    series = [series_facts(folder), digests.sha256(run / series_store.FOLDER / f"{series_store.INDEX}.js")]
+    series = [
+        series_facts(folder),
+        file_digests.sha256(run / series_store.FOLDER / f"{series_store.INDEX}.js"),
+    ]
     return digest([SCHEMA, _sources(), run.name, list(_files_of(run)), series, _library(folder, workspace)])
 
 
@@ -88,7 +91,7 @@ def _files_of(run: Path) -> Iterator[tuple[str, str]]:
         inside = sorted(top.rglob("*")) if top.is_dir() else [top]
         for path in (path for path in inside if not path.is_dir() and not path.name.startswith(".")):
             name = path.relative_to(run).as_posix()
-            yield name, "" if path.suffix in _LINKED else digests.sha256(path)
+            yield name, "" if path.suffix in _LINKED else file_digests.sha256(path)
 
 
 def _library(folder: RunFolder, workspace: Workspace | None) -> object:
@@ -109,4 +112,4 @@ def _digests(folder: Path, pattern: str) -> list[tuple[str, str]]:
 
 
 def _named(folder: Path, paths: Iterable[Path]) -> list[tuple[str, str]]:
-    return sorted((p.relative_to(folder).as_posix(), digests.sha256(p)) for p in paths)
+    return sorted((p.relative_to(folder).as_posix(), file_digests.sha256(p)) for p in paths)

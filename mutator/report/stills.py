@@ -13,9 +13,9 @@ from mutator.model import Experiment, Record, Status
 from mutator.report.film import Filming, Shot
 from mutator.results.ranking import places
 from mutator.results.table_reader import Results
-from mutator.store.planned import Planned
-from mutator.store.progress import Pace, Progress
+from mutator.store.planned_experiments import Planned
 from mutator.store.run_folder import GoldenRun, RunFolder
+from mutator.store.run_progress import Pace, Progress
 from mutator.workspace import Workspace
 
 MOST, ONE_IN = 10, 20  # at most 10 experiments, and at most one in 20 of the planned ones

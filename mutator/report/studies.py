@@ -8,20 +8,20 @@ from mutator.campaigns.installed_studies import find_study
 from mutator.errors import MutatorError
 from mutator.figures.figures import Drawing
 from mutator.model import Experiment, Fault, Record, Status
-from mutator.outcomes.fault_free import FaultFreeRun, fault_free_runs
+from mutator.outcomes.fault_free_runs import FaultFreeRun, fault_free_runs
 from mutator.outcomes.fault_paths import fault_paths_of
-from mutator.outcomes.golden import load_trace
+from mutator.outcomes.golden_comparison import load_trace
 from mutator.report.engines import EngineSummary, engine_summary
 from mutator.report.panel import Panel
 from mutator.report.paths import RunPaths
 from mutator.report.seen import PLACE, UNTIMED_PATH, Seen
 from mutator.report.source_lines import SourceLines
-from mutator.results.rows import Row, rows_of
+from mutator.results.result_rows import Row, rows_of
 from mutator.results.table_reader import Results
 from mutator.statistics.published_counts import Published
 from mutator.statistics.results_frame import prepare
 from mutator.store import plan_file
-from mutator.store.planned import Planned
+from mutator.store.planned_experiments import Planned
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 

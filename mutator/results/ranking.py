@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from mutator.model import Outcome, Status
-from mutator.results.counting import endings, hazard_margins
+from mutator.results.outcome_counting import endings, hazard_margins
 from mutator.targets.severity import CLASSES, DELTA_V
 
 if TYPE_CHECKING:

@@ -14,12 +14,12 @@ from mutator._common.processes import beside, processes_for, shared
 from mutator._common.version import VERSION
 from mutator.errors import MutatorError, MutatorWarning
 from mutator.outcomes.fault_paths import fault_paths_of
-from mutator.results import propagation
+from mutator.results import propagation_columns
 from mutator.results.table_columns import TIMINGS, Finished, cells_of, columns_of
 from mutator.results.table_files import CsvTable, ParquetTable, csv_lines, record_batch
-from mutator.store import digests, plan_file
-from mutator.store.digests import Digest
-from mutator.store.planned import Planned
+from mutator.store import file_digests, plan_file
+from mutator.store.file_digests import Digest
+from mutator.store.planned_experiments import Planned
 from mutator.store.run_folder import RunFolder
 
 CSV, PARQUET, TIMINGS_PARQUET = "results.csv", "results.parquet", "timings.parquet"
@@ -78,14 +78,14 @@ def _write_results(folder: RunFolder, paths: Mapping[str, Path]) -> None:
         finished = [Finished(planned[name], records[name], scale, fault_paths) for name in batch]
         cells = cells_of(columns, finished)
         lines, table = csv_lines(zip(*cells, strict=True)), record_batch(columns, cells)
-        found = propagation.columns_of((one.record for one in finished), folder.head.channels)
-        return lines, table, record_batch(propagation.COLUMNS, list(found.values()))
+        found = propagation_columns.columns_of((one.record for one in finished), folder.head.channels)
+        return lines, table, record_batch(propagation_columns.COLUMNS, list(found.values()))
 
     with ExitStack() as stack:
         stack.enter_context(_without_collection())
         csv = stack.enter_context(CsvTable(paths[CSV], columns))
         parquet = stack.enter_context(ParquetTable(paths[PARQUET], columns))
-        propagated = stack.enter_context(ParquetTable(paths[PROPAGATION], propagation.COLUMNS))
+        propagated = stack.enter_context(ParquetTable(paths[PROPAGATION], propagation_columns.COLUMNS))
         batches = _batches(name for name in sorted(planned) if name in records)
         for lines, table, departures in shared(made, batches, processes_for(len(records))):
             csv.append(lines)
@@ -115,15 +115,15 @@ def _made_from(folder: RunFolder) -> str:
     run = folder.path
     lines = sorted(path for kind in ("records", "timings") for path in (run / kind).glob("*.jsonl"))
     files = [plan_file.EXPERIMENTS, plan_file.FAULTS, *(path.relative_to(run).as_posix() for path in lines)]
-    found = list(digests.of_files(run, files).items())
+    found = list(file_digests.of_files(run, files).items())
     head = folder.head
     told = (head.hazards, head.compared, head.metrics, head.severity, head.channels, head.structure)
-    columns = [(one.name, one.type) for one in (*columns_of(head), *propagation.COLUMNS, *TIMINGS)]
+    columns = [(one.name, one.type) for one in (*columns_of(head), *propagation_columns.COLUMNS, *TIMINGS)]
     return digest([SCHEMA, VERSION, *told, columns, found])
 
 
 def _found(folder: RunFolder) -> dict[str, str | None]:
-    found = digests.of_files(folder.path, TABLES)
+    found = file_digests.of_files(folder.path, TABLES)
     return {name: one.sha256 if one else None for name, one in found.items()}
 
 

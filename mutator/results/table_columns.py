@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Record, Status
-from mutator.outcomes.verdicts import reaction_time, severity_of, since_activation, since_manifestation
+from mutator.outcomes.verdict_rules import reaction_time, severity_of, since_activation, since_manifestation
 from mutator.results.plan_columns import FIRST_PLANNED, LAST_PLANNED, PlanColumn
 from mutator.results.table_files import Column
 from mutator.targets.manifest import TargetManifest

@@ -14,7 +14,7 @@ from mutator._common.bounded import MOST_DATA, read_bounded
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Outcome, Status
 from mutator.results import table_building
-from mutator.results.rows import Row, rows_of
+from mutator.results.result_rows import Row, rows_of
 from mutator.results.table_columns import Finished, cells_of, columns_of
 from mutator.results.table_files import Column, record_batch, schema_of
 from mutator.store import plan_file

@@ -8,9 +8,9 @@ from threading import Lock
 from typing import TYPE_CHECKING
 
 from mutator.model import Fault, Outcome, Status
-from mutator.results.counting import UNUSABLE, endings
+from mutator.results.outcome_counting import UNUSABLE, endings
 from mutator.results.ranking import places
-from mutator.results.rows import Row, rows_of
+from mutator.results.result_rows import Row, rows_of
 from mutator.results.table_reader import Results
 from mutator.review.mutant_groups import Group
 from mutator.review.patch_shapes import group_label

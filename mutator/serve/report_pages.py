@@ -13,7 +13,7 @@ from mutator.audit.table_audit import tables
 from mutator.comparison import comparison_files
 from mutator.comparison import run_comparison as comparing
 from mutator.errors import Absent, MutatorError
-from mutator.outcomes.fault_free import fault_free_runs, own_alerts
+from mutator.outcomes.fault_free_runs import fault_free_runs, own_alerts
 from mutator.report import building
 from mutator.report.panel import FOLDER
 from mutator.report.stamp import made_from

@@ -18,7 +18,7 @@ from mutator.review import effect_pictures, group_results, mutant_groups
 from mutator.review.decisions import Change, Kind, Review, load_review, record
 from mutator.review.mutant_groups import Group
 from mutator.review.review_page import page_html, state_of
-from mutator.store.choices import Choices
+from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 

@@ -11,7 +11,7 @@ from urllib.parse import quote
 from mutator._common.below import open_below
 from mutator._common.folder_search import RUN_HEAD
 from mutator.errors import Absent, MutatorError, Outside
-from mutator.results.counting import outcome_counts
+from mutator.results.outcome_counting import outcome_counts
 from mutator.results.table_reader import Results
 from mutator.store.run_folder import RunFolder
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from mutator.results.counting import UNUSABLE
+from mutator.results.outcome_counting import UNUSABLE
 from mutator.results.table_columns import hazards_of
 from mutator.results.table_reader import Results
 

@@ -8,7 +8,7 @@ from mutator._common.files import json_bytes, read_json
 from mutator._common.hashing import digest
 from mutator._common.text import counted
 from mutator.errors import MutatorError
-from mutator.store import digests
+from mutator.store import file_digests
 from mutator.store.run_head import REMEDY
 
 SCHEMA, FILE = "reviewed/1", "reviewed.json"
@@ -16,7 +16,7 @@ _DIGEST_SCHEMA = "review-digest/1"
 
 
 def write_approvals(run: Path, approvals: dict[str, Any]) -> None:
-    digests.rewrite(run, FILE, json_bytes(approvals))
+    file_digests.rewrite(run, FILE, json_bytes(approvals))
 
 
 def review_digest(run: Path) -> str | None:

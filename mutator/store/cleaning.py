@@ -12,7 +12,7 @@ from mutator._common.doors import EXPORTS
 from mutator._common.files import complete, is_half_written, read_json, remove_folder
 from mutator._common.locks import owned
 from mutator.errors import MutatorError
-from mutator.store.folder_contents import CONTENT, FOLDERS, check_contents, is_closed
+from mutator.store.allowed_contents import CONTENT, FOLDERS, check_contents, is_closed
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import HEAD, SCHEMA
 

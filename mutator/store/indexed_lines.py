@@ -13,7 +13,7 @@ from typing import Any, Generic, TypeVar
 
 from mutator._common.hashing import from_json
 from mutator.errors import MutatorError
-from mutator.store.lines import bare_segment, verified_lines
+from mutator.store.checksummed_lines import bare_segment, verified_lines
 
 _OPEN = 16  # the most files to keep open
 _ID = re.compile(rb'"experiment_id":"([^"\\]+)"')  # matches once in a line of canonical JSON

@@ -13,15 +13,15 @@ from mutator._common.files import is_half_written
 from mutator._common.hashing import digest
 from mutator._common.text import counted
 from mutator.errors import MutatorError
-from mutator.store import digests, plan_file, verified_runs
-from mutator.store.digests import Digest, Ledger
-from mutator.store.lines import Segment, bare_segment, intact_lines, read_segment
-from mutator.store.patches import Patches
+from mutator.store import file_digests, plan_file, verified_runs_cache
+from mutator.store.checksummed_lines import Segment, bare_segment, intact_lines, read_segment
+from mutator.store.file_digests import Digest, Ledger
+from mutator.store.patch_files import Patches
 from mutator.store.records import SCHEMA, ending_on, second_record
 from mutator.store.run_head import CAMPAIGN, HEAD, RunHead
 from mutator.store.shards import Shard
 
-SEALED = ("plan", "golden", *digests.SEGMENTS)  # folders in which a finished run has no unknown files
+SEALED = ("plan", "golden", *file_digests.SEGMENTS)  # folders in which a finished run has no unknown files
 WHOLE = (HEAD, CAMPAIGN, plan_file.EXPERIMENTS, plan_file.FAULTS)  # files that cannot be recreated
 TOP = (HEAD, CAMPAIGN, "plan.csv", "checks.json", "reviewed.json")
 _MANY = 5  # at most this many experiments are named in one message
@@ -41,7 +41,7 @@ def problems(
     if ledger.finished:
         others = [
             MutatorError(
-                f"not named in {digests.FILE}",
+                f"not named in {file_digests.FILE}",
                 where=path,
                 expected="only files that the finished run wrote",
                 remedy=_remedy(run, ""),
@@ -51,7 +51,7 @@ def problems(
         yield from others
         wrong += others
         key = "" if wrong or ledger.rewriting else key_of(run, found)
-    if key and not anew and verified_runs.recall(key).get("verified"):
+    if key and not anew and verified_runs_cache.recall(key).get("verified"):
         return
     try:
         planned = share(run, head, shard)
@@ -63,7 +63,7 @@ def problems(
         none_yet = False
         yield problem
     if key and none_yet:
-        verified_runs.remember(key, verified=True)
+        verified_runs_cache.remember(key, verified=True)
 
 
 def content_key(run: Path) -> str:
@@ -71,22 +71,22 @@ def content_key(run: Path) -> str:
 
     The key is empty if the run is not finished or does not match its digests.
     """
-    ledger = digests.read(run)
+    ledger = file_digests.read(run)
     found = digests_of(run, ledger)
     settled = ledger.finished and not ledger.rewriting
     return key_of(run, found) if settled and not any(file_problems(run, ledger, found)) else ""
 
 
 def digests_of(run: Path, ledger: Ledger) -> dict[str, Digest | None]:
-    names = list(dict.fromkeys((*ledger.names, *verified_runs.other_files(run))))
-    return digests.of_files(run, names)
+    names = list(dict.fromkeys((*ledger.names, *verified_runs_cache.other_files(run))))
+    return file_digests.of_files(run, names)
 
 
 def key_of(run: Path, found: Mapping[str, Digest | None]) -> str:
     """Return the `verified_runs.key_of` of these files and the ledger."""
-    ledger = Digest.of_file(run / digests.FILE)
-    told = {**found, digests.FILE: ledger}
-    return verified_runs.key_of({name: one.sha256 if one else None for name, one in told.items()})
+    ledger = Digest.of_file(run / file_digests.FILE)
+    told = {**found, file_digests.FILE: ledger}
+    return verified_runs_cache.key_of({name: one.sha256 if one else None for name, one in told.items()})
 
 
 def share(run: Path, head: RunHead, shard: Shard | None) -> dict[str, int]:
@@ -126,7 +126,7 @@ def file_problems(
             yield MutatorError(
                 "missing",
                 where=inside(run, name),
-                expected=f"the file named in {digests.FILE}",
+                expected=f"the file named in {file_digests.FILE}",
                 remedy=_remedy(run, name),
             )
         else:
@@ -167,7 +167,7 @@ def _remedy(run: Path, name: str) -> str:
 
 def _open_segments(run: Path, ledger: Ledger) -> Iterator[MutatorError]:
     """Yield a problem for each damaged line of segments that are in use or that a killed command left."""
-    for name in digests.segments(run):
+    for name in file_digests.segments(run):
         if name not in ledger.files:
             try:
                 segment = read_segment(inside(run, name))
@@ -192,7 +192,7 @@ def id_problems(run: Path, head: RunHead, ledger: Ledger, planned: Collection[st
     """Yield a problem for each unplanned, duplicate or missing record."""
     patches = Patches(run)
     stored = dict(patches.digests())
-    for kind in digests.SEGMENTS:
+    for kind in file_digests.SEGMENTS:
         done: dict[str, int] = {}  # id -> hash of its final record
         for path in sorted((run / kind).glob("*.jsonl")):
             segment, lines = bare_segment(path), intact_lines(path)

@@ -16,14 +16,14 @@ from mutator._common.files import check_is_text
 from mutator._common.hashing import plain
 from mutator.errors import MutatorError
 from mutator.model import AfterHazard, Experiment, Limits, Record
-from mutator.store import digests, integrity, plan_file
-from mutator.store.folder_contents import SCRATCH, TRACES, check_contents
-from mutator.store.patches import Patches
+from mutator.store import file_digests, integrity, plan_file
+from mutator.store.allowed_contents import SCRATCH, TRACES, check_contents
+from mutator.store.patch_files import Patches
 from mutator.store.records import read_records
 from mutator.store.run_head import HEAD, RunHead, StoredGolden, read_head
 from mutator.store.shards import Shard
-from mutator.store.stretches import Stretch
 from mutator.store.timings import read_timings
+from mutator.store.work_stretches import Stretch
 from mutator.targets.severity import Scale
 
 STOP_NOTE = "Runs end at their first terminal hazard: later hazards and alerts are not recorded."
@@ -105,18 +105,18 @@ class RunFolder:
         """
         for _ in range(_LOOKS):
             try:
-                ledger = digests.read(self.path)
+                ledger = file_digests.read(self.path)
             except MutatorError as err:
                 return [err]
             found = list(integrity.problems(self.path, self.head, ledger, self.shard, anew=anew))
-            if not found or digests.read(self.path) == ledger:
+            if not found or file_digests.read(self.path) == ledger:
                 break
         return found
 
     @property
     def finished(self) -> bool:
         """Whether every experiment has a final record, and the equivalence check is complete."""
-        return digests.read(self.path).finished
+        return file_digests.read(self.path).finished
 
     @cached_property
     def head(self) -> RunHead:

@@ -12,9 +12,9 @@ from mutator._common.hashing import added, plain
 from mutator._common.plain_reader import from_plain
 from mutator.errors import Misfit, MutatorError
 from mutator.model import Limits
-from mutator.store.choices import Choices
+from mutator.store.plan_choices import Choices
 from mutator.store.plan_file import Chunk
-from mutator.store.stretches import Stretch
+from mutator.store.work_stretches import Stretch
 from mutator.targets.target_facts import TargetFacts
 
 SCHEMA = "run/3"

@@ -6,8 +6,8 @@ from typing import Any
 
 from mutator._common.below import inside
 from mutator.model import Record
-from mutator.store.lines import LineWriter, verified_lines, write_copy
-from mutator.store.patches import PatchWriter
+from mutator.store.checksummed_lines import LineWriter, verified_lines, write_copy
+from mutator.store.patch_files import PatchWriter
 from mutator.store.records import LINE_SCHEMAS, PROOF, RECORDS, line_of
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_packing import EncodedSeries, SeriesWriter

@@ -11,8 +11,8 @@ from typing import Any
 from mutator._common.below import inside
 from mutator._common.files import raising_disk_full
 from mutator.errors import MutatorError
-from mutator.store.blocks import BlockWriter, read_blocks
-from mutator.store.series import FOLDER, INDEX, Index, SeriesFolder, write_index
+from mutator.store.checksummed_blocks import BlockWriter, read_blocks
+from mutator.store.series_folder import FOLDER, INDEX, Index, SeriesFolder, write_index
 from mutator.store.series_script import name_of, size_in_script, write_script
 
 SUFFIX = ".blocks"  # suffix of the workers' files in series/

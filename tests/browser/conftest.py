@@ -23,8 +23,8 @@ from mutator.outcomes.series_sampling import Sampler, keep_series
 from mutator.report import building
 from mutator.report.panels import figures
 from mutator.results import table_building
-from mutator.store.lines import LineWriter
-from mutator.store.patches import PatchWriter
+from mutator.store.checksummed_lines import LineWriter
+from mutator.store.patch_files import PatchWriter
 from mutator.store.records import SCHEMA
 from mutator.store.series_format import encode
 from mutator.store.series_packing import EncodedSeries, SeriesWriter, pack

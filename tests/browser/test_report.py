@@ -11,9 +11,9 @@ import pytest
 from mutator.report import building
 from mutator.report.panels import figures
 from mutator.store import plan_file
-from mutator.store.patches import Patches
+from mutator.store.patch_files import Patches
 from mutator.store.run_folder import RunFolder
-from mutator.store.series import SeriesFolder
+from mutator.store.series_folder import SeriesFolder
 
 from .conftest import record
 

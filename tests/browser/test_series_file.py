@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mutator.store.run_folder import RunFolder
-from mutator.store.series import SeriesFolder, write_kept
+from mutator.store.series_folder import SeriesFolder, write_kept
 from mutator.store.series_format import Points, Series, encode
 from mutator.web import asset
 

@@ -15,7 +15,7 @@ from mutator.review.decisions import load_review
 from mutator.review.mutant_groups import of_library
 from mutator.review.review_page import page_html
 from mutator.serve.jobs import Jobs
-from mutator.store import digests
+from mutator.store import file_digests
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 from tests.made_up_results import edit_results
@@ -59,7 +59,7 @@ def runs(run: Path, workspace: Workspace) -> Path:
     head["about_hazards"] = [one | {"about": HTML} for one in head["about_hazards"]]
     for component in (head["structure"] or {}).get("components", {}).values():
         component["about"] = component["label"] = HTML
-    digests.rewrite(night, "run.json", json.dumps(head).encode())
+    file_digests.rewrite(night, "run.json", json.dumps(head).encode())
     edit_results(night, "longer", HTML)
     (night / "plots").mkdir(exist_ok=True)
     lines = (night / "plan/experiments.jsonl").read_text().splitlines()

@@ -18,8 +18,8 @@ import pytest
 from mutator.cli import campaigns
 from mutator.errors import MutatorError
 from mutator.store import approvals
-from mutator.store.folder_contents import CONTENT
-from mutator.store.series import SeriesFolder, read_kept
+from mutator.store.allowed_contents import CONTENT
+from mutator.store.series_folder import SeriesFolder, read_kept
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
 Reseal = Callable[..., None]  # recomputes every checksum and digest of a run folder

@@ -13,11 +13,11 @@ from mutator.errors import MutatorError
 from mutator.execution.session import Session
 from mutator.results.ranking import worth
 from mutator.results.table_reader import Results
-from mutator.store import blocks, lines
-from mutator.store.blocks import read_blocks
-from mutator.store.lines import read_segment
+from mutator.store import checksummed_blocks, checksummed_lines
+from mutator.store.checksummed_blocks import read_blocks
+from mutator.store.checksummed_lines import read_segment
 from mutator.store.run_folder import RunFolder
-from mutator.store.series import SeriesFolder
+from mutator.store.series_folder import SeriesFolder
 from mutator.store.series_packing import pack, segments
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
@@ -90,8 +90,8 @@ def test_files_are_synced_before_the_records_that_refer_to_them(
         looks.append(len(names))
 
     monkeypatch.setattr(os, "fsync", look)
-    monkeypatch.setattr(lines, "_BATCH", 2)
-    for module in (lines, blocks):
+    monkeypatch.setattr(checksummed_lines, "_BATCH", 2)
+    for module in (checksummed_lines, checksummed_blocks):
         monkeypatch.setattr(module, "_BATCH_S", 1e9)
     ran = cli(*WORDS)
     assert ran.code == 0, ran.err

@@ -14,7 +14,7 @@ from mutator.cli.console import Terminal
 from mutator.cli.progress import campaign_progress
 from mutator.execution.phases import duration
 from mutator.mutants.readable_patches import readable
-from mutator.store.progress import Progress
+from mutator.store.run_progress import Progress
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
 

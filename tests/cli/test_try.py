@@ -10,7 +10,7 @@ import pytest
 
 from mutator.cli import experiment_view
 from mutator.model import Record
-from mutator.outcomes.verdicts import reaction_time
+from mutator.outcomes.verdict_rules import reaction_time
 from mutator.workspace import Workspace
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json

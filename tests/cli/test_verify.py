@@ -13,7 +13,7 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.store.run_folder import RunFolder
-from mutator.store.series import Index, SeriesFolder, write_kept
+from mutator.store.series_folder import Index, SeriesFolder, write_kept
 from mutator.store.series_format import encode
 from mutator.store.series_packing import EncodedSeries, SeriesWriter, pack
 

@@ -17,7 +17,7 @@ import mutator
 from mutator.errors import MutatorError
 from mutator.execution.running import run_campaign
 from mutator.execution.session import Session
-from mutator.store import digests
+from mutator.store import file_digests
 from mutator.workspace import Workspace
 
 from .command import DERIVED, Bytes, Command, pytest_words, results
@@ -91,9 +91,9 @@ def test_lost_records_run_again(
             run_campaign(toy, "small", out)
         assert mutator.verify(out, repair=True, workspace=toy).repaired
     else:
-        known = digests.read(out)
+        known = file_digests.read(out)
         files = {name: one for name, one in known.files.items() if not name.startswith("records/")}
-        digests.write(out, replace(known, files=files, finished=False))
+        file_digests.write(out, replace(known, files=files, finished=False))
     summary = run_campaign(toy, "small", out)
     assert (summary.exit_code, summary.ran) == (0, 3)
     assert results(out) == undisturbed

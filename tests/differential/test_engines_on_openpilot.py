@@ -13,7 +13,7 @@ from mutator.engines.reference import ReferenceEngine
 from mutator.engines.registry import make_engine
 from mutator.execution.runner import Goldens, Runner
 from mutator.model import Record
-from mutator.store.choices import Choices
+from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import GoldenRun
 from mutator.workspace import Workspace
 

@@ -20,8 +20,8 @@ from mutator.execution.running import run_campaign
 from mutator.execution.session import Session
 from mutator.results import table_building
 from mutator.store import approvals
-from mutator.store.choices import Choices
-from mutator.store.patches import Patches
+from mutator.store.patch_files import Patches
+from mutator.store.plan_choices import Choices
 from mutator.store.records import read_records
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace

@@ -20,9 +20,9 @@ from mutator.audit.seal import Seals, seals_of
 from mutator.errors import MutatorError
 from mutator.execution.running import run_campaign
 from mutator.report import building
-from mutator.store import digests
+from mutator.store import file_digests
 from mutator.store.approvals import write_approvals
-from mutator.store.digests import Digest
+from mutator.store.file_digests import Digest
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 from tests.made_up_results import edit_results
@@ -116,8 +116,10 @@ def written(name: str, edit: Callable[[bytes], bytes]) -> Callable[[Path], None]
         is_new = not file.exists()
         file.write_bytes(edit(b"" if is_new else file.read_bytes()))
         if is_new and name.startswith("golden/"):
-            ledger = digests.read(run)
-            digests.write(run, replace(ledger, files={**ledger.files, name: Digest.of(file.read_bytes())}))
+            ledger = file_digests.read(run)
+            file_digests.write(
+                run, replace(ledger, files={**ledger.files, name: Digest.of(file.read_bytes())})
+            )
 
     return apply
 
@@ -128,10 +130,10 @@ def harmless(table: bytes) -> bytes:
 
 def gone(name: str) -> Callable[[Path], None]:
     def apply(run: Path) -> None:
-        ledger = digests.read(run)
+        ledger = file_digests.read(run)
         shutil.rmtree(run / name)
         files = {key: one for key, one in ledger.files.items() if not key.startswith(f"{name}/")}
-        digests.write(run, replace(ledger, files=files))
+        file_digests.write(run, replace(ledger, files=files))
 
     return apply
 

@@ -22,9 +22,9 @@ from mutator.execution.single_run import rerun, run_single
 from mutator.execution.worker import Worker
 from mutator.model import Status
 from mutator.store import plan_file
-from mutator.store.choices import Choices
-from mutator.store.patches import Patches
-from mutator.store.progress import Progress
+from mutator.store.patch_files import Patches
+from mutator.store.plan_choices import Choices
+from mutator.store.run_progress import Progress
 from mutator.workspace import Workspace
 
 CopyToycar = Callable[[Path], Workspace]

@@ -10,7 +10,7 @@ import pytest
 
 from mutator.audit.seal import seals_of
 from mutator.execution.running import run_campaign
-from mutator.store.choices import Choices
+from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from mutator.execution.running import run_campaign
-from mutator.store.choices import Choices
+from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
 
 pytestmark = pytest.mark.slow

@@ -20,7 +20,7 @@ from mutator.errors import CheckFailed
 from mutator.execution.running import run_campaign
 from mutator.execution.session import Session
 from mutator.execution.worker import Assignment, Worker
-from mutator.store.choices import Choices
+from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 

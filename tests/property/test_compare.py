@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from mutator.comparison.pairs import Change, Pair
 from mutator.model import Outcome, Status
-from mutator.results.rows import Row
+from mutator.results.result_rows import Row
 
 MIRROR = {
     Change.NEW_HAZARD: Change.HAZARD_GONE,

@@ -16,7 +16,7 @@ from mutator.faults.fault_models import FaultModels, ParamSchema, SnippetKind
 from mutator.model import AnchorKind, Fault, Hold, Injection, Trigger, Value
 from mutator.mutants.anchors import parsed
 from mutator.mutants.mutant_building import Mutant, build, build_directly
-from mutator.store.choices import Choices
+from mutator.store.plan_choices import Choices
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 

@@ -12,9 +12,9 @@ from typing import Any
 
 from mutator._common.files import json_bytes
 from mutator._common.hashing import digest
-from mutator.store import digests
-from mutator.store.digests import Digest
-from mutator.store.series import Index, write_index
+from mutator.store import file_digests
+from mutator.store.file_digests import Digest
+from mutator.store.series_folder import Index, write_index
 from tests.made_up_results import edit_results
 
 UP = "../../home/mine"  # from a run folder to the user's files
@@ -148,7 +148,7 @@ def _named(name: bytes) -> Trick:
 
 def _reseal(run: Path) -> None:
     """Recompute the digests of the files that the ledger has."""
-    path = run / digests.FILE
+    path = run / file_digests.FILE
     data = json.loads(path.read_bytes())
     for name, one in data["files"].items():
         content = (run / name).read_bytes() if (run / name).is_file() else None
@@ -164,7 +164,7 @@ def _write_ledger(path: Path, data: dict[str, Any]) -> None:
 
 def _in_ledger(key: str, name: str) -> Trick:
     def put(sent: Sent) -> None:
-        path = sent.run / digests.FILE
+        path = sent.run / file_digests.FILE
         data = json.loads(path.read_bytes())
         mine = Digest.of((sent.home / "mine").read_bytes())
         data[key][_filled(name, sent)] = {"size": mine.size, "sha256": mine.sha256}
@@ -310,9 +310,9 @@ def _checks_of_any_shape(sent: Sent) -> None:
 
 def _approvals_of_any_shape(sent: Sent) -> None:
     (sent.run / "reviewed.json").write_bytes(json_bytes({"schema": "reviewed/1", "groups": [UP]}))
-    ledger = json.loads((sent.run / digests.FILE).read_bytes())
+    ledger = json.loads((sent.run / file_digests.FILE).read_bytes())
     ledger["files"]["reviewed.json"] = {"size": 0, "sha256": ""}
-    _write_ledger(sent.run / digests.FILE, ledger)
+    _write_ledger(sent.run / file_digests.FILE, ledger)
     _reseal(sent.run)
 
 

@@ -18,7 +18,7 @@ from mutator.execution.cluster.bundle import Bundle, lay_out
 from mutator.execution.session import open_session
 from mutator.serve.app import Site, application
 from mutator.serve.runs import Runs
-from mutator.store.choices import Choices
+from mutator.store.plan_choices import Choices
 
 from .hostile_libraries import SECRET, TRICKS, World, plant_hooks
 from .readers import cli

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.store.patches import Patches
+from mutator.store.patch_files import Patches
 from mutator.workspace import Workspace
 
 from ..differential.command import Command

@@ -36,8 +36,8 @@ from mutator.execution.runner import Finished, Goldens, Runner
 from mutator.execution.worker import timing_of
 from mutator.model import Experiment
 from mutator.preflight.preflight_rules import look
-from mutator.store.blocks import as_block
-from mutator.store.patches import packed_patches
+from mutator.store.checksummed_blocks import as_block
+from mutator.store.patch_files import packed_patches
 from mutator.store.records import line_of
 from mutator.store.run_folder import GoldenRun
 from mutator.store.series_packing import series_block

@@ -8,7 +8,7 @@ from typing import Any
 
 from mutator._common.text import counted
 from mutator._common.version import VERSION
-from mutator.store.stretches import Stretch, differences
+from mutator.store.work_stretches import Stretch, differences
 
 _RECENT = 20  # finished pieces used to measure a worker's rate
 

@@ -25,7 +25,7 @@ from mutator.execution.cluster.intake import Intake
 from mutator.execution.cluster.pieces import Ending, Piece, Result
 from mutator.execution.session import Session
 from mutator.preflight import equivalence_check
-from mutator.store.stretches import Machine
+from mutator.store.work_stretches import Machine
 
 _LOOK_S = 0.5  # between two checks of the present workers
 _ALONE_S = 60.0  # time without any worker after which the command gives up

@@ -8,7 +8,7 @@ from mutator.execution.cluster.pieces import Kind, Piece, Result
 from mutator.execution.runner import without_outcome
 from mutator.execution.written_files import Sums
 from mutator.model import Status
-from mutator.outcomes.judging import load_channels
+from mutator.outcomes.hazards_and_metrics import load_channels
 from mutator.outcomes.series_sampling import Sampler
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_writer import RunWriter

@@ -12,7 +12,7 @@ from mutator.errors import MutatorError
 from mutator.exports import Export, ExportRequest
 from mutator.model import Experiment, Outcome, Status
 from mutator.results.plan_columns import plan_row
-from mutator.results.rows import Row
+from mutator.results.result_rows import Row
 from mutator.results.table_reader import Results
 from mutator.store.plan_file import read_all
 

@@ -24,12 +24,12 @@ from mutator.errors import MutatorError, MutatorWarning
 from mutator.execution.traces import Traces
 from mutator.exports import Export, ExportRequest
 from mutator.model import Experiment, Record
-from mutator.outcomes.golden import Trace
+from mutator.outcomes.golden_comparison import Trace
 from mutator.outcomes.trace_files import own_times
 from mutator.results.table_reader import Results
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
-from mutator.store.series import SeriesFolder, making_again
+from mutator.store.series_folder import SeriesFolder, making_again
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mutator.outcomes.mcap_files import read_topics
+from mutator.outcomes.mcap_reader import read_topics
 from mutator.outcomes.trace_files import Arrays, Importer, TraceRequest, own_times
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from mutator._common.bounded import read_bounded
 from mutator.errors import BadTrace
-from mutator.outcomes import npz_files
+from mutator.outcomes import npz_reader
 from mutator.outcomes.trace_files import (
     MOST_COLUMNS,
     MOST_TRACE,
@@ -20,13 +20,13 @@ from mutator.outcomes.trace_files import (
 
 def _columns(request: TraceRequest) -> Arrays:
     data = read_bounded(request.path, MOST_TRACE)
-    members = npz_files.members(data)
+    members = npz_reader.members(data)
     if members is not None:
         return {name: members[name] for name in request.choose(members)}
-    if data.startswith(npz_files.ARRAY):
+    if data.startswith(npz_reader.ARRAY):
         raise BadTrace("a single array", "an .npz file")
-    if data.count(npz_files.ENTRY) > MOST_COLUMNS:
-        raise BadTrace(f"{data.count(npz_files.ENTRY)} members", f"at most {MOST_COLUMNS}")
+    if data.count(npz_reader.ENTRY) > MOST_COLUMNS:
+        raise BadTrace(f"{data.count(npz_reader.ENTRY)} members", f"at most {MOST_COLUMNS}")
     with np.load(io.BytesIO(data), allow_pickle=False) as file:
         check_size(sum(member.file_size for member in file.zip.infolist()))
         return {name: np.asarray(file[name]) for name in request.choose(file.files)}

@@ -8,7 +8,7 @@ from mutator._common.tables import Table
 from mutator.model import Status
 from mutator.report.panel import Panel, rendered
 from mutator.report.studies import ReportedRun
-from mutator.results.rows import Row, rows_of
+from mutator.results.result_rows import Row, rows_of
 
 _HEADS = ("status", "experiment", "fault", "scenario", "message")
 LISTED, PAGE_LISTED = 30, 200  # maximum number of runs in Markdown and on the page, whose search finds all

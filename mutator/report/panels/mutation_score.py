@@ -5,7 +5,7 @@ operators have no such panel.
 from dataclasses import replace
 
 from mutator.model import OPERATORS
-from mutator.outcomes.fault_free import alerts_by_drive
+from mutator.outcomes.fault_free_runs import alerts_by_drive
 from mutator.report.panel import Panel, rendered
 from mutator.report.panels.tables import sheet_files
 from mutator.report.studies import ReportedRun

@@ -7,7 +7,7 @@ from mutator.report.panel import Panel, rendered
 from mutator.report.path_drawing import draw_path_counts, drawn_counts, share_text
 from mutator.report.paths import ALL, PathCounts, RunPaths, counts_by_fault_type
 from mutator.report.studies import ReportedRun
-from mutator.results.counting import kinds
+from mutator.results.outcome_counting import kinds
 from mutator.web import plainly_embedded
 
 _ABOUT = (

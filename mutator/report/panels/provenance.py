@@ -7,7 +7,7 @@ from mutator.report.panel import Panel, rendered
 from mutator.report.studies import ReportedRun
 from mutator.store.approvals import approval_summary
 from mutator.store.run_head import HEAD
-from mutator.store.stretches import package_versions, told
+from mutator.store.work_stretches import package_versions, told
 
 PACKAGES = ("jinja2", "libcst", "numpy")  # packages that build mutants and compare runs; run.json lists all
 _NOTE = "The seal does not cover this. Whoever can write to the run folder can change it unnoticed."

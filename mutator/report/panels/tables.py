@@ -5,10 +5,10 @@ from dataclasses import replace
 from operator import itemgetter
 
 from mutator._common.tables import Table
-from mutator.outcomes.fault_free import fault_free_table, own_alerts
+from mutator.outcomes.fault_free_runs import fault_free_table, own_alerts
 from mutator.report.panel import Panel, rendered
 from mutator.report.studies import ReportedRun
-from mutator.results.counting import count_table, counts_by, hazard_names, kinds
+from mutator.results.outcome_counting import count_table, counts_by, hazard_names, kinds
 from mutator.statistics.metric_tables import metrics_sheet, severity_sheet, tolerant_times_sheet
 from mutator.statistics.published_counts import Published
 from mutator.statistics.sheet_selection import run_sheets

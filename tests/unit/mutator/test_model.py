@@ -8,7 +8,7 @@ import pytest
 
 import mutator
 from mutator.model import Experiment, Method, Record, Value, fault_label
-from mutator.results.rows import rows_of
+from mutator.results.result_rows import rows_of
 from mutator.results.table_columns import Finished, cells_of, result_columns
 from mutator.results.table_files import record_batch
 from mutator.results.table_reader import typed

@@ -10,7 +10,7 @@ import mutator
 from mutator.api.mutant_files import pairs_of_campaign, pairs_of_specs, write_mutants
 from mutator.api.selection import Bench
 from mutator.errors import MutatorError
-from mutator.store.choices import Choices
+from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
 
 

@@ -22,11 +22,11 @@ from mutator.errors import MutatorError
 from mutator.execution.single_run import rerun, run_single
 from mutator.model import Experiment, Outcome, Status
 from mutator.store import plan_file
-from mutator.store.lines import LineWriter
-from mutator.store.patches import PatchWriter
+from mutator.store.checksummed_lines import LineWriter
+from mutator.store.patch_files import PatchWriter
 from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
-from mutator.store.series import SeriesFolder
+from mutator.store.series_folder import SeriesFolder
 from mutator.workspace import Workspace
 
 LANE = 'fault_type == "lane" and method == "random"'

@@ -10,7 +10,7 @@ from mutator.api.worst import worst_results
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import make_plan
 from mutator.model import Outcome, Record
-from mutator.store.lines import written
+from mutator.store.checksummed_lines import written
 from mutator.store.records import SCHEMA, line_of
 from mutator.workspace import Workspace
 

@@ -10,13 +10,13 @@ import pytest
 from mutator._common.locks import owned
 from mutator.audit.run_repair import _put_aside, repair
 from mutator.errors import MutatorError, Outside
-from mutator.store import digests, plan_file
-from mutator.store.digests import Digest, Ledger
-from mutator.store.lines import read_segment, written
-from mutator.store.patches import Patches
+from mutator.store import file_digests, plan_file
+from mutator.store.checksummed_lines import read_segment, written
+from mutator.store.file_digests import Digest, Ledger
+from mutator.store.patch_files import Patches
 from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
-from mutator.store.series import Index, write_index
+from mutator.store.series_folder import Index, write_index
 from mutator.workspace import Workspace
 
 
@@ -45,7 +45,7 @@ def edit(path: Path, change: Callable[[list[bytes]], list[bytes]]) -> None:
 
 
 RECORDS = "records/0001-a.jsonl"
-NO_FILES = [RECORDS, "timings/0001-a.jsonl", "golden/A/said.json", "plan.csv", digests.FILE]
+NO_FILES = [RECORDS, "timings/0001-a.jsonl", "golden/A/said.json", "plan.csv", file_digests.FILE]
 LOSSES: dict[str, tuple[Callable[[list[bytes]], list[bytes]], int]] = {
     "a changed line": (lambda x: [*x[:3], x[3].replace(b"ok", b"no"), *x[4:]], 1),
     "a dropped line": (lambda x: [*x[:3], *x[4:]], 2),  # the line after it cannot be verified
@@ -124,7 +124,7 @@ def test_files_that_run_can_rebuild_are_moved_aside(run: Path, name: str) -> Non
     assert not folder.finished and not (run / name).exists()
     assert (run / "damaged" / name).read_bytes() == b"other"
     (run / name).write_bytes(b"again")
-    digests.close_segments(run, finished=True)
+    file_digests.close_segments(run, finished=True)
     repaired(run)
     assert (run / "damaged" / f"{name}.2").read_bytes() == b"again"
 
@@ -153,7 +153,7 @@ def test_damaged_timings_are_removed(run: Path) -> None:
 
 @pytest.mark.parametrize("content", [None, b"{", b"{}"])
 def test_a_damaged_ledger_is_rebuilt_from_the_files(run: Path, content: bytes | None) -> None:
-    path = run / digests.FILE
+    path = run / file_digests.FILE
     path.unlink() if content is None else path.write_bytes(content)
     said, folder = repaired(run)
     assert said == ["digests.json rebuilt from the current files: only an earlier seal can confirm them"]
@@ -171,15 +171,15 @@ def test_a_damaged_campaign_file_or_plan_is_not_repaired(run: Path) -> None:
 
 
 def test_an_intact_run_is_not_changed(run: Path) -> None:
-    before = (run / digests.FILE).stat().st_mtime_ns
+    before = (run / file_digests.FILE).stat().st_mtime_ns
     assert repair(RunFolder.unverified(run)) == []
-    assert (run / digests.FILE).stat().st_mtime_ns == before and not (run / "damaged").exists()
+    assert (run / file_digests.FILE).stat().st_mtime_ns == before and not (run / "damaged").exists()
 
 
 def test_a_run_resumes_after_a_killed_repair(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     edit(run / RECORDS, lambda x: [*x[:3], x[3].replace(b"ok", b"no"), *x[4:]])
     with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
-        patched.setattr(digests, "close_segments", kill)
+        patched.setattr(file_digests, "close_segments", kill)
         repair(RunFolder.unverified(run))
     folder = RunFolder.open(run)
     assert (len(folder.records()), folder.finished) == (23, False)
@@ -225,8 +225,8 @@ def test_links_are_not_followed(run: Path, name: str) -> None:
 def test_a_file_outside_that_the_ledger_names_stays(run: Path, name: str) -> None:
     """Verifying prints the remedy `--repair`, which must not move a file that somebody else named."""
     (run.parent / "setup.py").write_text("mine")
-    ledger = digests.read(run)
-    digests.write(run, Ledger(files={**ledger.files, name: Digest.of(b"not mine")}, finished=True))
+    ledger = file_digests.read(run)
+    file_digests.write(run, Ledger(files={**ledger.files, name: Digest.of(b"not mine")}, finished=True))
     with pytest.raises(Outside, match=r"digests\.json"):
         repair(RunFolder.unverified(run))
     assert (run.parent / "setup.py").read_text() == "mine"

@@ -10,9 +10,9 @@ import pytest
 
 from mutator._common.hashing import canonical
 from mutator.audit.seal import seal_or_why_not, seals_of, unsealed_facts
-from mutator.store import digests
+from mutator.store import file_digests
 from mutator.store.approvals import write_approvals
-from mutator.store.lines import written
+from mutator.store.checksummed_lines import written
 from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -62,9 +62,9 @@ def test_a_retried_harness_error_does_not_affect_the_seal(made: Path, run: Path)
     name = next(iter(folder.share()))
     head = {"schema": SCHEMA, "plan": folder.head.plan}
     path = run / "records" / "0002-a.jsonl"
-    digests.close_segments(run, finished=False)
+    file_digests.close_segments(run, finished=False)
     path.write_bytes(written(path, head, [{"experiment_id": name, "status": "harness_error"}]))
-    digests.close_segments(run, finished=True)
+    file_digests.close_segments(run, finished=True)
     assert sealed(run) == sealed(made)
 
 
@@ -76,15 +76,15 @@ def edit(path: Path, old: str, new: str) -> None:
 
 def add(run: Path, name: str) -> None:
     (run / name).write_bytes(b"more")
-    ledger = digests.read(run)
-    digests.write(run, replace(ledger, files={**ledger.files, name: digests.Digest.of(b"more")}))
+    ledger = file_digests.read(run)
+    file_digests.write(run, replace(ledger, files={**ledger.files, name: file_digests.Digest.of(b"more")}))
 
 
 def rename(run: Path, name: str, other: str) -> None:
     (run / name).rename(run / other)
-    ledger = digests.read(run)
+    ledger = file_digests.read(run)
     files = {other if key == name else key: one for key, one in ledger.files.items()}
-    digests.write(run, replace(ledger, files=files))
+    file_digests.write(run, replace(ledger, files=files))
 
 
 CHANGES: dict[str, Callable[[Path], None]] = {
@@ -138,7 +138,7 @@ def test_any_change_of_the_result_changes_the_seal(
 
 
 def test_an_unfinished_run_has_no_seal(run: Path) -> None:
-    digests.close_segments(run, finished=False)
+    file_digests.close_segments(run, finished=False)
     folder = RunFolder.open(run)
     none = {"seal": "none: the run is not finished"}
     assert (seals_of(folder).seal, seal_or_why_not(folder)) == (None, none)

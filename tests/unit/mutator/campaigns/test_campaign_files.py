@@ -10,7 +10,7 @@ from mutator.campaigns.plan import make_plan
 from mutator.checks.library_check import check_library
 from mutator.errors import MutatorError
 from mutator.model import Method
-from mutator.store.choices import Choices
+from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
 
 TEXT = """\

@@ -8,7 +8,7 @@ import pytest
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import load_plan, make_plan
 from mutator.errors import MutatorError
-from mutator.store.choices import Choices
+from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
 
 

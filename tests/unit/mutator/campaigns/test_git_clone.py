@@ -12,7 +12,7 @@ import pytest
 
 from mutator.campaigns import git_clone
 from mutator.campaigns.git_clone import Clone, clone_state, user_name
-from mutator.store.stretches import CloneState
+from mutator.store.work_stretches import CloneState
 
 IDENTITY = ("-c", "user.name=x", "-c", "user.email=x@example.org", "-c", "commit.gpgsign=false")
 

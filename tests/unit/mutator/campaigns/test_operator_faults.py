@@ -15,7 +15,7 @@ from mutator.errors import MutatorError
 from mutator.model import Hold, Limits, Method
 from mutator.operators.executed_lines import Executed, GoldenDrive
 from mutator.review.mutant_groups import of_plan
-from mutator.store.choices import Choices
+from mutator.store.plan_choices import Choices
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 

@@ -11,7 +11,7 @@ import pytest
 from mutator.campaigns.plan import Plan, make_plan
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Hold, Method
-from mutator.store.choices import Choices
+from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
 
 

@@ -16,7 +16,7 @@ from mutator.errors import EXIT_WRONG_INPUT, MutatorError
 from mutator.execution.distribution import distributor, packages_of
 from mutator.store.check_results import SCHEMA
 from mutator.store.run_folder import RunFolder
-from mutator.store.stretches import CloneState
+from mutator.store.work_stretches import CloneState
 from mutator.workspace import Workspace
 
 

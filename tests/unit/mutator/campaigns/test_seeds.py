@@ -10,7 +10,7 @@ from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import Plan, Planning, load_plan, make_plan
 from mutator.errors import MutatorError
 from mutator.store import plan_file
-from mutator.store.choices import Choices
+from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 

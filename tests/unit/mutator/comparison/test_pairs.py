@@ -10,7 +10,7 @@ import pytest
 from mutator.comparison.compared_runs import Side
 from mutator.comparison.pairs import Change, Pair, match
 from mutator.model import Experiment, Method, Outcome, Status
-from mutator.results.rows import Row
+from mutator.results.result_rows import Row
 from mutator.store.run_folder import RunFolder
 
 Make = Callable[..., Experiment]

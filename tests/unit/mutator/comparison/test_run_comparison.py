@@ -16,7 +16,7 @@ from mutator.comparison.input_differences import facts, remarks
 from mutator.comparison.run_comparison import Comparison, Gate, compare, findings
 from mutator.errors import CheckFailed, MutatorError
 from mutator.model import AfterHazard, Experiment, Outcome, Status
-from mutator.store.stretches import Stretch
+from mutator.store.work_stretches import Stretch
 from mutator.workspace import Workspace
 
 Write = Callable[..., Path]

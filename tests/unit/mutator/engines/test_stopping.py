@@ -18,7 +18,7 @@ from mutator.errors import MutatorError
 from mutator.execution.runner import Finished, Goldens, Runner
 from mutator.model import AfterHazard, Experiment, Method, Outcome, Record, Status
 from mutator.mutants.mutant_building import build
-from mutator.outcomes.golden import until
+from mutator.outcomes.golden_comparison import until
 from mutator.targets.stopping import stop_source
 from mutator.triggers import over_time
 from mutator.triggers.kinds import always, at_time

@@ -16,7 +16,7 @@ from mutator.execution.runner import Goldens, Runner
 from mutator.model import Activation, Experiment, Outcome, Record, Status
 from mutator.outcomes import trace_files
 from mutator.preflight.preflight_rules import digest_of
-from mutator.store.choices import Choices
+from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
 
 T = np.arange(20) * 0.05

@@ -8,15 +8,15 @@ import pytest
 
 from mutator.execution.pytest_session import Controller
 from mutator.execution.written_files import WrittenFiles
-from mutator.store import digests
-from mutator.store.lines import LineWriter
+from mutator.store import file_digests
+from mutator.store.checksummed_lines import LineWriter
 
 NAME = "records/0001-gw0.jsonl"
 
 
 @pytest.fixture
 def run(tmp_path: Path) -> Path:
-    digests.write(tmp_path, digests.Ledger(files={}))
+    file_digests.write(tmp_path, file_digests.Ledger(files={}))
     return tmp_path
 
 
@@ -39,7 +39,7 @@ def test_lines_that_were_changed_are_set_aside(run: Path) -> None:
     (run / NAME).write_bytes(lines + lines)
     assert written.set_others_aside(run) == [NAME]
     assert (run / "damaged" / NAME).read_bytes() == lines + lines
-    assert digests.segments(run) == []
+    assert file_digests.segments(run) == []
 
 
 def test_lines_of_nobody_are_set_aside_and_lost_lines_are_named(run: Path) -> None:

@@ -6,8 +6,8 @@ import pytest
 from mutator._common.plain_reader import from_plain
 from mutator.model import Activation, Outcome, Record, Status
 from mutator.outcomes.channel_departures import departures
-from mutator.outcomes.golden import compare
-from mutator.results.propagation import COLUMNS, columns_of
+from mutator.outcomes.golden_comparison import compare
+from mutator.results.propagation_columns import COLUMNS, columns_of
 from mutator.targets.channels import Channel
 from mutator.targets.target_facts import ChannelFacts
 

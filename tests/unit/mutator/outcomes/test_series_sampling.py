@@ -11,9 +11,9 @@ import pytest
 from mutator.errors import MutatorError
 from mutator.model import Record
 from mutator.outcomes.channel_departures import departures
-from mutator.outcomes.golden import Trace, compare
+from mutator.outcomes.golden_comparison import Trace, compare
 from mutator.outcomes.series_sampling import Sampler, keep_series
-from mutator.store.series import SeriesFolder, write_kept
+from mutator.store.series_folder import SeriesFolder, write_kept
 from mutator.store.series_format import Series, decode, encode
 from mutator.targets.channels import Role
 from mutator.targets.manifest import TargetManifest

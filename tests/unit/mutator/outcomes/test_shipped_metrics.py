@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mutator.outcomes.judging import Judged, judge_run
+from mutator.outcomes.hazards_and_metrics import Judged, judge_run
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 

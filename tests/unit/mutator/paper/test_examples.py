@@ -15,7 +15,7 @@ from mutator.paper.actions import WANTED, Pair, Wanted
 from mutator.paper.examples import candidates, example_drawings
 from mutator.report import building
 from mutator.statistics.results_frame import load
-from mutator.store.choices import Choices
+from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 

@@ -12,7 +12,7 @@ from mutator.campaigns.plan import make_plan
 from mutator.paper.panels import observations_panel
 from mutator.paper.published import load_paper
 from mutator.report.studies import ReportedRun
-from mutator.store.choices import Choices
+from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 

@@ -11,7 +11,7 @@ import pytest
 
 from mutator.campaigns.plan import Plan, make_plan
 from mutator.model import Experiment, Method
-from mutator.store.choices import Choices
+from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).parents[4]
@@ -128,7 +128,7 @@ def test_the_reference_campaign_uses_the_reading_as_coded(library: Workspace) ->
 def test_the_plan_is_the_same_in_another_process(sample: Plan) -> None:
     code = (
         "from pathlib import Path; from mutator.campaigns.plan import make_plan;"
-        "from mutator.store.choices import Choices;"
+        "from mutator.store.plan_choices import Choices;"
         "from mutator.workspace import Workspace;"
         f"print(make_plan(Workspace.find(root=Path({str(ROOT)!r})), 'paper_sample').digest)"
     )

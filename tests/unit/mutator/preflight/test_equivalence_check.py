@@ -13,9 +13,9 @@ from mutator.errors import CheckFailed, MutatorError
 from mutator.execution.running import run_campaign
 from mutator.model import Experiment
 from mutator.preflight import equivalence_check
-from mutator.store import digests
-from mutator.store.choices import Choices
-from mutator.store.lines import LineWriter, read_segment
+from mutator.store import file_digests
+from mutator.store.checksummed_lines import LineWriter, read_segment
+from mutator.store.plan_choices import Choices
 from mutator.store.records import SCHEMA, read_records
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -194,7 +194,7 @@ def test_runs_of_an_unneeded_check_are_deleted(threaded: Workspace, tmp_path: Pa
     for _, line in lines[:1]:
         writer.append(line)
     writer.close()
-    digests.close_segments(run)
+    file_digests.close_segments(run)
     assert equivalence_check.left(folder) == ()
     summary = run_campaign(threaded, "small", run, engine="fork")
     assert (summary.proof, summary.seal) == (None, seal)

@@ -17,7 +17,7 @@ from mutator.engines.reference import ReferenceEngine
 from mutator.preflight import preflight_cache
 from mutator.preflight.preflight_checks import run_checks
 from mutator.preflight.preflight_rules import digest_of
-from mutator.store.choices import Choices
+from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 

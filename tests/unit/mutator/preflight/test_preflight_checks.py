@@ -14,10 +14,10 @@ from mutator.errors import CheckFailed
 from mutator.preflight.canary import judge
 from mutator.preflight.preflight_checks import run_checks
 from mutator.preflight.preflight_rules import CheckRun
-from mutator.store.lines import LineWriter
-from mutator.store.progress import Progress
+from mutator.store.checksummed_lines import LineWriter
 from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
+from mutator.store.run_progress import Progress
 from mutator.workspace import Workspace
 
 

@@ -6,10 +6,10 @@ from pathlib import Path
 
 from mutator._common.hashing import plain
 from mutator.results.table_columns import SINCE, result_columns
-from mutator.store import digests, plan_file
-from mutator.store.choices import Choices
-from mutator.store.digests import Ledger
-from mutator.store.stretches import Stretch
+from mutator.store import file_digests, plan_file
+from mutator.store.file_digests import Ledger
+from mutator.store.plan_choices import Choices
+from mutator.store.work_stretches import Stretch
 from tests.made_head import made_head
 from tests.made_up_results import write_results
 
@@ -69,7 +69,7 @@ def make_run(folder: Path, **head: object) -> Path:
     (folder / "run.json").write_text(json.dumps(HEAD | head))
     write_results(folder, COLUMNS, LINES)
     plan_file.write(folder, [], [])
-    digests.write(folder, Ledger(files={}))
+    file_digests.write(folder, Ledger(files={}))
     (folder / "plots").mkdir()
     (folder / "plots" / ("0" * 16 + "-14.50s.jpg")).write_bytes(b"picture")
     return folder

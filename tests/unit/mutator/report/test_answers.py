@@ -18,7 +18,7 @@ from mutator.report.panels.answers import answers_panel
 from mutator.report.paths import RunPaths
 from mutator.report.studies import ReportedRun
 from mutator.results.table_columns import SINCE, result_columns
-from mutator.store.lines import written
+from mutator.store.checksummed_lines import written
 from mutator.store.run_folder import RunFolder
 from mutator.store.timings import TIMINGS_SCHEMA
 from mutator.targets.target_facts import MetricFacts

@@ -13,8 +13,8 @@ from mutator.model import Experiment, Outcome, Record, Status
 from mutator.report import building, engines, stamp
 from mutator.report.seen import timings_of
 from mutator.results.table_building import build
-from mutator.store.choices import Choices
-from mutator.store.lines import LineWriter
+from mutator.store.checksummed_lines import LineWriter
+from mutator.store.plan_choices import Choices
 from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.store.timings import TIMINGS_SCHEMA

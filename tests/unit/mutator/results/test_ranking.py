@@ -10,7 +10,7 @@ import pandas as pd
 
 from mutator.model import Status
 from mutator.results.ranking import places, worth
-from mutator.results.rows import Row, rows_of
+from mutator.results.result_rows import Row, rows_of
 from mutator.results.table_columns import SEVERITY, SINCE, result_columns
 from mutator.results.table_reader import Results
 from mutator.targets.severity import CLASSES

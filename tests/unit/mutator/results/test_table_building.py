@@ -20,7 +20,7 @@ from mutator.campaigns.plan import make_plan
 from mutator.errors import MutatorWarning
 from mutator.model import Record
 from mutator.outcomes.fault_paths import fault_paths_of
-from mutator.results import propagation, table_building, table_files
+from mutator.results import propagation_columns, table_building, table_files
 from mutator.results.table_columns import (
     TIMINGS,
     Finished,
@@ -29,7 +29,7 @@ from mutator.results.table_columns import (
 )
 from mutator.results.table_files import Column
 from mutator.store import plan_file
-from mutator.store.lines import LineWriter
+from mutator.store.checksummed_lines import LineWriter
 from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.store.timings import TIMINGS_SCHEMA
@@ -112,13 +112,13 @@ def made_at_once(folder: RunFolder) -> dict[str, bytes]:
     left = [(r.experiment_id, *one) for _, r in done for one in r.left]
     facts = {channel.name: (channel.component, channel.role.value) for channel in folder.head.channels}
     cells = [(name, ch, *facts.get(ch, ("", "")), round(first, 6), most) for name, ch, first, most in left]
-    left_names = [column.name for column in propagation.COLUMNS]
+    left_names = [column.name for column in propagation_columns.COLUMNS]
     return {
         table_building.CSV: text.getvalue().encode(),
         table_building.PARQUET: parquet_at_once(rows, columns),
         table_building.TIMINGS_PARQUET: parquet_at_once(lines, TIMINGS),
         table_building.PROPAGATION: parquet_at_once(
-            [dict(zip(left_names, one, strict=True)) for one in cells], propagation.COLUMNS
+            [dict(zip(left_names, one, strict=True)) for one in cells], propagation_columns.COLUMNS
         ),
     }
 

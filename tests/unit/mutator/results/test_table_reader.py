@@ -23,7 +23,7 @@ from mutator.exports.write import export
 from mutator.model import Experiment, Outcome, Status
 from mutator.report import building
 from mutator.results import table_building
-from mutator.results.counting import hazard_names as checked_hazards
+from mutator.results.outcome_counting import hazard_names as checked_hazards
 from mutator.results.table_columns import (
     SEVERITY,
     SINCE,
@@ -76,7 +76,7 @@ def run(crane: Workspace, tmp_path: Path, write_run: WriteRun) -> Path:
 ALONE = """
 import sys
 from pathlib import Path
-from mutator.results.counting import hazard_names as checked_hazards
+from mutator.results.outcome_counting import hazard_names as checked_hazards
 from mutator.results.table_reader import Results, same_parquet
 table = Results(Path(sys.argv[1]))
 assert same_parquet(table.path, table.path)

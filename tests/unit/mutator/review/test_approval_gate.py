@@ -13,7 +13,7 @@ from mutator.review import approval_gate
 from mutator.review.decisions import Change, Kind, load_review, record
 from mutator.review.mutant_groups import of_plan
 from mutator.store.approvals import approval_summary, write_approvals
-from mutator.store.choices import Choices
+from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
 
 

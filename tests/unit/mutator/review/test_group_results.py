@@ -13,11 +13,11 @@ from mutator.campaigns.plan import make_plan
 from mutator.errors import MutatorError
 from mutator.model import Outcome, Status
 from mutator.results import table_building
-from mutator.results.rows import Row
+from mutator.results.result_rows import Row
 from mutator.results.table_reader import Results
 from mutator.review.group_results import of_group, verdict_of
 from mutator.review.mutant_groups import of_plan
-from mutator.store.choices import Choices
+from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 

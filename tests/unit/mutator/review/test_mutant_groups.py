@@ -10,7 +10,7 @@ from mutator.campaigns.plan import make_plan
 from mutator.errors import MutatorError
 from mutator.review.decision_basis import fault_hunks
 from mutator.review.mutant_groups import Group, of_library, of_plan
-from mutator.store.choices import Choices
+from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
 
 SENSOR = ("sensor/*",)

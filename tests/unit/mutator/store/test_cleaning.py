@@ -11,8 +11,8 @@ from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import make_plan
 from mutator.errors import MutatorError
 from mutator.exports import Table, find_export
+from mutator.store.allowed_contents import CONTENT
 from mutator.store.cleaning import clean, finish_deletion
-from mutator.store.folder_contents import CONTENT
 from mutator.workspace import Workspace
 
 PAGE = Path(__file__).parents[4] / "docs" / "reference" / "run-folder.md"

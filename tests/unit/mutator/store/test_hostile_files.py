@@ -15,12 +15,12 @@ from mutator.errors import MutatorError
 from mutator.outcomes.importers import npz
 from mutator.outcomes.trace_files import TraceRequest
 from mutator.store import series_format
-from mutator.store.blocks import as_block, read_blocks
-from mutator.store.digests import Digest
-from mutator.store.lines import read_segment, verified_lines
-from mutator.store.patches import WHOLE, Patches
+from mutator.store.checksummed_blocks import as_block, read_blocks
+from mutator.store.checksummed_lines import read_segment, verified_lines
+from mutator.store.file_digests import Digest
+from mutator.store.patch_files import WHOLE, Patches
 from mutator.store.plan_file import lines_of
-from mutator.store.series import read_index
+from mutator.store.series_folder import read_index
 from mutator.store.series_script import write_script
 from tests.costs import is_cheap, is_refused
 

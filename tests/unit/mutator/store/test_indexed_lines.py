@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 
 from mutator.errors import MutatorError
+from mutator.store.checksummed_lines import LineWriter, written
 from mutator.store.indexed_lines import IndexedLines
-from mutator.store.lines import LineWriter, written
 
 SCHEMA = "things/1"
 

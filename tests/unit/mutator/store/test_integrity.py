@@ -11,11 +11,11 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.model import Status
-from mutator.store import digests, integrity, plan_file
-from mutator.store.lines import LineWriter
+from mutator.store import file_digests, integrity, plan_file
+from mutator.store.checksummed_lines import LineWriter
 from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
-from mutator.store.stretches import Stretch
+from mutator.store.work_stretches import Stretch
 from mutator.workspace import Workspace
 
 Write = Callable[..., Path]
@@ -131,7 +131,7 @@ def test_swapped_files_are_reported(run: Path) -> None:
 
 def unsealed(run: Path, *lines: dict[str, object], plan: str | None = None) -> Path:
     """Turn a finished run into a killed one, with these lines in an unclosed segment."""
-    digests.close_segments(run, finished=False)
+    file_digests.close_segments(run, finished=False)
     head = {"schema": SCHEMA, "plan": plan or RunFolder.unverified(run).head.plan}
     writer = LineWriter(run / "records" / "0002-a.jsonl", head)
     for line in lines:
@@ -195,7 +195,7 @@ def test_a_folder_that_is_being_written_is_not_damaged(run: Path, monkeypatch: p
         found = list(real(*arguments, **more))  # type: ignore[arg-type]
         if not seen:
             seen.append("the owner was faster")
-            digests.rewrite(run, "plan.csv", b"other")
+            file_digests.rewrite(run, "plan.csv", b"other")
             return [MutatorError("plan.csv changed")]
         return found
 

@@ -10,9 +10,9 @@ import pytest
 from mutator._common.hashing import canonical
 from mutator.errors import CheckFailed, MutatorError
 from mutator.model import Activation, Outcome, Record, RunError, Status
-from mutator.store.lines import LineWriter
-from mutator.store.progress import Tail
+from mutator.store.checksummed_lines import LineWriter
 from mutator.store.records import SCHEMA, line_of, read_records
+from mutator.store.run_progress import Tail
 
 HEAD = {"schema": SCHEMA, "plan": "p"}
 MakeRecord = Callable[..., Record]

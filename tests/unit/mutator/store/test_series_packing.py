@@ -9,7 +9,7 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.model import Activation, Outcome, Record, Status
-from mutator.store.series import SeriesFolder, run_facts, write_kept
+from mutator.store.series_folder import SeriesFolder, run_facts, write_kept
 from mutator.store.series_format import Series, encode
 from mutator.store.series_packing import EncodedSeries, SeriesWriter, pack, segments
 

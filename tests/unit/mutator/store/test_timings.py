@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.store.lines import LineWriter
+from mutator.store.checksummed_lines import LineWriter
 from mutator.store.timings import TIMINGS_SCHEMA, read_timings
 
 LINE = {

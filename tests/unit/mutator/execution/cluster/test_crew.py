@@ -4,7 +4,7 @@ import pytest
 
 from mutator._common.version import VERSION
 from mutator.execution.cluster.crew import Crew, describe
-from mutator.store.stretches import Stretch
+from mutator.store.work_stretches import Stretch
 
 FACTS = {
     "mutator": VERSION,

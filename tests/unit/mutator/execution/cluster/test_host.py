@@ -20,7 +20,7 @@ from mutator.execution.cluster.host import Host
 from mutator.execution.cluster.pieces import Ending, Piece, Result
 from mutator.execution.cluster.site import Site
 from mutator.execution.session import open_session
-from mutator.store.choices import Choices
+from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
 
 

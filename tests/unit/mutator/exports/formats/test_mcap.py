@@ -20,7 +20,7 @@ from mutator.exports.write import export
 from mutator.model import Activation, Experiment, Outcome
 from mutator.store.cleaning import check
 from mutator.store.run_folder import RunFolder
-from mutator.store.series import SeriesFolder, run_facts, write_kept
+from mutator.store.series_folder import SeriesFolder, run_facts, write_kept
 from mutator.store.series_format import Points, Series, encode
 from mutator.workspace import Workspace
 

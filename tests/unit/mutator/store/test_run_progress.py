@@ -2,13 +2,13 @@
 
 import pytest
 
-from mutator.store import progress
-from mutator.store.progress import Pace
+from mutator.store import run_progress
+from mutator.store.run_progress import Pace
 
 
 def test_earlier_steps_do_not_count_towards_a_stages_rate(monkeypatch: pytest.MonkeyPatch) -> None:
     now = 100.0
-    monkeypatch.setattr(progress.time, "monotonic", lambda: now)
+    monkeypatch.setattr(run_progress.time, "monotonic", lambda: now)
     pace = Pace("proof", 23, done=3)
     assert (pace.at(3).per_s, pace.at(3).remaining_s) == (None, None)
     now = 108.0

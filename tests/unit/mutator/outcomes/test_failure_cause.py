@@ -6,7 +6,7 @@ import pytest
 
 from mutator.engines.jobs import Execution, Raised, Stack
 from mutator.model import RunError, Status
-from mutator.outcomes.blame import assign_blame, error_of
+from mutator.outcomes.failure_cause import assign_blame, error_of
 
 FILES = {
     "car/radar.py": b"""from car import _fi  # fi:probe

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mutator._common.tables import Table
-from mutator.outcomes.golden import load_record, load_trace
-from mutator.outcomes.judging import judge_run
+from mutator.outcomes.golden_comparison import load_record, load_trace
+from mutator.outcomes.hazards_and_metrics import judge_run
 from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.targets.manifest import TargetManifest
 

@@ -22,7 +22,7 @@ from mutator._common.cores import usable_cores
 from mutator._common.files import is_no_file, json_bytes, read_json, write_json
 from mutator._common.hashing import digest
 from mutator.errors import MutatorError, Outside
-from mutator.store.lines import read_segment
+from mutator.store.checksummed_lines import read_segment
 
 SCHEMA, FILE = "digests/1", "digests.json"
 _WORTH_THREADS = 20_000_000  # the least number of bytes for which threads save time

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from mutator.model import Outcome, Status
-from mutator.results.counting import count_table, counts_by, hazard_names, kinds, outcome_counts
+from mutator.results.outcome_counting import count_table, counts_by, hazard_names, kinds, outcome_counts
 from mutator.results.table_columns import SINCE, result_columns
 from mutator.results.table_reader import Results
 from mutator.store import plan_file

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from mutator.errors import DiskFull, MutatorError
-from mutator.store.lines import LineWriter, Segment, read_segment
+from mutator.store.checksummed_lines import LineWriter, Segment, read_segment
 
 SCHEMA = "records/2"
 HEAD = {"schema": SCHEMA, "plan": "p"}

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.store.blocks import BlockWriter, as_block, read_blocks
+from mutator.store.checksummed_blocks import BlockWriter, as_block, read_blocks
 
 CONTENT = {"one": b"1" * 50, "two": b"FIB1" * 9, "three": b""}
 

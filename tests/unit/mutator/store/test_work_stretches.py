@@ -9,7 +9,7 @@ import pytest
 from mutator._common.hashing import plain
 from mutator._common.plain_reader import from_plain
 from mutator.errors import Misfit
-from mutator.store.stretches import (
+from mutator.store.work_stretches import (
     Blas,
     CloneState,
     Machine,

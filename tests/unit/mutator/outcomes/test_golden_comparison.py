@@ -12,7 +12,14 @@ import numpy as np
 import pytest
 
 from mutator.errors import BadOutput, Shortage
-from mutator.outcomes.golden import alerts_of, compare, load_record, load_trace, sharing_times, trace_digest
+from mutator.outcomes.golden_comparison import (
+    alerts_of,
+    compare,
+    load_record,
+    load_trace,
+    sharing_times,
+    trace_digest,
+)
 from mutator.outcomes.importers import npz
 from mutator.store.run_folder import GoldenRun
 from mutator.targets.channels import Channel, Role

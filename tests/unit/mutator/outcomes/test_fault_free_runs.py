@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.outcomes.fault_free import fault_free_runs, fault_free_table, own_alerts
+from mutator.outcomes.fault_free_runs import fault_free_runs, fault_free_table, own_alerts
 from mutator.store.run_folder import RunFolder
 from mutator.targets.channels import Channel
 from mutator.targets.criteria import Hazard

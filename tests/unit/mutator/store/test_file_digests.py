@@ -10,9 +10,9 @@ import pytest
 from mutator._common import files
 from mutator._common.files import write_atomic
 from mutator.errors import MutatorError, Outside
-from mutator.store import digests
-from mutator.store.digests import Digest, Ledger
-from mutator.store.lines import LineWriter
+from mutator.store import file_digests
+from mutator.store.checksummed_lines import LineWriter
+from mutator.store.file_digests import Digest, Ledger
 
 NAMES = FIRST, SECOND = "plan.csv", "checks.json"
 
@@ -26,12 +26,12 @@ def run(tmp_path: Path) -> Path:
     for name in NAMES:
         (tmp_path / name).write_text(f"old {name}")
     known = {name: Digest.of((tmp_path / name).read_bytes()) for name in NAMES}
-    digests.write(tmp_path, Ledger(files=known))
+    file_digests.write(tmp_path, Ledger(files=known))
     return tmp_path
 
 
 def accepted(run: Path) -> bool:
-    ledger = digests.read(run)
+    ledger = file_digests.read(run)
     return all(ledger.accepts(name, Digest.of_file(run / name)) for name in ledger.names)
 
 
@@ -48,35 +48,35 @@ def test_a_ledger_is_read_as_written(run: Path) -> None:
     ledger = Ledger(
         files={"records/x.jsonl": one}, rewriting={"checks.json": one, "plan.csv": None}, finished=True
     )
-    digests.write(run, ledger)
-    assert digests.read(run) == ledger
+    file_digests.write(run, ledger)
+    assert file_digests.read(run) == ledger
 
 
 def test_every_changed_byte_is_found(run: Path) -> None:
-    path = run / digests.FILE
+    path = run / file_digests.FILE
     data = path.read_bytes()
     for place in range(len(data)):
         path.write_bytes(data[:place] + bytes([data[place] ^ 1]) + data[place + 1 :])
         with pytest.raises(MutatorError, match=r"digests\.json"):
-            digests.read(run)
+            file_digests.read(run)
 
 
 @pytest.mark.parametrize("content", ["{}", '{"schema": "digests/1"}', "[]", "", '{"schema": "digests/9"}'])
 def test_a_file_that_is_not_a_ledger_is_refused(run: Path, content: str) -> None:
-    (run / digests.FILE).write_text(content)
+    (run / file_digests.FILE).write_text(content)
     with pytest.raises(MutatorError, match=r"digests\.json"):
-        digests.read(run)
-    (run / digests.FILE).unlink()
+        file_digests.read(run)
+    (run / file_digests.FILE).unlink()
     with pytest.raises(MutatorError, match=r"digests\.json: missing"):
-        digests.read(run)
+        file_digests.read(run)
 
 
 def test_a_forged_ledger_is_refused(run: Path) -> None:
     """The checksum is valid, but the content is not that of a ledger."""
-    data = {"schema": digests.SCHEMA, "finished": True, "files": [], "rewriting": {}}
-    files.write_json(run / digests.FILE, data | {"sum": digests.digest(data)})
+    data = {"schema": file_digests.SCHEMA, "finished": True, "files": [], "rewriting": {}}
+    files.write_json(run / file_digests.FILE, data | {"sum": file_digests.digest(data)})
     with pytest.raises(MutatorError, match="not a list of digests"):
-        digests.read(run)
+        file_digests.read(run)
 
 
 @pytest.mark.parametrize("key", ["files", "rewriting"])
@@ -89,16 +89,16 @@ def test_a_forged_ledger_is_refused(run: Path) -> None:
 )
 def test_a_ledger_names_only_files_that_a_run_writes(run: Path, key: str, name: str) -> None:
     one = Digest.of(b"")
-    digests.write(run, Ledger(**{"files": {}, "rewriting": {}} | {key: {name: one}}))  # type: ignore[arg-type]
+    file_digests.write(run, Ledger(**{"files": {}, "rewriting": {}} | {key: {name: one}}))  # type: ignore[arg-type]
     with pytest.raises(Outside, match=r"digests\.json"):
-        digests.read(run)
+        file_digests.read(run)
 
 
 def test_a_segment_with_a_second_name_is_not_cut_in_place(run: Path) -> None:
     path = segment(run, "records/0001-gw0.jsonl", 1)
     path.write_bytes(torn := path.read_bytes() + b'{"sum"')
     (run.parent / "mine").hardlink_to(path)
-    digests.close_segments(run)
+    file_digests.close_segments(run)
     assert (run.parent / "mine").read_bytes() == torn != path.read_bytes()
 
 
@@ -120,7 +120,7 @@ def kills(run: Path, work: Callable[[], Any], monkeypatch: pytest.MonkeyPatch) -
 
         with monkeypatch.context() as patch:
             patch.setattr(files, "write_atomic", write)
-            patch.setattr(digests, "write_below", write_below)
+            patch.setattr(file_digests, "write_below", write_below)
             try:
                 work()
                 return survived
@@ -130,36 +130,36 @@ def kills(run: Path, work: Callable[[], Any], monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_a_kill_during_a_rewrite_leaves_a_valid_folder(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert kills(run, lambda: digests.rewrite(run, FIRST, b"new"), monkeypatch) == 3
+    assert kills(run, lambda: file_digests.rewrite(run, FIRST, b"new"), monkeypatch) == 3
     assert accepted(run) and (run / FIRST).read_text() == "new"
-    assert digests.read(run).rewriting == {}
+    assert file_digests.read(run).rewriting == {}
 
 
 def test_after_a_kill_a_file_is_old_or_new(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with monkeypatch.context() as patch, pytest.raises(Killed):
-        patch.setattr(digests, "write_below", lambda run, name, data: (_ for _ in ()).throw(Killed))
-        digests.rewrite(run, FIRST, b"new")
+        patch.setattr(file_digests, "write_below", lambda run, name, data: (_ for _ in ()).throw(Killed))
+        file_digests.rewrite(run, FIRST, b"new")
     assert accepted(run)
     (run / FIRST).write_text("mine")
     assert not accepted(run)
 
 
 def test_a_file_announced_for_deletion_can_be_missing(run: Path) -> None:
-    with digests.rewriting(run, {FIRST: None}):
+    with file_digests.rewriting(run, {FIRST: None}):
         assert accepted(run)
         (run / FIRST).unlink()
         assert accepted(run)
-    assert digests.read(run).names == [SECOND] and accepted(run)
+    assert file_digests.read(run).names == [SECOND] and accepted(run)
 
 
 def test_a_closed_segment_is_in_the_ledger(run: Path) -> None:
     path = segment(run, "records/0001-gw0.jsonl", 1, 2)
     whole = path.read_bytes()
     path.write_bytes(whole + b'{"sum":"0123')
-    digests.close_segments(run)
-    known = digests.read(run).files["records/0001-gw0.jsonl"]
+    file_digests.close_segments(run)
+    known = file_digests.read(run).files["records/0001-gw0.jsonl"]
     assert (path.read_bytes(), known) == (whole, Digest.of(whole, lines=3))
-    assert not digests.read(run).finished
+    assert not file_digests.read(run).finished
     with path.open("ab") as file:
         file.write(b"{}\n")
     assert not accepted(run)
@@ -169,13 +169,13 @@ def test_a_damaged_segment_cannot_be_closed(run: Path) -> None:
     path = segment(run, "proof/0001-gw0.jsonl", 1, 2)
     path.write_bytes(path.read_bytes().replace(b'"value":1', b'"value":3'))
     with pytest.raises(MutatorError, match=r"0001-gw0\.jsonl:2: a damaged line"):
-        digests.close_segments(run)
+        file_digests.close_segments(run)
 
 
 def test_closing_twice_writes_once(run: Path) -> None:
     segment(run, "records/0001-gw0.jsonl", 1)
-    digests.close_segments(run, finished=True)
-    before = (run / digests.FILE).stat().st_mtime_ns
-    digests.close_segments(run)
-    assert (run / digests.FILE).stat().st_mtime_ns == before
-    assert json.loads((run / digests.FILE).read_text())["finished"] is True
+    file_digests.close_segments(run, finished=True)
+    before = (run / file_digests.FILE).stat().st_mtime_ns
+    file_digests.close_segments(run)
+    assert (run / file_digests.FILE).stat().st_mtime_ns == before
+    assert json.loads((run / file_digests.FILE).read_text())["finished"] is True

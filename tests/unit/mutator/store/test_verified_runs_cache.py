@@ -10,10 +10,10 @@ from mutator._common import caches
 from mutator.errors import MutatorError
 from mutator.execution.ended_runs import ended_before
 from mutator.execution.running import run_campaign
-from mutator.store import digests, integrity, verified_runs
-from mutator.store.choices import Choices
-from mutator.store.patches import Patches
-from mutator.store.patches import rewrite as rewrite_patches
+from mutator.store import file_digests, integrity, verified_runs_cache
+from mutator.store.patch_files import Patches
+from mutator.store.patch_files import rewrite as rewrite_patches
+from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -91,22 +91,22 @@ def test_a_damaged_entry_is_not_used(made: tuple[Workspace, Path], cache: Path) 
     run = made[1]
     RunFolder.open(run)
     key = integrity.content_key(run)
-    assert verified_runs.recall(key) == {"verified": True}
+    assert verified_runs_cache.recall(key) == {"verified": True}
     [entry] = (cache / "mutator" / "runs").iterdir()
     entry.write_text(json.dumps(json.loads(entry.read_text()) | {"ended": {}}))
-    assert verified_runs.recall(key) == {}
+    assert verified_runs_cache.recall(key) == {}
     entry.write_text("[]")
-    assert verified_runs.recall(key) == {}
+    assert verified_runs_cache.recall(key) == {}
 
 
 def test_an_unfinished_run_has_no_entry(made: tuple[Workspace, Path], cache: Path) -> None:
     run = made[1]
-    ledger = digests.read(run)
+    ledger = file_digests.read(run)
     try:
-        digests.write(run, digests.Ledger(files=ledger.files))
+        file_digests.write(run, file_digests.Ledger(files=ledger.files))
         assert integrity.content_key(run) == ""
     finally:
-        digests.write(run, ledger)
+        file_digests.write(run, ledger)
 
 
 @pytest.mark.slow

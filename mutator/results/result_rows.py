@@ -6,7 +6,7 @@ from math import isnan
 from typing import TYPE_CHECKING, Any
 
 from mutator.model import Fault, Outcome, Status, Value, fault_label
-from mutator.results.counting import UNUSABLE, endings, hazard_margins, hazard_times, kinds
+from mutator.results.outcome_counting import UNUSABLE, endings, hazard_margins, hazard_times, kinds
 from mutator.results.plan_columns import number_of
 from mutator.results.table_columns import alerts_of
 from mutator.targets.severity import DELTA_V

@@ -17,9 +17,9 @@ from mutator._common.bounded import unpacked
 from mutator._common.hashing import canonical
 from mutator.errors import MutatorError
 from mutator.model import Record
+from mutator.store.series_check import check_values
 from mutator.store.series_format import Series, decode
 from mutator.store.series_script import name_of, read_script, write_script
-from mutator.store.series_sizes import check_values
 
 SCHEMA, FOLDER, KEPT = "series/1", "series", "kept"
 INDEX = "index"

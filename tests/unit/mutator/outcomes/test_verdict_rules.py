@@ -5,7 +5,7 @@ from itertools import product
 import pytest
 
 from mutator.model import Activation, Outcome
-from mutator.outcomes.verdicts import first_events, judge, reaction_time
+from mutator.outcomes.verdict_rules import first_events, judge, reaction_time
 
 ACTIVE = Activation(first=2.0, last=4.0, count=3)
 

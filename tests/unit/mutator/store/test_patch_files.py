@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.store.patches import Patches, PatchWriter
+from mutator.store.patch_files import Patches, PatchWriter
 
 
 @pytest.fixture

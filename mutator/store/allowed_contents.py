@@ -14,14 +14,14 @@ from pathlib import Path
 
 from mutator._common.below import entries_below, is_deep, is_plain, not_plain
 from mutator.errors import Outside
-from mutator.store import digests
+from mutator.store import file_digests
 from mutator.store.run_head import CAMPAIGN, HEAD
 
 SCRATCH, ASIDE, TRACES = "work", "damaged", "traces"
 SIGNATURE = ("seal.json", "seal.json.sig")
 _TABLES = ("results", "propagation", "timings")
 CONTENT = (  # all files that a run folder can contain; * matches any text, including folders
-    *(HEAD, digests.FILE, CAMPAIGN, "plan.csv", "plan/*.jsonl", "reviewed.json", "checks.json"),
+    *(HEAD, file_digests.FILE, CAMPAIGN, "plan.csv", "plan/*.jsonl", "reviewed.json", "checks.json"),
     *SIGNATURE,
     *("golden/*/*", "patches/*.blocks"),
     *("records/*.jsonl", "timings/*.jsonl", "proof/*.jsonl"),

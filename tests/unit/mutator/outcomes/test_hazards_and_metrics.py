@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from mutator.errors import BadOutput, MutatorError
-from mutator.outcomes.golden import Trace
-from mutator.outcomes.judging import Judged, judge_run, load_judged
+from mutator.outcomes.golden_comparison import Trace
+from mutator.outcomes.hazards_and_metrics import Judged, judge_run, load_judged
 from mutator.targets.manifest import TargetManifest
 
 from .cart import GAP, SPEED, T, write_manifest

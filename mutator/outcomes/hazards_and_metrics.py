@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mutator.errors import BadOutput, MutatorError
-from mutator.outcomes.golden import (
+from mutator.outcomes.golden_comparison import (
     Trace,
     alerts_of,
     at_steps_of_other,

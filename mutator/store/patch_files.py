@@ -13,7 +13,7 @@ from mutator._common.below import inside
 from mutator._common.bounded import unpacked
 from mutator._common.files import write_atomic
 from mutator._common.hashing import digest
-from mutator.store.blocks import Block, BlockWriter, as_block, intact_blocks, read_blocks
+from mutator.store.checksummed_blocks import Block, BlockWriter, as_block, intact_blocks, read_blocks
 
 FOLDER, SUFFIX = "patches", ".blocks"
 WHOLE, BESIDE = 0, 1  # kinds of blocks: a complete patch, or a difference from the last complete one
