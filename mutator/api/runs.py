@@ -22,7 +22,7 @@ from mutator.exports import Format, Parts, find_export
 from mutator.exports import Table as ExportedTable
 from mutator.exports.write import export
 from mutator.model import OPERATORS
-from mutator.outcomes.fault_free_runs import FaultFreeRun, alerts_by_drive, fault_free_runs, own_alerts
+from mutator.outcomes.fault_free_runs import FaultFreeRun, alerts_by_drive, load_fault_free_runs, own_alerts
 from mutator.outcomes.golden_comparison import load_trace
 from mutator.preflight import equivalence_check
 from mutator.report import building
@@ -122,7 +122,7 @@ class Run(RunContents):
 
     def fault_free(self) -> tuple[FaultFreeRun, ...]:
         """Return the alerts and hazards of the golden runs, and the range of each plotted channel."""
-        return fault_free_runs(self.folder, self.bench.manifest)
+        return load_fault_free_runs(self.folder, self.bench.manifest)
 
     def alerts_note(self) -> str:
         """Return a sentence on the alerts that golden runs also raise; empty if there are none."""

@@ -24,7 +24,7 @@ class FaultFreeRun:
     ranges: tuple[tuple[str, float, float], ...]  # name, minimum and maximum of recorded plotted channels
 
 
-def fault_free_runs(folder: RunFolder, manifest: TargetManifest) -> tuple[FaultFreeRun, ...]:
+def load_fault_free_runs(folder: RunFolder, manifest: TargetManifest) -> tuple[FaultFreeRun, ...]:
     """Return the fault-free runs of a run folder, sorted by name. MutatorError if one cannot be read."""
     found = []
     for one in sorted(folder.goldens):

@@ -8,7 +8,7 @@ from mutator.campaigns.installed_studies import find_study
 from mutator.errors import MutatorError
 from mutator.figures.figures import Drawing
 from mutator.model import Experiment, Fault, Record, Status
-from mutator.outcomes.fault_free_runs import FaultFreeRun, fault_free_runs
+from mutator.outcomes.fault_free_runs import FaultFreeRun, load_fault_free_runs
 from mutator.outcomes.fault_paths import fault_paths_of
 from mutator.outcomes.golden_comparison import load_trace
 from mutator.report.engines import EngineSummary, engine_summary
@@ -90,7 +90,7 @@ class ReportedRun:
         if self.workspace is None:
             return ()
         try:
-            return fault_free_runs(self.folder, self.workspace.manifest(self.folder.head.target))
+            return load_fault_free_runs(self.folder, self.workspace.manifest(self.folder.head.target))
         except (MutatorError, KeyError):
             return ()
 

@@ -13,7 +13,7 @@ from mutator.audit.table_audit import tables
 from mutator.comparison import comparison_files
 from mutator.comparison import run_comparison as comparing
 from mutator.errors import Absent, MutatorError
-from mutator.outcomes.fault_free_runs import fault_free_runs, own_alerts
+from mutator.outcomes.fault_free_runs import load_fault_free_runs, own_alerts
 from mutator.report import building
 from mutator.report.panel import FOLDER
 from mutator.report.stamp import made_from
@@ -104,7 +104,7 @@ class Shown:
     def _alerts(self, run: Path) -> str:
         folder = RunFolder.open(run)
         try:
-            return own_alerts(fault_free_runs(folder, self._workspace.manifest(folder.head.target)))
+            return own_alerts(load_fault_free_runs(folder, self._workspace.manifest(folder.head.target)))
         except (MutatorError, KeyError):
             return ""
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.outcomes.fault_free_runs import fault_free_runs, fault_free_table, own_alerts
+from mutator.outcomes.fault_free_runs import fault_free_table, load_fault_free_runs, own_alerts
 from mutator.store.run_folder import RunFolder
 from mutator.targets.channels import Channel
 from mutator.targets.criteria import Hazard
@@ -45,7 +45,7 @@ def folder(path: Path, runs: dict[tuple[str, str], dict]) -> RunFolder:
 
 def test_the_table_has_first_times_of_events_and_ranges_of_channels(tmp_path: Path) -> None:
     raised = [{"name": "fcw", "t": 3.5}, {"name": "fcw", "t": 9.0}, {"name": "chime", "t": 1.0}]
-    runs = fault_free_runs(
+    runs = load_fault_free_runs(
         folder(
             tmp_path,
             {("B", ""): {"hazards": {"H1": 7.0}, "alerts": raised}, ("A", "rain"): {"hazards": {}}},
@@ -63,7 +63,7 @@ def test_the_table_has_first_times_of_events_and_ranges_of_channels(tmp_path: Pa
 def test_the_sentence_names_each_alert_once_with_its_scenarios(tmp_path: Path) -> None:
     fcw = {"hazards": {}, "alerts": [{"name": "fcw", "t": 3.5}]}
     late = {"hazards": {}, "alerts": [{"name": "late", "t": 3.5}]}
-    runs = fault_free_runs(
+    runs = load_fault_free_runs(
         folder(tmp_path, {("A", ""): fcw, ("A", "rain"): fcw, ("B", ""): fcw, ("C", ""): late}), MANIFEST
     )
     assert own_alerts(runs).endswith("fault-free runs raise fcw in A, B; late in C.")
@@ -74,4 +74,4 @@ def test_a_missing_golden_run_is_an_error(tmp_path: Path) -> None:
     made = folder(tmp_path, {("A", ""): {"hazards": {}}})
     (made.golden("A") / "record.json").unlink()
     with pytest.raises(MutatorError, match="golden"):
-        fault_free_runs(made, MANIFEST)
+        load_fault_free_runs(made, MANIFEST)
