@@ -199,7 +199,7 @@ def run(
     place: Place,
 ) -> None:
     """Run or resume a campaign; print its results and write its report."""
-    from mutator.cli.progress import campaign_progress
+    from mutator.cli.progress_display import campaign_progress
 
     terminal = Terminal(as_json)
     workspace = place.workspace()

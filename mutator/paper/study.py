@@ -1,10 +1,10 @@
 """The study that the entry point in `mutator.studies` provides."""
 
 from mutator.figures.figures import Drawing
-from mutator.paper.examples import example_drawings
-from mutator.paper.panels import observations_panel
-from mutator.paper.published import has_paper, load_paper
-from mutator.paper.published_checks import check_paper
+from mutator.paper.example_figures import example_drawings
+from mutator.paper.observations_panel import observations_panel
+from mutator.paper.published_counts import has_paper, load_paper
+from mutator.paper.published_counts_check import check_paper
 from mutator.report.studies import ReportedRun, Study
 from mutator.statistics.published_counts import Published
 

@@ -1,6 +1,6 @@
 """Write all generated pages and schemas of the current clone."""
 
-from mutator.reference.pages import write
+from mutator.reference.generated_files import write
 from mutator.workspace import Workspace
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ from typing import Any
 
 import pytest
 
-from mutator.reference.pages import SCHEMAS
+from mutator.reference.generated_files import SCHEMAS
 from mutator.reference.schemas import file_formats
 from mutator.workspace import Workspace
 

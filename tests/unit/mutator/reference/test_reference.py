@@ -14,9 +14,9 @@ from mutator.cli.app import GROUPS, app
 from mutator.config import yaml_files
 from mutator.errors import MutatorError
 from mutator.faults.specs import spec_model
-from mutator.reference.pages import FOLDER, PAGES, SCHEMAS, STUB, generated_files, write
+from mutator.reference.generated_files import FOLDER, PAGES, SCHEMAS, STUB, generated_files, write
 from mutator.reference.schemas import Format, definitions, file_formats
-from mutator.reference.tables import reading_order
+from mutator.reference.yaml_key_tables import reading_order
 from mutator.workspace import Workspace
 
 CLONE = Path(__file__).parents[4]

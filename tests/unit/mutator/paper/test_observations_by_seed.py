@@ -6,7 +6,7 @@ from typing import Any
 import pandas as pd
 
 from mutator.paper.observations import Verdict, judge
-from mutator.paper.seeds import judge_by_seed, sheet, table
+from mutator.paper.observations_by_seed import judge_by_seed, sheet, table
 
 from ..statistics.results_frame import results
 

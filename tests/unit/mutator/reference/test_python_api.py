@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import mutator
-from mutator.reference.api import members, python_api, undocumented
+from mutator.reference.python_api import members, python_api, undocumented
 from mutator.workspace import Workspace
 
 CLONE = Path(__file__).parents[4]

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from mutator._common.doors import OPERATORS
 from mutator._common.tables import Table
 from mutator.operators.operator_lookup import find_operator
-from mutator.reference.tables import generated
+from mutator.reference.yaml_key_tables import generated
 from mutator.workspace import Workspace
 
 _INTRO = """\

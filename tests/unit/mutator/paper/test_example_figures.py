@@ -11,8 +11,8 @@ import pytest
 
 from mutator.execution.running import run_campaign
 from mutator.figures.figures import Drawing, drawing_files
-from mutator.paper.actions import WANTED, Pair, Wanted
-from mutator.paper.examples import candidates, example_drawings
+from mutator.paper.example_figures import candidates, example_drawings
+from mutator.paper.unsafe_actions import WANTED, Pair, Wanted
 from mutator.report import building
 from mutator.statistics.results_frame import load
 from mutator.store.plan_choices import Choices

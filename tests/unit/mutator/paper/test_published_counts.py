@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.paper.published import Paper, load_paper
+from mutator.paper.published_counts import Paper, load_paper
 from mutator.statistics import guided_against_random
 from mutator.statistics.guided_against_random_tables import kinds_sheet, overall_sheet
 from mutator.statistics.shares import share

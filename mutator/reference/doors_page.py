@@ -7,7 +7,7 @@ from pkgutil import resolve_name
 
 from mutator._common.doors import DISTRIBUTORS, DOORS, EXPORTS, IMPORTERS, OPERATORS, STUDIES, Door
 from mutator._common.tables import Table
-from mutator.reference.tables import generated
+from mutator.reference.yaml_key_tables import generated
 from mutator.workspace import Workspace
 
 _INTRO = """\

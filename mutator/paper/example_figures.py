@@ -11,8 +11,8 @@ from mutator.execution.traces import Traces
 from mutator.figures.figures import Drawing
 from mutator.figures.run_plot import marks_of
 from mutator.outcomes.series_sampling import RATE
-from mutator.paper.actions import WANTED, Pair, Wanted
-from mutator.paper.run_pair import draw
+from mutator.paper.run_pair_plot import draw
+from mutator.paper.unsafe_actions import WANTED, Pair, Wanted
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace

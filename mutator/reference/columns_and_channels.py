@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator
 
 from mutator._common.tables import Table
-from mutator.reference.tables import generated
+from mutator.reference.yaml_key_tables import generated
 from mutator.results.plan_columns import PLAN_COLUMNS
 from mutator.results.propagation_columns import COLUMNS as PROPAGATION
 from mutator.results.table_columns import TIMINGS, result_columns, severity_columns

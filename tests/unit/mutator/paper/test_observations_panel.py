@@ -9,8 +9,8 @@ import pytest
 
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import make_plan
-from mutator.paper.panels import observations_panel
-from mutator.paper.published import load_paper
+from mutator.paper.observations_panel import observations_panel
+from mutator.paper.published_counts import load_paper
 from mutator.report.studies import ReportedRun
 from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder

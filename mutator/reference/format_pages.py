@@ -9,7 +9,7 @@ from mutator.execution.cluster import cluster_files
 from mutator.faults import specs
 from mutator.faults.readings import SCHEMA as READINGS_SCHEMA
 from mutator.faults.readings import UNDECLARED, ReadingsModel
-from mutator.reference.tables import generated, sections
+from mutator.reference.yaml_key_tables import generated, sections
 from mutator.stpa import analysis, context_tables, hazards
 from mutator.targets import manifest_files, severity_model
 from mutator.workspace import Workspace

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from mutator._common.tables import Table
 from mutator.faults import fault_model_files
 from mutator.faults.fault_models import TARGET_UNIT, Example, FaultModel, ParamSchema, SnippetKind
-from mutator.reference.tables import generated, sections
+from mutator.reference.yaml_key_tables import generated, sections
 from mutator.workspace import Workspace
 
 INTRODUCTION = """\

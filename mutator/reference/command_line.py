@@ -12,7 +12,7 @@ from mutator._common.tables import Table
 from mutator.cli.app import EXIT_CODES, GROUPS, app
 from mutator.cli.options import Place
 from mutator.execution import pytest_plugin
-from mutator.reference.tables import generated
+from mutator.reference.yaml_key_tables import generated
 from mutator.workspace import Workspace
 
 _PLACE = {field.name for field in fields(Place)}

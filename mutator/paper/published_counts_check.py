@@ -8,7 +8,7 @@ from typing import Any
 from mutator.config.sources import Source
 from mutator.config.yaml_files import load
 from mutator.errors import MutatorError
-from mutator.paper.published import FILES, Paper, load_paper
+from mutator.paper.published_counts import FILES, Paper, load_paper
 from mutator.statistics.tallies import Tally, total
 from mutator.workspace import Workspace
 

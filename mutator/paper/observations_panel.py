@@ -8,9 +8,9 @@ from mutator._common.bounded import read_bounded
 from mutator._common.text import counted
 from mutator.config.yaml_files import MAX_BYTES
 from mutator.outcomes.fault_free_runs import own_alerts
-from mutator.paper import observations, observations_page, seeds
+from mutator.paper import observations, observations_by_seed, observations_page
 from mutator.paper.observations import Verdict
-from mutator.paper.published import has_paper, load_paper
+from mutator.paper.published_counts import has_paper, load_paper
 from mutator.report.panel import Panel, rendered
 from mutator.report.panels.tables import csv_files
 from mutator.report.studies import ReportedRun
@@ -76,15 +76,17 @@ def observations_panel(run: ReportedRun) -> Panel | None:
     if all(one.verdict is Verdict.UNDECIDED for one in judged):
         return None
     shown_ends = tuple(sorted(ends.items()))
-    by_seed = seeds.judge_by_seed(file, frame, lambda runs: list(_lacks(run, _missing(kinds, runs))))
-    of_seeds = seeds.table(judged, by_seed) if by_seed else None
-    sheets = [observations_page.sheet(judged), *([seeds.sheet(by_seed)] if by_seed else ())]
+    by_seed = observations_by_seed.judge_by_seed(
+        file, frame, lambda runs: list(_lacks(run, _missing(kinds, runs)))
+    )
+    of_seeds = observations_by_seed.table(judged, by_seed) if by_seed else None
+    sheets = [observations_page.sheet(judged), *([observations_by_seed.sheet(by_seed)] if by_seed else ())]
     text = observations_page.markdown(judged, shown_ends, coverage)
     parts = [
         "## The paper's observations",
         coverage,
         observations_page.verdicts(judged),
-        *(("### Seed by seed", seeds.ABOUT, of_seeds.as_markdown()) if of_seeds else ()),
+        *(("### Seed by seed", observations_by_seed.ABOUT, of_seeds.as_markdown()) if of_seeds else ()),
         f"The claims, rules, numbers and queries are in [{FILE}]({FILE}).",
     ]
     html = rendered(
@@ -96,7 +98,7 @@ def observations_panel(run: ReportedRun) -> Panel | None:
         session=observations_page.session(shown_ends),
         rules=observations_page.rules(),
         of_seeds=of_seeds,
-        about_seeds=seeds.ABOUT,
+        about_seeds=observations_by_seed.ABOUT,
     )
     return Panel(
         anchor="observations",

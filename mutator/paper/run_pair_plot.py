@@ -15,7 +15,7 @@ from mutator.figures.run_plot import (
     MarkKind,
     finite,
 )
-from mutator.paper.actions import Pair, Steps, Wanted
+from mutator.paper.unsafe_actions import Pair, Steps, Wanted
 from mutator.targets.manifest import TargetManifest
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mutator.model import Record
-from mutator.paper.actions import Look, Pair, at_a_wrong_time, both_unavailable, brake_too_short
+from mutator.paper.unsafe_actions import Look, Pair, at_a_wrong_time, both_unavailable, brake_too_short
 
 T = np.arange(0, 10, 0.1)
 NONE = np.zeros_like(T)

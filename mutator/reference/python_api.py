@@ -14,7 +14,7 @@ from typing import Any
 
 import mutator
 from mutator._common.tables import Table
-from mutator.reference.tables import generated
+from mutator.reference.yaml_key_tables import generated
 from mutator.workspace import Workspace
 
 _INTRO = """\
