@@ -51,7 +51,7 @@ _HTML = """\
 """
 
 
-def observations_panel(run: ReportedRun) -> Panel | None:
+def build_observations_panel(run: ReportedRun) -> Panel | None:
     """Return the panel of the observations that the library cites, with observations.md and tables.
 
     None if the library cites no observations, if the run has none of the published fault types, or if its

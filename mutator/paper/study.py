@@ -2,7 +2,7 @@
 
 from mutator.figures.figures import Drawing
 from mutator.paper.example_figures import example_drawings
-from mutator.paper.observations_panel import observations_panel
+from mutator.paper.observations_panel import build_observations_panel
 from mutator.paper.published_counts import has_paper, load_paper
 from mutator.paper.published_counts_check import check_paper
 from mutator.report.studies import ReportedRun, Study
@@ -30,6 +30,6 @@ STUDY = Study(
     about="Rubaiyat, Qin, Alemzadeh: Experimental Resilience Assessment of An Open-Source Driving Agent",
     check=check_paper,
     published=published,
-    panels=(observations_panel,),
+    panels=(build_observations_panel,),
     drawings=drawings,
 )

@@ -17,7 +17,7 @@ from mutator.targets.target_facts import metric_facts
 from mutator.workspace import Workspace
 
 
-def results(workspace: Workspace) -> str:
+def render_results_page(workspace: Workspace) -> str:
     left_out = ", ".join(f"`{name}`" for name in PLAN_COLUMNS)
     manifests = [workspace.manifest(name) for name in workspace.targets]
     return "\n".join(
@@ -64,7 +64,7 @@ def _columns(columns: Iterable[Column]) -> Iterator[str]:
     yield ""
 
 
-def channels(workspace: Workspace) -> str:
+def render_channels_page(workspace: Workspace) -> str:
     manifests = [workspace.manifest(name) for name in workspace.targets]
     parts = [
         generated("Channels and units"),

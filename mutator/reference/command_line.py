@@ -22,7 +22,7 @@ _PLACES = (
 )
 
 
-def command_line(workspace: Workspace) -> str:
+def render_command_line_page(workspace: Workspace) -> str:
     command: Any = get_command(app)
     parts = [
         generated("Command line"),

@@ -104,7 +104,7 @@ _PLACES = (
 )
 
 
-def doors_page(workspace: Workspace) -> str:
+def render_doors_page(workspace: Workspace) -> str:
     heads = ("door", "what it adds", "protocol", "how to register", "example")
     rows = [(f"**{p.name}**", p.adds, p.protocol, p.register, p.example) for p in _PLACES]
     inside = Table(heads=heads, rows=rows).as_markdown(escape=False)

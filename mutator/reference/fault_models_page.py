@@ -43,7 +43,7 @@ _DOES = {
 }
 
 
-def fault_models_page(workspace: Workspace) -> str:
+def render_fault_models_page(workspace: Workspace) -> str:
     models = list(workspace.fault_models())
     parts = [generated("Fault models"), INTRODUCTION]
     rows = [(f"[{model.name}](#{model.name})", _sentence(model.about)) for model in models]

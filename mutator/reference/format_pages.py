@@ -26,7 +26,7 @@ _SAME = (
 )
 
 
-def fault_spec(workspace: Workspace) -> str:
+def render_fault_spec_page(workspace: Workspace) -> str:
     example = min((workspace.library / "faults").rglob("*.yaml")).read_text(encoding="utf-8")
     return _page(
         generated("Fault specs"),
@@ -48,7 +48,7 @@ def fault_spec(workspace: Workspace) -> str:
     )
 
 
-def campaigns(workspace: Workspace) -> str:
+def render_campaigns_page(workspace: Workspace) -> str:
     example = (workspace.library / "campaigns" / "quickstart.yaml").read_text(encoding="utf-8")
     return _page(
         generated("Campaigns"),
@@ -63,7 +63,7 @@ def campaigns(workspace: Workspace) -> str:
     )
 
 
-def manifests(workspace: Workspace) -> str:
+def render_manifests_page(workspace: Workspace) -> str:
     return _page(
         generated("Target manifests"),
         "A manifest at `fault_library/targets/<name>.yaml` holds everything that the harness knows "
@@ -80,7 +80,7 @@ def manifests(workspace: Workspace) -> str:
     )
 
 
-def hazard_analysis(workspace: Workspace) -> str:
+def render_hazard_analysis_page(workspace: Workspace) -> str:
     return _page(
         generated("Files of the hazard analysis"),
         "These are the files in `fault_library/stpa/`. [The hazard "
@@ -101,7 +101,7 @@ def hazard_analysis(workspace: Workspace) -> str:
     )
 
 
-def clusters(workspace: Workspace) -> str:
+def render_clusters_page(workspace: Workspace) -> str:
     return _page(
         generated("Cluster files"),
         "A cluster file describes the cluster that `mutator run --cluster FILE.yaml` starts, and stops after "

@@ -21,23 +21,25 @@ FOLDER = Path("docs") / "reference"
 SCHEMAS = FOLDER / "schemas"
 STUB = Path("mutator") / "__init__.pyi"
 PAGES: dict[str, Callable[[Workspace], str]] = {
-    "api.md": python_api.python_api,
-    "campaign.md": format_pages.campaigns,
-    "channels.md": columns_and_channels.channels,
-    "cluster-file.md": format_pages.clusters,
-    "cli.md": command_line.command_line,
-    "doors.md": doors_page.doors_page,
-    "fault-models.md": fault_models_page.fault_models_page,
-    "fault-spec.md": format_pages.fault_spec,
-    "hazard-analysis.md": format_pages.hazard_analysis,
-    "operators.md": operators_page.operators_page,
-    "results.md": columns_and_channels.results,
-    "target-manifest.md": format_pages.manifests,
+    "api.md": python_api.render_api_page,
+    "campaign.md": format_pages.render_campaigns_page,
+    "channels.md": columns_and_channels.render_channels_page,
+    "cluster-file.md": format_pages.render_clusters_page,
+    "cli.md": command_line.render_command_line_page,
+    "doors.md": doors_page.render_doors_page,
+    "fault-models.md": fault_models_page.render_fault_models_page,
+    "fault-spec.md": format_pages.render_fault_spec_page,
+    "hazard-analysis.md": format_pages.render_hazard_analysis_page,
+    "operators.md": operators_page.render_operators_page,
+    "results.md": columns_and_channels.render_results_page,
+    "target-manifest.md": format_pages.render_manifests_page,
 }
 
 
-def generated_files(workspace: Workspace) -> dict[Path, str]:
-    files = {FOLDER / name: make(workspace) for name, make in PAGES.items()} | {STUB: python_api.stub()}
+def render_files(workspace: Workspace) -> dict[Path, str]:
+    files = {FOLDER / name: make(workspace) for name, make in PAGES.items()} | {
+        STUB: python_api.render_stub()
+    }
     known = workspace.fault_models()
     for kind in file_formats(workspace.readings()):
         text = json.dumps(editor_schema(kind, known), indent=1, ensure_ascii=False)
@@ -45,11 +47,11 @@ def generated_files(workspace: Workspace) -> dict[Path, str]:
     return files
 
 
-def write(workspace: Workspace) -> Iterator[Path]:
+def write_files(workspace: Workspace) -> Iterator[Path]:
     """Write the files into the library's clone; yield the paths. MutatorError if there is no clone."""
     clone = workspace.library.parent
     refuse_shipped(clone)
-    for path, text in generated_files(workspace).items():
+    for path, text in render_files(workspace).items():
         (clone / path).parent.mkdir(parents=True, exist_ok=True)
         (clone / path).write_text(text, encoding="utf-8")
         yield path

@@ -49,7 +49,7 @@ _FIELDS = (
 )
 
 
-def operators_page(workspace: Workspace) -> str:
+def render_operators_page(workspace: Workspace) -> str:
     replacements = Table(heads=("operator", "where", "replacement"), rows=list(_replacements()))
     fields = Table(heads=("field", "what it is"), rows=_FIELDS)
     tables = [table.as_markdown(escape=False) for table in (replacements, fields)]

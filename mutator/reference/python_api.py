@@ -64,7 +64,7 @@ class Member:
     meaning: str
 
 
-def python_api(workspace: Workspace) -> str:
+def render_api_page(workspace: Workspace) -> str:
     shared = Table(heads=("argument", "what you can pass"), rows=_ARGUMENTS).as_markdown(escape=False)
     parts = [generated("Python API"), _INTRO, shared, "\n## Functions\n"]
     for name in _functions():
@@ -248,7 +248,7 @@ def _argument(arg: ast.arg, default: ast.expr | None, typed: bool) -> str:
     return f"{text} = {ast.unparse(default)}" if typed else f"{text}={ast.unparse(default)}"
 
 
-def stub() -> str:
+def render_stub() -> str:
     """Return `mutator/__init__.pyi`: type checkers cannot follow names that are imported on first use."""
     lines = [
         f"from {module} import {name} as {name}"

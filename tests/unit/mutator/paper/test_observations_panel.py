@@ -9,7 +9,7 @@ import pytest
 
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import make_plan
-from mutator.paper.observations_panel import observations_panel
+from mutator.paper.observations_panel import build_observations_panel
 from mutator.paper.published_counts import load_paper
 from mutator.report.studies import ReportedRun
 from mutator.store.plan_choices import Choices
@@ -52,7 +52,7 @@ def test_claims_about_all_faults_need_the_whole_plan(
         run = ReportedRun(
             folder=folder, workspace=toycar, results=done_results, frame=frame, study=None, seen=SEEN
         )
-        panel = observations_panel(run)
+        panel = build_observations_panel(run)
         assert panel is not None
         text = panel.files["observations.md"].decode()
         why = f"not enough data: only {done} of 12 planned experiments were run"
@@ -67,4 +67,4 @@ def test_a_report_without_activated_faults_of_the_paper_has_no_observations(
     folder = RunFolder.open(tmp_path / "run")
     frame = results({"module": "radar", "fault_type": "chaff"})
     run = ReportedRun(folder=folder, workspace=toycar, results=frame, frame=frame, study=None, seen=SEEN)
-    assert observations_panel(run) is None
+    assert build_observations_panel(run) is None

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import mutator
-from mutator.reference.python_api import members, python_api, undocumented
+from mutator.reference.python_api import members, render_api_page, undocumented
 from mutator.workspace import Workspace
 
 CLONE = Path(__file__).parents[4]
@@ -21,7 +21,7 @@ def test_every_public_name_is_documented() -> None:
 
 def test_the_page_describes_every_public_name() -> None:
     """The version is left out, because it is a plain string."""
-    page = python_api(Workspace.find(CLONE))
+    page = render_api_page(Workspace.find(CLONE))
     headings = re.findall(r"^### (?:mutator\.)?(\w+)$", page, re.MULTILINE)
     assert sorted(headings) == sorted(set(mutator.__all__) - {"__version__"})
 

@@ -14,7 +14,7 @@ from mutator.cli.app import GROUPS, app
 from mutator.config import yaml_files
 from mutator.errors import MutatorError
 from mutator.faults.specs import spec_model
-from mutator.reference.generated_files import FOLDER, PAGES, SCHEMAS, STUB, generated_files, write
+from mutator.reference.generated_files import FOLDER, PAGES, SCHEMAS, STUB, render_files, write_files
 from mutator.reference.schemas import Format, definitions, file_formats
 from mutator.reference.yaml_key_tables import reading_order
 from mutator.workspace import Workspace
@@ -45,7 +45,7 @@ _FILES: dict[Path, str] = {}
 
 def _generated() -> dict[Path, str]:
     if not _FILES:
-        _FILES.update(generated_files(Workspace.find(CLONE)))
+        _FILES.update(render_files(Workspace.find(CLONE)))
     return _FILES
 
 
@@ -128,5 +128,5 @@ def test_pages_are_written_only_in_a_clone(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
     library = tmp_path / "mutator" / "shipped" / "0" / "fault_library"
     with pytest.raises(MutatorError, match="ships with mutator"):
-        next(write(Workspace(library=library, templates=library.with_name("templates"))))
+        next(write_files(Workspace(library=library, templates=library.with_name("templates"))))
     assert list(tmp_path.iterdir()) == []
