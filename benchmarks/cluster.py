@@ -30,12 +30,12 @@ from mutator.campaigns.chunks import Pending, pending
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import make_plan
 from mutator.campaigns.run_provenance import add_stretch
-from mutator.execution.cluster import crew, dask_side, dask_workers
-from mutator.execution.cluster import intake as intakes
-from mutator.execution.cluster.board import Board
+from mutator.execution.cluster import cluster_distributor, crew, worker_tasks
+from mutator.execution.cluster import result_intake as intakes
 from mutator.execution.cluster.bundle import Bundle
+from mutator.execution.cluster.cluster_choice import parse
+from mutator.execution.cluster.piece_queue import Board
 from mutator.execution.cluster.pieces import Ending, Piece, Result
-from mutator.execution.cluster.where import parse
 from mutator.store.checksummed_blocks import as_block
 from mutator.store.patch_files import packed_patches
 from mutator.store.run_folder import RunFolder
@@ -151,7 +151,7 @@ def work(run: str, data: bytes) -> bytes:
 
 def intake() -> None:
     for fake in (facts, deliver, attend, leave, work):
-        setattr(dask_side, fake.__name__, fake)
+        setattr(worker_tasks, fake.__name__, fake)
     with planned() as (workspace, folder, left):
         folder = add_stretch(folder, Stretch(python="", packages={}, platform=""))
         session: Any = SimpleNamespace(
@@ -181,7 +181,7 @@ def intake() -> None:
         counts: list[int] = []
         intakes.Intake.take = timed  # type: ignore[method-assign]
         before = time.process_time()
-        dask_workers.ClusterWorkers(parse("local:2")).run(session)
+        cluster_distributor.ClusterWorkers(parse("local:2")).run(session)
         used = time.process_time() - before
         if session.problem:
             raise SystemExit(session.problem)

@@ -21,10 +21,10 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from mutator.campaigns.plan import Plan, make_plan  # noqa: E402
-from mutator.engines.fork import ForkEngine  # noqa: E402
-from mutator.engines.jobs import Engine, Job  # noqa: E402
-from mutator.engines.reference import ReferenceEngine  # noqa: E402
-from mutator.execution.runner import Finished, Goldens, Runner  # noqa: E402
+from mutator.engines.engine_jobs import Engine, Job  # noqa: E402
+from mutator.engines.fork_engine import ForkEngine  # noqa: E402
+from mutator.engines.reference_engine import ReferenceEngine  # noqa: E402
+from mutator.execution.experiment_runner import Finished, Goldens, Runner  # noqa: E402
 from mutator.model import Experiment, Record  # noqa: E402
 from mutator.mutants.mutant_building import build  # noqa: E402
 from mutator.outcomes import golden_comparison  # noqa: E402

@@ -24,7 +24,7 @@ import made_up_run
 import report_page
 from playwright.sync_api import sync_playwright
 
-from mutator.execution.running import run_campaign
+from mutator.execution.campaign_running import run_campaign
 from mutator.report import building
 from mutator.results import table_building
 from mutator.store.run_folder import RunFolder

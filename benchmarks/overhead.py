@@ -26,10 +26,10 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from mutator.campaigns.plan import make_plan  # noqa: E402
-from mutator.engines.fork import ForkEngine  # noqa: E402
-from mutator.engines.jobs import Job  # noqa: E402
-from mutator.engines.reference import ReferenceEngine  # noqa: E402
-from mutator.execution.runner import Goldens, Runner  # noqa: E402
+from mutator.engines.engine_jobs import Job  # noqa: E402
+from mutator.engines.fork_engine import ForkEngine  # noqa: E402
+from mutator.engines.reference_engine import ReferenceEngine  # noqa: E402
+from mutator.execution.experiment_runner import Goldens, Runner  # noqa: E402
 from mutator.model import Experiment, Hold, Trigger  # noqa: E402
 from mutator.mutants.mutant_building import build  # noqa: E402
 from mutator.store.checksummed_lines import LineWriter  # noqa: E402

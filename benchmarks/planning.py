@@ -17,9 +17,9 @@ from typing import Any
 from mutator._common.files import json_bytes
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import make_plan
-from mutator.engines.jobs import Execution, Job
-from mutator.engines.reference import ReferenceEngine
-from mutator.execution.running import run_campaign
+from mutator.engines.engine_jobs import Execution, Job
+from mutator.engines.reference_engine import ReferenceEngine
+from mutator.execution.campaign_running import run_campaign
 from mutator.model import Experiment, Outcome, Record, Status
 from mutator.preflight import preflight_cache, preflight_checks, preflight_rules
 from mutator.store.check_results import FILE

@@ -16,7 +16,7 @@ from statistics import median
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from mutator.engines.base_tree import BaseTree  # noqa: E402
+from mutator.engines.job_tree_pool import BaseTree  # noqa: E402
 from mutator.mutants.mutant_building import build  # noqa: E402
 from mutator.mutants.probe import probe_path  # noqa: E402
 from mutator.triggers.kinds import always  # noqa: E402

@@ -19,8 +19,8 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from mutator.execution import runner  # noqa: E402
-from mutator.execution.running import run_campaign  # noqa: E402
+from mutator.execution import experiment_runner  # noqa: E402
+from mutator.execution.campaign_running import run_campaign  # noqa: E402
 from mutator.store.patch_files import PatchWriter  # noqa: E402
 from mutator.store.plan_choices import Choices  # noqa: E402
 from mutator.store.run_folder import RunFolder  # noqa: E402
@@ -51,7 +51,7 @@ class Clock:
 
 def measured(campaign: str, count: int, out: Path) -> dict[str, float]:
     made, series, patches = Clock(), Clock(), Clock()
-    made.on(runner.Runner, "_series")
+    made.on(experiment_runner.Runner, "_series")
     series.on(SeriesWriter, "append")
     patches.on(PatchWriter, "append")
     workspace = Workspace.find(root=ROOT)

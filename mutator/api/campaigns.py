@@ -6,10 +6,10 @@ from pathlib import Path
 from mutator._common.arguments import check_type, check_whole
 from mutator.api.runs import Run
 from mutator.api.selection import WorkspaceLike, open_workspace
-from mutator.engines.registry import check_offered
+from mutator.engines.engine_choice import check_offered
 from mutator.errors import IncompleteRun
+from mutator.execution.campaign_running import run_campaign
 from mutator.execution.distribution import distributor
-from mutator.execution.running import run_campaign
 from mutator.execution.session import Notify, Summary
 from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder

@@ -8,7 +8,7 @@ from mutator._common.hashing import plain
 from mutator.api.stored_experiments import StoredRun
 from mutator.campaigns.plan import Plan, load_plan
 from mutator.errors import MutatorError
-from mutator.execution.traces import Traces
+from mutator.execution.run_traces import Traces
 from mutator.model import Status
 from mutator.results import outcome_counting
 from mutator.results.table_reader import Results

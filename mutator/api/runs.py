@@ -16,8 +16,8 @@ from mutator.api.run_experiments import RunExperiment
 from mutator.api.selection import WorkspaceLike, open_workspace
 from mutator.audit.seal import Seals, seals_of
 from mutator.errors import MutatorError
-from mutator.execution.merging import merge
 from mutator.execution.session import Notify, Summary
+from mutator.execution.shard_merging import merge
 from mutator.exports import Format, Parts, find_export
 from mutator.exports import Table as ExportedTable
 from mutator.exports.write import export

@@ -8,7 +8,7 @@ from pathlib import Path
 from mutator._common.below import inside
 from mutator._common.hashing import digest
 from mutator._common.text import counted
-from mutator.engines.jobs import FAST
+from mutator.engines.engine_jobs import FAST
 from mutator.errors import InvalidMutant, MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Activation, Fault, Record, Status, Trigger

@@ -15,7 +15,7 @@ from typing import Any
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-from mutator.engines.processes import environment
+from mutator.engines.target_processes import environment
 from mutator.store.work_stretches import Blas
 from mutator.targets.environment import THREADS
 

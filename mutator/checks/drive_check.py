@@ -21,11 +21,11 @@ from mutator.checks.findings import Finding, Level
 from mutator.checks.first_difference import describe_first_difference
 from mutator.checks.reachability import Reach
 from mutator.engines import forkable
-from mutator.engines.fork import ForkEngine
-from mutator.engines.in_target.watch import CLOCK, THREAD
-from mutator.engines.jobs import Execution, Job
-from mutator.engines.reference import ReferenceEngine
-from mutator.engines.threads import too_many, turned_off
+from mutator.engines.engine_jobs import Execution, Job
+from mutator.engines.fork_engine import ForkEngine
+from mutator.engines.in_target.nondeterminism_watch import CLOCK, THREAD
+from mutator.engines.reference_engine import ReferenceEngine
+from mutator.engines.thread_messages import too_many, turned_off
 from mutator.errors import NotForkable
 from mutator.model import Experiment, Limits
 from mutator.mutants.injected_lines import tag_of

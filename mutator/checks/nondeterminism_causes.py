@@ -5,7 +5,7 @@ from typing import Any
 
 from mutator.checks import set_iteration_order
 from mutator.checks.findings import Place
-from mutator.engines.in_target.watch import CLOCK, DRAW, HASH, PROCESS, THREAD
+from mutator.engines.in_target.nondeterminism_watch import CLOCK, DRAW, HASH, PROCESS, THREAD
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.source_tree import matches
 

@@ -33,7 +33,7 @@ from mutator.cli.options import (
 )
 from mutator.cli.run_folders import show_counts
 from mutator.errors import MutatorError
-from mutator.execution.phases import duration
+from mutator.execution.progress_text import duration
 
 if TYPE_CHECKING:
     from mutator.api.runs import Run

@@ -11,7 +11,7 @@ import typer
 
 import mutator
 from mutator.cli import completion
-from mutator.engines.kinds import ENGINES, FORK, OFFERED
+from mutator.engines.engine_kinds import ENGINES, FORK, OFFERED
 
 if TYPE_CHECKING:
     from mutator.workspace import Workspace

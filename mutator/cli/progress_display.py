@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from mutator._common import events
 from mutator.cli.console import Terminal
-from mutator.execution.phases import Lines, count, endings, rate, remaining, title
+from mutator.execution.progress_text import Lines, count, endings, rate, remaining, title
 
 if TYPE_CHECKING:
     from mutator.store.run_progress import Progress

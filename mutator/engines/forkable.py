@@ -4,8 +4,8 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from mutator.engines.code_swap import plan_swap
-from mutator.engines.fork_pool import Pool
-from mutator.engines.registry import not_forkable
+from mutator.engines.engine_choice import not_forkable
+from mutator.engines.fork_server_client import Pool
 from mutator.errors import ForkServerLost, MutatorError, NotForkable, NotSwappable
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Fault

@@ -17,7 +17,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from mutator._common.files import clear_place
-from mutator.engines.processes import environment
+from mutator.engines.target_processes import environment
 from mutator.errors import MutatorError
 from mutator.targets.manifest import TargetManifest
 

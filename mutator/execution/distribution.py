@@ -10,7 +10,7 @@ from typing import Protocol
 
 from mutator._common.doors import DISTRIBUTORS
 from mutator.errors import MutatorError
-from mutator.execution.local import LocalWorkers
+from mutator.execution.local_distributor import LocalWorkers
 from mutator.execution.session import Session
 
 _DEFAULT = "dask"

@@ -14,8 +14,8 @@ import pytest
 from mutator._common.locks import living_workers
 from mutator._common.shortages import shortage
 from mutator.errors import HarnessErrors, MutatorError
-from mutator.execution.following import followed
-from mutator.execution.phases import Lines
+from mutator.execution.progress_reporting import followed
+from mutator.execution.progress_text import Lines
 from mutator.execution.pytest_worker import INPUT, PROBLEM, WRITTEN, CampaignItem, LazyWorker, collect
 from mutator.execution.session import Notify, Session, Summary, open_session
 from mutator.execution.stopped_workers import Continuing

@@ -26,12 +26,12 @@ from mutator.campaigns.chunks import Pending, pending
 from mutator.campaigns.freezing import make_run_folder
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.run_provenance import add_machine, begin_stretch, check_versions
-from mutator.engines.kinds import REFERENCE
-from mutator.engines.registry import choose_engine, not_worth_forking
-from mutator.engines.run_home import make_work
+from mutator.engines.engine_choice import choose_engine, not_worth_forking
+from mutator.engines.engine_kinds import REFERENCE
+from mutator.engines.job_folder import make_work
 from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK, DiskFull, MutatorError, MutatorWarning
-from mutator.execution.ended_runs import Ended, ended_before, keep_end
-from mutator.execution.run_plan import open_frozen
+from mutator.execution.finished_run_cache import Ended, ended_before, keep_end
+from mutator.execution.frozen_plan import open_frozen
 from mutator.execution.written_files import WrittenFiles
 from mutator.model import Record
 from mutator.preflight import equivalence_check

@@ -12,10 +12,10 @@ from mutator._common.files import make_folder, raising_disk_full, remove_folder,
 from mutator._common.locks import alone_in
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.run_provenance import check_sources
-from mutator.engines.jobs import Job
-from mutator.engines.reference import ReferenceEngine
+from mutator.engines.engine_jobs import Job
+from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import CheckFailed
-from mutator.execution.runner import Finished, Goldens, Runner
+from mutator.execution.experiment_runner import Finished, Goldens, Runner
 from mutator.model import Experiment, Limits, Record, Status
 from mutator.mutants.mutant_building import Mutant
 from mutator.store import plan_file

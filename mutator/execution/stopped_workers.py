@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 
-from mutator.engines.in_target import guard
+from mutator.engines.in_target import process_guard
 
 _LOOK_S = 1.0
 _STOPPED = "T"
@@ -42,7 +42,7 @@ def on_stop(act: Callable[[], None]) -> None:
 
 
 def _stopped_children() -> Iterator[int]:
-    for pid in guard.children(os.getpid()):
+    for pid in process_guard.children(os.getpid()):
         with suppress(OSError):
             state = Path(f"/proc/{pid}/stat").read_text(errors="replace").rpartition(")")[2].split()[0]
             if state == _STOPPED:

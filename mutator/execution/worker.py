@@ -14,11 +14,11 @@ from mutator._common.files import raising_disk_full
 from mutator.campaigns.chunks import Pending
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.run_provenance import check_sources
-from mutator.engines.in_target import guard
-from mutator.engines.jobs import FAST, Engine, Setting
-from mutator.engines.reference import ReferenceEngine
-from mutator.engines.registry import make_engine
-from mutator.execution.runner import Finished, Goldens, Runner, without_outcome
+from mutator.engines.engine_choice import make_engine
+from mutator.engines.engine_jobs import FAST, Engine, Setting
+from mutator.engines.in_target import guard, process_guard
+from mutator.engines.reference_engine import ReferenceEngine
+from mutator.execution.experiment_runner import Finished, Goldens, Runner, without_outcome
 from mutator.execution.written_files import Sums
 from mutator.model import Experiment, Status
 from mutator.preflight import equivalence_check
@@ -190,10 +190,10 @@ def dying_python(parent: int) -> list[str]:
 
     It imports nothing from its working folder.
     """
-    return [sys.executable, "-I", "-S", guard.__file__, str(parent), sys.executable, "-P"]
+    return [sys.executable, "-I", "-S", process_guard.__file__, str(parent), sys.executable, "-P"]
 
 
 def bind_to_parent(parent: int) -> None:
     """End this process when `parent` ends, and ignore Ctrl-C, which `parent` handles."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    guard.die_with_parent(parent)
+    process_guard.die_with_parent(parent)

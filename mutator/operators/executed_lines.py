@@ -15,8 +15,8 @@ from mutator._common import caches
 from mutator._common.bounded import read_bounded
 from mutator._common.files import ScratchFolder, json_bytes, write_atomic
 from mutator._common.hashing import digest
-from mutator.engines.jobs import Job
-from mutator.engines.reference import ReferenceEngine
+from mutator.engines.engine_jobs import Job
+from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import MutatorError
 from mutator.model import Limits, Status
 from mutator.targets.manifest import TargetManifest

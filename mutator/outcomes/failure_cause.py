@@ -9,7 +9,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import dropwhile
 
-from mutator.engines.jobs import Execution, Raised, Stack
+from mutator.engines.engine_jobs import Execution, Raised, Stack
 from mutator.model import RunError, Status
 from mutator.mutants.injected_lines import Tag, changed_parts, tag_of
 from mutator.mutants.probe import is_probe

@@ -7,7 +7,7 @@ import pandas as pd
 
 from mutator._common.text import counted
 from mutator.errors import MutatorError
-from mutator.execution.traces import Traces
+from mutator.execution.run_traces import Traces
 from mutator.figures.figures import Drawing
 from mutator.figures.run_plot import marks_of
 from mutator.outcomes.series_sampling import RATE

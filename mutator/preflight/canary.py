@@ -5,7 +5,7 @@ harmless.
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
-from mutator.engines.jobs import Job
+from mutator.engines.engine_jobs import Job
 from mutator.errors import MutatorError
 from mutator.faults.expansion import expand
 from mutator.model import Experiment, Fault, fault_label

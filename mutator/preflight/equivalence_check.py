@@ -16,7 +16,7 @@ from mutator._common.files import raising_disk_full, remove_folder
 from mutator._common.hashing import digest
 from mutator._common.text import counted
 from mutator.campaigns.sampling import pick
-from mutator.engines.jobs import RunMode
+from mutator.engines.engine_jobs import RunMode
 from mutator.errors import CheckFailed
 from mutator.model import Experiment, Record, Status
 from mutator.store import file_digests, plan_file

@@ -7,7 +7,7 @@ from pathlib import Path
 from mutator._common.below import inside
 from mutator._common.bounded import read_bounded
 from mutator._common.hashing import digest
-from mutator.engines.jobs import Execution
+from mutator.engines.engine_jobs import Execution
 from mutator.errors import BadOutput
 from mutator.model import Status
 from mutator.mutants.probe import was_triggered

@@ -10,8 +10,8 @@ from typing import Any
 from mutator._common import caches
 from mutator._common.below import inside
 from mutator._common.files import remove_folder
-from mutator.engines.jobs import Job
-from mutator.engines.reference import ReferenceEngine
+from mutator.engines.engine_jobs import Job
+from mutator.engines.reference_engine import ReferenceEngine
 from mutator.model import Experiment
 from mutator.mutants.mutant_building import build
 from mutator.preflight import canary, unreached_triggers

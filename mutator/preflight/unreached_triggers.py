@@ -15,7 +15,7 @@ import numpy as np
 from mutator._common.below import inside
 from mutator._common.bounded import read_bounded
 from mutator._common.text import counted
-from mutator.engines.activation import active_at
+from mutator.engines.first_activation import active_at
 from mutator.model import Experiment, Trigger
 from mutator.mutants.mutant_building import build
 from mutator.targets.manifest import TargetManifest

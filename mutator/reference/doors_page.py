@@ -90,9 +90,9 @@ _PLACES = (
     _Place(
         name="engine",
         adds="how a run is executed",
-        protocol="`mutator.engines.kinds.EngineKind`",
-        register="`ENGINES` in `mutator/engines/kinds.py`",
-        example="`mutator/engines/reference.py`",
+        protocol="`mutator.engines.engine_kinds.EngineKind`",
+        register="`ENGINES` in `mutator/engines/engine_kinds.py`",
+        example="`mutator/engines/reference_engine.py`",
     ),
     _Place(
         name="panel",

@@ -5,8 +5,8 @@ from typing import Any
 import pandas as pd
 
 from mutator._common.text import counted
-from mutator.engines.jobs import RunMode
-from mutator.execution.phases import duration
+from mutator.engines.engine_jobs import RunMode
+from mutator.execution.progress_text import duration
 from mutator.report.answer_parts import (
     FIRST,
     LATE,

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from mutator._common.tables import Table
-from mutator.engines.jobs import RunMode
-from mutator.engines.registry import WORTH_IT
+from mutator.engines.engine_choice import WORTH_IT
+from mutator.engines.engine_jobs import RunMode
 from mutator.errors import CheckFailed
 from mutator.model import Record
 from mutator.preflight import equivalence_check

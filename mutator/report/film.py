@@ -13,8 +13,8 @@ from pathlib import Path
 from mutator._common.below import inside, open_below
 from mutator._common.files import ScratchFolder, half_written, make_folder
 from mutator.engines import bytecode
-from mutator.engines.processes import environment
 from mutator.engines.sandbox import Sandbox
+from mutator.engines.target_processes import environment
 from mutator.errors import MutatorError
 from mutator.execution.single_run import is_same, manifest_of, run_golden, run_single
 from mutator.figures.run_plot import marks_of

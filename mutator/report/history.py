@@ -13,7 +13,7 @@ from mutator._common.files import write_atomic
 from mutator._common.tables import Table
 from mutator._common.text import counted
 from mutator.errors import MutatorError
-from mutator.execution.phases import duration
+from mutator.execution.progress_text import duration
 from mutator.model import Outcome
 from mutator.report.panel import FOLDER, rendered
 from mutator.results.result_rows import Row

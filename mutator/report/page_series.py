@@ -4,7 +4,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from mutator.errors import MutatorError
-from mutator.execution.traces import Traces
+from mutator.execution.run_traces import Traces
 from mutator.outcomes.series_sampling import keep_series
 from mutator.results.table_columns import deviation_columns
 from mutator.store.run_folder import RunFolder

@@ -23,9 +23,9 @@ from mutator._common import caches
 from mutator._common.bounded import read_bounded
 from mutator._common.files import ScratchFolder, json_bytes, write_atomic
 from mutator._common.hashing import content_id, digest
+from mutator.engines.engine_jobs import Job
 from mutator.engines.in_target import picture_probe
-from mutator.engines.jobs import Job
-from mutator.engines.reference import ReferenceEngine
+from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Fault, FaultLocation, Injection, Limits, Status

@@ -17,7 +17,7 @@ from typing import IO, Any
 
 from mutator._common.events import EVENTS_FD
 from mutator.errors import Absent, JobEnded, MutatorError
-from mutator.execution.phases import endings
+from mutator.execution.progress_text import endings
 from mutator.serve.job_events import Event, EventReader, Link, Phase
 from mutator.serve.orders import TRIES, Work
 from mutator.serve.responses import without_places

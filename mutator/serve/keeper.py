@@ -8,7 +8,7 @@ descendants. If the keeper itself is killed, the kernel kills the command.
 import os
 import sys
 
-from mutator.engines.in_target import guard
+from mutator.engines.in_target import process_guard
 
 PATIENCE_S = 20.0  # a command's time to clean up workers, scratch folders and half-written files
 
@@ -16,7 +16,7 @@ PATIENCE_S = 20.0  # a command's time to clean up workers, scratch folders and h
 def main() -> int:
     """Run the command; return its exit code, or 128 plus the signal that ended it."""
     caller = int(sys.argv[1])
-    ended = guard.fork(caller, patience_s=PATIENCE_S)
+    ended = process_guard.fork(caller, patience_s=PATIENCE_S)
     if ended is None:
         os.close(caller)
         os.execv(sys.executable, [sys.executable, "-P", "-m", "mutator", *sys.argv[2:]])

@@ -274,7 +274,7 @@ sys.exit(code)"""
     words = [sys.executable, "-c", code, "show", experiment_with(run, "hazard"), "--run", str(run)]
     done = subprocess.run(words, capture_output=True, text=True, check=True)
     # the list of engines is needed for the help texts; it imports none of them
-    assert done.stdout.splitlines()[-1] == "['mutator.engines.kinds']"
+    assert done.stdout.splitlines()[-1] == "['mutator.engines.engine_kinds']"
 
 
 def test_show_accepts_an_id_prefix(cli: Cli, run: Path) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from mutator.engines import sandbox
-from mutator.execution.cluster import connecting
+from mutator.execution.cluster import dask_connections
 
 from .conftest import Cli
 
@@ -89,7 +89,7 @@ def test_processes_that_dask_starts_get_a_safe_path(monkeypatch: pytest.MonkeyPa
     for before in (None, "0"):
         if before is not None:
             monkeypatch.setenv("PYTHONSAFEPATH", before)
-        with connecting.own_scheduler():
+        with dask_connections.own_scheduler():
             assert os.environ["PYTHONSAFEPATH"] == "1"
         assert os.environ.get("PYTHONSAFEPATH") == before
 

@@ -12,7 +12,7 @@ import pytest
 from mutator._common.text import folded
 from mutator.cli.console import Terminal
 from mutator.cli.progress_display import campaign_progress
-from mutator.execution.phases import duration
+from mutator.execution.progress_text import duration
 from mutator.mutants.readable_patches import readable
 from mutator.store.run_progress import Progress
 

@@ -65,7 +65,7 @@ class Machines:
         for path in Path("/proc").glob("[0-9]*"):
             try:
                 mine = f"MACHINES={self.folder}".encode() in (path / "environ").read_bytes()
-                ours = mine and b"mutator.execution.cluster.child" in (path / "cmdline").read_bytes()
+                ours = mine and b"mutator.execution.cluster.piece_process" in (path / "cmdline").read_bytes()
             except OSError:
                 continue
             if ours:

@@ -15,7 +15,7 @@ import pytest
 
 import mutator
 from mutator.errors import MutatorError
-from mutator.execution.running import run_campaign
+from mutator.execution.campaign_running import run_campaign
 from mutator.execution.session import Session
 from mutator.store import file_digests
 from mutator.workspace import Workspace

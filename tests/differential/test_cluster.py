@@ -12,9 +12,9 @@ import pytest
 
 from mutator.campaigns import run_environment
 from mutator.errors import MutatorWarning
+from mutator.execution.campaign_running import run_campaign
 from mutator.execution.cluster import bundle
 from mutator.execution.distribution import distributor
-from mutator.execution.running import run_campaign
 from mutator.execution.session import Summary
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -195,7 +195,7 @@ def whole_toy(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar)
 
 _UNLIKE = """\
 import sys
-if any("cluster.child" in word for word in sys.orig_argv):
+if any("cluster.piece_process" in word for word in sys.orig_argv):
     from dataclasses import replace
     from mutator.preflight import preflight_rules
     real = preflight_rules.look

@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from mutator.engines.jobs import Engine, Execution, Job, RunMode, Setting
-from mutator.engines.kinds import ENGINES
-from mutator.engines.registry import make_engine
+from mutator.engines.engine_choice import make_engine
+from mutator.engines.engine_jobs import Engine, Execution, Job, RunMode, Setting
+from mutator.engines.engine_kinds import ENGINES
 from mutator.model import (
     Anchor,
     AnchorKind,

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 from mutator.campaigns.plan import make_plan
-from mutator.engines.jobs import Job, Setting
-from mutator.engines.kinds import ENGINES
-from mutator.engines.reference import ReferenceEngine
-from mutator.engines.registry import make_engine
-from mutator.execution.runner import Goldens, Runner
+from mutator.engines.engine_choice import make_engine
+from mutator.engines.engine_jobs import Job, Setting
+from mutator.engines.engine_kinds import ENGINES
+from mutator.engines.reference_engine import ReferenceEngine
+from mutator.execution.experiment_runner import Goldens, Runner
 from mutator.model import Record
 from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import GoldenRun

@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from mutator._common.doors import OPERATORS
-from mutator.execution.running import run_campaign
+from mutator.execution.campaign_running import run_campaign
 from mutator.model import AnchorKind
 from mutator.workspace import Workspace
 

@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 
 from mutator._common.hashing import digest
-from mutator.engines.jobs import Engine, Job, Setting
-from mutator.engines.kinds import ENGINES
-from mutator.engines.reference import ReferenceEngine
-from mutator.engines.registry import make_engine
-from mutator.execution.runner import Goldens, Runner
+from mutator.engines.engine_choice import make_engine
+from mutator.engines.engine_jobs import Engine, Job, Setting
+from mutator.engines.engine_kinds import ENGINES
+from mutator.engines.reference_engine import ReferenceEngine
+from mutator.execution.experiment_runner import Goldens, Runner
 from mutator.model import (
     Anchor,
     AnchorKind,

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.engines.jobs import RunMode
+from mutator.engines.engine_jobs import RunMode
 from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection, Status
 from mutator.workspace import Workspace
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.engines.jobs import RunMode
+from mutator.engines.engine_jobs import RunMode
 from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection
 
 from .test_engines import SENT, TRIGGERS, Engines, check_same

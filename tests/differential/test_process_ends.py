@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from mutator.engines.jobs import Execution, RunMode
-from mutator.engines.kinds import ENGINES
+from mutator.engines.engine_jobs import Execution, RunMode
+from mutator.engines.engine_kinds import ENGINES
 from mutator.model import Limits, Status
 from mutator.workspace import Workspace
 

@@ -12,12 +12,12 @@ import pytest
 from mutator.audit.seal import seals_of
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import make_plan
-from mutator.engines import registry
+from mutator.engines import engine_choice
 from mutator.errors import CheckFailed, MutatorError
-from mutator.execution import merging
-from mutator.execution.merging import merge
-from mutator.execution.running import run_campaign
+from mutator.execution import shard_merging
+from mutator.execution.campaign_running import run_campaign
 from mutator.execution.session import Session
+from mutator.execution.shard_merging import merge
 from mutator.results import table_building
 from mutator.store import approvals
 from mutator.store.patch_files import Patches
@@ -83,7 +83,7 @@ def test_a_killed_merge_loses_no_series(runs: Runs, tmp_path: Path, monkeypatch:
         seen.append(len(list((run / "series").iterdir())))
         return table_building.build(run)
 
-    monkeypatch.setattr(merging, "table_building", SimpleNamespace(build=build))
+    monkeypatch.setattr(shard_merging, "table_building", SimpleNamespace(build=build))
     merge([runs["1/2"], runs["2/2"]], tmp_path / "out")
     assert seen == [3]
 
@@ -97,7 +97,7 @@ def test_merged_shards_have_the_seal_of_the_single_run(runs: Runs, tmp_path: Pat
 def test_the_whole_plan_decides_the_engine_of_a_shard(
     runs: Runs, toy: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(registry, "WORTH_IT", RunFolder.open(runs["whole"]).planned)
+    monkeypatch.setattr(engine_choice, "WORTH_IT", RunFolder.open(runs["whole"]).planned)
     assert {Session(toy, RunFolder.open(path)).engine for path in runs.values()} == {"fork"}
 
 

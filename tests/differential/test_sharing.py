@@ -14,14 +14,14 @@ from mutator._common.hashing import canonical
 from mutator.campaigns.chunks import Pending, pending
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import load_plan, make_plan
-from mutator.engines.reference import ReferenceEngine
+from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import CheckFailed
+from mutator.execution.campaign_running import run_campaign
 from mutator.execution.cluster import bundle
-from mutator.execution.cluster.board import Board
 from mutator.execution.cluster.bundle import Bundle, read_inputs
-from mutator.execution.cluster.child import PieceRunner
-from mutator.execution.cluster.site import Site
-from mutator.execution.running import run_campaign
+from mutator.execution.cluster.piece_process import PieceRunner
+from mutator.execution.cluster.piece_queue import Board
+from mutator.execution.cluster.unpacked_bundle import Site
 from mutator.preflight.preflight_checks import run_checks
 from mutator.store import plan_file
 from mutator.store.records import line_of

@@ -18,7 +18,7 @@ import mutator
 from mutator._common.hashing import canonical
 from mutator.audit.seal import Seals, seals_of
 from mutator.errors import MutatorError
-from mutator.execution.running import run_campaign
+from mutator.execution.campaign_running import run_campaign
 from mutator.report import building
 from mutator.store import file_digests
 from mutator.store.approvals import write_approvals

@@ -13,10 +13,10 @@ import pytest
 
 import mutator
 from mutator.campaigns.chunks import Pending
-from mutator.engines.jobs import Execution, Job
-from mutator.engines.reference import ReferenceEngine
+from mutator.engines.engine_jobs import Execution, Job
+from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import CheckFailed, MutatorError
-from mutator.execution.running import run_campaign
+from mutator.execution.campaign_running import run_campaign
 from mutator.execution.session import Summary
 from mutator.execution.single_run import rerun, run_single
 from mutator.execution.worker import Worker
@@ -282,7 +282,7 @@ def test_a_changed_target_is_refused(toy: Workspace, finished: Path) -> None:
 FULL_DISK = """
 import os, sys, threading, time
 from pathlib import Path
-from mutator.execution.running import run_campaign
+from mutator.execution.campaign_running import run_campaign
 from mutator.workspace import Workspace
 out, workers = Path(sys.argv[2]) / "run", int(sys.argv[3])
 toy = Workspace.find(root=Path(sys.argv[1]))

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 import mutator
-from mutator.engines.jobs import RunMode
-from mutator.execution.running import run_campaign
+from mutator.engines.engine_jobs import RunMode
+from mutator.execution.campaign_running import run_campaign
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from mutator.execution.running import run_campaign
+from mutator.execution.campaign_running import run_campaign
 from mutator.report import building
 from mutator.store.approvals import write_approvals
 from mutator.store.series_script import read_script, write_script

@@ -20,7 +20,7 @@ from mutator.campaigns.plan import load_plan
 from mutator.campaigns.plan_parts import plan_digest
 from mutator.cli.app import main
 from mutator.errors import MutatorError
-from mutator.execution.running import run_campaign
+from mutator.execution.campaign_running import run_campaign
 from mutator.model import Experiment
 from mutator.results import table_building
 from mutator.store import plan_file

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from mutator.audit.seal import seals_of
-from mutator.execution.running import run_campaign
+from mutator.execution.campaign_running import run_campaign
 from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.execution.running import run_campaign
+from mutator.execution.campaign_running import run_campaign
 from mutator.workspace import Workspace
 
 pytestmark = pytest.mark.slow

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.execution.running import run_campaign
+from mutator.execution.campaign_running import run_campaign
 from mutator.outcomes.golden_comparison import load_trace
 from mutator.outcomes.hazards_and_metrics import values_of
 from mutator.triggers.over_time import holds

@@ -15,7 +15,7 @@ import pytest
 from mutator import load_run
 from mutator.cli.app import main
 from mutator.errors import MutatorError
-from mutator.execution.running import run_campaign
+from mutator.execution.campaign_running import run_campaign
 from mutator.exports import Format
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder

@@ -14,10 +14,10 @@ from mutator import load_run
 from mutator._common import caches
 from mutator.campaigns import run_environment
 from mutator.cli.app import main
-from mutator.engines.jobs import Execution, Job
-from mutator.engines.reference import ReferenceEngine
+from mutator.engines.engine_jobs import Execution, Job
+from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import CheckFailed
-from mutator.execution.running import run_campaign
+from mutator.execution.campaign_running import run_campaign
 from mutator.execution.session import Session
 from mutator.execution.worker import Assignment, Worker
 from mutator.store.plan_choices import Choices

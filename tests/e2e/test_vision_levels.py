@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from selfdrive.sim.detection_memory import FILE
 
-from mutator.execution.running import run_campaign
+from mutator.execution.campaign_running import run_campaign
 from mutator.store.plan_choices import Choices
 from mutator.store.records import read_records
 from mutator.workspace import Workspace

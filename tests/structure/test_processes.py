@@ -6,7 +6,7 @@ import sys
 PROCESSES = (
     "mutator.execution.pytest_plugin",
     "mutator.execution.pytest_worker",
-    "mutator.execution.cluster.child",
+    "mutator.execution.cluster.piece_process",
     "mutator.serve.keeper",
     "mutator.engines.in_target.fork_server",
     "mutator.engines.in_target.run_once",

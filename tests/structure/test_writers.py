@@ -8,7 +8,7 @@ from pathlib import Path
 
 MUTATOR = Path(__file__).parents[2] / "mutator"
 WRITERS = {"LineWriter", "PatchWriter", "SeriesWriter", "write_copy"}
-EXCEPTIONS = {"execution/merging.py": {"PatchWriter"}}
+EXCEPTIONS = {"execution/shard_merging.py": {"PatchWriter"}}
 
 
 def uses(tree: ast.Module) -> Iterator[str]:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from mutator._common.files import remove_folder
-from mutator.engines.kinds import OFFERED, REFERENCE
+from mutator.engines.engine_kinds import OFFERED, REFERENCE
 from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK
 from mutator.model import Status
 from mutator.workspace import Workspace

@@ -3,7 +3,7 @@
 Each process waits between two steps of a golden run; the first waits before any run. A process answers on its
 own socket with marshalled dicts, each preceded by its length. While it has only one thread, it forks on
 request, to run a mutant or to wait at a later step. It ends when the other end closes its socket, or
-when the first process ends (guard.py).
+when the first process ends (process_guard.py).
 """
 
 import array
@@ -26,14 +26,15 @@ from typing import Any, NoReturn
 
 _spec = importlib.util.spec_from_file_location("run_once", Path(__file__).with_name("run_once.py"))
 assert _spec and _spec.loader
-child: Any = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(child)
-swap, guard, threads = child.beside("swap"), child.guard, child.beside("threads")
-stop = child.beside("stop")
+run_once: Any = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(run_once)
+process_guard = run_once.process_guard
+mutant_installation, thread_names = run_once.beside("mutant_installation"), run_once.beside("thread_names")
+early_stop = run_once.beside("early_stop")
 
 
 def main(connection: int, start_file: str) -> int:
-    if guard.fork(connection) is not None:
+    if process_guard.fork(connection) is not None:
         return 0
     try:
         serve_first(connection, marshal.loads(Path(start_file).read_bytes()))
@@ -44,17 +45,17 @@ def main(connection: int, start_file: str) -> int:
 def serve_first(connection: int, start: dict[str, Any]) -> None:
     os.chdir(start["home"])
     sys.path.insert(0, start["tree"])
-    sys.meta_path.insert(0, child.Harness)
+    sys.meta_path.insert(0, run_once.Harness)
     sys.argv = [start["module"]]
     server = Process(start, socket.socket(fileno=connection))
     try:
         module = importlib.import_module(start["module"])
         server.begin = operator.attrgetter(start["stepwise"])(module)
     except BaseException as err:
-        server.send({"failed": child.describe(err, start["tree"], None)})
+        server.send({"failed": run_once.describe(err, start["tree"], None)})
         return
     gc.collect()
-    server.send({"threads": threads.others(), "group": os.getpgrp()})
+    server.send({"threads": thread_names.others(), "group": os.getpgrp()})
     server.serve()
 
 
@@ -68,8 +69,8 @@ class Process:
     def __init__(self, start: dict[str, Any], connection: socket.socket) -> None:
         self.start = start
         self.connection = connection
-        self.places = child.places(start["tree"])
-        self.stamp = child.stamp(self.places)
+        self.places = run_once.places(start["tree"])
+        self.stamp = run_once.stamp(self.places)
         self.outside: list[str] = []  # files outside the tree from which the target's packages were imported
         self.begin: Any = None
         self.run: Any = None
@@ -128,7 +129,7 @@ class Process:
             finally:
                 os._exit(0)
         ours.close()
-        self.send({"threads": threads.others()}, theirs.fileno())
+        self.send({"threads": thread_names.others()}, theirs.fileno())
         theirs.close()
 
     def go_on(self, step: int, args: list[str] | None) -> None:
@@ -138,7 +139,7 @@ class Process:
                 self.run = self.begin(args)
             reply = self.advance(step)
         except BaseException as err:
-            reply = {"failed": child.describe(err, self.start["tree"], None)}
+            reply = {"failed": run_once.describe(err, self.start["tree"], None)}
         self.send(reply)
         self.serve()
 
@@ -156,7 +157,7 @@ class Process:
                 importlib.import_module(name)
         self.outside = self.elsewhere(sys.modules)
         gc.freeze()
-        return {"threads": threads.others()}
+        return {"threads": thread_names.others()}
 
     def mutant(self, job: bytes, home: str, wall_s: float, disk_mb: int) -> dict[str, Any]:
         """Fork and guard a child that continues as a mutant; return how it ended.
@@ -164,14 +165,14 @@ class Process:
         Only the child unmarshals the job, because memory that this process writes to must be copied after
         each fork.
         """
-        if others := threads.others():
+        if others := thread_names.others():
             return {"threads": others}
-        space = guard.Space(home, disk_mb)
+        space = process_guard.Space(home, disk_mb)
         get_ready()
-        ended = guard.fork(self.connection.fileno(), wall_s=wall_s, space=space)
+        ended = process_guard.fork(self.connection.fileno(), wall_s=wall_s, space=space)
         if ended is None:
             self.become(marshal.loads(job))
-        if ended["stopped"] == guard.ABANDONED:
+        if ended["stopped"] == process_guard.ABANDONED:
             raise Abandoned
         return {**ended, "threads": [], "touched": self.touched()}
 
@@ -183,11 +184,11 @@ class Process:
         os.dup2(log, 2)
         os.close(log)
         self.use_folder(job["home"])
-        child.limit_resources(job)
+        run_once.limit_resources(job)
         os.chdir(job["out"])
         report = self.finish(job)
-        report["outside"] = self.outside + self.elsewhere(child.imported_since(job["probe_name"]))
-        report["threads"] = threads.others()
+        report["outside"] = self.outside + self.elsewhere(run_once.imported_since(job["probe_name"]))
+        report["threads"] = thread_names.others()
         Path(job["report"]).write_text(json.dumps(report), encoding="utf-8")
         if not report["threads"]:  # with other threads, the result is not used
             end()
@@ -201,11 +202,11 @@ class Process:
             tempfile.tempdir = home
 
     def elsewhere(self, names: Iterable[str]) -> Any:
-        return child.imported_elsewhere(self.start["packages"], self.start["tree"], names)
+        return run_once.imported_elsewhere(self.start["packages"], self.start["tree"], names)
 
     def touched(self) -> bool:
         try:
-            return bool(child.stamp(self.places) != self.stamp)
+            return bool(run_once.stamp(self.places) != self.stamp)
         except OSError:
             return True
 
@@ -214,29 +215,29 @@ class Process:
         watch = job["watch"]
         probe, known = None, set() if watch is None else set(sys.modules)
         try:
-            probe = swap.install(job["probe_name"], job["probe"])
-            swap.swap_code(job["functions"], probe)
-            swap.run_settings(job["settings"], probe)
+            probe = mutant_installation.install(job["probe_name"], job["probe"])
+            mutant_installation.swap_code(job["functions"], probe)
+            mutant_installation.run_settings(job["settings"], probe)
             probe.limit(job["steps"])
-            child.note_activation(probe, job["inactive"])
+            run_once.note_activation(probe, job["inactive"])
             # give the probe the state that it would have if it had observed from the start
             holder, state = job["probe_state"]
             for name, value in state.items():
                 setattr(getattr(probe, holder), name, value)
-            seen = None if watch is None else swap.keep_observations(probe, holder, watch)
+            seen = None if watch is None else mutant_installation.keep_observations(probe, holder, watch)
             run = self.begin(job["args"]) if self.run is None else self.run
             if seen is not None:
-                report |= {"seen": seen, "before": swap.observations_before_steps(run, seen)}
-            report["stopped"] = stop.drive(run, job["stop"])
+                report |= {"seen": seen, "before": mutant_installation.observations_before_steps(run, seen)}
+            report["stopped"] = early_stop.drive(run, job["stop"])
             run.write(Path(job["out"]))
             if seen is not None:
-                report["libraries"] = child.libraries(known, self.start["packages"])
-        except swap.SwapRefused as why:
+                report["libraries"] = run_once.libraries(known, self.start["packages"])
+        except mutant_installation.SwapRefused as why:
             report |= {"ended": "swap refused", "why": str(why)}
         except BaseException as err:
-            report |= child.describe(err, self.start["tree"], job["probe_name"])
+            report |= run_once.describe(err, self.start["tree"], job["probe_name"])
         if probe is not None:
-            report |= child.asked(probe, self.start["tree"], job["probe_name"])
+            report |= run_once.asked(probe, self.start["tree"], job["probe_name"])
         return report
 
 

@@ -1,8 +1,8 @@
 """Run a target once in a fresh interpreter: `python -P -s run_once.py job.json SOCKET`.
 
 Standard library only, because the harness must not change what the target does. The script forks. The parent
-guards the child (see guard.py) and reports over the socket how it ended. The child limits itself, puts the
-tree first on sys.path, runs the entry module as `__main__`, and writes report.json.
+guards the child (see process_guard.py) and reports over the socket how it ended. The child limits itself,
+puts the tree first on sys.path, runs the entry module as `__main__`, and writes report.json.
 """
 
 import errno
@@ -37,7 +37,7 @@ def beside(name: str) -> Any:
     return module
 
 
-guard = beside("guard")
+process_guard = beside("process_guard")
 
 
 class Harness:
@@ -59,8 +59,8 @@ class Harness:
 
 def main(job_file: str, connection: int) -> int:
     job = json.loads(Path(job_file).read_text(encoding="utf-8"))
-    space = guard.Space(job["home"], job["disk_mb"])
-    ended = guard.fork(connection, wall_s=job["wall_s"], space=space)
+    space = process_guard.Space(job["home"], job["disk_mb"])
+    ended = process_guard.fork(connection, wall_s=job["wall_s"], space=space)
     if ended is None:
         os.close(connection)
         run(job)
@@ -80,8 +80,8 @@ def run(job: dict[str, Any]) -> None:
     report: dict[str, Any] = {"schema": "child/1", "ended": "ok", "error": None, "disk_full": False}
     probe = None
     known = set(sys.modules)
-    watcher = beside("watch").Watcher(job["tree"]) if job["watch"] else None
-    lines = beside("lines").Lines(job["tree"], *job["lines"]) if job["lines"] else None
+    watcher = beside("nondeterminism_watch").Watcher(job["tree"]) if job["watch"] else None
+    lines = beside("executed_lines").Lines(job["tree"], *job["lines"]) if job["lines"] else None
     seen: list[Any] = []
     try:
         if watcher:
@@ -93,7 +93,7 @@ def run(job: dict[str, Any]) -> None:
             probe.limit(job["steps"])
             note_activation(probe, job["inactive"])
         if probe and job["observe"]:
-            seen = beside("swap").keep_observations(probe, *job["observe"])
+            seen = beside("mutant_installation").keep_observations(probe, *job["observe"])
         if probe and watcher:
             watcher.look_for_threads(probe, seen)
         if job["stop"] is None:
@@ -115,7 +115,7 @@ def run(job: dict[str, Any]) -> None:
 
 def limit_resources(job: dict[str, Any]) -> None:
     memory, disk = job["memory_mb"] << 20, job["disk_mb"] << 20
-    resource.setrlimit(resource.RLIMIT_CPU, (job["cpu_s"], job["cpu_s"] + guard.HARD_CPU_EXTRA_S))
+    resource.setrlimit(resource.RLIMIT_CPU, (job["cpu_s"], job["cpu_s"] + process_guard.HARD_CPU_EXTRA_S))
     resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
     resource.setrlimit(resource.RLIMIT_FSIZE, (disk, disk))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
@@ -136,7 +136,7 @@ def run_until(job: dict[str, Any]) -> bool:
     sys.argv = [job["module"], *job["args"]]
     begin = operator.attrgetter(job["stepwise"])(importlib.import_module(job["module"]))
     stepped = begin(job["args"])
-    stopped: bool = beside("stop").drive(stepped, job["stop"])
+    stopped: bool = beside("early_stop").drive(stepped, job["stop"])
     stepped.write(Path(job["out"]))
     return stopped
 

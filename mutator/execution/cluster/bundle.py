@@ -24,7 +24,7 @@ from mutator._common.version import VERSION
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.errors import MutatorError, Outside
 from mutator.execution.cluster.parcel import pack, unpack
-from mutator.execution.cluster.site import META, SCHEMA, Site
+from mutator.execution.cluster.unpacked_bundle import META, SCHEMA, Site
 from mutator.faults.fault_model_files import load_fault_models
 from mutator.faults.fault_models import FILES
 from mutator.results.table_columns import check_names

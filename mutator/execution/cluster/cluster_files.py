@@ -19,7 +19,7 @@ from pydantic import Field
 from mutator.config.sources import Source
 from mutator.config.yaml_files import StrictModel, read
 from mutator.errors import MutatorError
-from mutator.execution.cluster.connecting import (
+from mutator.execution.cluster.dask_connections import (
     certificates,
     connected,
     importing,

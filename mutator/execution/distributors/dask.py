@@ -2,11 +2,11 @@
 
 from pkgutil import resolve_name
 
-from mutator.execution.cluster.connecting import importing
-from mutator.execution.cluster.where import parse
+from mutator.execution.cluster.cluster_choice import parse
+from mutator.execution.cluster.dask_connections import importing
 from mutator.execution.distribution import Distributor, DistributorKind
 
-_WORKERS = "mutator.execution.cluster.dask_workers:ClusterWorkers"
+_WORKERS = "mutator.execution.cluster.cluster_distributor:ClusterWorkers"
 
 
 def _open(where: str, insecure: bool) -> Distributor:

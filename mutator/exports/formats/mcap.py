@@ -21,7 +21,7 @@ from mutator._common.files import make_folder, write_atomic
 from mutator._common.text import counted
 from mutator.campaigns.filters import compile_filter
 from mutator.errors import MutatorError, MutatorWarning
-from mutator.execution.traces import Traces
+from mutator.execution.run_traces import Traces
 from mutator.exports import Export, ExportRequest
 from mutator.model import Experiment, Record
 from mutator.outcomes.golden_comparison import Trace

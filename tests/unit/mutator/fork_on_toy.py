@@ -4,9 +4,9 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
-from mutator.engines.fork import ForkEngine
-from mutator.engines.fork_pool import Pool
-from mutator.engines.jobs import Execution, Job
+from mutator.engines.engine_jobs import Execution, Job
+from mutator.engines.fork_engine import ForkEngine
+from mutator.engines.fork_server_client import Pool
 from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection, Limits, Trigger
 from mutator.mutants.mutant_building import build
 from mutator.targets.manifest import TargetManifest

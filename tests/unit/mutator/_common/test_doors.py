@@ -62,7 +62,10 @@ def test_no_other_module_looks_for_entry_points() -> None:
     folder = CLONE / "mutator"
     looking = [path for path in folder.rglob("*.py") if "entry_points(" in path.read_text()]
     # pytest loads the plugin; `local` asks only whether it will
-    assert {str(path.relative_to(folder)) for path in looking} == {"_common/doors.py", "execution/local.py"}
+    assert {str(path.relative_to(folder)) for path in looking} == {
+        "_common/doors.py",
+        "execution/local_distributor.py",
+    }
 
 
 def test_the_command_line_starts_without_any_addition() -> None:

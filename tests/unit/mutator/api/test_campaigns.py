@@ -9,7 +9,7 @@ import pytest
 import mutator
 from mutator.api import campaigns
 from mutator.errors import MutatorError
-from mutator.execution import running
+from mutator.execution import campaign_running
 from mutator.workspace import Workspace
 
 TWO = mutator.Choices(only='fault_type == "lane"', limit=2)
@@ -68,7 +68,9 @@ def test_a_warning_names_harness_errors(
     toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def run_campaign(*args: Any, **kwargs: Any) -> mutator.Summary:
-        return replace(running.run_campaign(*args, **kwargs), harness_errors=(("abcd", "no memory"),), done=1)
+        return replace(
+            campaign_running.run_campaign(*args, **kwargs), harness_errors=(("abcd", "no memory"),), done=1
+        )
 
     monkeypatch.setattr(campaigns, "run_campaign", run_campaign)
     with pytest.warns(mutator.IncompleteRun, match="1 of 2.*abcd: no memory.*the same call resumes"):

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from mutator.engines.jobs import RunMode
+from mutator.engines.engine_jobs import RunMode
 from mutator.model import Status
 from mutator.triggers.kinds import always, at_time
 

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 import mutator
+from mutator.engines.engine_jobs import RunMode
 from mutator.engines.in_target.run_once import Harness
-from mutator.engines.jobs import RunMode
 from mutator.model import Status
 from mutator.triggers.kinds import at_time
 

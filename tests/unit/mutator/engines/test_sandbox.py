@@ -11,8 +11,8 @@ import pytest
 
 from mutator._common.files import remove_folder
 from mutator.engines import sandbox
-from mutator.engines.jobs import Execution, Job, RunMode
-from mutator.engines.reference import ReferenceEngine
+from mutator.engines.engine_jobs import Execution, Job, RunMode
+from mutator.engines.reference_engine import ReferenceEngine
 from mutator.engines.sandbox import Sandbox
 from mutator.errors import EXIT_WRONG_INPUT, MutatorError
 from mutator.model import Limits, Status

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.engines.jobs import Job, RunMode
+from mutator.engines.engine_jobs import Job, RunMode
 from mutator.model import Status
 from mutator.triggers.kinds import at_time
 

@@ -11,11 +11,11 @@ import pytest
 
 from mutator._common.hashing import digest
 from mutator.campaigns.plan import make_plan
-from mutator.engines.fork import ForkEngine
-from mutator.engines.in_target.stop import compiled
-from mutator.engines.jobs import Engine, RunMode
+from mutator.engines.engine_jobs import Engine, RunMode
+from mutator.engines.fork_engine import ForkEngine
+from mutator.engines.in_target.early_stop import compiled
 from mutator.errors import MutatorError
-from mutator.execution.runner import Finished, Goldens, Runner
+from mutator.execution.experiment_runner import Finished, Goldens, Runner
 from mutator.model import AfterHazard, Experiment, Method, Outcome, Record, Status
 from mutator.mutants.mutant_building import build
 from mutator.outcomes.golden_comparison import until

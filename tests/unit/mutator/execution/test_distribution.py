@@ -7,7 +7,7 @@ import pytest
 import mutator
 from mutator.errors import MutatorError
 from mutator.execution.distribution import distributor, packages_of
-from mutator.execution.local import LocalWorkers
+from mutator.execution.local_distributor import LocalWorkers
 from mutator.workspace import Workspace
 
 TWO = mutator.Choices(only='fault_type == "lane"', limit=2)

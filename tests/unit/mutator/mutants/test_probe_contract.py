@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mutator._common.hashing import digest
-from mutator.engines.activation import active_at
+from mutator.engines.first_activation import active_at
 from mutator.errors import MutatorError
 from mutator.faults.fault_model_files import load_fault_models
 from mutator.faults.probe_templates import CODE, SETTINGS

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from mutator._common import caches
-from mutator.engines.jobs import Job
-from mutator.engines.reference import ReferenceEngine
+from mutator.engines.engine_jobs import Job
+from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import MutatorError
 from mutator.model import Limits, Status
 from mutator.operators import executed_lines

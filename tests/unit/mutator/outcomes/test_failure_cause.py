@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.engines.jobs import Execution, Raised, Stack
+from mutator.engines.engine_jobs import Execution, Raised, Stack
 from mutator.model import RunError, Status
 from mutator.outcomes.failure_cause import assign_blame, error_of
 

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mutator.execution.running import run_campaign
+from mutator.execution.campaign_running import run_campaign
 from mutator.figures.figures import Drawing, drawing_files
 from mutator.paper.example_figures import candidates, example_drawings
 from mutator.paper.unsafe_actions import WANTED, Pair, Wanted

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from mutator.api.audits import verify
-from mutator.engines.registry import choose_engine
+from mutator.engines.engine_choice import choose_engine
 from mutator.errors import CheckFailed, MutatorError
-from mutator.execution.running import run_campaign
+from mutator.execution.campaign_running import run_campaign
 from mutator.model import Experiment
 from mutator.preflight import equivalence_check
 from mutator.store import file_digests

@@ -12,8 +12,8 @@ from mutator._common import kept_folders
 from mutator._common.files import json_bytes
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import make_plan
-from mutator.engines.jobs import Execution, Job
-from mutator.engines.reference import ReferenceEngine
+from mutator.engines.engine_jobs import Execution, Job
+from mutator.engines.reference_engine import ReferenceEngine
 from mutator.preflight import preflight_cache
 from mutator.preflight.preflight_checks import run_checks
 from mutator.preflight.preflight_rules import digest_of

@@ -9,7 +9,7 @@ import pytest
 from mutator.campaigns import run_environment
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import load_plan, make_plan
-from mutator.engines.reference import ReferenceEngine
+from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import CheckFailed
 from mutator.preflight.canary import judge
 from mutator.preflight.preflight_checks import run_checks

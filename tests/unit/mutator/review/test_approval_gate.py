@@ -8,7 +8,7 @@ from mutator._common.version import VERSION
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import Plan, load_plan, make_plan
 from mutator.errors import CheckFailed
-from mutator.execution.running import run_campaign
+from mutator.execution.campaign_running import run_campaign
 from mutator.review import approval_gate
 from mutator.review.decisions import Change, Kind, load_review, record
 from mutator.review.mutant_groups import of_plan

@@ -10,8 +10,8 @@ import pytest
 from PIL import Image
 
 from mutator._common import caches
-from mutator.engines.jobs import Execution, Job
-from mutator.engines.reference import ReferenceEngine
+from mutator.engines.engine_jobs import Execution, Job
+from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import MutatorError
 from mutator.review import effect_pictures
 from mutator.review.effect_pictures import LEVELS, Pictures

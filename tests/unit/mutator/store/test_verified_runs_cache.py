@@ -8,8 +8,8 @@ import pytest
 
 from mutator._common import caches
 from mutator.errors import MutatorError
-from mutator.execution.ended_runs import ended_before
-from mutator.execution.running import run_campaign
+from mutator.execution.campaign_running import run_campaign
+from mutator.execution.finished_run_cache import ended_before
 from mutator.store import file_digests, integrity, verified_runs_cache
 from mutator.store.patch_files import Patches
 from mutator.store.patch_files import rewrite as rewrite_patches

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.engines.jobs import RunMode
+from mutator.engines.engine_jobs import RunMode
 from mutator.errors import MutatorError
 from mutator.model import Status
 from mutator.report.film import Shot, _show

@@ -17,9 +17,9 @@ from selfdrive.sim.remembering_detector import SEEING
 from selfdrive.sim.road_renderer import RoadRenderer
 
 from mutator._common import caches
-from mutator.engines.base_tree import BaseTree
-from mutator.engines.jobs import Job
-from mutator.engines.reference import ReferenceEngine
+from mutator.engines.engine_jobs import Job
+from mutator.engines.job_tree_pool import BaseTree
+from mutator.engines.reference_engine import ReferenceEngine
 from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection, Limits, Status
 from mutator.mutants.mutant_building import build
 from mutator.targets.source_tree import matches

@@ -12,7 +12,7 @@ from mutator.errors import MutatorError
 from mutator.execution.cluster import bundle
 from mutator.execution.cluster.bundle import Bundle, lay_out, read_inputs
 from mutator.execution.cluster.parcel import pack, unpack
-from mutator.execution.cluster.site import Site
+from mutator.execution.cluster.unpacked_bundle import Site
 from mutator.execution.session import open_session
 from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.execution.cluster.where import parse
+from mutator.execution.cluster.cluster_choice import parse
 
 from .loops import run
 

@@ -1,0 +1,112 @@
+"""The folder of one run, which the run can change in any way, and from which the harness reads.
+
+A mutant can delete or rename its folders, lock them, or put links, pipes and other folders in their place.
+In a sandbox, a process of the fork server, which runs on, could do so between the harness's look and its
+reading. So both folders are held by descriptors from before the run, and everything is opened below these,
+without following links. The plain files of the output are moved to a folder that no sandbox contains, before
+anybody reads them by path. Thus an exchange cannot mislead the harness to other files, and every engine
+reads the same of what a run left.
+
+This does not protect a file's content: without a sandbox, every process of the user can write to it.
+"""
+
+import errno
+import os
+import stat
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+from mutator._common.below import move_plain, open_folder, read_below
+from mutator._common.files import clear_place
+from mutator.engines.target_processes import parsed_report, tail
+from mutator.errors import Outside
+
+OUTPUT = "output"  # the name of the folder with the output's plain files
+_OUT, _LOG, _REPORT, _INACTIVE = "out", "log", "report.json", "inactive"
+
+
+_DISTURBED = (errno.ENOENT, errno.EEXIST, errno.ENOTDIR, errno.EISDIR, errno.ELOOP, errno.ENOTEMPTY)
+_LOCKED = (errno.EACCES, errno.EPERM)
+
+
+def is_disturbance(err: OSError) -> bool:
+    """Return whether an error can result from what a run did to the folders of this or another run."""
+    return err.errno in (*_DISTURBED, *_LOCKED)
+
+
+def make_work(work: Path) -> None:
+    """Make the folder of all runs again if a run has deleted it, or put something else in its place."""
+    try:
+        if stat.S_ISDIR(os.lstat(work).st_mode):
+            return
+        work.unlink()
+    except FileNotFoundError:
+        pass
+    work.mkdir(parents=True, exist_ok=True)
+
+
+class RunHome:
+    """The new folder `path`, open until the end of a `with` block. OSError if it cannot be made."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.out, self.log = path / _OUT, path / _LOG
+        self.report = path / _REPORT
+        self.inactive = path / _INACTIVE  # the first activation deletes it
+        self._open = ExitStack()
+
+    def __enter__(self) -> "RunHome":
+        self.path.mkdir(parents=True, exist_ok=True)
+        with ExitStack() as opened:
+            self._home = opened.enter_context(open_folder(self.path))
+            os.mkdir(_OUT, dir_fd=self._home)
+            self._out = opened.enter_context(open_folder(_OUT, self._home))
+            os.close(os.open(_INACTIVE, os.O_CREAT | os.O_EXCL, 0o644, dir_fd=self._home))
+            self._open = opened.pop_all()
+        self._held = Path(f"/proc/self/fd/{self._home}")
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._open.close()
+
+    def is_moved(self) -> bool:
+        """Return whether the folder or that of the output is no longer in its place."""
+        places = ((self.path, self._home), (self.out, self._out))
+        return not all(_is_at(path, handle) for path, handle in places)
+
+    def read_report(self, **more: type) -> dict[str, Any] | None:
+        """Return the child's report; None if it is missing, incomplete or invalid (`parsed_report`)."""
+        try:
+            return parsed_report(read_below(self._held, _REPORT), **more)
+        except (OSError, Outside, ValueError):
+            return None
+
+    def log_tail(self) -> str:
+        return tail(self._held, _LOG)
+
+    def was_active(self) -> bool:
+        try:
+            os.stat(_INACTIVE, dir_fd=self._home, follow_symlinks=False)
+        except OSError:
+            return True
+        return False
+
+    def let_in(self) -> None:
+        """Make the folder readable again, which a run can lock."""
+        os.fchmod(self._home, 0o700)
+
+    def move_output(self, place: Path) -> Path:
+        """Move the plain files of the output to the new folder `place`; return it."""
+        clear_place(place)
+        place.mkdir(parents=True)
+        with open_folder(place) as target:
+            move_plain(self._out, target)
+        return place
+
+
+def _is_at(path: Path, handle: int) -> bool:
+    try:
+        return os.path.samestat(os.lstat(path), os.fstat(handle))
+    except OSError:
+        return False

@@ -1,0 +1,63 @@
+"""Run a campaign: plan if needed, check, run experiments without a record, build the table of results.
+
+`mutator run` starts pytest itself; otherwise, `pytest --campaign FILE --campaign-out DIR -n N` does the same.
+"""
+
+import warnings
+from pathlib import Path
+
+from mutator.errors import MutatorWarning
+from mutator.execution.distribution import Distributor, packages_of
+from mutator.execution.local_distributor import LocalWorkers
+from mutator.execution.progress_reporting import followed
+from mutator.execution.session import Notify, Summary, open_session
+from mutator.execution.stray_files import LeftFiles
+from mutator.store.plan_choices import Choices
+from mutator.workspace import Workspace
+
+LOCAL = LocalWorkers()
+
+
+def run_campaign(
+    workspace: Workspace,
+    campaign: str | Path,
+    out: Path,
+    *,
+    workers: int = 0,
+    choices: Choices | None = None,
+    engine: str | None = None,
+    reviewed: bool = False,
+    accept_versions: bool = False,
+    distributor: Distributor = LOCAL,
+    notify: Notify | None = None,
+) -> Summary:
+    """Run or resume the campaign in the run folder `out` with `workers` processes (0: in this process).
+
+    A frozen plan in `out` is used unchanged. Omitted `choices` keep their frozen values. `engine` is a name
+    in `engines.engine_kinds` (None: the fastest that pays off). With `reviewed`, only approved mutants run
+    (`mutator.review.approval_gate`). Without `accept_versions`, Python and packages must not change during a
+    run. Another thread calls `notify` about twice a second.
+
+    Raises MutatorError for wrong input, choices that differ from the frozen ones, or a changed campaign file
+    or target. Raises CheckFailed if an unapproved mutant would run with `reviewed`, or if a
+    preflight or equivalence check fails.
+    """
+    with open_session(
+        workspace,
+        campaign,
+        out,
+        workers=workers,
+        choices=choices or Choices(),
+        engine=engine,
+        reviewed=reviewed,
+        accept_versions=accept_versions,
+        notify=notify,
+    ) as session:
+        session.prepare(packages_of(distributor))
+        if session.pending or session.proof:
+            left = LeftFiles()
+            with followed(session):
+                distributor.run(session)
+            if remark := left.remark():
+                warnings.warn(remark, MutatorWarning, stacklevel=2)
+        return session.finish()

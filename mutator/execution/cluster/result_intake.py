@@ -1,0 +1,58 @@
+"""Write the results of workers into the run folder."""
+
+import json
+from functools import partial
+
+from mutator.errors import MutatorError
+from mutator.execution.cluster.pieces import Kind, Piece, Result
+from mutator.execution.experiment_runner import without_outcome
+from mutator.execution.written_files import Sums
+from mutator.model import Status
+from mutator.outcomes.hazards_and_metrics import load_channels
+from mutator.outcomes.series_sampling import Sampler
+from mutator.store.run_folder import RunFolder
+from mutator.store.run_writer import RunWriter
+from mutator.targets.manifest import TargetManifest
+
+
+class Intake:
+    """Appends results to the run folder, like a worker on this machine.
+
+    Results are trusted, because a worker that might compute differently gets no work.
+    """
+
+    def __init__(self, folder: RunFolder, manifest: TargetManifest, name: str) -> None:
+        self._folder, self._manifest = folder, manifest
+        self._writer = RunWriter(folder, name)
+
+    def take(self, piece: Piece, result: Result) -> None:
+        """Append the result of a piece. MutatorError if it belongs to other experiments."""
+        names = [json.loads(line)["experiment_id"] for line in result.records]
+        if sorted(names) != sorted(piece.lines):
+            raise MutatorError(
+                f"a worker's records ({len(names)}) do not match its piece (experiments: {len(piece.lines)})",
+                where=self._folder.path,
+                expected="one record per experiment",
+                remedy="this is a defect of the harness; please report it",
+            )
+        if piece.kind is Kind.PROVE:
+            self._writer.extend_proof(result.records)
+            return
+        goldens = {key: partial(self._golden_series, key) for key in result.series_of}
+        self._writer.extend_series(result.series, goldens)
+        self._writer.extend(result.records, result.timings, result.patches)
+
+    def give_up(self, piece: Piece, why: str) -> None:
+        append = self._writer.append_record if piece.kind is Kind.RUN else self._writer.append_proof
+        for name in piece.lines:
+            append(without_outcome(name, Status.HARNESS_ERROR, why))
+
+    def close(self) -> Sums:
+        """Close the files; return the digests of those whose lines count."""
+        self._writer.close()
+        return self._writer.digests
+
+    def _golden_series(self, key: str) -> bytes:
+        golden = next(one for one in self._folder.goldens if one.key == key)
+        trace = load_channels(self._manifest, self._folder.golden(*golden))
+        return Sampler(self._manifest, trace).encoded

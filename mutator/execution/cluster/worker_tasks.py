@@ -1,0 +1,93 @@
+"""Functions that the command submits to Dask workers by reference.
+
+For each run, the task `attend` runs on every worker, outside the thread pool, for as long as the run lasts.
+When it ends, the run's processes on that worker are killed, and its files are deleted. Each piece is a
+separate task.
+"""
+
+import platform
+import socket
+import threading
+import time
+from collections.abc import Iterable
+from hashlib import sha256
+from typing import Any
+
+from distributed import Worker, get_worker, secede
+from distributed.core import Status
+
+from mutator._common.hashing import plain
+from mutator._common.version import VERSION
+from mutator.campaigns import run_environment
+from mutator.errors import MutatorError
+from mutator.execution.cluster.worker_host import Host, Wanted
+
+_PATIENCE_S = 60.0  # how long a piece waits for the bundle of its run
+
+_hosts: dict[str, Host] = {}  # by run
+_arrived = threading.Condition()
+
+
+def facts(packages: Iterable[str]) -> dict[str, Any]:
+    """Describe this worker's machine and software, including the versions of these packages."""
+    return {
+        "mutator": VERSION,
+        "host": socket.gethostname(),
+        "python": run_environment.python(),
+        "platform": platform.platform(),
+        "cpu": run_environment.cpu(),
+        "blas": plain(run_environment.blas()),
+        "packages": run_environment.versions(packages),
+    }
+
+
+def deliver(run: str, name: str, bundle: bytes, digest: str) -> None:
+    if sha256(bundle).hexdigest() != digest:
+        raise MutatorError(
+            "the bundle that arrived differs from the one that was sent", remedy="check the network"
+        )
+    host = Host.lay_out(bundle, get_worker().local_directory, name)
+    with _arrived:
+        _hosts[run] = host
+        _arrived.notify_all()
+
+
+def attend(run: str) -> None:
+    """Take part in a run until the command releases this task or is gone."""
+    host, wanted = _hosts[run], _wanted()
+    secede()
+    try:
+        host.attend(wanted)
+    finally:
+        with _arrived:
+            if _hosts.get(run) is host:  # unless the bundle has been delivered again
+                del _hosts[run]
+
+
+def leave(run: str) -> None:
+    """Leave a run, and wait until its processes and files on this worker are gone."""
+    if (host := _hosts.get(run)) is not None:
+        host.end()
+
+
+def work(run: str, piece: bytes) -> bytes:
+    deadline = time.monotonic() + _PATIENCE_S
+    with _arrived:
+        while run not in _hosts:
+            if not _arrived.wait(deadline - time.monotonic()):
+                raise MutatorError("the bundle of the run did not arrive", remedy="check the network")
+        host = _hosts[run]
+    return host.run(piece, _wanted()).packed()
+
+
+def _wanted() -> Wanted:
+    """Make a function that returns whether this thread's task is wanted and the worker is not closing."""
+    worker: Worker = get_worker()
+    key = worker.get_current_task()
+
+    def is_wanted() -> bool:
+        task = worker.state.tasks.get(key)
+        alive = worker.status in (Status.running, Status.paused)
+        return alive and task is not None and task.state in ("executing", "long-running")
+
+    return is_wanted

@@ -1,0 +1,342 @@
+"""Turn experiments into records: build each mutant, run it, compare it with its golden run, judge it."""
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cache, lru_cache
+from pathlib import Path
+from typing import TypeVar
+
+from mutator._common.below import inside
+from mutator._common.bounded import read_bounded
+from mutator._common.hashing import digest
+from mutator._common.unchanged_files import UnchangedFiles
+from mutator.campaigns.shared_runs import runs
+from mutator.engines.engine_jobs import Engine, Execution, Job, RunMode
+from mutator.errors import BadAddition, BadOutput, InvalidMutant, MutatorError
+from mutator.faults.fault_models import FaultModels
+from mutator.model import Activation, AfterHazard, Experiment, Record, Status
+from mutator.mutants.mutant_building import Mutant, build
+from mutator.mutants.probe import activation_of
+from mutator.outcomes import golden_comparison
+from mutator.outcomes.channel_departures import departures
+from mutator.outcomes.failure_cause import assign_blame, error_of
+from mutator.outcomes.golden_comparison import Trace
+from mutator.outcomes.hazards_and_metrics import Judged, load_channels, load_judged
+from mutator.outcomes.series_sampling import Sampler
+from mutator.outcomes.verdict_rules import first_events, judge
+from mutator.preflight.preflight_rules import digest_of
+from mutator.store.run_folder import GoldenRun
+from mutator.store.series_format import encode
+from mutator.store.series_packing import EncodedSeries
+from mutator.targets.manifest import TargetManifest
+
+_T = TypeVar("_T")
+_KEPT = 32  # golden runs in memory: enough for the current seed and the next
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finished:
+    """An experiment with its record.
+
+    `out` (the target's output folder) is valid until the next result; None without a mutant or a run.
+    `series` is None if not requested or if the run failed.
+    """
+
+    experiment: Experiment
+    record: Record
+    mutant: Mutant | None = None
+    out: Path | None = None
+    cpu_s: float = 0.0
+    wall_s: float = 0.0
+    log: str = ""
+    mode: RunMode | None = None  # None if nothing ran
+    why: str = ""
+    start: int = 0
+    series: EncodedSeries | None = None
+
+
+class Goldens:
+    """The channels of golden runs, loaded on request. Only the last few are kept in memory."""
+
+    def __init__(
+        self,
+        manifest: TargetManifest,
+        folder_of: Callable[[Experiment], Path],
+        *,
+        several_seeds: bool = False,
+        digests: Mapping[Path, str] | None = None,
+    ) -> None:
+        self.folder = folder_of  # finds the output folder of the fault-free run
+        self._manifest = manifest
+        self._several_seeds = several_seeds
+        self._digests = digests  # what `digest_of` must return, by folder
+        self._files = lru_cache(_KEPT)(self._watched)
+        self._trace = lru_cache(_KEPT)(lambda folder: self._unchanged(folder, load_channels))
+        self._sampler = lru_cache(_KEPT)(lambda folder: Sampler(manifest, self._trace(folder)))
+        self._judged = lru_cache(_KEPT)(lambda folder: self._unchanged(folder, load_judged)[1])
+
+    def begin(self, experiment: Experiment) -> None:
+        """Read the golden run's files before they are used. MutatorError if their digest is another."""
+        self._files(self.folder(experiment))
+
+    def check(self, folder: Path) -> None:
+        """Raise MutatorError if the files of a golden run have been written to since they were read."""
+        if changed := self._files(folder).first_changed():
+            raise _changed(Path(changed))
+
+    def _unchanged(self, folder: Path, load: Callable[[TargetManifest, Path], _T]) -> _T:
+        self._files(folder)
+        loaded = load(self._manifest, folder)
+        self.check(folder)
+        return loaded
+
+    def _watched(self, folder: Path) -> UnchangedFiles:
+        paths = [path for name in self._manifest.outputs if (path := inside(folder, name)).is_file()]
+        files = UnchangedFiles({str(path): read_bounded(path) for path in paths})
+        if self._digests is not None and digest_of(self._manifest, folder) != self._digests[folder]:
+            raise _changed(folder)
+        return files
+
+    def key(self, experiment: Experiment) -> str:
+        return GoldenRun.of(experiment, several_seeds=self._several_seeds).key
+
+    def trace(self, experiment: Experiment) -> Trace:
+        return self._trace(self.folder(experiment))
+
+    def ends(self, experiment: Experiment) -> bool:
+        return self._judged(self.folder(experiment)).t_end is not None
+
+    def sampler(self, experiment: Experiment) -> Sampler:
+        return self._sampler(self.folder(experiment))
+
+
+class Runner:
+    """Runs experiments on an engine, which chooses their order."""
+
+    def __init__(
+        self,
+        manifest: TargetManifest,
+        models: FaultModels,
+        engine: Engine,
+        goldens: Goldens,
+        scenario_file: Callable[[str], Path],
+        *,
+        with_series: bool = False,
+    ) -> None:
+        self.manifest = manifest
+        self.models = models
+        self.engine = engine
+        self.goldens = goldens
+        self.scenario_file = cache(scenario_file)
+        self.with_series = with_series
+
+    def run(self, experiments: Iterable[Experiment]) -> Iterator[Finished]:
+        """Yield each experiment with its record.
+
+        A mutant that cannot be built is not run. Experiments that share a run get the same record.
+        """
+        shared = {same[0].id: same for same in runs(self.manifest, experiments)}
+        for finished in self._run([same[0] for same in shared.values()]):
+            yield finished
+            for other in shared[finished.experiment.id][1:]:
+                record = replace(finished.record, experiment_id=other.id)
+                yield replace(finished, experiment=other, record=record, cpu_s=0.0, wall_s=0.0)
+
+    def _run(self, experiments: Iterable[Experiment]) -> Iterator[Finished]:
+        refused: deque[Finished] = deque()
+        started: dict[str, tuple[Experiment, Mutant]] = {}
+
+        def jobs() -> Iterator[Job]:
+            for experiment in experiments:
+                try:
+                    built = build(self.manifest, self.models, experiment.fault, experiment.trigger)
+                except MutatorError as err:
+                    refused.append(self._refused(experiment, err))
+                    continue
+                self.goldens.begin(experiment)
+                started[experiment.id] = (experiment, built)
+                yield self._job(experiment, built)
+
+        for job, execution in self.engine.run(jobs()):
+            while refused:
+                yield refused.popleft()
+            yield self._finish(*started.pop(job.name), execution)
+        yield from refused
+
+    def _job(self, experiment: Experiment, built: Mutant) -> Job:
+        stop = experiment.after_hazard is AfterHazard.STOP
+        return Job(
+            name=experiment.id,
+            scenario=self.scenario_file(experiment.scenario),
+            seed=experiment.seed,
+            changes=experiment.changes,
+            files=built.files,
+            mutant=built.id,
+            probe=built.probe,
+            injections=built.injections,
+            golden=self.goldens.folder(experiment),
+            stop=stop,
+            golden_ends=stop and self.goldens.ends(experiment),
+        )
+
+    def _refused(self, experiment: Experiment, err: MutatorError) -> Finished:
+        status = Status.INVALID_MUTANT if isinstance(err, InvalidMutant) else Status.HARNESS_ERROR
+        place = f"{self.manifest.tree.named(err.where)}: " if err.where else ""
+        return Finished(experiment=experiment, record=_bare(experiment, status, place + err.got, None))
+
+    def _finish(self, experiment: Experiment, built: Mutant, execution: Execution) -> Finished:
+        faulty = None
+        try:
+            record, faulty = self._record(experiment, built, execution)
+        except (BadOutput, BadAddition) as err:
+            record = _bare(experiment, Status.HARNESS_ERROR, _problem_of(err), built)
+        self._check_input(experiment, execution)
+        return Finished(
+            experiment=experiment,
+            record=record,
+            mutant=built,
+            out=execution.out,
+            cpu_s=execution.cpu_s,
+            wall_s=execution.wall_s,
+            log=execution.log,
+            mode=execution.mode,
+            why=execution.why,
+            start=execution.start,
+            series=self._series(experiment, record, faulty) if faulty is not None else None,
+        )
+
+    def _check_input(self, experiment: Experiment, execution: Execution) -> None:
+        """Raise MutatorError if a run has written to what this experiment used, so its record would not
+        count.
+        """
+        if execution.mode is RunMode.GOLDEN:
+            self.goldens.check(execution.out)
+        scenario = self.scenario_file(experiment.scenario)
+        if digest(read_bounded(scenario)) != experiment.scenario_digest:
+            raise _changed(scenario)
+
+    def _series(self, experiment: Experiment, record: Record, faulty: Trace) -> EncodedSeries | None:
+        if not self.with_series:
+            return None
+        sampler = self.goldens.sampler(experiment)
+        return EncodedSeries(
+            key=self.goldens.key(experiment),
+            golden=sampler.encoded,
+            faulty=encode(sampler.series(faulty, record), sampler.golden),
+        )
+
+    def _raising(self, experiment: Experiment, built: Mutant) -> set[str]:
+        models = [self.models.get(injection.model) for injection in experiment.fault.injections]
+        return {name for name, model in zip(built.injections, models, strict=True) if model.raises}
+
+    def _record(
+        self, experiment: Experiment, built: Mutant, execution: Execution
+    ) -> tuple[Record, Trace | None]:
+        if execution.status is not Status.OK or execution.probe is None:
+            return self._failed(experiment, built, execution), None
+        activation = activation_of(execution.probe)
+        reference = self.goldens.trace(experiment)
+        try:
+            faulty, judged = load_judged(self.manifest, execution.out, reference)
+        except BadOutput as err:
+            if activation is None:
+                raise
+            return _bare(experiment, Status.CRASHED, _problem_of(err), built, activation), None
+        record = self._judged(experiment, built, execution, faulty, judged)
+        return record, faulty if record.status is Status.OK else None
+
+    def _judged(
+        self, experiment: Experiment, built: Mutant, execution: Execution, faulty: Trace, judged: Judged
+    ) -> Record:
+        activation = activation_of(execution.probe or {})
+        reference, time = self.goldens.trace(experiment), self.manifest.time_channel
+        if execution.stopped:
+            if judged.t_end is None:
+                why = "was stopped, but no terminal hazard is in its trace"
+                return _bare(experiment, Status.HARNESS_ERROR, why, built)
+            reference = golden_comparison.until(reference, faulty[time][-1], time)
+        faulty = golden_comparison.sharing_times(reference, faulty, time)
+        difference = golden_comparison.compare(reference, faulty, self.manifest.compared, time, judged.t_end)
+        if problem := _not_by_the_fault(difference.t_first, activation):
+            return _bare(experiment, Status.HARNESS_ERROR, problem, built)
+        hazards = first_events(judged.hazards, activation)
+        return Record(
+            experiment_id=experiment.id,
+            status=Status.OK,
+            outcome=judge(activation=activation, t_manifest=difference.t_first, hazards=hazards),
+            detail="",
+            tree=built.tree_digest,
+            activation=activation,
+            t_manifest=difference.t_first,
+            max_dev=difference.max_dev,
+            hazards=tuple(hazards),
+            alerts=tuple(first_events(judged.alerts, activation)),
+            trace_digest=golden_comparison.trace_digest(self.manifest, execution.out),
+            patch=digest(built.patch_bytes),
+            t_end=judged.t_end,
+            dev=() if judged.t_end is None else difference.dev,
+            metrics=judged.metrics,
+            left=departures(reference, faulty, self.manifest.channels, time, judged.t_end),
+        )
+
+    def _failed(self, experiment: Experiment, built: Mutant, execution: Execution) -> Record:
+        status, detail = assign_blame(execution, built.files, self._raising(experiment, built))
+        # the number of activations before a crash is reproducible; before a timeout it is not
+        activation = activation_of(execution.probe or {}) if status is Status.CRASHED else None
+        bare = _bare(experiment, status, detail, built, activation)
+        return replace(bare, error=error_of(execution.raised))
+
+
+def _changed(path: Path) -> MutatorError:
+    return MutatorError(
+        "changed while it was in use",
+        where=path,
+        expected="files that no mutant writes to",
+        remedy="restore it (`mutator verify` names what is damaged in a run folder), then run the same "
+        "command again; `mutator run --sandbox` keeps mutants from it",
+    )
+
+
+def _problem_of(err: MutatorError) -> str:
+    return f"{Path(err.where or '').name}: {err.got}"
+
+
+def _not_by_the_fault(t_first: float | None, activation: Activation | None) -> str:
+    """Return why the fault cannot have caused a difference from the golden run; empty if it can."""
+    if t_first is None or (activation is not None and t_first >= activation.first):
+        return ""
+    when = "although the fault was never active"
+    if activation is not None:
+        when = f"before the fault was first active ({activation.first} s)"
+    return f"differs from the golden run at {t_first} s, {when}"
+
+
+def _bare(
+    experiment: Experiment,
+    status: Status,
+    detail: str,
+    built: Mutant | None,
+    activation: Activation | None = None,
+) -> Record:
+    bare = without_outcome(experiment.id, status, detail)
+    if built is not None:
+        bare = replace(bare, tree=built.tree_digest, patch=digest(built.patch_bytes))
+    return replace(bare, activation=activation)
+
+
+def without_outcome(experiment_id: str, status: Status, detail: str) -> Record:
+    """Make the record of an experiment that has a status but no outcome."""
+    return Record(
+        experiment_id=experiment_id,
+        status=status,
+        outcome=None,
+        detail=detail,
+        tree="",
+        activation=None,
+        t_manifest=None,
+        max_dev=(),
+        hazards=(),
+        alerts=(),
+        trace_digest="",
+    )

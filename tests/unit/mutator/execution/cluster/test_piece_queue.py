@@ -1,0 +1,229 @@
+"""How the board distributes pieces of work to workers."""
+
+import random
+from collections import Counter
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from mutator.campaigns.chunks import pending
+from mutator.campaigns.freezing import freeze
+from mutator.campaigns.plan import make_plan
+from mutator.execution.cluster.piece_queue import Board
+from mutator.execution.cluster.pieces import Kind, Piece
+from mutator.preflight.equivalence_check import Sample
+from mutator.store import plan_file
+from mutator.store.run_folder import RunFolder
+from mutator.workspace import Workspace
+
+CLONE = Path(__file__).parents[5]
+
+
+class Clock:
+    """A clock whose time is set by the tests."""
+
+    now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> RunFolder:
+    """A frozen plan in which some experiments share a run."""
+    shipped = Workspace.find(root=CLONE)
+    return freeze(make_plan(shipped, "paper_smoke"), tmp_path_factory.mktemp("board") / "run", shipped)
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def ids(folder: RunFolder) -> list[str]:
+    return list(plan_file.ids(folder.path))
+
+
+def board(folder: RunFolder, clock: Clock, proof: tuple[str, ...] = ()) -> Board:
+    """Return a board for two workers, with the whole plan and a proof that reruns the experiments in
+    `proof`."""
+    samples = [Sample(number, name) for number, name in enumerate(proof)]
+    made = Board(folder, pending(folder, {}), samples, now=clock)
+    for name in ("alpha", "beta"):
+        made.join(name, 1)
+    return made
+
+
+def taken(board: Board, worker: str) -> Piece:
+    piece = board.take(worker)
+    assert piece is not None
+    return piece
+
+
+def drained(board: Board, workers: tuple[str, ...] = ("alpha", "beta")) -> list[tuple[str, Piece]]:
+    """Let the workers take pieces until none is left. Return each worker with its piece, in order."""
+    done = []
+    while not board.is_empty:
+        for worker in workers:
+            if (piece := board.take(worker)) is not None:
+                done.append((worker, piece))
+                assert board.done(piece, worker, 0.4 * piece.runs)
+    return done
+
+
+def test_each_experiment_is_run_exactly_once(folder: RunFolder, clock: Clock, ids: list[str]) -> None:
+    done = [piece for _, piece in drained(board(folder, clock))]
+    assert sorted(name for piece in done for name in piece.lines) == sorted(ids)
+    for piece in done:
+        experiments = Piece.of(piece.packed()).experiments()
+        assert [experiment.id for experiment in experiments] == list(piece.lines)
+        assert {folder.golden_of(experiment).key for experiment in experiments} >= {piece.golden}
+
+
+def test_the_proof_reruns_an_experiment_on_another_worker(
+    folder: RunFolder, clock: Clock, ids: list[str]
+) -> None:
+    done = drained(board(folder, clock, tuple(ids[::7])))
+    ran = {name: worker for worker, piece in done if piece.kind is Kind.RUN for name in piece.lines}
+    proved = {name: worker for worker, piece in done if piece.kind is Kind.PROVE for name in piece.lines}
+    assert sorted(proved) == sorted(ids[::7])
+    assert all(ran[name] != worker for name, worker in proved.items())
+
+
+def test_a_single_worker_proves_its_own_experiments(folder: RunFolder, clock: Clock, ids: list[str]) -> None:
+    alone = board(folder, clock, tuple(ids[:2]))
+    alone.leave("beta")
+    done = drained(alone, ("alpha",))
+    assert [piece.kind for _, piece in done][-2:] == [Kind.PROVE, Kind.PROVE]
+
+
+def test_a_worker_prefers_experiments_with_its_current_golden_run(folder: RunFolder, clock: Clock) -> None:
+    done = drained(board(folder, clock))
+    for worker in ("alpha", "beta"):
+        keys = [piece.golden for name, piece in done if name == worker]
+        changes = sum(one != other for one, other in pairwise(keys))
+        assert changes <= len(folder.goldens)
+
+
+def test_the_last_pieces_are_shorter(folder: RunFolder, clock: Clock) -> None:
+    """Here, a run takes longer than the shortest piece should take, so the last pieces have one run each."""
+    there = board(folder, clock)
+    first = taken(there, "alpha")
+    there.done(first, "alpha", 2.0 * first.runs)
+    sizes = [piece.runs for _, piece in drained(there)]
+    assert max(sizes[:4]) > 1
+    assert sizes[-1] == 1
+
+
+def test_a_late_piece_is_repeated_but_counted_once(folder: RunFolder, clock: Clock) -> None:
+    there = board(folder, clock)
+    frozen = taken(there, "alpha")
+    drained_by_beta = 0
+    while (piece := there.take("beta")) is not None:
+        there.done(piece, "beta", 0.1)
+        drained_by_beta += 1
+    assert drained_by_beta and not there.is_empty
+    clock.now += 60.0
+    again = taken(there, "beta")
+    assert again == frozen
+    assert there.done(again, "beta", 0.1)
+    assert not there.done(frozen, "alpha", 60.0)
+    assert there.is_empty
+
+
+def test_only_an_experiment_that_kills_workers_is_given_up(
+    folder: RunFolder, clock: Clock, ids: list[str]
+) -> None:
+    there, deadly, done = board(folder, clock), ids[17], Counter[str]()
+    given_up: list[str] = []
+    while not there.is_empty:
+        for worker in ("alpha", "beta"):
+            if (piece := there.take(worker)) is None:
+                continue
+            if deadly not in piece.lines:
+                there.done(piece, worker, 0.1)
+                done.update(piece.ids)
+            elif (found := there.died(piece, worker)) is not None:
+                given_up += found.lines
+    assert given_up == [deadly]
+    assert sorted([*done.elements(), deadly]) == sorted(ids)
+
+
+def test_an_experiment_is_given_up_after_it_kills_two_workers(
+    folder: RunFolder, clock: Clock, ids: list[str]
+) -> None:
+    there = board(folder, clock)
+    piece = taken(there, "alpha")
+    deadly = piece.ids[-1]
+    assert there.died(piece, "alpha", deadly) is None
+    apart = next(one for one in iter(lambda: taken(there, "beta"), None) if deadly in one.lines)
+    assert apart.ids == (deadly,)
+    assert there.died(apart, "beta", deadly) is not None
+
+
+def test_only_the_last_worker_retries_a_piece_that_killed_it(folder: RunFolder, clock: Clock) -> None:
+    there = board(folder, clock)
+    deadly = taken(there, "alpha")
+    there.died(deadly, "alpha")
+    while (piece := there.take("alpha")) is not None:
+        assert piece.number != deadly.number
+        there.done(piece, "alpha", 0.1)
+    assert taken(there, "beta").number == deadly.number
+    clock.now += 60.0
+    assert there.take("alpha") is None
+    there.give_back(deadly, "beta")
+    there.leave("beta")
+    assert taken(there, "alpha").number == deadly.number
+
+
+def test_a_worker_that_repeats_a_piece_continues_when_another_dies(folder: RunFolder, clock: Clock) -> None:
+    for first in ("alpha", "beta"):
+        there = board(folder, clock)
+        late = taken(there, "alpha")
+        while (piece := there.take("beta")) is not None:
+            there.done(piece, "beta", 0.1)
+        clock.now += 60.0
+        assert taken(there, "beta") == late
+        assert there.died(late, first) is None
+        assert there.take(first) is None
+        assert there.done(late, "beta" if first == "alpha" else "alpha", 0.1)
+        assert there.is_empty
+
+
+def test_an_idle_worker_leaves_the_proof_to_a_busy_worker(folder: RunFolder, clock: Clock) -> None:
+    """The busy worker's piece is not late yet."""
+    there = board(folder, clock, taken(board(folder, clock), "alpha").ids[:1])
+    first = taken(there, "alpha")
+    there.done(first, "alpha", 60.0 * first.runs)
+    last = taken(there, "beta")
+    while (piece := there.take("alpha")) is not None:
+        there.done(piece, "alpha", 60.0 * piece.runs)
+    clock.now += 50.0
+    assert there.take("alpha") is None
+    there.done(last, "beta", 60.0 * last.runs)
+    assert taken(there, "beta").kind is Kind.PROVE
+
+
+def test_each_experiment_is_counted_once_for_any_order_of_events(
+    folder: RunFolder, clock: Clock, ids: list[str]
+) -> None:
+    draw, there, done = random.Random(5), board(folder, clock), Counter[str]()
+    out: list[tuple[str, Piece]] = []
+    while not there.is_empty:
+        clock.now += draw.uniform(0.0, 8.0)
+        worker = draw.choice(("alpha", "beta"))
+        if (piece := there.take(worker)) is not None:
+            out.append((worker, piece))
+        if not out:
+            continue
+        who, piece = out.pop(draw.randrange(len(out)))
+        fate = draw.random()
+        if fate < 0.2:
+            there.give_back(piece, who)
+        elif fate < 0.25 and not piece.died_at:
+            there.died(piece, who)
+        elif there.done(piece, who, 0.3):
+            done.update(piece.ids)
+    assert done == Counter(ids)

@@ -1,0 +1,174 @@
+"""The worker's part of a run: a separate process runs the pieces of work and ends when it is no longer
+needed."""
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from mutator.errors import MutatorError, PieceNotWanted
+from mutator.execution.cluster import bundle
+from mutator.execution.cluster.bundle import Bundle, read_inputs
+from mutator.execution.cluster.golden_cache import DrivenGoldens
+from mutator.execution.cluster.piece_queue import Board
+from mutator.execution.cluster.pieces import Ending, Piece, Result
+from mutator.execution.cluster.unpacked_bundle import Site
+from mutator.execution.cluster.worker_host import Host
+from mutator.execution.session import open_session
+from mutator.store.plan_choices import Choices
+from mutator.workspace import Workspace
+
+
+def children(host: Host) -> list[int]:
+    """Return the ids of the processes that run the host's pieces."""
+    words = str(host.folder).encode()
+    found = []
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            if words in (told := path.read_bytes()) and b"cluster.piece_process" in told:
+                found.append(int(path.parent.name))
+        except OSError:
+            continue
+    return found
+
+
+@contextmanager
+def attended(host: Host) -> Iterator[threading.Event]:
+    unwanted = threading.Event()
+    thread = threading.Thread(target=host.attend, args=(lambda: not unwanted.is_set(),))
+    thread.start()
+    try:
+        yield unwanted
+    finally:
+        unwanted.set()
+        thread.join()
+
+
+@pytest.fixture(scope="module")
+def sent(tmp_path_factory: pytest.TempPathFactory, copy_toycar: object) -> tuple[Bundle, Piece]:
+    """What a worker receives for the toy's small campaign: the bundle, and a piece of work."""
+    folder = tmp_path_factory.mktemp("sent")
+    toy: Workspace = copy_toycar(folder)  # type: ignore[operator]
+    with open_session(toy, "small", folder / "run", workers=2, choices=Choices(), engine="fork") as session:
+        session.prepare()
+        board = Board(session.folder, session.pending, ())
+        board.join("w", 1)
+        piece = board.take("w")
+        assert piece is not None
+        return Bundle.of(toy, session.folder, "fork"), piece
+
+
+@pytest.fixture
+def host(sent: tuple[Bundle, Piece], tmp_path: Path) -> Host:
+    return Host.lay_out(sent[0].data, str(tmp_path / "place"), "alpha")
+
+
+def test_all_pieces_run_in_one_process_that_ends_with_the_host(
+    host: Host, sent: tuple[Bundle, Piece]
+) -> None:
+    piece = sent[1]
+    with attended(host):
+        first = host.run(piece.packed(), lambda: True)
+        [child] = children(host)
+        second = host.run(piece.packed(), lambda: True)
+        assert children(host) == [child]
+    assert (first.ending, first.text, len(first.records)) == (Ending.DONE, "", len(piece.lines))
+    assert second.records == first.records
+    assert first.forked and first.patches and first.series and first.series_of == (piece.golden,)
+    assert children(host) == [] and not host.folder.exists()
+
+
+def test_a_killed_process_is_reported_with_its_experiment(host: Host, sent: tuple[Bundle, Piece]) -> None:
+    with attended(host):
+        killer = threading.Thread(target=lambda: os.kill(_first(host), signal.SIGKILL))
+        killer.start()
+        result = host.run(sent[1].packed(), lambda: True)
+        killer.join()
+        assert (result.ending, result.at) == (Ending.DIED, sent[1].ids[0])
+        assert "killed by SIGKILL" in result.text
+        assert host.run(sent[1].packed(), lambda: True).ending is Ending.DONE
+
+
+def _first(host: Host) -> int:
+    while not (found := children(host)):
+        time.sleep(0.01)
+    return found[0]
+
+
+def test_if_the_process_does_not_start_no_piece_is_blamed(host: Host, sent: tuple[Bundle, Piece]) -> None:
+    (host.folder / "meta.json").unlink()
+    with attended(host):
+        result = host.run(sent[1].packed(), lambda: True)
+    assert result.ending is Ending.UNFIT
+    assert "meta.json" in result.text
+
+
+def test_the_process_of_a_cancelled_piece_ends(host: Host, sent: tuple[Bundle, Piece]) -> None:
+    asked: list[float] = []
+
+    def wanted() -> bool:
+        asked.append(time.monotonic())
+        return len(asked) < 4
+
+    with attended(host):
+        with pytest.raises(PieceNotWanted):
+            host.run(sent[1].packed(), wanted)
+        assert children(host) == []
+
+
+def test_damaged_data_is_refused(sent: tuple[Bundle, Piece], host: Host, tmp_path: Path) -> None:
+    with pytest.raises(MutatorError, match="damaged parcel"):
+        Host.lay_out(sent[0].data[:-1] + b"?", str(tmp_path / "other"), "alpha")
+    assert not [*(tmp_path / "other").iterdir()]
+    with pytest.raises(MutatorError, match="damaged parcel"):
+        host.run(sent[1].packed()[:-1], lambda: True)
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    return tmp_path / "cache" / "mutator" / "goldens"
+
+
+def run_once(sent: tuple[Bundle, Piece], place: Path) -> Result:
+    host = Host.lay_out(sent[0].data, str(place), "alpha")
+    with attended(host):
+        return host.run(sent[1].packed(), lambda: True)
+
+
+def written(entry: Path) -> int:
+    return (entry / "log.npz").stat().st_mtime_ns
+
+
+def test_hosts_of_a_machine_share_golden_runs(
+    sent: tuple[Bundle, Piece], cache: Path, tmp_path: Path
+) -> None:
+    first = run_once(sent, tmp_path / "a")
+    (entry,) = cache.iterdir()
+    before = written(entry)
+    assert run_once(sent, tmp_path / "b").records == first.records
+    assert [*cache.iterdir()] == [entry] and written(entry) == before
+    (entry / "log.npz").write_bytes(b"damaged")
+    assert run_once(sent, tmp_path / "c").records == first.records
+    assert [*cache.iterdir()] == [entry] and (entry / "log.npz").read_bytes() != b"damaged"
+
+
+def test_a_cached_golden_run_must_match_the_campaign(
+    sent: tuple[Bundle, Piece], cache: Path, tmp_path: Path
+) -> None:
+    run_once(sent, tmp_path / "a")
+    bundle.lay_out(sent[0].data, tmp_path / "site")
+    site = Site(tmp_path / "site")
+    manifest = read_inputs(site).manifest
+    golden, known = site.goldens[sent[1].golden]
+    to = tmp_path / "golden"
+    assert DrivenGoldens(site, manifest).fetch(golden, known, to) and to.is_dir()
+    assert not DrivenGoldens(site, manifest).fetch(golden, "0" * 64, to) and not to.exists()
+    source = next((site.place / "target").rglob("*.py"))
+    source.write_text(source.read_text() + "# another\n")
+    assert not DrivenGoldens(site, manifest).fetch(golden, known, to)

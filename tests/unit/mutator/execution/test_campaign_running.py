@@ -1,0 +1,94 @@
+"""Campaigns that use a custom distributor of work."""
+
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from mutator.execution.campaign_running import run_campaign
+from mutator.execution.session import Session
+from mutator.execution.worker import Assignment, Worker
+from mutator.workspace import Workspace
+
+WORKER = """
+import pickle, sys
+from mutator.campaigns.run_inputs import RunInputs
+from mutator.execution.worker import Worker
+
+inputs, assignment, pending, proof = pickle.load(sys.stdin.buffer)
+worker = Worker(RunInputs.unpacked(inputs), assignment)
+for piece in pending:
+    worker.run(piece)
+for sample in proof:
+    worker.prove(sample)
+worker.close()
+sys.stdout.buffer.write(pickle.dumps((worker.written, set(sys.modules))))
+"""
+
+
+def assignment_of(session: Session) -> Assignment:
+    return Assignment(
+        run=session.folder.path,
+        name=session.worker_name("mine"),
+        engine=session.engine,
+        goldens=session.golden_digests,
+        secret=session.secret,
+    )
+
+
+class InOrder:
+    def run(self, session: Session) -> None:
+        worker = Worker(session.inputs, assignment_of(session))
+        for piece in session.pending:
+            worker.run(piece)
+        for sample in session.proof:
+            worker.prove(sample)
+        worker.close()
+        session.written.report(worker.written)
+
+
+class Elsewhere:
+    """A distributor whose worker is a process of its own."""
+
+    def __init__(self) -> None:
+        self.loaded: set[str] = set()
+
+    def run(self, session: Session) -> None:
+        work = (session.inputs.packed(), assignment_of(session), session.pending, session.proof)
+        command = [sys.executable, "-c", WORKER]
+        done = subprocess.run(command, input=pickle.dumps(work), stdout=subprocess.PIPE, check=True)
+        written, self.loaded = pickle.loads(done.stdout)
+        session.written.report(written)
+
+
+class Idle:
+    """A distributor that gives up immediately."""
+
+    def run(self, session: Session) -> None:
+        session.problem = "no machine answered"
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("kept_checks")
+def test_a_run_resumed_by_another_distributor_has_the_same_results(toycar: Workspace, tmp_path: Path) -> None:
+    assert run_campaign(toycar, "small", tmp_path / "local").exit_code == 0
+    summary = run_campaign(toycar, "small", tmp_path / "idle", distributor=Idle())
+    assert (summary.exit_code, summary.done, summary.problem) == (3, 0, "no machine answered")
+    summary = run_campaign(toycar, "small", tmp_path / "idle", distributor=InOrder())
+    assert summary.exit_code == 0
+    local, other = (tmp_path / name / "results.csv" for name in ("local", "idle"))
+    assert other.read_bytes() == local.read_bytes()
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("kept_checks")
+def test_a_worker_needs_no_reader_of_yaml(toycar: Workspace, tmp_path: Path) -> None:
+    assert run_campaign(toycar, "small", tmp_path / "here", distributor=InOrder()).exit_code == 0
+    elsewhere = Elsewhere()
+    assert run_campaign(toycar, "small", tmp_path / "elsewhere", distributor=elsewhere).exit_code == 0
+    here, other = (tmp_path / name / "results.csv" for name in ("here", "elsewhere"))
+    assert other.read_bytes() == here.read_bytes()
+    assert "libcst" in elsewhere.loaded
+    assert not {"pydantic", "yaml", "mutator.workspace"} & elsewhere.loaded

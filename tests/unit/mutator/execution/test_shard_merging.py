@@ -1,0 +1,68 @@
+"""Shards from elsewhere are merged without reaching anything outside of them and of the result."""
+
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from mutator.errors import Outside
+from mutator.execution.shard_merging import merge
+from mutator.store import file_digests
+from mutator.store.file_digests import Digest
+from mutator.workspace import Workspace
+
+
+@pytest.fixture
+def shard(toycar: Workspace, tmp_path: Path, write_finished: Callable[..., Path]) -> Path:
+    run = write_finished(toycar, tmp_path / "sent" / "runs" / "part", shard="1/1")
+    shutil.rmtree(run / "proof")
+    ledger = file_digests.read(run)
+    files = {name: one for name, one in ledger.files.items() if not name.startswith("proof/")}
+    file_digests.write(run, replace(ledger, files=files))
+    return run
+
+
+@pytest.fixture
+def out(tmp_path: Path) -> Path:
+    return tmp_path / "home" / "runs" / "whole"
+
+
+def test_a_single_shard_is_merged(shard: Path, out: Path) -> None:
+    assert merge([shard], out) == out / "results.csv"
+
+
+@pytest.mark.parametrize("name", ["../../setup.py", "golden/../../../setup.py", "setup.py"])
+def test_a_file_that_the_ledger_should_not_name_is_not_copied(shard: Path, out: Path, name: str) -> None:
+    theirs, mine = shard / name, out / name
+    theirs.write_text("theirs")
+    ledger = file_digests.read(shard)
+    file_digests.write(shard, replace(ledger, files={**ledger.files, name: Digest.of(b"theirs")}))
+    mine.parent.mkdir(parents=True, exist_ok=True)
+    if mine.resolve().parent != out.resolve():
+        mine.resolve().write_text("mine")
+    with pytest.raises(Outside, match=r"digests\.json"):
+        merge([shard], out)
+    assert not mine.resolve().exists() or mine.resolve().read_text() == "mine"
+
+
+@pytest.mark.parametrize("name", ["workers", "records", "report", "series", "golden/A", "work", "plan"])
+def test_a_shard_with_a_link_is_refused(shard: Path, out: Path, name: str) -> None:
+    shutil.rmtree(shard / name, ignore_errors=True)
+    (shard / name).symlink_to(out.parent)
+    with pytest.raises(Outside, match=f"{name}: a link"):
+        merge([shard], out)
+    assert not out.parent.exists()
+
+
+@pytest.mark.parametrize("name", ["workers", "owner.lock", "plan", "campaign.yaml", ".run.json.1"])
+def test_nothing_is_merged_into_a_folder_with_a_link(shard: Path, out: Path, name: str) -> None:
+    out.mkdir(parents=True)
+    mine = out.parent / "mine"
+    mine.mkdir()
+    (mine / "1").write_text("mine")
+    (out / name).symlink_to(mine)
+    with pytest.raises(Outside, match="a link"):
+        merge([shard], out)
+    assert [path.read_text() for path in mine.iterdir()] == ["mine"]
