@@ -16,7 +16,7 @@ from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.run_provenance import check_sources
 from mutator.engines.engine_choice import make_engine
 from mutator.engines.engine_jobs import FAST, Engine, Setting
-from mutator.engines.in_target import guard, process_guard
+from mutator.engines.in_target import process_guard
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.execution.experiment_runner import Finished, Goldens, Runner, without_outcome
 from mutator.execution.written_files import Sums
