@@ -25,7 +25,7 @@ import report_page
 from playwright.sync_api import sync_playwright
 
 from mutator.execution.campaign_running import run_campaign
-from mutator.report import building
+from mutator.report import report_builder
 from mutator.results import table_building
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -62,7 +62,7 @@ def table(size: int, run: Path) -> None:
 
 
 def report(size: int, run: Path) -> None:
-    written = building.write(run, Workspace.find(root=made_up_run.ROOT))
+    written = report_builder.write_report(run, Workspace.find(root=made_up_run.ROOT))
     if written.rows < size:
         raise SystemExit(f"the report has only {written.rows} experiments")
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from mutator.report.browse import scene_facts
+from mutator.report.experiment_list import scene_facts
 from mutator.targets.manifest import TargetManifest
 from mutator.web import asset, load_order
 from mutator.workspace import Workspace

@@ -27,15 +27,15 @@ from mutator.model import Experiment, Record, Trigger
 from mutator.mutants.mutant_building import build
 from mutator.mutants.readable_patches import readable
 from mutator.outcomes.series_sampling import Sampler
-from mutator.report import browse as report_browse
-from mutator.report import page as report_page
-from mutator.report.browse import Browse
-from mutator.report.page import Content
-from mutator.report.panels.answers import answers_panel
-from mutator.report.panels.paths import paths_panel
-from mutator.report.seen import PLACE, UNTIMED_PATH
-from mutator.report.studies import ReportedRun
-from mutator.report.words import words_of
+from mutator.report import experiment_list as report_browse
+from mutator.report import markdown_and_html as report_page
+from mutator.report.experiment_facts import PLACE, UNTIMED_PATH
+from mutator.report.experiment_list import Browse
+from mutator.report.glossary import words_of
+from mutator.report.markdown_and_html import Content
+from mutator.report.panels.answers_panel import build_answers_panel
+from mutator.report.panels.fault_paths_panel import build_fault_paths_panel
+from mutator.report.reported_run import ReportedRun
 from mutator.results import table_building
 from mutator.results.outcome_counting import outcome_counts
 from mutator.review.patch_shapes import shapes
@@ -162,8 +162,8 @@ def write(size: int, out: Path) -> dict[str, float]:
         planned="",
         words=words_of(run),
         study="",
-        answers=answers_panel(run),
-        panels=[panel for panel in (paths_panel(run),) if panel],
+        answers=build_answers_panel(run),
+        panels=[panel for panel in (build_fault_paths_panel(run),) if panel],
         browse=browse,
     )
     page = report_page.page_html(content)

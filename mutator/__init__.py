@@ -42,7 +42,7 @@ HOMES = {
     "mutator.exports": ("Format",),
     "mutator.model": ("Experiment", "Fault", "Outcome", "Record", "Status", "Trigger"),
     "mutator.report.film": ("Shot",),
-    "mutator.report.history": ("History",),
+    "mutator.report.run_history": ("History",),
     "mutator.store.plan_choices": ("Choices",),
     "mutator.store.run_progress": ("Progress",),
     "mutator.audit.seal": ("Seals",),

@@ -47,7 +47,7 @@ from mutator.model import Record as Record
 from mutator.model import Status as Status
 from mutator.model import Trigger as Trigger
 from mutator.report.film import Shot as Shot
-from mutator.report.history import History as History
+from mutator.report.run_history import History as History
 from mutator.store.plan_choices import Choices as Choices
 from mutator.store.run_progress import Progress as Progress
 from mutator.workspace import Workspace as Workspace

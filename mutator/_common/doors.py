@@ -206,5 +206,5 @@ OPERATORS = Door(
     # if two make the same change, it belongs to the first, so another order changes samples
     first=("arithmetic", "comparison", "constant", "branch", "omission", "return", "argument"),
 )
-STUDIES = Door(thing="study", group="mutator.studies", kind="mutator.report.studies:Study")
+STUDIES = Door(thing="study", group="mutator.studies", kind="mutator.report.reported_run:PublishedWork")
 DOORS = (EXPORTS, IMPORTERS, DISTRIBUTORS, OPERATORS, STUDIES)

@@ -18,7 +18,7 @@ from mutator.audit.signatures import sign as write_signature
 from mutator.audit.signatures import signer
 from mutator.errors import CheckFailed, MutatorError
 from mutator.execution.spot_check import drawn, driven_again
-from mutator.report.audited_pages import pages
+from mutator.report.report_audit import pages
 from mutator.store.run_folder import RunFolder
 from mutator.store.work_stretches import package_versions, told
 from mutator.workspace import Workspace

@@ -15,8 +15,8 @@ from mutator.comparison import run_comparison as comparing
 from mutator.comparison.pairs import Change, Pair
 from mutator.comparison.run_comparison import Comparison, Finding, Gate
 from mutator.errors import MutatorError
-from mutator.report import history
-from mutator.report.history import History
+from mutator.report import run_history
+from mutator.report.run_history import History
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -126,4 +126,4 @@ def write_history(folder: str | Path) -> History:
     """Write HISTORY.md and history.html into a folder of run folders: the results of each run, and what
     changed between runs of the same plan. MutatorError if the folder holds no run with results.
     """
-    return history.write_history(Path(folder))
+    return run_history.write_history(Path(folder))

@@ -25,7 +25,7 @@ from mutator.model import OPERATORS
 from mutator.outcomes.fault_free_runs import FaultFreeRun, alerts_by_drive, load_fault_free_runs, own_alerts
 from mutator.outcomes.golden_comparison import load_trace
 from mutator.preflight import equivalence_check
-from mutator.report import building
+from mutator.report import report_builder
 from mutator.report.stills import take_stills
 from mutator.results import outcome_counting
 from mutator.results import table_building as results_table
@@ -159,16 +159,16 @@ class Run(RunContents):
             )
         return trace_frame(load_trace(self.bench.manifest, folder), self.bench.manifest)
 
-    def report(self, *, anew: bool = False) -> building.Report:
+    def report(self, *, anew: bool = False) -> report_builder.WrittenReport:
         """Write the report, Markdown and one HTML page, unless it is up to date; with `anew`, always.
 
         No experiment is rerun. Without a library, the report shows only the results.
         """
         workspace = self._workspace_if_any()
         if not anew:
-            return building.ensure(self.path, workspace)
+            return report_builder.ensure_report(self.path, workspace)
         results_table.build(self.path)
-        return building.write(self.path, workspace)
+        return report_builder.write_report(self.path, workspace)
 
     def take_stills(self, progress: Notify | None = None, *, workers: int = 1) -> str:
         """Rerun the worst camera experiments, and keep the frames at the activation, the first alert and the

@@ -6,8 +6,8 @@ from pathlib import Path
 from mutator._common.folder_search import RUNS
 from mutator.api.selection import WorkspaceLike, open_workspace
 from mutator.errors import MutatorError
-from mutator.serve.app import Site
-from mutator.serve.runs import Runs
+from mutator.serve.application import Site
+from mutator.serve.served_runs import Runs
 from mutator.serve.server import serve
 
 

@@ -1,7 +1,7 @@
 """Installed studies: published works that a campaign can reproduce, each in a separate package.
 
 A package registers its study as an entry point of the group `mutator.studies`; a campaign names it with
-`study:`. `mutator.report.studies` defines what a study adds to a report.
+`study:`. `mutator.report.reported_run` defines what a study adds to a report.
 """
 
 from collections.abc import Iterable

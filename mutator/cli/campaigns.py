@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from mutator.api.runs import Run
     from mutator.campaigns.plan import Cost
     from mutator.execution.session import Notify, Summary
-    from mutator.report.building import Report
+    from mutator.report.report_builder import WrittenReport
 
 CampaignName = Annotated[
     str,
@@ -238,7 +238,7 @@ def _take_stills(terminal: Terminal, run: "Run", notify: "Notify", workers: int)
         terminal.note(f"no stills of {problem}")
 
 
-def _report(out: Path, run: "Run", notify: "Notify") -> "Report | None":
+def _report(out: Path, run: "Run", notify: "Notify") -> "WrittenReport | None":
     if not (run.summary and run.summary.results):
         return None
     notify(mutator.Progress(stage="report"))
@@ -255,7 +255,7 @@ def _report(out: Path, run: "Run", notify: "Notify") -> "Report | None":
 
 
 def _print_end(
-    terminal: Terminal, out: Path, run: "Run", summary: "Summary", written: "Report | None"
+    terminal: Terminal, out: Path, run: "Run", summary: "Summary", written: "WrittenReport | None"
 ) -> None:
     report = (
         [out / path.relative_to(run.path) for path in (written.markdown, written.page)] if written else []

@@ -8,7 +8,7 @@ import pandas as pd
 from mutator._common.text import counted
 from mutator.errors import MutatorError
 from mutator.execution.run_traces import Traces
-from mutator.figures.figures import Drawing
+from mutator.figures.drawings import Drawing
 from mutator.figures.run_plot import marks_of
 from mutator.outcomes.series_sampling import RATE
 from mutator.paper.run_pair_plot import draw

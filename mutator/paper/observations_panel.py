@@ -12,8 +12,8 @@ from mutator.paper import observations, observations_by_seed, observations_page
 from mutator.paper.observations import Verdict
 from mutator.paper.published_counts import has_paper, load_paper
 from mutator.report.panel import Panel, rendered
-from mutator.report.panels.tables import csv_files
-from mutator.report.studies import ReportedRun
+from mutator.report.panels.tables_panel import csv_files
+from mutator.report.reported_run import ReportedRun
 from mutator.statistics.results_frame import slim
 
 if TYPE_CHECKING:

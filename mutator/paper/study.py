@@ -1,11 +1,11 @@
 """The study that the entry point in `mutator.studies` provides."""
 
-from mutator.figures.figures import Drawing
+from mutator.figures.drawings import Drawing
 from mutator.paper.example_figures import example_drawings
 from mutator.paper.observations_panel import build_observations_panel
 from mutator.paper.published_counts import has_paper, load_paper
 from mutator.paper.published_counts_check import check_paper
-from mutator.report.studies import ReportedRun, Study
+from mutator.report.reported_run import PublishedWork, ReportedRun
 from mutator.statistics.published_counts import Published
 
 
@@ -26,7 +26,7 @@ def drawings(run: ReportedRun) -> tuple[Drawing, ...]:
     return example_drawings(run.folder, run.frame, run.workspace)
 
 
-STUDY = Study(
+STUDY = PublishedWork(
     about="Rubaiyat, Qin, Alemzadeh: Experimental Resilience Assessment of An Open-Source Driving Agent",
     check=check_paper,
     published=published,

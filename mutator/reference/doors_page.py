@@ -99,7 +99,7 @@ _PLACES = (
         adds="a part of the report",
         protocol="a function from a `ReportedRun` to a `Panel` or None",
         register="`PANELS` in `mutator/report/panels/`",
-        example="`mutator/report/panels/provenance.py`",
+        example="`mutator/report/panels/provenance_panel.py`",
     ),
 )
 

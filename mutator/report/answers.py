@@ -24,10 +24,10 @@ from mutator.report.answer_parts import (
     warnings_of,
     were,
 )
-from mutator.report.dangers import dangerous, worst_of
+from mutator.report.experiment_facts import PLACE, UNTIMED_PATH
 from mutator.report.fix_order import first_to_fix
-from mutator.report.seen import PLACE, UNTIMED_PATH
-from mutator.report.studies import ReportedRun
+from mutator.report.most_dangerous import dangerous, worst_of
+from mutator.report.reported_run import ReportedRun
 from mutator.results.result_rows import Row, rows_of
 
 TYPES = 6  # maximum number of fault types that an answer lists

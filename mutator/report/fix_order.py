@@ -8,8 +8,8 @@ import pandas as pd
 
 from mutator.outcomes.fault_paths import UntimedPath
 from mutator.report.answer_parts import FIRST, SILENT, Answer, Cell, Link, Listing, kind_link, share, to_list
-from mutator.report.dangers import NO_CONTACT, SEVERITY
-from mutator.report.paths import RunPaths, link_text
+from mutator.report.fault_path_data import RunPaths, link_text
+from mutator.report.most_dangerous import NO_CONTACT, SEVERITY
 
 LISTED = 5  # maximum number of fault types listed
 

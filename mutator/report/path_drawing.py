@@ -7,7 +7,7 @@ from html import escape
 from typing import Any
 from urllib.parse import quote
 
-from mutator.report.paths import PathCounts, link_text
+from mutator.report.fault_path_data import PathCounts, link_text
 from mutator.stpa import shapes
 from mutator.stpa.analysis import LinkModel, StructureModel
 from mutator.stpa.layout import Arrow, Box, lay_out

@@ -19,10 +19,10 @@ from mutator._common.events import EVENTS_FD
 from mutator.errors import Absent, JobEnded, MutatorError
 from mutator.execution.progress_text import endings
 from mutator.serve.job_events import Event, EventReader, Link, Phase
-from mutator.serve.orders import TRIES, Work
+from mutator.serve.job_requests import TRIES, Work
 from mutator.serve.responses import without_places
 
-_KEEPER = "mutator.serve.keeper"
+_GUARD_MODULE = "mutator.serve.job_guard"
 _COLUMNS = "200"  # line width of a job's output; pages wrap the lines
 _LOG_BYTES = 100_000  # only the last bytes of a job's output are kept
 _READ_BYTES = 65_536
@@ -58,7 +58,7 @@ class Job:
     error: str = ""
     links: dict[str, str] = field(default_factory=dict)  # kind of file -> path
     events: EventReader = field(default_factory=EventReader)
-    hold: int | None = None  # the writing end of the pipe to the job's keeper
+    hold: int | None = None  # the writing end of the pipe to the job's guard
 
     def told(self) -> dict[str, Any]:
         order = self.work.order
@@ -193,7 +193,7 @@ class Jobs:
                 return None
             try:
                 process = subprocess.Popen(
-                    [sys.executable, "-P", "-m", _KEEPER, str(watched), *job.work.words],
+                    [sys.executable, "-P", "-m", _GUARD_MODULE, str(watched), *job.work.words],
                     pass_fds=[watched, events],
                     env={**os.environ, "COLUMNS": _COLUMNS, EVENTS_FD: str(events)},
                     stdin=subprocess.DEVNULL,

@@ -14,14 +14,14 @@ from mutator.comparison import comparison_files
 from mutator.comparison import run_comparison as comparing
 from mutator.errors import Absent, MutatorError
 from mutator.outcomes.fault_free_runs import load_fault_free_runs, own_alerts
-from mutator.report import building
+from mutator.report import report_builder
 from mutator.report.panel import FOLDER
-from mutator.report.stamp import made_from
+from mutator.report.report_digests import made_from
 from mutator.results.table_reader import Results
 from mutator.serve.page_tokens import PageTokens, run_page
 from mutator.serve.report_cache import ReportCache
 from mutator.serve.responses import STORED, OpenFile, kind_of
-from mutator.serve.runs import Runs, open_in_run
+from mutator.serve.served_runs import Runs, open_in_run
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_script import read_script, script_of
 from mutator.web import load_order
@@ -78,7 +78,7 @@ class Shown:
             raise Absent("no such file", expected="a file of the report")
         if not name.endswith(".html"):
             return Response(data, media_type=kind_of(name), headers=STORED)
-        if name == building.PAGE:
+        if name == report_builder.PAGE_FILE:
             head = _HEAD.format(self._tokens.token(run_page(run))).encode()
             data = head.join(data.split(b"</head>", 1))
             data = _SCRIPTS.join(data.rsplit(b"</body>", 1))
@@ -91,7 +91,7 @@ class Shown:
         if folder.finished:
             for problem in tables(folder)[1]:
                 raise problem
-        return building.build(folder, self._workspace).files
+        return report_builder.build_report(folder, self._workspace).files
 
     def _comparison(self, a: Path, b: Path) -> dict[str, bytes]:
         made = comparing.compare(a, b, None, (self._alerts(a), self._alerts(b)))

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import uvicorn
 
 from mutator.errors import MutatorError
-from mutator.serve.app import Site, application
+from mutator.serve.application import Site, build_application
 from mutator.serve.connections import Connection
 from mutator.serve.security import HOST, Guarded
 
@@ -33,7 +33,7 @@ def serve(site: Site, *, port: int, ready: Callable[[str], None]) -> None:
 
 def server_of(site: Site, *, port: int, token: str) -> uvicorn.Server:
     config = uvicorn.Config(
-        Guarded(application(site), port=port, token=token),
+        Guarded(build_application(site), port=port, token=token),
         http=Connection,
         backlog=_BACKLOG,
         access_log=False,  # the log would show the token

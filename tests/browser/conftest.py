@@ -20,8 +20,8 @@ from mutator.campaigns.plan import make_plan
 from mutator.model import Activation, Experiment, Outcome, Record, Status
 from mutator.mutants.mutant_building import build
 from mutator.outcomes.series_sampling import Sampler, keep_series
-from mutator.report import building
-from mutator.report.panels import figures
+from mutator.report import report_builder
+from mutator.report.panels import figures_panel
 from mutator.results import table_building
 from mutator.store.checksummed_lines import LineWriter
 from mutator.store.patch_files import PatchWriter
@@ -108,8 +108,8 @@ def run(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], 
     pack(out.path, plan.digest, {packed.experiment_id: 0}, 1)
     keep_series(out.path, manifest, golden, faulty, kept)
     with pytest.MonkeyPatch.context() as patch:  # figures take seconds and are tested elsewhere
-        patch.setattr(figures, "drawings", lambda frame: ())
-        building.write(out.path, None)
+        patch.setattr(figures_panel, "draw_figures", lambda frame: ())
+        report_builder.write_report(out.path, None)
     return out.path
 
 
@@ -164,9 +164,9 @@ Serve = Callable[..., AbstractContextManager[str]]
 @pytest.fixture(scope="session")
 def serve() -> Serve:
     pytest.importorskip("uvicorn", reason="extra `serve` is not installed")
-    from mutator.serve.app import Site
-    from mutator.serve.runs import Runs
+    from mutator.serve.application import Site
     from mutator.serve.security import HOST
+    from mutator.serve.served_runs import Runs
     from mutator.serve.server import listening, server_of
 
     @contextmanager

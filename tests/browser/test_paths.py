@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from mutator.model import Activation, Experiment, Outcome
-from mutator.report import building
-from mutator.report.panels import figures
+from mutator.report import report_builder
+from mutator.report.panels import figures_panel
 from mutator.results import table_building
 from mutator.workspace import Workspace
 
@@ -63,8 +63,8 @@ def report(
     run = write_run(workspace, folder / "run", result_of)
     table_building.build(run)
     with pytest.MonkeyPatch.context() as patch:  # figures take seconds and are tested elsewhere
-        patch.setattr(figures, "drawings", lambda frame: ())
-        building.write(run, None)
+        patch.setattr(figures_panel, "draw_figures", lambda frame: ())
+        report_builder.write_report(run, None)
     return run
 
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from mutator.report import building
-from mutator.report.panels import figures
+from mutator.report import report_builder
+from mutator.report.panels import figures_panel
 from mutator.store import plan_file
 from mutator.store.patch_files import Patches
 from mutator.store.run_folder import RunFolder
@@ -341,8 +341,8 @@ def test_a_target_without_alerts_has_no_alert_column(
     other = tmp_path / "run"
     shutil.copytree(run, other, ignore=shutil.ignore_patterns("report"))
     monkeypatch.setattr(RunFolder, "has_alerts", False)
-    monkeypatch.setattr(figures, "drawings", lambda frame: ())
-    building.write(other, None)
+    monkeypatch.setattr(figures_panel, "draw_figures", lambda frame: ())
+    report_builder.write_report(other, None)
     told = [*page.texts("#grid th"), *page.texts("[data-facet] > summary"), *page.texts("option")]
     assert sum("alert" in text.lower() for text in told) >= 4
     page.url = (other / "report" / "index.html").as_uri()

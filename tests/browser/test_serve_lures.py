@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from mutator._common.hashing import digest
-from mutator.report.panels import figures
-from mutator.report.stamp import made_from
+from mutator.report.panels import figures_panel
+from mutator.report.report_digests import made_from
 from mutator.review.decisions import load_review
 from mutator.review.mutant_groups import of_library
 from mutator.review.review_page import page_html
@@ -94,7 +94,7 @@ def address(
     workspace: Workspace, runs: Path, serve: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[str]:
     """The address of a server whose jobs stay in the queue."""
-    monkeypatch.setattr(figures, "drawings", lambda frame: ())
+    monkeypatch.setattr(figures_panel, "draw_figures", lambda frame: ())
     monkeypatch.setattr(Jobs, "_started", lambda jobs, job: None)
     with serve(workspace, (runs,)) as found:
         yield found

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from mutator.report.panels import figures
+from mutator.report.panels import figures_panel
 from mutator.workspace import Workspace
 
 Visit = Callable[..., Any]
@@ -25,7 +25,7 @@ def address(
     folder: Path, run: Path, serve: Callable[..., Any], module_patch: pytest.MonkeyPatch
 ) -> Iterator[str]:
     """The address of a server that uses the run's library."""
-    module_patch.setattr(figures, "drawings", lambda frame: ())  # they take seconds
+    module_patch.setattr(figures_panel, "draw_figures", lambda frame: ())  # they take seconds
     root = run.parent / "toy"
     with serve(Workspace(library=root / "fault_library", templates=root / "templates"), (folder,)) as found:
         yield found

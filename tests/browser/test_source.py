@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from mutator.model import Experiment, Outcome
-from mutator.report import building
-from mutator.report.panels import figures
+from mutator.report import report_builder
+from mutator.report.panels import figures_panel
 from mutator.results import table_building
 from mutator.workspace import Workspace
 
@@ -34,8 +34,8 @@ def report(
     out = write_run(workspace, folder / "run", result_of, changed=of_operators(workspace, "toycar/driver.py"))
     table_building.build(out)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(figures, "drawings", lambda frame: ())
-        building.write(out, workspace)
+        patch.setattr(figures_panel, "draw_figures", lambda frame: ())
+        report_builder.write_report(out, workspace)
     return out
 
 

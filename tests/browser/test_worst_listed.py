@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from mutator.report import browse, building
-from mutator.report.panels import figures
+from mutator.report import experiment_list, report_builder
+from mutator.report.panels import figures_panel
 
 if TYPE_CHECKING:
     from conftest import Page
@@ -19,9 +19,9 @@ LISTED = 10
 @pytest.fixture
 def large(run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     shutil.copytree(run, tmp_path / "run")
-    monkeypatch.setattr(browse, "LISTED", LISTED)
-    monkeypatch.setattr(figures, "drawings", lambda frame: ())
-    building.write(tmp_path / "run", None)
+    monkeypatch.setattr(experiment_list, "LISTED", LISTED)
+    monkeypatch.setattr(figures_panel, "draw_figures", lambda frame: ())
+    report_builder.write_report(tmp_path / "run", None)
     return tmp_path / "run"
 
 

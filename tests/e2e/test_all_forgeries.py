@@ -19,7 +19,7 @@ from mutator._common.hashing import canonical
 from mutator.audit.seal import Seals, seals_of
 from mutator.errors import MutatorError
 from mutator.execution.campaign_running import run_campaign
-from mutator.report import building
+from mutator.report import report_builder
 from mutator.store import file_digests
 from mutator.store.approvals import write_approvals
 from mutator.store.file_digests import Digest
@@ -49,7 +49,7 @@ def genuine(
     assert run_campaign(workspace, "small", run, engine="fork").exit_code == 0
     group = {"group": "0" * 12, "by": "Jane", "decision": "approved", "diff": "1" * 16, "remarks": []}
     write_approvals(run, {"schema": "reviewed/1", "target": "toycar", "groups": [group]})
-    building.write(run, workspace)
+    report_builder.write_report(run, workspace)
     return workspace, run, seals_of(RunFolder.open(run))
 
 

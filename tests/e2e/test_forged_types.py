@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from mutator.execution.campaign_running import run_campaign
-from mutator.report import building
+from mutator.report import report_builder
 from mutator.store.approvals import write_approvals
 from mutator.store.series_script import read_script, write_script
 from mutator.workspace import Workspace
@@ -36,7 +36,7 @@ def genuine(
     assert run_campaign(workspace, "small", run, engine="fork").exit_code == 0
     group = {"group": "0" * 12, "by": "Jane", "decision": "approved", "diff": "1" * 16, "remarks": []}
     write_approvals(run, {"schema": "reviewed/1", "target": "toycar", "groups": [group]})
-    building.write(run, workspace)
+    report_builder.write_report(run, workspace)
     return workspace, run
 
 

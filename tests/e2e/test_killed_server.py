@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 from mutator._common.files import is_half_written
-from mutator.serve.keeper import PATIENCE_S
+from mutator.serve.job_guard import PATIENCE_S
 from mutator.workspace import Workspace
 
 CAMPAIGN = {"kind": "campaign", "campaign": "toy", "name": "new", "limit": 6, "workers": 2}

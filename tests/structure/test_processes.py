@@ -7,7 +7,7 @@ PROCESSES = (
     "mutator.execution.pytest_plugin",
     "mutator.execution.pytest_worker",
     "mutator.execution.cluster.piece_process",
-    "mutator.serve.keeper",
+    "mutator.serve.job_guard",
     "mutator.engines.in_target.fork_server",
     "mutator.engines.in_target.run_once",
 )

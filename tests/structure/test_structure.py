@@ -164,14 +164,14 @@ VIOLATIONS = {
     "new package in the target": ("target/selfdrive/novel.py", "X = 1"),
     "target": ("mutator/engines/reference_engine.py", "import selfdrive.sim.run"),
     "harness": ("target/selfdrive/sim/run.py", "import mutator.errors"),
-    "study": ("mutator/report/building.py", "from mutator import paper"),
+    "study": ("mutator/report/report_builder.py", "from mutator import paper"),
     "new package": ("mutator/novel.py", "X = 1"),
     "stranger in a target's process": ("mutator/engines/in_target/run_once.py", "import pandas"),
     "stranger in the glue": ("mutator/glue.py", "import yaml"),
     "harness in the glue": ("mutator/glue.py", "from mutator.errors import MutatorError"),
     "glue in the harness": ("mutator/engines/engine_jobs.py", "from mutator import glue"),
-    "hidden import": ("mutator/report/page.py", "def f():\n    from mutator.report import panel"),
-    "namesake": ("mutator/report/page.py", "def page():\n    pass"),
+    "hidden import": ("mutator/report/film.py", "def f():\n    from mutator.report import panel"),
+    "namesake": ("mutator/report/film.py", "def film():\n    pass"),
 }
 
 

@@ -16,8 +16,8 @@ import mutator
 from mutator.errors import MutatorError
 from mutator.execution.cluster.bundle import Bundle, lay_out
 from mutator.execution.session import open_session
-from mutator.serve.app import Site, application
-from mutator.serve.runs import Runs
+from mutator.serve.application import Site, build_application
+from mutator.serve.served_runs import Runs
 from mutator.store.plan_choices import Choices
 
 from .hostile_libraries import SECRET, TRICKS, World, plant_hooks
@@ -145,7 +145,7 @@ def asked(world: World, address: str) -> tuple[int, str]:
 
     site = Site(workspace=world.workspace, runs=Runs((world.out,)))
     try:
-        asyncio.run(application(site)(scope, receive, send))
+        asyncio.run(build_application(site)(scope, receive, send))
     finally:
         site.jobs.close()
     return 0, b"".join(said).decode("utf-8", "replace")

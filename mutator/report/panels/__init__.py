@@ -6,22 +6,31 @@ from collections.abc import Callable
 
 from mutator._common.doors import STUDIES
 from mutator.report.panel import Panel
-from mutator.report.panels import failed, figures, mutation_score, paths, provenance, seeds, source, tables
-from mutator.report.studies import ReportedRun
+from mutator.report.panels import (
+    failed_runs_panel,
+    fault_paths_panel,
+    figures_panel,
+    mutation_score_panel,
+    provenance_panel,
+    seeds_panel,
+    source_panel,
+    tables_panel,
+)
+from mutator.report.reported_run import ReportedRun
 
 PANELS: tuple[Callable[[ReportedRun], Panel | None], ...] = (
-    mutation_score.score_panel,
-    source.source_panel,
-    paths.paths_panel,
-    tables.tables_panel,
-    seeds.seeds_panel,
-    figures.figures_panel,
-    failed.failed_panel,
-    provenance.provenance_panel,
+    mutation_score_panel.build_mutation_score_panel,
+    source_panel.build_source_panel,
+    fault_paths_panel.build_fault_paths_panel,
+    tables_panel.build_tables_panel,
+    seeds_panel.build_seeds_panel,
+    figures_panel.build_figures_panel,
+    failed_runs_panel.build_failed_runs_panel,
+    provenance_panel.build_provenance_panel,
 )
 
 
-def study_panels(run: ReportedRun) -> tuple[Panel, ...]:
+def build_study_panels(run: ReportedRun) -> tuple[Panel, ...]:
     """Return the panels of the study's page: those of the study, then the run's tables and figures next to
     the published ones. Empty if the run has too few experiments or none of the study's faults.
     """
@@ -29,5 +38,9 @@ def study_panels(run: ReportedRun) -> tuple[Panel, ...]:
         return ()
     with STUDIES.running(run.folder.head.study or ""):
         said = [panel for panel_of in run.study.panels if (panel := panel_of(run))]
-        beside = (tables.published_panel(run), figures.study_figures(run)) if said else ()
+        beside = (
+            (tables_panel.build_published_panel(run), figures_panel.build_study_figures_panel(run))
+            if said
+            else ()
+        )
     return (*said, *(panel for panel in beside if panel))

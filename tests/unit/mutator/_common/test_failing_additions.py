@@ -10,7 +10,7 @@ from mutator._common.doors import DOORS, EXPORTS, OPERATORS, STUDIES
 from mutator.cli.app import main
 from mutator.errors import EXIT_WRONG_INPUT, BadAddition, Shortage
 from mutator.execution.distribution import distributor
-from mutator.report import building
+from mutator.report import report_builder
 from mutator.workspace import Workspace
 
 from ..report.made_run import make_run
@@ -20,7 +20,7 @@ SOURCE = """\
 from mutator.execution.distribution import DistributorKind
 from mutator.exports import Export
 from mutator.operators import Operator
-from mutator.report.studies import Study
+from mutator.report.reported_run import PublishedWork
 
 def fail(*_):
     raise ValueError("no luck")
@@ -39,7 +39,7 @@ tally = Export(about="", file="tally.txt", write=fail)
 words = Export(about="", file="words.txt", write=lambda _: "text")
 shut = DistributorKind(about="", open=fail)
 late = DistributorKind(about="", open=lambda *_: Failing())
-panel = Study(about="", check=lambda _: (), published=fail, panels=(fail,), drawings=fail)
+panel = PublishedWork(about="", check=lambda _: (), published=fail, panels=(fail,), drawings=fail)
 """
 ADDED = {
     "operators": ("boom", "odd", "leaves"),
@@ -110,7 +110,7 @@ def test_a_study_whose_panel_fails_is_named_with_its_package(tmp_path: Path) -> 
     run = tmp_path / "run"
     run.mkdir()
     with pytest.raises(BadAddition, match=f"study 'panel' of package rvdoors 0.3 {NO_LUCK}"):
-        building.write(make_run(run, study="panel"), Workspace.find(root=CLONE))
+        report_builder.write_report(make_run(run, study="panel"), Workspace.find(root=CLONE))
 
 
 def test_only_the_code_of_other_packages_is_blamed() -> None:

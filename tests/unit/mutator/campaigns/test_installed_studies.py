@@ -13,7 +13,7 @@ from mutator.campaigns.installed_studies import find_study
 from mutator.campaigns.plan import load_plan, make_plan
 from mutator.checks.library_check import check_library
 from mutator.errors import MutatorError
-from mutator.report import building
+from mutator.report import report_builder
 from mutator.workspace import Workspace
 
 from ..report.made_run import make_run
@@ -46,7 +46,7 @@ def test_the_shipped_study_is_installed() -> None:
 def test_the_report_contains_a_study_from_another_package(installed: None, tmp_path: Path) -> None:
     run = tmp_path / "run"
     run.mkdir()
-    written = building.write(make_run(run, study="crash_tests"), Workspace.find(root=CLONE))
+    written = report_builder.write_report(make_run(run, study="crash_tests"), Workspace.find(root=CLONE))
     page = written.page.with_name("study.html").read_text()
     for text in (written.markdown.with_name("STUDY.md").read_text(), page):
         assert "Crashed runs: 1 here, 12 in the published tests." in text
@@ -71,9 +71,12 @@ STRANGERS = {
     "raising": ("strange_studies.raising:STUDY", "ZeroDivisionError: division by zero"),
     "unwritten": ("strange_studies.unwritten:STUDY", "SyntaxError"),
     "malformed": ("not an object!", "cannot be loaded"),
-    "function": ("json:dumps", "is of type function; expected a mutator.report.studies.Study"),
-    "module": ("json", "is of type module; expected a mutator.report.studies.Study"),
-    "unmade": ("mutator.report.studies:Study", "is of type type; expected a mutator.report.studies.Study"),
+    "function": ("json:dumps", "is of type function; expected a mutator.report.reported_run.PublishedWork"),
+    "module": ("json", "is of type module; expected a mutator.report.reported_run.PublishedWork"),
+    "unmade": (
+        "mutator.report.reported_run:PublishedWork",
+        "is of type type; expected a mutator.report.reported_run.PublishedWork",
+    ),
     "mirror": ("strange_studies.parts:MIRROR", "is of type SimpleNamespace; expected a mutator"),
     "idle": ("strange_studies.idle:STUDY", "cannot be loaded: TypeError: .* check must be a function"),
     "paneless": ("strange_studies.paneless:STUDY", r"cannot be loaded: TypeError: .* panels\[0\] must be"),
@@ -81,17 +84,17 @@ STRANGERS = {
 PARTS = """
 from types import SimpleNamespace
 
-from mutator.report.studies import Study
+from mutator.report.reported_run import PublishedWork
 
 def nothing(*_):
     return ()
 
 PARTS = {"about": "", "check": nothing, "published": nothing, "panels": (), "drawings": nothing}
 MIRROR = SimpleNamespace(**PARTS)
-FAILING = Study(**PARTS | {"check": lambda _: 1 / 0})
-TALKING = Study(**PARTS | {"check": lambda _: ["oh"]})
+FAILING = PublishedWork(**PARTS | {"check": lambda _: 1 / 0})
+TALKING = PublishedWork(**PARTS | {"check": lambda _: ["oh"]})
 """
-INVALID = "from strange_studies.parts import PARTS, Study; STUDY = Study(**PARTS | {change})"
+INVALID = "from strange_studies.parts import PARTS, PublishedWork; STUDY = PublishedWork(**PARTS | {change})"
 BAD_CHECKS = {
     "failing": ("strange_studies.parts:FAILING", "fails: ZeroDivisionError: division by zero"),
     "talking": ("strange_studies.parts:TALKING", "returned 'oh', which is not a MutatorError"),
@@ -153,7 +156,7 @@ def test_an_error_in_a_studys_check_is_reported_as_a_problem(
 def test_a_report_is_written_without_an_invalid_study(strangers: None, tmp_path: Path) -> None:
     run = tmp_path / "run"
     run.mkdir()
-    written = building.write(make_run(run, study="function"), Workspace.find(root=CLONE))
+    written = report_builder.write_report(make_run(run, study="function"), Workspace.find(root=CLONE))
     assert "function, which cannot be loaded here" in written.markdown.read_text()
 
 

@@ -10,10 +10,10 @@ import pandas as pd
 import pytest
 
 from mutator.execution.campaign_running import run_campaign
-from mutator.figures.figures import Drawing, drawing_files
+from mutator.figures.drawings import Drawing, drawing_files
 from mutator.paper.example_figures import candidates, example_drawings
 from mutator.paper.unsafe_actions import WANTED, Pair, Wanted
-from mutator.report import building
+from mutator.report import report_builder
 from mutator.statistics.results_frame import load
 from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
@@ -83,7 +83,7 @@ def test_rewriting_a_report_starts_no_process(place: Path, monkeypatch: pytest.M
     monkeypatch.setattr("subprocess.Popen", start)
     monkeypatch.setattr("mutator.execution.single_run.run_single", start)
     workspace = Workspace.find(root=place / "toy")
-    report = building.write(place / "run", workspace)
+    report = report_builder.write_report(place / "run", workspace)
     assert '"packed": true' in report.page.read_text()
     assert drawn(place, BRAKE).figure is not None
     assert not (place / "run" / "traces").exists()

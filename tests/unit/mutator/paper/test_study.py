@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.report import building
+from mutator.report import report_builder
 from mutator.workspace import Workspace
 from tests.made_up_results import write_results
 
@@ -25,7 +25,7 @@ def run(tmp_path: Path) -> Path:
 
 def study_forms(run: Path) -> tuple[str, str]:
     """Return the study's Markdown and the text of its page."""
-    building.write(run, HERE)
+    report_builder.write_report(run, HERE)
     report = run / "report"
     return (report / "STUDY.md").read_text(), " ".join(Page((report / "study.html").read_text()).texts)
 
@@ -51,17 +51,17 @@ def test_the_observations_are_in_a_file_a_table_the_markdown_and_the_page(run: P
 
 
 def test_without_a_library_there_are_no_observations(run: Path) -> None:
-    written = building.write(run, None)
+    written = report_builder.write_report(run, None)
     assert "observation" not in written.markdown.read_text() + written.page.read_text()
     assert not (run / "report" / "observations.md").exists()
 
 
 def test_the_report_links_to_the_page_of_the_study(run: Path) -> None:
-    written = building.write(run, HERE)
+    written = report_builder.write_report(run, HERE)
     assert "[STUDY.md](STUDY.md)" in written.markdown.read_text()
     assert "study.html" in Page(written.page.read_text()).links
     write_results(run, COLUMNS, LINES)
-    written = building.write(run, HERE)
+    written = report_builder.write_report(run, HERE)
     assert "STUDY.md" not in written.markdown.read_text()
     assert "study.html" not in Page(written.page.read_text()).links
     assert not (run / "report" / "study.html").exists()
@@ -80,7 +80,7 @@ def test_an_experiment_outside_the_plan_has_no_figure(run: Path) -> None:
 def test_the_origin_says_which_data_of_the_paper_are_missing(run: Path, toycar: Workspace) -> None:
     said = "the published numbers are not in this library"
     for workspace, expected in ((toycar, True), (HERE, False)):
-        written = building.write(run, workspace)
+        written = report_builder.write_report(run, workspace)
         for text in (written.markdown.read_text(), written.page.read_text()):
             assert "driving_agent_resilience (Rubaiyat" in text
             assert (said in text) is expected

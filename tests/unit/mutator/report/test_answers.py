@@ -12,11 +12,11 @@ import pytest
 from mutator.outcomes.fault_paths import LinkState, PathLink, UntimedPath
 from mutator.report.answer_parts import NO_ALERT, Answer, Codes, Link, Part, to_list
 from mutator.report.answers import answers_of
-from mutator.report.dangers import dangerous
+from mutator.report.fault_path_data import RunPaths
 from mutator.report.fix_order import first_to_fix
-from mutator.report.panels.answers import answers_panel
-from mutator.report.paths import RunPaths
-from mutator.report.studies import ReportedRun
+from mutator.report.most_dangerous import dangerous
+from mutator.report.panels.answers_panel import build_answers_panel
+from mutator.report.reported_run import ReportedRun
 from mutator.results.table_columns import SINCE, result_columns
 from mutator.store.checksummed_lines import written
 from mutator.store.run_folder import RunFolder
@@ -228,7 +228,7 @@ def names_of(run: ReportedRun, empty: str) -> set[str]:
 
 
 def test_a_report_without_hazards_has_no_empty_table(run: ReportedRun) -> None:
-    panel = answers_panel(part_of(run, names_of(run, "t_h1")))
+    panel = build_answers_panel(part_of(run, names_of(run, "t_h1")))
     assert "0 of 3 activated faults (0 %) led to a hazard." in panel.markdown
     assert "## Which hazards were silent\n\nNo hazard occurred." in panel.markdown
     assert "| worst" not in panel.markdown

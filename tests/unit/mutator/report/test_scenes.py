@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from mutator.report.browse import scene_facts
+from mutator.report.experiment_list import scene_facts
 from mutator.triggers.json_trees import Tree
 from mutator.workspace import Workspace
 

@@ -8,11 +8,11 @@ import pytest
 
 from mutator.api.runs import load_run
 from mutator.model import Experiment, Outcome, Status
-from mutator.report.browse import _listed, _table
-from mutator.report.panels.mutation_score import score_panel
-from mutator.report.panels.source import source_panel
+from mutator.report.experiment_list import _listed, _table
+from mutator.report.panels.mutation_score_panel import build_mutation_score_panel
+from mutator.report.panels.source_panel import build_source_panel
+from mutator.report.reported_run import ReportedRun
 from mutator.report.source_lines import Mark
-from mutator.report.studies import ReportedRun
 from mutator.results import table_building
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -67,7 +67,7 @@ def test_lines_have_the_worst_outcome_of_their_mutants(toycar: Workspace, run: P
 
 def test_a_line_leads_to_its_experiments(toycar: Workspace, run: Path) -> None:
     reported = ReportedRun.open(RunFolder.open(run), toycar)
-    panel = source_panel(reported)
+    panel = build_source_panel(reported)
     assert panel is not None
     page = Page(str(panel.html))
     assert not page.open
@@ -105,7 +105,7 @@ def test_the_source_of_a_changed_target_is_not_shown(toycar: Workspace, run: Pat
     reported = ReportedRun.open(
         RunFolder.open(run), Workspace(library=toycar.library, templates=toycar.templates)
     )
-    panel, score = source_panel(reported), score_panel(reported)
+    panel, score = build_source_panel(reported), build_mutation_score_panel(reported)
     assert panel is not None and score is not None
     assert "has changed since this run was planned" in panel.markdown
     assert "wanted" not in str(panel.html)
@@ -118,5 +118,5 @@ def test_a_run_without_operators_has_no_source_view_and_no_score(
     out = write_run(toycar, tmp_path / "run")
     table_building.build(out)
     reported = ReportedRun.open(RunFolder.open(out), toycar)
-    assert source_panel(reported) is None and score_panel(reported) is None
+    assert build_source_panel(reported) is None and build_mutation_score_panel(reported) is None
     assert not {"line", "lasting"} & {c["name"] for c in _table(reported, _listed(reported))["columns"]}

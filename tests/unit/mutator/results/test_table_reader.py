@@ -21,7 +21,7 @@ from mutator.execution.single_run import run_single
 from mutator.exports import Format
 from mutator.exports.write import export
 from mutator.model import Experiment, Outcome, Status
-from mutator.report import building
+from mutator.report import report_builder
 from mutator.results import table_building
 from mutator.results.outcome_counting import hazard_names as checked_hazards
 from mutator.results.table_columns import (
@@ -171,7 +171,7 @@ def test_exports_and_the_report_use_the_names_of_the_target(run: Path, crane: Wo
     assert "hazard CRUSHED [s]" in export(run, Format.JUNIT).read_text()
     elements = export(run, Format.MUTATION_ELEMENTS, workspace=crane).read_text()
     assert "CRUSHED, DROPPED in" in elements
-    text = building.write(run, crane).markdown.read_text()
+    text = report_builder.write_report(run, crane).markdown.read_text()
     assert "CRUSHED" in text
     assert "H1" not in text
 

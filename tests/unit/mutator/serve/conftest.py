@@ -13,11 +13,11 @@ from typing import Any
 
 import pytest
 
-from mutator.report.panels import figures
-from mutator.serve.app import Site
+from mutator.report.panels import figures_panel
+from mutator.serve.application import Site
 from mutator.serve.page_tokens import HEADER, HOME, review_page
-from mutator.serve.runs import Runs
 from mutator.serve.security import HOST
+from mutator.serve.served_runs import Runs
 from mutator.serve.server import listening, server_of
 from mutator.workspace import Workspace
 
@@ -148,6 +148,8 @@ def client(
     night.mkdir(parents=True)
     make_run(night)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(figures, "drawings", lambda frame: ())  # these take seconds and are tested elsewhere
+        patch.setattr(
+            figures_panel, "draw_figures", lambda frame: ()
+        )  # these take seconds and are tested elsewhere
         with served_at(workspace, place / "runs") as client:
             yield client

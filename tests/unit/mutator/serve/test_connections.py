@@ -19,8 +19,8 @@ from .conftest import TOKEN, Client
 SERVER = """
 import resource, sys
 from pathlib import Path
-from mutator.serve.app import Site
-from mutator.serve.runs import (Runs)
+from mutator.serve.application import Site
+from mutator.serve.served_runs import (Runs)
 from mutator.serve.server import serve
 from mutator.workspace import Workspace
 resource.setrlimit(resource.RLIMIT_NOFILE, (64, 64))

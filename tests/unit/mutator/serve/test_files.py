@@ -10,14 +10,14 @@ import pytest
 
 from mutator._common import caches
 from mutator.errors import MutatorError
-from mutator.report import building
-from mutator.report.stamp import made_from, write_files
+from mutator.report import report_builder
+from mutator.report.report_digests import made_from, write_files
 from mutator.results import table_building
 from mutator.serve.page_tokens import PageTokens
 from mutator.serve.report_cache import ReportCache
 from mutator.serve.report_pages import Shown
 from mutator.serve.responses import without_places
-from mutator.serve.runs import Runs
+from mutator.serve.served_runs import Runs
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_script import script_of
 from mutator.workspace import Workspace
@@ -217,7 +217,7 @@ def test_a_report_is_built_once(client: Client, linked: Path, monkeypatch: pytes
     assert not (linked / "report").exists()
     before = [path.name for path in caches.of_pages().iterdir()]
     with monkeypatch.context() as patch:
-        patch.setattr(building, "build", None)
+        patch.setattr(report_builder, "build_report", None)
         assert client.get("/runs/linked/report/index.html").data == first
         monkeypatch.setattr(client.site.shown, "_reports", ReportCache())
         assert client.get("/runs/linked/report/index.html").data == first

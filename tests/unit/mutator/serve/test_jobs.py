@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.report.panels import figures
+from mutator.report.panels import figures_panel
+from mutator.serve.job_requests import Rerun, Work
 from mutator.serve.jobs import Job, Jobs, State
-from mutator.serve.orders import Rerun, Work
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -32,7 +32,7 @@ def busy(
     shutil.rmtree(workspace.library / "faults" / "hostile")
     (place / "runs").mkdir()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(figures, "drawings", lambda frame: ())
+        patch.setattr(figures_panel, "draw_figures", lambda frame: ())
         with served_at(workspace, place / "runs") as client:
             order = {"kind": "campaign", "campaign": "small", "name": "first", "limit": 2, "workers": 1}
             answer = client.post("/api/jobs", order)

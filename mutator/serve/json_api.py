@@ -6,12 +6,12 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
 from mutator.errors import GroupsChanged, JobEnded, MutatorError
+from mutator.serve.job_requests import Desk, Work
 from mutator.serve.jobs import Jobs
-from mutator.serve.orders import Desk, Work
 from mutator.serve.page_tokens import HEADER, HOME, PageTokens, review_page, run_page
 from mutator.serve.responses import error_facts
-from mutator.serve.reviews import Decisions, Reviews, Selection
-from mutator.serve.runs import Runs
+from mutator.serve.served_reviews import Decisions, Reviews, Selection
+from mutator.serve.served_runs import Runs
 
 _MOST_WORDS = 100  # the maximum number of parameters in an address
 

@@ -8,9 +8,9 @@ import pytest
 
 from mutator._common.files import write_json
 from mutator.model import Experiment
-from mutator.report import browse
-from mutator.report.browse import column, details, media, table
-from mutator.report.seen import PLACE
+from mutator.report import experiment_list
+from mutator.report.experiment_facts import PLACE
+from mutator.report.experiment_list import column, details, media, table
 from mutator.review.patch_shapes import shapes
 from mutator.store.run_folder import RunFolder
 from tests.made_head import made_head
@@ -91,5 +91,5 @@ def test_pictures_beyond_the_budget_are_links(tmp_path: Path) -> None:
 
 def test_the_list_does_not_depend_on_the_order_of_results() -> None:
     frame = results({"experiment_id": "b"}, {"experiment_id": "a"}, {"module": "car"})
-    listed = frame.sort_values(browse.READING_ORDER)
+    listed = frame.sort_values(experiment_list.READING_ORDER)
     assert list(listed["experiment_id"]) == ["2", "a", "b"]

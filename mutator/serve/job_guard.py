@@ -1,8 +1,8 @@
 """Runs a job as a child process, and ends all its processes when the server ends.
 
-`python -m mutator.serve.keeper FD WORDS...` runs `mutator WORDS...`. FD is the reading end of a pipe from the
-server. When the writing end closes, the keeper asks the command to end, and later kills it with its
-descendants. If the keeper itself is killed, the kernel kills the command.
+`python -m mutator.serve.job_guard FD WORDS...` runs `mutator WORDS...`. FD is the reading end of a pipe from
+the server. When the writing end closes, the guard asks the command to end, and later kills it with its
+descendants. If the guard itself is killed, the kernel kills the command.
 """
 
 import os

@@ -9,8 +9,8 @@ import pytest
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import make_plan
 from mutator.errors import MutatorError
-from mutator.serve.orders import Desk, Work
-from mutator.serve.runs import Runs
+from mutator.serve.job_requests import Desk, Work
+from mutator.serve.served_runs import Runs
 from mutator.store import plan_file
 from mutator.workspace import Workspace
 

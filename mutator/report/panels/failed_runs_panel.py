@@ -7,7 +7,7 @@ from pandas import DataFrame
 from mutator._common.tables import Table
 from mutator.model import Status
 from mutator.report.panel import Panel, rendered
-from mutator.report.studies import ReportedRun
+from mutator.report.reported_run import ReportedRun
 from mutator.results.result_rows import Row, rows_of
 
 _HEADS = ("status", "experiment", "fault", "scenario", "message")
@@ -22,7 +22,7 @@ _HTML = """\
 """
 
 
-def failed_panel(run: ReportedRun) -> Panel | None:
+def build_failed_runs_panel(run: ReportedRun) -> Panel | None:
     """Return the panel of failed runs with their messages; None if no run failed."""
     results = run.results[run.results["status"] != Status.OK.value]
     if results.empty:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.report.history import write_history
+from mutator.report.run_history import write_history
 from tests.made_up_results import write_results
 
 from .made_run import COLUMNS, NONE, OK, Page, make_run

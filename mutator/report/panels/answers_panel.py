@@ -8,9 +8,9 @@ from markupsafe import Markup
 from mutator._common.tables import Table
 from mutator.report.answer_parts import Cell, Codes, Link, Listing, Part
 from mutator.report.answers import answers_of
+from mutator.report.glossary import Words, meanings_of
 from mutator.report.panel import Panel, rendered
-from mutator.report.studies import ReportedRun
-from mutator.report.words import Words, meanings_of
+from mutator.report.reported_run import ReportedRun
 
 _HTML = """\
 <div class="answers">
@@ -35,7 +35,7 @@ _HTML = """\
 _BAR = '<span class="meter" style="--share: {:.3f}"></span><span class="of">{}</span>'
 
 
-def answers_panel(run: ReportedRun) -> Panel:
+def build_answers_panel(run: ReportedRun) -> Panel:
     made = answers_of(run)
     parts = []
     for answer in made:

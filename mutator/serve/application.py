@@ -15,15 +15,15 @@ from starlette.responses import HTMLResponse, JSONResponse, RedirectResponse, Re
 from starlette.routing import Route
 
 from mutator.errors import Absent, MutatorError
-from mutator.serve.api import JobApi, ReviewApi, asked
 from mutator.serve.home import home_page, offered
+from mutator.serve.job_requests import TRIES, Desk, Work
 from mutator.serve.jobs import Jobs
-from mutator.serve.orders import TRIES, Desk, Work
+from mutator.serve.json_api import JobApi, ReviewApi, asked
 from mutator.serve.page_tokens import HOME, PageTokens, review_page
 from mutator.serve.report_pages import Shown
 from mutator.serve.responses import OpenFile, kind_of, on_error
-from mutator.serve.reviews import Reviews
-from mutator.serve.runs import Runs, open_file, report_of, told
+from mutator.serve.served_reviews import Reviews
+from mutator.serve.served_runs import Runs, open_file, report_of, told
 from mutator.web import asset, assets
 from mutator.workspace import Workspace
 
@@ -56,7 +56,7 @@ class Site:
         return report_of(key) if key else None
 
 
-def application(site: Site) -> Starlette:
+def build_application(site: Site) -> Starlette:
     """Return the application without the checks of `security`; its shutdown ends the jobs."""
 
     @asynccontextmanager

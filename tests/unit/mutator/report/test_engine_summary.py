@@ -10,8 +10,8 @@ import pytest
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import make_plan
 from mutator.model import Experiment, Outcome, Record, Status
-from mutator.report import building, engines, stamp
-from mutator.report.seen import timings_of
+from mutator.report import engine_summary, report_builder, report_digests
+from mutator.report.experiment_facts import timings_of
 from mutator.results.table_building import build
 from mutator.store.checksummed_lines import LineWriter
 from mutator.store.plan_choices import Choices
@@ -83,9 +83,9 @@ def write(path: Path, schema: str, lines: list[dict[str, object]]) -> None:
     writer.close()
 
 
-def summary(run: Path) -> engines.EngineSummary | None:
+def summary(run: Path) -> engine_summary.EngineSummary | None:
     folder = RunFolder.open(run)
-    return engines.engine_summary(folder, folder.records(), timings_of(folder))
+    return engine_summary.summarize_engines(folder, folder.records(), timings_of(folder))
 
 
 def test_each_way_of_running_is_counted_with_its_reasons(finish: Finish) -> None:
@@ -103,7 +103,7 @@ def test_less_frequent_reasons_share_a_line(finish: Finish) -> None:
     write(run / "timings/0002-main.jsonl", TIMINGS_SCHEMA, more)
     told = summary(run)
     assert told is not None
-    assert len(told.table.rows) == 3 + engines.LISTED + 1
+    assert len(told.table.rows) == 3 + engine_summary.LISTED + 1
     assert sum(int(count) for _, count in told.table.rows) == 34
 
 
@@ -151,7 +151,7 @@ def test_complete_partial_and_missing_proofs_are_distinguished(
 def test_a_large_campaign_without_forks_has_no_note_on_its_size(
     finish: Finish, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(engines, "WORTH_IT", 4)
+    monkeypatch.setattr(engine_summary, "WORTH_IT", 4)
     told = summary(finish(None))
     assert told is not None
     assert told.proof.endswith("so no equivalence check is needed.")
@@ -160,7 +160,7 @@ def test_a_large_campaign_without_forks_has_no_note_on_its_size(
 def test_a_failed_proof_is_reported_first(finish: Finish) -> None:
     run = finish(4, change=lambda r: replace(r, trace_digest="0" * 64))
     build(run)
-    written = building.write(run, None)
+    written = report_builder.write_report(run, None)
     for text in (written.markdown.read_text(), written.page.read_text()):
         assert text.index("The equivalence check failed") < text.index("Planned: ")
         assert f"FAILED: experiment {record_ids(run)[0]} differs on the reference engine" in text
@@ -171,10 +171,10 @@ def test_a_failed_proof_is_reported_first(finish: Finish) -> None:
 def test_new_results_of_the_proof_make_a_report_out_of_date(finish: Finish) -> None:
     run = finish(3)
     build(run)
-    before = stamp.made_from(RunFolder.open(run), None)
-    assert before == stamp.made_from(RunFolder.open(run), None)
+    before = report_digests.made_from(RunFolder.open(run), None)
+    assert before == report_digests.made_from(RunFolder.open(run), None)
     write(run / "proof/0002-main.jsonl", SCHEMA, [])
-    assert before != stamp.made_from(RunFolder.open(run), None)
+    assert before != report_digests.made_from(RunFolder.open(run), None)
 
 
 def test_a_changed_trace_digest_makes_a_report_out_of_date(
@@ -183,13 +183,13 @@ def test_a_changed_trace_digest_makes_a_report_out_of_date(
     """The results do not contain the digests of traces."""
     run = finish(4)
     build(run)
-    results, before = (run / "results.csv").read_bytes(), stamp.made_from(RunFolder.open(run), None)
+    results, before = (run / "results.csv").read_bytes(), report_digests.made_from(RunFolder.open(run), None)
     path = run / "records/0001-main.jsonl"
     path.write_text(path.read_text().replace('"trace_digest":""', '"trace_digest":"0"'))
     reseal(run)
     build(run)
     assert (run / "results.csv").read_bytes() == results
-    assert before != stamp.made_from(RunFolder.open(run), None)
+    assert before != report_digests.made_from(RunFolder.open(run), None)
 
 
 def test_a_failed_proof_is_reported_without_timings(finish: Finish) -> None:

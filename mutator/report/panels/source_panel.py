@@ -13,8 +13,8 @@ from markupsafe import Markup, escape
 from mutator._common.tables import Table
 from mutator._common.text import counted
 from mutator.report.panel import Panel, rendered
+from mutator.report.reported_run import ReportedRun
 from mutator.report.source_lines import ENDINGS, LASTING, Mark, MarkedFile
-from mutator.report.studies import ReportedRun
 
 _SIGNS = dict(zip(ENDINGS, "HCTAMN", strict=True))  # sign shown with a mark's colour
 _MEANINGS = dict(
@@ -62,7 +62,7 @@ _PART = Markup('<span class="py-{}">{}</span>')
 _CLASSES = {tokenize.COMMENT: "comment", tokenize.NUMBER: "number", tokenize.STRING: "string"}
 
 
-def source_panel(run: ReportedRun) -> Panel | None:
+def build_source_panel(run: ReportedRun) -> Panel | None:
     """Return the panel with each file that has faults. Only the worst file is unfolded."""
     source = run.source
     if source is None:

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from mutator._common.text import counted
 from mutator.model import Outcome
 from mutator.mutants.injected_lines import tag_words
-from mutator.report.browse import Browse
+from mutator.report.experiment_list import Browse
+from mutator.report.glossary import Words
 from mutator.report.panel import Panel, rendered
-from mutator.report.words import Words
 from mutator.web import asset, load_order, plainly_embedded
 
 

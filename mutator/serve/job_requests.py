@@ -18,7 +18,7 @@ from mutator.campaigns.filters import compile_filter
 from mutator.config.yaml_files import StrictModel
 from mutator.errors import MutatorError
 from mutator.results.plan_columns import PLAN_COLUMNS
-from mutator.serve.runs import Runs, report_of
+from mutator.serve.served_runs import Runs, report_of
 from mutator.store import plan_file
 from mutator.triggers.conditions import check_condition
 from mutator.workspace import Workspace

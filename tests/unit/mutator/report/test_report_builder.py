@@ -13,9 +13,9 @@ import pytest
 from mutator._common.files import write_json
 from mutator.errors import MutatorError, Outside
 from mutator.figures.style import themed
-from mutator.report import building
-from mutator.report.panels import failed
-from mutator.report.stamp import made_from
+from mutator.report import report_builder
+from mutator.report.panels import failed_runs_panel
+from mutator.report.report_digests import made_from
 from mutator.store import approvals
 from mutator.store.run_folder import STOP_NOTE, RunFolder
 from mutator.workspace import Workspace
@@ -34,7 +34,7 @@ def run(tmp_path: Path) -> Path:
 
 
 def test_harness_errors_are_counted_separately(run: Path) -> None:
-    text = building.write(run, None).markdown.read_text()
+    text = report_builder.write_report(run, None).markdown.read_text()
     assert "3 experiments: 1 hazard, 1 crashed, 1 harness_error." in text
     failed = text.split("## Runs that did not finish normally")[1]
     assert failed.index("harness_error") < failed.index("crashed")
@@ -45,7 +45,7 @@ def test_harness_errors_are_counted_separately(run: Path) -> None:
 
 
 def test_the_page_is_well_formed_and_escaped(run: Path) -> None:
-    page = Page(building.write(run, None).page.read_text())
+    page = Page(report_builder.write_report(run, None).page.read_text())
     assert page.open == []
     assert "night_<b>drive</b>" in page.texts
     assert "the disk | is <gone>" in page.texts
@@ -57,7 +57,7 @@ def carried(page: Path, name: str) -> Any:
 
 
 def test_the_page_needs_no_other_file(run: Path) -> None:
-    written = building.write(run, None)
+    written = report_builder.write_report(run, None)
     page = Page(written.page.read_text())
     assert page.links
     assert all(link.startswith(("#", "data:")) for link in page.links)
@@ -69,7 +69,7 @@ def test_the_page_contains_results_diff_and_still_of_an_experiment(
 ) -> None:
     stored = {"0" * 16: PATCH.encode()}
     monkeypatch.setattr(RunFolder, "read_patch", lambda self, name, record: stored.get(name))
-    page = building.write(run, None).page
+    page = report_builder.write_report(run, None).page
     table = carried(page, "table")
     columns = {column["name"]: column for column in table["columns"]}
     assert table["count"] == 3
@@ -86,44 +86,44 @@ def test_the_page_contains_results_diff_and_still_of_an_experiment(
 
 
 def test_a_link_leads_to_failed_runs_that_are_not_listed(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(failed, "PAGE_LISTED", 1)
-    text = building.write(run, None).page.read_text()
+    monkeypatch.setattr(failed_runs_panel, "PAGE_LISTED", 1)
+    text = report_builder.write_report(run, None).page.read_text()
     assert "1 more: " in text
     assert "#status=crashed,timeout,invalid_mutant,harness_error" in text
 
 
 def test_the_report_states_its_origin(run: Path) -> None:
-    written = building.write(run, None)
+    written = report_builder.write_report(run, None)
     for text in (written.markdown.read_text(), written.page.read_text()):
         for fact in ("ab" * 32, "cd" * 32, "as_described", "chosen: limit", "3 of 3 planned", "2.4.6"):
             assert fact in text
 
 
 def test_the_report_names_the_reviewers(run: Path) -> None:
-    assert "reviewed" not in building.write(run, None).markdown.read_text()
+    assert "reviewed" not in report_builder.write_report(run, None).markdown.read_text()
     said = {"schema": approvals.SCHEMA, "target": "toycar", "groups": [{"by": "Jane"}, {"by": "Joe"}]}
     write_json(run / approvals.FILE, said)
-    written = building.ensure(run, None)
+    written = report_builder.ensure_report(run, None)
     for text in (written.markdown.read_text(), written.page.read_text()):
         assert "2 groups approved by Jane (1), Joe (1)" in text
 
 
 def test_the_report_is_reproducible(run: Path) -> None:
-    written = building.write(run, None)
+    written = report_builder.write_report(run, None)
     before = written.page.read_bytes(), written.markdown.read_bytes()
-    again = building.write(run, None)
+    again = report_builder.write_report(run, None)
     assert (again.page.read_bytes(), again.markdown.read_bytes()) == before
 
 
 def test_a_folder_without_a_run_gets_no_report(tmp_path: Path) -> None:
     with pytest.raises(MutatorError, match="not a run folder"):
-        building.write(tmp_path, None)
+        report_builder.write_report(tmp_path, None)
 
 
 def test_figures_are_in_the_markdown_and_in_the_page(run: Path) -> None:
     other = OK | {"experiment_id": "3" * 16, "fault_id": "f3", "fault_type": "jamming", "scenario": "S2"}
     write_results(run, COLUMNS, [*LINES, other])
-    written = building.write(run, None)
+    written = report_builder.write_report(run, None)
     shown = [link for link in Page(written.page.read_text()).links if link.startswith("data:image/svg")]
     files = sorted((run / "report" / "figures").glob("*.svg"))
     embedded = [base64.b64decode(link.partition(",")[2]).decode() for link in shown]
@@ -133,19 +133,20 @@ def test_figures_are_in_the_markdown_and_in_the_page(run: Path) -> None:
 
 
 def test_experiments_and_runs_are_counted_separately(run: Path) -> None:
-    assert "Planned: 3 experiments, in 2 runs" in building.write(run, None).markdown.read_text()
+    assert "Planned: 3 experiments, in 2 runs" in report_builder.write_report(run, None).markdown.read_text()
     (run / "run.json").write_text(json.dumps(HEAD | {"runs": 3}))
     assert (
-        "Planned: 3 experiments; each needs its own run.\n" in building.write(run, None).markdown.read_text()
+        "Planned: 3 experiments; each needs its own run.\n"
+        in report_builder.write_report(run, None).markdown.read_text()
     )
 
 
 def test_the_report_says_what_stopped_runs_might_have_missed(run: Path) -> None:
     """If a run stops at a hazard, later alerts are unknown."""
-    assert STOP_NOTE not in building.write(run, None).markdown.read_text()
+    assert STOP_NOTE not in report_builder.write_report(run, None).markdown.read_text()
     stops = {"canary": {"after_hazard": "stop"}, "alerts": ["fcw"]}
     (run / "run.json").write_text(json.dumps(HEAD | stops))
-    written = building.write(run, None)
+    written = report_builder.write_report(run, None)
     assert written.markdown.read_text().count(STOP_NOTE) == 3
     assert f"share one run. {STOP_NOTE}" in written.markdown.read_text()
     assert STOP_NOTE in written.page.read_text()
@@ -154,7 +155,7 @@ def test_the_report_says_what_stopped_runs_might_have_missed(run: Path) -> None:
 def drawn_again(run: Path, workspace: Workspace | None) -> bool:
     page = run / "report" / "index.html"
     before = page.stat().st_mtime_ns if page.exists() else None
-    building.ensure(run, workspace)
+    report_builder.ensure_report(run, workspace)
     return page.stat().st_mtime_ns != before
 
 
@@ -174,7 +175,7 @@ def test_an_up_to_date_report_is_not_written_again(run: Path) -> None:
 @pytest.mark.parametrize("name", ["REPORT.md", "index.html", "tables/fault_tolerant_times.csv"])
 def test_a_report_that_was_edited_is_written_again(run: Path, name: str) -> None:
     out = run / "report"
-    building.write(run, None)
+    report_builder.write_report(run, None)
     (out / "compare-other").mkdir()
     (out / "compare-other" / "index.html").write_text("another command's")
     assert not drawn_again(run, None)
@@ -183,9 +184,9 @@ def test_a_report_that_was_edited_is_written_again(run: Path, name: str) -> None
 
 
 def test_a_report_can_be_built_without_writing(run: Path) -> None:
-    built = building.build(RunFolder.open(run), None)
+    built = report_builder.build_report(RunFolder.open(run), None)
     assert not (run / "report").exists()
-    building.write(run, None)
+    report_builder.write_report(run, None)
     out = run / "report"
     written = {path.relative_to(out).as_posix(): path.read_bytes() for path in out.rglob("*.*")}
     del written["made_from.json"]
@@ -195,22 +196,22 @@ def test_a_report_can_be_built_without_writing(run: Path) -> None:
 def test_files_of_an_earlier_report_are_deleted(run: Path) -> None:
     """A report of other results can have fewer tables. Files that no report wrote are kept."""
     out = run / "report"
-    building.write(run, None)
+    report_builder.write_report(run, None)
     (out / "tables" / "mine.csv").touch()
     write_results(run, COLUMNS, [])
-    building.write(run, None)
+    report_builder.write_report(run, None)
     assert [path.name for path in (out / "tables").iterdir()] == ["mine.csv"]
 
 
 @pytest.mark.parametrize("name", ["report", "report/tables", "report/index.html"])
 def test_a_report_is_not_written_through_a_link(run: Path, tmp_path: Path, name: str) -> None:
     elsewhere = tmp_path / "elsewhere"
-    building.write(run, None)
+    report_builder.write_report(run, None)
     (run / name).rename(elsewhere)
     (run / name).symlink_to(elsewhere)
     before = {path: path.stat().st_mtime_ns for path in (elsewhere, *elsewhere.rglob("*"))}
     with suppress(Outside):
-        building.write(run, None)
+        report_builder.write_report(run, None)
     assert before == {path: path.stat().st_mtime_ns for path in (elsewhere, *elsewhere.rglob("*"))}
 
 
@@ -228,21 +229,21 @@ def test_inputs_of_a_report_are_not_read_without_limit(run: Path) -> None:
 
 @pytest.mark.parametrize("text", ["{", "[1]", '{"schema": "report/1"}', *STAMPS])
 def test_a_damaged_list_of_inputs_causes_a_new_report(run: Path, text: str) -> None:
-    building.write(run, None)
+    report_builder.write_report(run, None)
     (run / "report" / "made_from.json").write_text(text)
     assert drawn_again(run, None)
 
 
 @pytest.mark.parametrize("damage", ["REPORT.md", "made_from.json"])
 def test_an_incomplete_report_is_written_again(run: Path, damage: str) -> None:
-    building.write(run, None)
+    report_builder.write_report(run, None)
     (run / "report" / damage).unlink()
     assert drawn_again(run, None)
 
 
 @pytest.mark.parametrize("workspace", [HERE, None], ids=["library", "no library"])
 def test_published_fault_types_alone_add_no_published_numbers(run: Path, workspace: Workspace | None) -> None:
-    written = building.write(run, workspace)
+    written = report_builder.write_report(run, workspace)
     page = re.sub(r"(?s)<(style|script).*?</\1>", "", written.page.read_text())
     shown = written.markdown.read_text() + page
     assert not {"paper", "observation", "study"} & set(re.findall(r"[a-z]+", shown.lower()))
@@ -256,16 +257,18 @@ def test_published_fault_types_alone_add_no_published_numbers(run: Path, workspa
 def test_a_study_that_cannot_be_evaluated_is_left_out_with_the_reason(
     tmp_path: Path, workspace: Workspace | None
 ) -> None:
-    text = building.write(make_run(tmp_path, study="moon_landing"), workspace).markdown.read_text()
+    text = report_builder.write_report(
+        make_run(tmp_path, study="moon_landing"), workspace
+    ).markdown.read_text()
     assert ("moon_landing, which cannot be loaded here" in text) == (workspace is not None)
     assert ("moon_landing, which needs a fault library" in text) == (workspace is None)
 
 
 def test_the_report_shows_the_spread_of_several_seeds(run: Path) -> None:
-    assert building.write(run, None).summaries == ()
+    assert report_builder.write_report(run, None).summaries == ()
     more = [line | {"experiment_id": f"{i}a" * 8, "seed": str(9 + i)} for i, line in enumerate(LINES)]
     write_results(run, COLUMNS, [line | {"seed": "2"} for line in LINES] + more)
-    written = building.write(run, None)
+    written = report_builder.write_report(run, None)
     assert "## Seeds\n\n3 seeds (2 to 11). Each seed repeats" in written.markdown.read_text()
     assert '<section class="part" id="seeds">' in written.page.read_text()
     assert (run / "report" / "tables" / "seeds_by_fault_type.csv").is_file()

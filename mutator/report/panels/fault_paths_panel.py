@@ -3,10 +3,10 @@
 from collections.abc import Mapping, Sequence
 
 from mutator._common.tables import Table
+from mutator.report.fault_path_data import ALL, PathCounts, RunPaths, counts_by_fault_type
 from mutator.report.panel import Panel, rendered
 from mutator.report.path_drawing import draw_path_counts, drawn_counts, share_text
-from mutator.report.paths import ALL, PathCounts, RunPaths, counts_by_fault_type
-from mutator.report.studies import ReportedRun
+from mutator.report.reported_run import ReportedRun
 from mutator.results.outcome_counting import kinds
 from mutator.web import plainly_embedded
 
@@ -57,7 +57,7 @@ names all components that stopped it.</p>
 """
 
 
-def paths_panel(run: ReportedRun) -> Panel | None:
+def build_fault_paths_panel(run: ReportedRun) -> Panel | None:
     """Return the panel with the counts of links and components; None if no path is known."""
     paths = run.paths
     counts = counts_by_fault_type(kinds(run.results), run.seen.path_numbers, paths) if paths else {}

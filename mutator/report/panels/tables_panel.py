@@ -7,7 +7,7 @@ from operator import itemgetter
 from mutator._common.tables import Table
 from mutator.outcomes.fault_free_runs import fault_free_table, own_alerts
 from mutator.report.panel import Panel, rendered
-from mutator.report.studies import ReportedRun
+from mutator.report.reported_run import ReportedRun
 from mutator.results.outcome_counting import count_table, counts_by, hazard_names, kinds
 from mutator.statistics.metric_tables import metrics_sheet, severity_sheet, tolerant_times_sheet
 from mutator.statistics.published_counts import Published
@@ -61,7 +61,7 @@ def notes(folder: RunFolder) -> str:
     return NOTES + (NO_ALERT + note if folder.has_alerts else "")
 
 
-def tables_panel(run: ReportedRun) -> Panel:
+def build_tables_panel(run: ReportedRun) -> Panel:
     """Return the panel of counts, then statistics. Tables with published counterparts are on the study's
     page.
     """
@@ -94,7 +94,7 @@ def tables_panel(run: ReportedRun) -> Panel:
     )
 
 
-def published_panel(run: ReportedRun) -> Panel | None:
+def build_published_panel(run: ReportedRun) -> Panel | None:
     """Return the panel of the run's statistics next to the published ones of its study; None if there are
     none.
     """

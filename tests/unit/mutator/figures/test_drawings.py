@@ -5,8 +5,8 @@ import xml.etree.ElementTree as ET
 import pandas as pd
 import pytest
 
-from mutator.figures import hazards, heat_map, propagation_times
-from mutator.figures.figures import drawing_files, drawings
+from mutator.figures import hazards_by_fault_type, heat_map, propagation_times
+from mutator.figures.drawings import draw_figures, drawing_files
 
 from ..statistics.results_frame import results
 
@@ -32,11 +32,11 @@ def texts(svg: bytes) -> list[str]:
 
 
 def test_each_run_with_a_hazard_is_in_exactly_one_part_of_a_bar(frame: pd.DataFrame) -> None:
-    assert list(hazards.hazard_sets(frame)) == ["H1", "several", "", "", "", "H2"]
+    assert list(hazards_by_fault_type.hazard_sets(frame)) == ["H1", "several", "", "", "", "H2"]
 
 
 def test_hazard_bars_show_counts(frame: pd.DataFrame) -> None:
-    figure = hazards.draw(frame)
+    figure = hazards_by_fault_type.draw(frame)
     guided, _, rates = figure.axes
     widths = {c.get_label(): [bar.get_width() for bar in c] for c in guided.containers}
     assert widths == {"H1 alone": [1, 0], "H2 alone": [0, 0], "H3 alone": [0, 0], "more than one": [1, 0]}
@@ -63,7 +63,7 @@ def test_time_panels_include_only_runs_with_both_events(frame: pd.DataFrame) -> 
 
 
 def test_a_figure_drawn_again_has_the_same_bytes(frame: pd.DataFrame) -> None:
-    files, again = (drawing_files(drawings(frame)[:1]) for _ in range(2))
+    files, again = (drawing_files(draw_figures(frame)[:1]) for _ in range(2))
     assert files == again
     assert len(files) == 2
     assert "vision_input/blur" in texts(files["figures/hazards_by_fault_type.svg"])
@@ -71,12 +71,12 @@ def test_a_figure_drawn_again_has_the_same_bytes(frame: pd.DataFrame) -> None:
 
 def test_a_single_fault_type_or_scenario_is_not_compared(frame: pd.DataFrame) -> None:
     chaff, blur = frame[frame["kind"] == "radar/chaff"], frame[frame["scenario"] == "S2"]
-    assert drawings(chaff) == drawings(blur) == drawings(frame[:0]) == ()
+    assert draw_figures(chaff) == draw_figures(blur) == draw_figures(frame[:0]) == ()
     one_scenario = frame.assign(scenario="S1")
-    assert [drawing.name for drawing in drawings(one_scenario)] == ["hazards_by_fault_type"]
-    assert [d.name for d in drawings(frame.assign(kind="a/b"))] == ["propagation_by_scenario"]
+    assert [drawing.name for drawing in draw_figures(one_scenario)] == ["hazards_by_fault_type"]
+    assert [d.name for d in draw_figures(frame.assign(kind="a/b"))] == ["propagation_by_scenario"]
 
 
 def test_runs_without_hazards_or_times_are_drawn(frame: pd.DataFrame) -> None:
     nothing = results({}, BLUR | {"scenario": "S2"})
-    assert len(drawing_files(drawings(nothing))) == 6
+    assert len(drawing_files(draw_figures(nothing))) == 6

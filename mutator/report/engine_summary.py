@@ -36,7 +36,7 @@ class EngineSummary:
     failed: bool  # an experiment had a different result on the reference engine
 
 
-def engine_summary(
+def summarize_engines(
     folder: RunFolder, records: Mapping[str, Record], timings: "DataFrame"
 ) -> EngineSummary | None:
     """Summarize a run's `timings` (as in `Seen`) and `proof/`. None without timings and without `proof/`."""

@@ -14,8 +14,8 @@ from mutator.outcomes.fault_paths import (
     PathLink,
     UntimedPath,
 )
+from mutator.report.fault_path_data import PathCounts, RunPaths
 from mutator.report.path_drawing import draw_path_counts, drawn_counts
-from mutator.report.paths import PathCounts, RunPaths
 from mutator.stpa.analysis import load_analysis
 from mutator.targets.target_facts import ChannelFacts
 from mutator.workspace import Workspace

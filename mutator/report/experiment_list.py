@@ -19,14 +19,14 @@ from mutator.errors import MutatorError
 from mutator.model import Experiment, Fault
 from mutator.mutants.readable_patches import readable
 from mutator.report.answer_parts import warnings_of
+from mutator.report.experiment_facts import PLACE, UNTIMED_PATH
+from mutator.report.fault_path_data import RunPaths
+from mutator.report.glossary import meanings_of
+from mutator.report.heat_map_data import map_of
 from mutator.report.page_series import series_facts
 from mutator.report.panel import FOLDER
-from mutator.report.paths import RunPaths
-from mutator.report.seen import PLACE, UNTIMED_PATH
+from mutator.report.reported_run import ReportedRun
 from mutator.report.source_lines import SourceLines
-from mutator.report.studies import ReportedRun
-from mutator.report.whole_map import map_of
-from mutator.report.words import meanings_of
 from mutator.results.outcome_counting import endings, hazard_names, hazard_times, hazards_joined, kinds
 from mutator.results.result_rows import Row, rows_of
 from mutator.review.patch_shapes import Shape, shapes

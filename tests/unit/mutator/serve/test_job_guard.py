@@ -1,4 +1,4 @@
-"""The keeper of a job ends the job's processes when the server ends."""
+"""The guard of a job ends the job's processes when the server ends."""
 
 import os
 import signal
@@ -10,14 +10,14 @@ from pathlib import Path
 
 import pytest
 
-# A keeper for a command that is not mutator, with a shorter timeout.
-KEEPER = """
+# A guard for a command that is not mutator, with a shorter timeout.
+GUARD = """
 import os, sys
-from mutator.serve import keeper
-keeper.PATIENCE_S = float(sys.argv.pop())
+from mutator.serve import job_guard
+job_guard.PATIENCE_S = float(sys.argv.pop())
 execv = os.execv
-keeper.os.execv = lambda path, words: execv(path, [path, "-c", *words[4:]])
-sys.exit(keeper.main())
+job_guard.os.execv = lambda path, words: execv(path, [path, "-c", *words[4:]])
+sys.exit(job_guard.main())
 """
 # Starts a process in another session, reports it, and waits. `{}` is the reaction to a request to end.
 COMMAND = """
@@ -40,9 +40,9 @@ def eventually(holds: Callable[[], bool]) -> bool:
     return holds()
 
 
-def kept(folder: Path, script: str, patience_s: float = 10.0) -> tuple[subprocess.Popen[bytes], int]:
+def start_guarded(folder: Path, script: str, patience_s: float = 10.0) -> tuple[subprocess.Popen[bytes], int]:
     watched, hold = os.pipe()
-    words = [sys.executable, "-c", KEEPER, str(watched), script, str(patience_s)]
+    words = [sys.executable, "-c", GUARD, str(watched), script, str(patience_s)]
     keeper = subprocess.Popen(words, cwd=folder, pass_fds=[watched], start_new_session=True)
     os.close(watched)
     return keeper, hold
@@ -61,7 +61,7 @@ def child_of(folder: Path) -> int:
 
 
 def test_a_command_is_asked_to_end_when_its_server_ends(tmp_path: Path) -> None:
-    keeper, hold = kept(tmp_path, COMMAND.format(IN_ORDER))
+    keeper, hold = start_guarded(tmp_path, COMMAND.format(IN_ORDER))
     child = child_of(tmp_path)
     os.close(hold)
     assert keeper.wait(20) == 0
@@ -70,15 +70,15 @@ def test_a_command_is_asked_to_end_when_its_server_ends(tmp_path: Path) -> None:
 
 
 def test_a_command_that_does_not_end_is_killed(tmp_path: Path) -> None:
-    keeper, hold = kept(tmp_path, COMMAND.format("pass"), patience_s=0.2)
+    keeper, hold = start_guarded(tmp_path, COMMAND.format("pass"), patience_s=0.2)
     child = child_of(tmp_path)
     os.close(hold)
     assert keeper.wait(20) == 128 + signal.SIGKILL
     assert is_gone(child)
 
 
-def test_a_command_dies_with_its_keeper(tmp_path: Path) -> None:
-    keeper, hold = kept(tmp_path, COMMAND.format(IN_ORDER))
+def test_a_command_dies_with_its_guard(tmp_path: Path) -> None:
+    keeper, hold = start_guarded(tmp_path, COMMAND.format(IN_ORDER))
     child = child_of(tmp_path)
     [command] = Path(f"/proc/{keeper.pid}/task/{keeper.pid}/children").read_text().split()
     keeper.kill()
@@ -89,7 +89,7 @@ def test_a_command_dies_with_its_keeper(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("code", [0, 1, 3])
-def test_the_keeper_exits_with_the_commands_code(tmp_path: Path, code: int) -> None:
-    keeper, hold = kept(tmp_path, f"raise SystemExit({code})")
+def test_the_guard_exits_with_the_commands_code(tmp_path: Path, code: int) -> None:
+    keeper, hold = start_guarded(tmp_path, f"raise SystemExit({code})")
     assert keeper.wait(20) == code
     os.close(hold)

@@ -4,9 +4,9 @@ from collections.abc import Iterator
 
 from mutator._common.below import inside, read_below
 from mutator.errors import MutatorError
-from mutator.report.building import build
 from mutator.report.panel import FOLDER
-from mutator.report.stamp import FILE
+from mutator.report.report_builder import build_report
+from mutator.report.report_digests import FILE
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -24,7 +24,7 @@ def pages(folder: RunFolder, workspace: Workspace | None) -> tuple[int, Iterator
 
 
 def _differences(folder: RunFolder, workspace: Workspace | None, stored: set[str]) -> Iterator[MutatorError]:
-    built = build(folder, workspace).files
+    built = build_report(folder, workspace).files
     for name in sorted({*built, *stored}):
         path = inside(folder.path / FOLDER, name)
         if name not in built:

@@ -7,8 +7,8 @@ from dataclasses import replace
 from mutator.model import OPERATORS
 from mutator.outcomes.fault_free_runs import alerts_by_drive
 from mutator.report.panel import Panel, rendered
-from mutator.report.panels.tables import sheet_files
-from mutator.report.studies import ReportedRun
+from mutator.report.panels.tables_panel import sheet_files
+from mutator.report.reported_run import ReportedRun
 from mutator.statistics.mutation_score import score_sheet
 from mutator.statistics.statistics_sheet import Sheet
 from mutator.store import plan_file
@@ -24,7 +24,7 @@ _HTML = """\
 """
 
 
-def score_panel(run: ReportedRun) -> Panel | None:
+def build_mutation_score_panel(run: ReportedRun) -> Panel | None:
     """Return the panel with the shares in total and by operator."""
     if not (run.results["module"] == OPERATORS).any():
         return None

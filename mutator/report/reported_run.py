@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING, cast
 
 from mutator.campaigns.installed_studies import find_study
 from mutator.errors import MutatorError
-from mutator.figures.figures import Drawing
+from mutator.figures.drawings import Drawing
 from mutator.model import Experiment, Fault, Record, Status
 from mutator.outcomes.fault_free_runs import FaultFreeRun, load_fault_free_runs
 from mutator.outcomes.fault_paths import fault_paths_of
 from mutator.outcomes.golden_comparison import load_trace
-from mutator.report.engines import EngineSummary, engine_summary
+from mutator.report.engine_summary import EngineSummary, summarize_engines
+from mutator.report.experiment_facts import PLACE, UNTIMED_PATH, Seen
+from mutator.report.fault_path_data import RunPaths
 from mutator.report.panel import Panel
-from mutator.report.paths import RunPaths
-from mutator.report.seen import PLACE, UNTIMED_PATH, Seen
 from mutator.report.source_lines import SourceLines
 from mutator.results.result_rows import Row, rows_of
 from mutator.results.table_reader import Results
@@ -41,7 +41,7 @@ class ReportedRun:
     workspace: Workspace | None
     results: "DataFrame"
     frame: "DataFrame"
-    study: "Study | None"
+    study: "PublishedWork | None"
     seen: Seen
     engines: EngineSummary | None = None
     compared: bool = False
@@ -63,8 +63,8 @@ class ReportedRun:
             workspace=workspace,
             results=results,
             frame=prepare(results.assign(**{PLACE: seen.places, UNTIMED_PATH: seen.path_numbers})),
-            engines=engine_summary(folder, records, seen.timings),
-            study=_study(folder) if workspace else None,
+            engines=summarize_engines(folder, records, seen.timings),
+            study=_find_published_work(folder) if workspace else None,
             seen=seen,
             faults=faults,
             paths=RunPaths.of(folder, fault_paths, experiments, records, seen.untimed_paths)
@@ -113,7 +113,7 @@ class ReportedRun:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Study:
+class PublishedWork:
     """Published work with which runs are compared, provided by an entry point in `mutator.studies`. `about`
     cites it. `check` finds problems in its data in a fault library. `published` returns the counts to show
     next to those of a run, or None if they do not apply. Each function in `panels` can return a panel of
@@ -134,9 +134,9 @@ class Study:
             raise TypeError(f"of a study, {', '.join(idle)} must be a function")
 
 
-def _study(folder: RunFolder) -> Study | None:
+def _find_published_work(folder: RunFolder) -> PublishedWork | None:
     name = folder.head.study
     try:
-        return cast(Study, find_study(name)) if name else None
+        return cast(PublishedWork, find_study(name)) if name else None
     except MutatorError:
         return None

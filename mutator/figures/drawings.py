@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
-from mutator.figures import hazards, heat_map, propagation_times
+from mutator.figures import hazards_by_fault_type, heat_map, propagation_times
 from mutator.figures.run_plot import images
 from mutator.statistics.results_frame import slim
 
@@ -32,7 +32,7 @@ class Drawing:
         return f"{FOLDER}/{self.name}.{suffix}"
 
 
-def drawings(frame: pd.DataFrame) -> tuple[Drawing, ...]:
+def draw_figures(frame: pd.DataFrame) -> tuple[Drawing, ...]:
     frame = slim(frame)
     kinds, scenarios = frame["kind"].nunique(), frame["scenario"].nunique()
     made = []
@@ -61,7 +61,7 @@ def _hazards(frame: pd.DataFrame) -> Drawing:
         title="Hazards by fault type",
         note="Left: runs with a hazard among all injected. Right: hazards as a share of activated faults. "
         "Fault types without a mark were never activated.",
-        figure=hazards.draw(frame),
+        figure=hazards_by_fault_type.draw(frame),
     )
 
 

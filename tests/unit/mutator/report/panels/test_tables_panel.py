@@ -8,8 +8,8 @@ import pytest
 from markupsafe import escape
 
 from mutator.report.panel import Panel
-from mutator.report.panels.tables import tables_panel
-from mutator.report.studies import ReportedRun
+from mutator.report.panels.tables_panel import build_tables_panel
+from mutator.report.reported_run import ReportedRun
 from mutator.results.table_columns import SINCE, result_columns
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
@@ -54,7 +54,7 @@ def names(panel: Panel, suffix: str) -> set[str]:
 
 
 def test_every_table_is_written_in_csv_and_markdown(run: RunFolder) -> None:
-    panel = tables_panel(ReportedRun.open(run, HERE))
+    panel = build_tables_panel(ReportedRun.open(run, HERE))
     assert "alert_to_hazard" in names(panel, "md") == names(panel, "csv")
     for name, data in panel.files.items():
         assert name.endswith(".csv") or data.decode().rstrip() in panel.markdown
@@ -62,13 +62,13 @@ def test_every_table_is_written_in_csv_and_markdown(run: RunFolder) -> None:
 
 def test_without_a_library_no_time_is_censored(run: RunFolder) -> None:
     """Without the target's manifest, the ends of runs are unknown."""
-    panel = tables_panel(ReportedRun.open(run, None))
+    panel = build_tables_panel(ReportedRun.open(run, None))
     assert "propagation" in names(panel, "csv")
     assert "alert_to_hazard" not in names(panel, "csv")
 
 
 def test_tables_are_reproducible(run: RunFolder) -> None:
-    panel, again = (tables_panel(ReportedRun.open(run, HERE)) for _ in range(2))
+    panel, again = (build_tables_panel(ReportedRun.open(run, HERE)) for _ in range(2))
     assert panel.files == again.files
 
 
@@ -79,7 +79,7 @@ def test_tables_of_alerts_mention_the_alerts_of_fault_free_runs(run: RunFolder) 
     np.savez(golden / "trace.npz", **drive)
     record = {"hazards": {"H1": None}, "alerts": [{"name": "steer_saturated", "t": 12.29}]}
     (golden / "record.json").write_text(json.dumps(record))
-    panel = tables_panel(ReportedRun.open(run, HERE))
+    panel = build_tables_panel(ReportedRun.open(run, HERE))
     note = "Not every alert is caused by a fault: fault-free runs raise steer_saturated in S1."
     assert panel.html.count(str(escape(note))) == panel.markdown.count(note) >= 6
     assert "| S1 | steer_saturated at 12.29 s | none | 1 to 1 |" in panel.markdown
@@ -91,5 +91,5 @@ def test_tables_of_alerts_mention_the_alerts_of_fault_free_runs(run: RunFolder) 
 def test_a_target_without_alerts_has_no_alert_tables(run: RunFolder, alerts: list[str]) -> None:
     head = json.loads((run.path / "run.json").read_text()) | {"alerts": alerts}
     (run.path / "run.json").write_text(json.dumps(head))
-    markdown = tables_panel(ReportedRun.open(RunFolder.unverified(run.path), HERE)).markdown
+    markdown = build_tables_panel(ReportedRun.open(RunFolder.unverified(run.path), HERE)).markdown
     assert ("no alert" in markdown.lower()) == bool(alerts)

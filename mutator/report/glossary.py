@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from mutator.config.yaml_files import load
 from mutator.errors import MutatorError
 from mutator.model import Method
-from mutator.report.studies import ReportedRun
+from mutator.report.reported_run import ReportedRun
 from mutator.targets.severity import Scale
 
 Words = Mapping[str, Mapping[str, str]]  # heading -> term -> meaning

@@ -2,8 +2,8 @@
 
 from mutator._common.tables import Table
 from mutator.report.panel import Panel, rendered
-from mutator.report.panels.tables import sheet_files
-from mutator.report.studies import ReportedRun
+from mutator.report.panels.tables_panel import sheet_files
+from mutator.report.reported_run import ReportedRun
 from mutator.statistics.seed_spread import ALL, kinds_sheet, seeds_of, seeds_sheet
 from mutator.statistics.statistics_sheet import Sheet, text_of
 
@@ -20,7 +20,7 @@ _HTML = """\
 """
 
 
-def seeds_panel(run: ReportedRun) -> Panel | None:
+def build_seeds_panel(run: ReportedRun) -> Panel | None:
     """Return the panel with the spread of each share between seeds."""
     seeds = seeds_of(run.frame)
     if len(seeds) < 2:

@@ -10,25 +10,25 @@ from pathlib import Path
 from mutator._common.processes import beside, processes_for
 from mutator._common.tables import Table
 from mutator._common.text import counted
-from mutator.report.browse import Browse, browse_data
-from mutator.report.page import Content, markdown, page_html, study_html, study_markdown
+from mutator.report.experiment_list import Browse, browse_data
+from mutator.report.glossary import words_of
+from mutator.report.markdown_and_html import Content, markdown, page_html, study_html, study_markdown
 from mutator.report.page_series import sample_kept_traces
 from mutator.report.panel import FOLDER
-from mutator.report.panels import PANELS, study_panels
-from mutator.report.panels.answers import answers_panel
-from mutator.report.stamp import is_current, made_from, write_files
-from mutator.report.studies import ReportedRun
-from mutator.report.words import words_of
+from mutator.report.panels import PANELS, build_study_panels
+from mutator.report.panels.answers_panel import build_answers_panel
+from mutator.report.report_digests import is_current, made_from, write_files
+from mutator.report.reported_run import ReportedRun
 from mutator.results.outcome_counting import outcome_counts
 from mutator.results.table_reader import Results
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
-MARKDOWN, PAGE = "REPORT.md", "index.html"
+MARKDOWN_FILE, PAGE_FILE = "REPORT.md", "index.html"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Report:
+class WrittenReport:
     """The files of a report, and its number of experiments. Only a new report has `summaries`, tables for
     the terminal.
     """
@@ -40,7 +40,7 @@ class Report:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Built:
+class BuiltReport:
     """A report in memory: its `files` by name in the report's folder, of which REPORT.md and index.html
     always exist.
     """
@@ -50,14 +50,14 @@ class Built:
     summaries: tuple[Table, ...]
 
 
-def ensure(run: Path, workspace: Workspace | None) -> Report:
+def ensure_report(run: Path, workspace: Workspace | None) -> WrittenReport:
     """Write the report of a run folder unless it is up to date."""
     if not is_current(run, made_from(RunFolder.open(run), workspace)):
-        return write(run, workspace)
-    return _report(run, Results(run).count())
+        return write_report(run, workspace)
+    return _written_report(run, Results(run).count())
 
 
-def write(run: Path, workspace: Workspace | None) -> Report:
+def write_report(run: Path, workspace: Workspace | None) -> WrittenReport:
     """Write the report of a run folder whose tables are up to date, and missing series of kept traces.
 
     Without a workspace, no experiments are rerun and no published numbers are shown.
@@ -66,48 +66,48 @@ def write(run: Path, workspace: Workspace | None) -> Report:
     if workspace:
         sample_kept_traces(folder, workspace)
     sources = made_from(folder, workspace)
-    built = build(folder, workspace)
+    built = build_report(folder, workspace)
     write_files(run, sources, built.files)
-    return _report(run, built.rows, built.summaries)
+    return _written_report(run, built.rows, built.summaries)
 
 
-def build(folder: RunFolder, workspace: Workspace | None) -> Built:
+def build_report(folder: RunFolder, workspace: Workspace | None) -> BuiltReport:
     """Build the report of a run folder whose tables are up to date, without writing anything."""
     reported = ReportedRun.open(folder, workspace)
     with beside(lambda: browse_data(reported), processes_for(len(reported.results))) as browse:
-        study = study_panels(reported)
-        content = _content(replace(reported, compared=bool(study)), browse)
+        study = build_study_panels(reported)
+        content = _build_content(replace(reported, compared=bool(study)), browse)
     panels = (*content.panels, *study)
     files = {name: data for panel in panels for name, data in panel.files.items()}
-    files |= {MARKDOWN: markdown(content).encode(), PAGE: page_html(content).encode()}
+    files |= {MARKDOWN_FILE: markdown(content).encode(), PAGE_FILE: page_html(content).encode()}
     if study:
         files |= {"STUDY.md": study_markdown(content, study).encode()}
         files |= {"study.html": study_html(content, study).encode()}
     summaries = tuple(panel.summary for panel in panels if panel.summary)
-    return Built(files=files, rows=len(reported.results), summaries=summaries)
+    return BuiltReport(files=files, rows=len(reported.results), summaries=summaries)
 
 
-def _report(run: Path, rows: int, summaries: tuple[Table, ...] = ()) -> Report:
+def _written_report(run: Path, rows: int, summaries: tuple[Table, ...] = ()) -> WrittenReport:
     out = run / FOLDER
-    return Report(markdown=out / MARKDOWN, page=out / PAGE, rows=rows, summaries=summaries)
+    return WrittenReport(markdown=out / MARKDOWN_FILE, page=out / PAGE_FILE, rows=rows, summaries=summaries)
 
 
-def _content(run: ReportedRun, browse: Callable[[], Browse]) -> Content:
+def _build_content(run: ReportedRun, browse: Callable[[], Browse]) -> Content:
     panels = [panel for panel_of in PANELS if (panel := panel_of(run)) is not None]
     return Content(
         name=run.folder.head.campaign,
         alarm=run.engines.proof if run.engines and run.engines.failed else "",
         outcomes=outcome_counts(run.results),
-        planned=_planned(run.folder),
+        planned=_describe_plan(run.folder),
         words=words_of(run),
         study=run.study.about if run.study and run.compared else "",
-        answers=answers_panel(run),
+        answers=build_answers_panel(run),
         panels=panels,
         browse=browse(),
     )
 
 
-def _planned(folder: RunFolder) -> str:
+def _describe_plan(folder: RunFolder) -> str:
     experiments, runs = folder.head.experiments, folder.head.runs
     text = f"Planned: {counted(experiments, 'experiment')}"
     if folder.shard:

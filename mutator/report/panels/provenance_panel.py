@@ -4,7 +4,7 @@ from mutator._common.tables import Table
 from mutator.audit.seal import OUTSIDE, seal_or_why_not, unsealed_facts, without
 from mutator.campaigns.installed_studies import study_problems
 from mutator.report.panel import Panel, rendered
-from mutator.report.studies import ReportedRun
+from mutator.report.reported_run import ReportedRun
 from mutator.store.approvals import approval_summary
 from mutator.store.run_head import HEAD
 from mutator.store.work_stretches import package_versions, told
@@ -25,7 +25,7 @@ _HTML = """\
 """
 
 
-def provenance_panel(run: ReportedRun) -> Panel:
+def build_provenance_panel(run: ReportedRun) -> Panel:
     """Return the panel with engines, equivalence check, plan, choices, sources and versions."""
     engines, facts = run.engines, _facts(run)
     unsealed = list(unsealed_facts(run.folder).items())

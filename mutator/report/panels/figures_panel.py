@@ -2,10 +2,10 @@
 
 import base64
 
-from mutator.figures.figures import Drawing, drawing_files, drawings
+from mutator.figures.drawings import Drawing, draw_figures, drawing_files
 from mutator.figures.style import themed
 from mutator.report.panel import Panel, rendered
-from mutator.report.studies import ReportedRun
+from mutator.report.reported_run import ReportedRun
 
 _HTML = """\
 <h2>Figures</h2>
@@ -22,12 +22,12 @@ _HTML = """\
 """
 
 
-def figures_panel(run: ReportedRun) -> Panel | None:
+def build_figures_panel(run: ReportedRun) -> Panel | None:
     """Return the panel of figures over all results; None if there are none."""
-    return _panel(drawings(run.frame))
+    return _panel(draw_figures(run.frame))
 
 
-def study_figures(run: ReportedRun) -> Panel | None:
+def build_study_figures_panel(run: ReportedRun) -> Panel | None:
     """Return the panel of figures that the run's study adds; None if there are none."""
     return _panel(run.study.drawings(run)) if run.study else None
 
