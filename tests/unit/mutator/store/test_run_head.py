@@ -13,6 +13,7 @@ from mutator.campaigns.plan import make_plan
 from mutator.errors import MutatorError, Outside
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import RunHead, read_head
+from mutator.targets.target_facts import TargetFacts
 from mutator.workspace import Workspace
 from tests.made_head import made_head
 
@@ -55,13 +56,15 @@ def test_a_head_is_written_as_it_was_read(run: Path) -> None:
     assert read_head(run).as_json() == path.read_bytes()
 
 
-def test_optional_keys_have_their_place(toycar: Workspace, tmp_path: Path) -> None:
+def test_optional_keys_and_those_of_the_target_have_their_place(toycar: Workspace, tmp_path: Path) -> None:
     path = toycar.library / "campaigns" / "small.yaml"
     lines = [line for line in path.read_text().splitlines() if not line.startswith("seed:")]
     path.write_text("\n".join([*lines, "seeds: {from: 3, to: 4}", ""]))
     folder = freeze(make_plan(toycar, "small"), tmp_path / "run", toycar)
     keys = list(json.loads((folder.path / "run.json").read_text()))
     assert keys[keys.index("seed") : keys.index("choices")] == ["seed", "seeds", "reading"]
+    of_target = [field.name for field in dataclasses.fields(TargetFacts)]
+    assert (keys[0], keys[keys.index("limits") + 1 : keys.index("goldens")]) == ("schema", of_target)
     assert folder.head.seeds == (3, 4)
 
 
