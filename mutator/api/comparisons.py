@@ -12,8 +12,8 @@ from mutator.api.html import text_html
 from mutator.api.runs import Run, known_alerts_note, load_run
 from mutator.comparison import comparison_files
 from mutator.comparison import run_comparison as comparing
-from mutator.comparison.pairs import Change, Pair
-from mutator.comparison.run_comparison import Comparison, Finding, Gate
+from mutator.comparison.pairs import ExperimentPair, ResultChange
+from mutator.comparison.run_comparison import Comparison, Gate, GateFinding
 from mutator.errors import MutatorError
 from mutator.report import run_history
 from mutator.report.run_history import History
@@ -36,7 +36,7 @@ class RunComparison:
 
     def _repr_html_(self) -> str:
         names = self.comparison.names
-        differing = [[f.name, f.a, f.b] for f in self.comparison.facts if f.differs]
+        differing = [[f.name, f.a, f.b] for f in self.comparison.facts if f.is_different]
         facts = Table(heads=("what differs", names.a, names.b), rows=differing).as_html()
         sheets = [text_html(s.title) + s.table().as_html() for s in self.comparison.sheets[:SHOWN]]
         remarks = "".join(map(text_html, self.comparison.remarks))
@@ -45,7 +45,7 @@ class RunComparison:
     @property
     def summary(self) -> str:
         """The comparison in a few sentences."""
-        return comparison_files.summary(self.comparison)
+        return comparison_files.summary_text(self.comparison)
 
     @property
     def files_text(self) -> str:
@@ -55,12 +55,12 @@ class RunComparison:
     @property
     def not_compared(self) -> dict[str, int]:
         """Reasons why experiments could not be compared, with counts."""
-        return dict(comparison_files.reasons(self.comparison))
+        return dict(comparison_files.count_by_reason(self.comparison))
 
     @property
     def changes(self) -> dict[str, int]:
         """Number of pairs with each kind of change."""
-        return {change.value: len(self.comparison.having(change)) for change in Change}
+        return {change.value: len(self.comparison.pairs_with(change)) for change in ResultChange}
 
     @cached_property
     def pairs(self) -> "pd.DataFrame":
@@ -72,7 +72,7 @@ class RunComparison:
     @cached_property
     def changed(self) -> "pd.DataFrame":
         """The rows of `pairs` whose result changed, new hazards first."""
-        return _frame(self.comparison.changed)
+        return _frame(self.comparison.changed_pairs)
 
     @cached_property
     def tables(self) -> "dict[str, pd.DataFrame]":
@@ -80,9 +80,9 @@ class RunComparison:
 
         A share has five columns: count, of, rate and both ends of its interval.
         """
-        return {sheet.name: sheet.frame() for sheet in self.comparison.sheets}
+        return {sheet.name: sheet.as_frame() for sheet in self.comparison.sheets}
 
-    def findings(self, gates: Sequence[Gate | str]) -> tuple[Finding, ...]:
+    def findings(self, gates: Sequence[Gate | str]) -> tuple[GateFinding, ...]:
         """Return the experiments that fail a gate, in the order of `gates`.
 
         A gate is a Gate or its name, such as `new-hazard` or `severity:S2`.
@@ -93,13 +93,13 @@ class RunComparison:
             raise MutatorError(
                 f"gate '{strangers[0]}'", argument="gates", expected=f"one of {', '.join(known)}"
             )
-        return comparing.findings(self.comparison, [Gate(gate) for gate in gates])
+        return comparing.findings_of_gates(self.comparison, [Gate(gate) for gate in gates])
 
-    def write(self, out: str | Path | None = None) -> comparison_files.Written:
+    def write(self, out: str | Path | None = None) -> comparison_files.ComparisonFiles:
         """Write HTML, Markdown and CSV to `out`; default: report/compare-<first run> in the second run."""
         a, b = self.comparison.a, self.comparison.b
         default = inside(b.folder.path / "report", f"compare-{a.name}")
-        return comparison_files.write(self.comparison, default if out is None else Path(out))
+        return comparison_files.write_comparison(self.comparison, default if out is None else Path(out))
 
 
 def compare(a: Run | str | Path, b: Run | str | Path, *, only: str | None = None) -> RunComparison:
@@ -111,13 +111,13 @@ def compare(a: Run | str | Path, b: Run | str | Path, *, only: str | None = None
     """
     runs = [one if isinstance(one, Run) else load_run(one) for one in (a, b)]
     first, second = map(known_alerts_note, runs)
-    return RunComparison(comparing.compare(runs[0].path, runs[1].path, only, (first, second)))
+    return RunComparison(comparing.compare_runs(runs[0].path, runs[1].path, only, (first, second)))
 
 
-def _frame(pairs: Sequence[Pair]) -> "pd.DataFrame":
+def _frame(pairs: Sequence[ExperimentPair]) -> "pd.DataFrame":
     import pandas as pd
 
-    frame = pd.DataFrame([comparison_files.pair_line(pair) for pair in pairs])
+    frame = pd.DataFrame([comparison_files.pair_cells(pair) for pair in pairs])
     times = [name for name in frame.columns if name.startswith("t_")]
     return frame.astype(dict.fromkeys(times, float))
 

@@ -29,8 +29,8 @@ from mutator.report import report_builder
 from mutator.report.stills import take_stills
 from mutator.results import outcome_counting
 from mutator.results import table_building as results_table
-from mutator.statistics.mutation_score import score_sheet, totals
-from mutator.statistics.results_frame import prepare
+from mutator.statistics.mutation_score import mutation_score_sheet, totals_table
+from mutator.statistics.results_frame import prepare_results
 from mutator.statistics.statistics_sheet import Sheet
 from mutator.store import cleaning
 from mutator.store.run_folder import GoldenRun, RunFolder
@@ -109,16 +109,16 @@ class Run(RunContents):
         """
         frame = self._frame
         if not (frame["module"] == OPERATORS).any():
-            return score_sheet(prepare(frame), {}, None)
+            return mutation_score_sheet(prepare_results(frame), {}, None)
         try:
             alerts = alerts_by_drive(self.fault_free())
         except (MutatorError, KeyError):  # without target or golden runs, alerts cannot be compared
             alerts = None
-        return score_sheet(prepare(frame), self.faults, alerts, self.folder.head.operators)
+        return mutation_score_sheet(prepare_results(frame), self.faults, alerts, self.folder.head.operators)
 
     def mutation_totals(self) -> Table:
         """Return the total mutation score. Empty without operator mutants."""
-        return totals(self.mutation_score())
+        return totals_table(self.mutation_score())
 
     def fault_free(self) -> tuple[FaultFreeRun, ...]:
         """Return the alerts and hazards of the golden runs, and the range of each plotted channel."""

@@ -13,7 +13,7 @@ from mutator.cli.options import Json, Only
 from mutator.errors import EXIT_CHECK_FAILED, EXIT_HARNESS_ERRORS, MutatorError
 
 if TYPE_CHECKING:
-    from mutator.comparison.run_comparison import Comparison, Finding
+    from mutator.comparison.run_comparison import Comparison, GateFinding
 
 NAMED = 20  # experiments listed in the terminal; the written comparison lists all of them
 GATES = (
@@ -102,7 +102,7 @@ def _show(terminal: Terminal, compared: "mutator.RunComparison") -> None:
     if found.parts_remark:
         terminal.say(found.parts_remark, style="bold")
         terminal.say()
-    differing = [(f.name, f.a, f.b) for f in found.facts if f.differs]
+    differing = [(f.name, f.a, f.b) for f in found.facts if f.is_different]
     if differing:
         terminal.table(["what differs", found.names.a, found.names.b], differing)
         terminal.say(compared.files_text)
@@ -120,16 +120,16 @@ def _show(terminal: Terminal, compared: "mutator.RunComparison") -> None:
             terminal.say(remark)
 
 
-def _as_json(compared: "mutator.RunComparison", failing: "tuple[Finding, ...]") -> dict[str, object]:
+def _as_json(compared: "mutator.RunComparison", failing: "tuple[GateFinding, ...]") -> dict[str, object]:
     found = compared.comparison
     return {
         "run_a": str(found.a.folder.path),
         "run_b": str(found.b.folder.path),
         "pairs": len(found.pairs),
-        "changed": len(found.changed),
+        "changed": len(found.changed_pairs),
         "changes": compared.changes,
         "not_compared": compared.not_compared,
-        "differs": [fact for fact in found.facts if fact.differs],
+        "differs": [fact for fact in found.facts if fact.is_different],
         "files": found.files,
         "remarks": list(found.remarks),
         "tables": {s.name: [dict(zip(s.heads, line, strict=True)) for line in s.lines] for s in found.sheets},
@@ -138,14 +138,14 @@ def _as_json(compared: "mutator.RunComparison", failing: "tuple[Finding, ...]") 
 
 
 def _judge(
-    terminal: Terminal, found: "Comparison", gates: "list[mutator.Gate]", failing: "tuple[Finding, ...]"
+    terminal: Terminal, found: "Comparison", gates: "list[mutator.Gate]", failing: "tuple[GateFinding, ...]"
 ) -> None:
     for finding in failing[:NAMED]:
-        terminal.complain(f"{finding.gate.value}: {finding.words} [{finding.experiment_id}]")
+        terminal.complain(f"{finding.gate.value}: {finding.description} [{finding.experiment_id}]")
     if more := failing[NAMED:]:
         terminal.complain(f"and {len(more)} more")
     if failing:
         raise typer.Exit(EXIT_CHECK_FAILED)
-    if gates and found.incomplete:
-        terminal.complain(f"{counted(found.incomplete, 'result')} missing: finish both runs first")
+    if gates and found.missing_result_count:
+        terminal.complain(f"{counted(found.missing_result_count, 'result')} missing: finish both runs first")
         raise typer.Exit(EXIT_HARNESS_ERRORS)

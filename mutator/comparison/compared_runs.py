@@ -16,7 +16,7 @@ from mutator.targets.severity import Scale
 from mutator.targets.target_facts import T_END
 
 
-class Key(NamedTuple):
+class ExperimentKey(NamedTuple):
     """Identifies an experiment across runs, independently of target, reading, setting and seed. Ids can
     differ across runs, because they depend on drawn times, reading, setting and the scenario's text.
     """
@@ -29,32 +29,32 @@ class Key(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Side:
+class ComparedRun:
     """One run: its folder, its planned experiments, and their rows and metrics by id. Metrics without a value
     are left out.
     """
 
     folder: RunFolder
     experiments: tuple[Experiment, ...]
-    rows: dict[str, Row]
-    metrics: dict[str, dict[str, float]] = field(default_factory=dict)
+    row_by_id: dict[str, Row]
+    metrics_by_id: dict[str, dict[str, float]] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
         return self.folder.path.name
 
-    def classed(self, scale: Scale | None) -> "Side":
+    def classified_by(self, scale: Scale | None) -> "ComparedRun":
         """Return this side with contacts classified by `scale`, or unclassified if it is None."""
         rows = {}
-        for name, row in self.rows.items():
+        for name, row in self.row_by_id.items():
             severity = ""
             if scale and row.severity and row.delta_v is not None:
                 severity = scale.class_of(row.delta_v)
             rows[name] = replace(row, severity=severity)
-        return replace(self, rows=rows)
+        return replace(self, row_by_id=rows)
 
 
-def read_side(run: Path, only: str | None = None) -> Side:
+def load_compared_run(run: Path, only: str | None = None) -> ComparedRun:
     """Read the run folder `run` and its experiments that match `only`, a filter over plan columns.
 
     Raise MutatorError if `run` is not a run folder, and CheckFailed if its equivalence check failed.
@@ -65,18 +65,20 @@ def read_side(run: Path, only: str | None = None) -> Side:
     accepts = compile_filter(only, PLAN_COLUMNS) if only else None
     experiments = tuple(e for e in plan_file.read_all(folder.path) if accepts is None or accepts(plan_row(e)))
     faults = {e.fault.id: e.fault for e in experiments}
-    return Side(
+    return ComparedRun(
         folder=folder,
         experiments=experiments,
-        rows={row.experiment_id: row for row in rows_of(frame_of(folder, experiments), faults)},
-        metrics={e.id: _metrics(records[e.id]) for e in experiments if e.id in records},
+        row_by_id={row.experiment_id: row for row in rows_of(frame_of(folder, experiments), faults)},
+        metrics_by_id={e.id: _metrics_of(records[e.id]) for e in experiments if e.id in records},
     )
 
 
-def _metrics(record: Record) -> dict[str, float]:
+def _metrics_of(record: Record) -> dict[str, float]:
     return dict(record.metrics) | ({T_END: record.t_end} if record.t_end is not None else {})
 
 
-def key_of(experiment: Experiment) -> Key:
+def experiment_key(experiment: Experiment) -> ExperimentKey:
     fault = experiment.fault
-    return Key(fault.spec, fault.value, experiment.scenario, experiment.method.value, experiment.trigger.name)
+    return ExperimentKey(
+        fault.spec, fault.value, experiment.scenario, experiment.method.value, experiment.trigger.name
+    )

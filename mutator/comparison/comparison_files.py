@@ -11,122 +11,132 @@ from mutator._common.below import inside
 from mutator._common.files import make_folder, write_atomic
 from mutator._common.tables import Table, markdown_line
 from mutator._common.text import counted
-from mutator.comparison.input_differences import Fact
-from mutator.comparison.pairs import Change, Pair, time_to_hazard
-from mutator.comparison.run_comparison import Comparison, Gate, ending_change
+from mutator.comparison.input_differences import InputFact
+from mutator.comparison.pairs import ExperimentPair, ResultChange, time_to_hazard
+from mutator.comparison.run_comparison import Comparison, Gate, describe_ending_change
 from mutator.results.plan_columns import plan_row
 from mutator.results.result_rows import Row
 from mutator.web import asset, load_order
 
-LISTED = 50  # number of experiments that the Markdown lists for each change; the page and the CSV list all
-SHOWN = 500  # table rows that the page shows at once; browsers need seconds to lay out thousands
-_BAD = frozenset(gate.value for gate in Gate)
+MOST_LISTED_EXPERIMENTS = (
+    50  # number of experiments that the Markdown lists for each change; the page and the CSV list all
+)
+MOST_SHOWN_ROWS = 500  # table rows that the page shows at once; browsers need seconds to lay out thousands
+_WORSE_CHANGES = frozenset(gate.value for gate in Gate)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Written:
+class ComparisonFiles:
     markdown: Path
     page: Path
     pairs: Path
 
 
-def write(comparison: Comparison, out: Path) -> Written:
+def write_comparison(comparison: Comparison, out: Path) -> ComparisonFiles:
     """Write all forms of the comparison into `out`, which is created if missing. Equal inputs give equal
     bytes.
     """
     make_folder(out / "tables")
     text, hypertext, pairs = out / "COMPARISON.md", out / "index.html", out / "pairs.csv"
     for sheet in comparison.sheets:
-        write_atomic(inside(out / "tables", f"{sheet.name}.csv"), sheet.csv().encode())
+        write_atomic(inside(out / "tables", f"{sheet.name}.csv"), sheet.as_csv().encode())
     write_atomic(pairs, pairs_csv(comparison))
     write_atomic(out / "unmatched.csv", unmatched_csv(comparison))
-    write_atomic(text, markdown(comparison).encode())
-    write_atomic(hypertext, page(comparison).encode())
-    return Written(markdown=text, page=hypertext, pairs=pairs)
+    write_atomic(text, render_markdown(comparison).encode())
+    write_atomic(hypertext, render_page(comparison).encode())
+    return ComparisonFiles(markdown=text, page=hypertext, pairs=pairs)
 
 
 def pairs_csv(comparison: Comparison) -> bytes:
-    return _table(pair_line(p) for p in comparison.pairs)
+    return _csv_bytes(pair_cells(p) for p in comparison.pairs)
 
 
 def unmatched_csv(comparison: Comparison) -> bytes:
-    unmatched = ({"why": why, "experiment": e.id, "words": e.label} for why, e in comparison.unmatched)
-    return _table(unmatched, heads=("why", "experiment", "words"))
+    unmatched = (
+        {"why": why, "experiment": e.id, "words": e.label} for why, e in comparison.unmatched_experiments
+    )
+    return _csv_bytes(unmatched, heads=("why", "experiment", "words"))
 
 
-def summary(comparison: Comparison) -> str:
+def summary_text(comparison: Comparison) -> str:
     c = comparison
     counts = Counter(change for pair in c.pairs for change in pair.changes)
     text = f"In both runs: {counted(len(c.pairs), 'experiment')}. "
     if counts:
-        listed = ", ".join(f"{change.value} {counts[change]}" for change in Change if counts[change])
-        text += f"{len(c.changed)} of them changed: {listed}."
+        listed = ", ".join(f"{change.value} {counts[change]}" for change in ResultChange if counts[change])
+        text += f"{len(c.changed_pairs)} of them changed: {listed}."
     else:
         text += "None of them changed."
-    if unusable := sum(not p.usable for p in c.pairs):
+    if unusable := sum(not p.is_usable for p in c.pairs):
         text += " Left out of the rates, because a run has a harness error or an invalid mutant: "
         text += f"{unusable}."
-    if c.unmatched:
-        text += " Not compared: " + ", ".join(f"{n} {why}" for why, n in reasons(c)) + "."
+    if c.unmatched_experiments:
+        text += " Not compared: " + ", ".join(f"{n} {why}" for why, n in count_by_reason(c)) + "."
     return text
 
 
-def reasons(comparison: Comparison) -> list[tuple[str, int]]:
-    return list(Counter(why for why, _ in comparison.unmatched).items())
+def count_by_reason(comparison: Comparison) -> list[tuple[str, int]]:
+    return list(Counter(why for why, _ in comparison.unmatched_experiments).items())
 
 
 def files_text(comparison: Comparison) -> str:
-    found = comparison.files
+    differences = comparison.files
     parts = {
-        "changed": found.changed,
-        f"only in {comparison.names.a}": found.only_a,
-        f"only in {comparison.names.b}": found.only_b,
+        "changed": differences.changed,
+        f"only in {comparison.names.a}": differences.only_a,
+        f"only in {comparison.names.b}": differences.only_b,
     }
     named = [f"{what}: {', '.join(paths)}" for what, paths in parts.items() if paths]
     return f"Files of the target {'; '.join(named)}." if named else "The target's files are the same."
 
 
-def markdown(comparison: Comparison) -> str:
+def render_markdown(comparison: Comparison) -> str:
     c = comparison
-    parts = [f"# {c.names.a} against {c.names.b}", summary(c), *c.remarks, "## What differs between the runs"]
-    differing = _facts(c, [fact for fact in c.facts if fact.differs])
+    parts = [
+        f"# {c.names.a} against {c.names.b}",
+        summary_text(c),
+        *c.remarks,
+        "## What differs between the runs",
+    ]
+    differing = _facts_table(c, [fact for fact in c.facts if fact.is_different])
     if differing.rows:
         parts.append(differing.as_markdown())
     else:
         parts.append("Nothing: the same sources, choices and versions.")
     parts.append(files_text(c))
-    parts += [sheet.markdown().rstrip() for sheet in c.sheets]
-    for change in Change:
-        if pairs := c.having(change):
-            parts += [f"## {change.value}: {len(pairs)}", _listed(pairs)]
-    if c.unmatched:
-        parts += ["## Not compared", _reasons(c).as_markdown()]
+    parts += [sheet.as_markdown().rstrip() for sheet in c.sheets]
+    for change in ResultChange:
+        if pairs := c.pairs_with(change):
+            parts += [f"## {change.value}: {len(pairs)}", _pair_list(pairs)]
+    if c.unmatched_experiments:
+        parts += ["## Not compared", _reasons_table(c).as_markdown()]
         parts.append("`unmatched.csv` lists these experiments.")
     parts.append("All pairs are in `pairs.csv`; `index.html` lists those that changed.")
     return "\n\n".join(parts) + "\n"
 
 
-def _listed(pairs: tuple[Pair, ...]) -> str:
+def _pair_list(pairs: tuple[ExperimentPair, ...]) -> str:
     lines = [
-        f"- {p.b.label}: {markdown_line(ending_change(p))} (`{p.a.id}`, `{p.b.id}`)" for p in pairs[:LISTED]
+        f"- {p.b.label}: {markdown_line(describe_ending_change(p))} (`{p.a.id}`, `{p.b.id}`)"
+        for p in pairs[:MOST_LISTED_EXPERIMENTS]
     ]
-    more = len(pairs) - LISTED
+    more = len(pairs) - MOST_LISTED_EXPERIMENTS
     return "\n".join([*lines, f"- and {more} more"] if more > 0 else lines)
 
 
-def _facts(comparison: Comparison, facts: Sequence[Fact]) -> Table:
+def _facts_table(comparison: Comparison, facts: Sequence[InputFact]) -> Table:
     names = comparison.names
     return Table(
         heads=("what", names.a, names.b), rows=[(fact.name, fact.a, fact.b) for fact in facts], named=True
     )
 
 
-def _reasons(comparison: Comparison) -> Table:
-    rows = [(why, str(number)) for why, number in reasons(comparison)]
+def _reasons_table(comparison: Comparison) -> Table:
+    rows = [(why, str(number)) for why, number in count_by_reason(comparison)]
     return Table(heads=("why", "experiments"), rows=rows, right=(1,))
 
 
-def page(comparison: Comparison) -> str:
+def render_page(comparison: Comparison) -> str:
     """Return the comparison as one HTML page. All text from runs is escaped."""
     from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
@@ -137,45 +147,45 @@ def page(comparison: Comparison) -> str:
     counts = Counter(change for pair in comparison.pairs for change in pair.changes)
     return environment.from_string(asset("comparison/comparison.html")).render(
         c=comparison,
-        summary=summary(comparison),
-        differing=_facts(comparison, [fact for fact in comparison.facts if fact.differs]),
-        origin=_facts(comparison, [f for f in comparison.facts if not f.name.startswith("package ")]),
+        summary=summary_text(comparison),
+        differing=_facts_table(comparison, [fact for fact in comparison.facts if fact.is_different]),
+        origin=_facts_table(comparison, [f for f in comparison.facts if not f.name.startswith("package ")]),
         files=files_text(comparison),
-        counts=[(change.value, counts[change]) for change in Change if counts[change]],
-        reasons=_reasons(comparison),
-        changed=_changed(comparison),
-        limit=SHOWN,
-        style=Markup(style()),
+        counts=[(change.value, counts[change]) for change in ResultChange if counts[change]],
+        reasons=_reasons_table(comparison),
+        changed=_changed_table(comparison),
+        limit=MOST_SHOWN_ROWS,
+        style=Markup(page_style()),
         script=Markup(asset("comparison/comparison.js")),
     )
 
 
-def style() -> str:
-    return "".join(map(asset, load_order("comparison", ".css"))).replace("LIMIT", str(SHOWN + 1))
+def page_style() -> str:
+    return "".join(map(asset, load_order("comparison", ".css"))).replace("LIMIT", str(MOST_SHOWN_ROWS + 1))
 
 
-def _changed(comparison: Comparison) -> Table:
+def _changed_table(comparison: Comparison) -> Table:
     a, b = comparison.names.a, comparison.names.b
     heads = ("experiment", "what changed", a, b, f"hazard, {a} [s]", f"hazard, {b} [s]", "ids")
-    return Table(heads=heads, rows=list(map(_changed_row, comparison.changed)), right=(4, 5))
+    return Table(heads=heads, rows=list(map(_changed_row, comparison.changed_pairs)), right=(4, 5))
 
 
-def _changed_row(pair: Pair) -> tuple[str, ...]:
+def _changed_row(pair: ExperimentPair) -> tuple[str, ...]:
     from markupsafe import Markup
 
     badge = Markup('<span class="change{}">{}</span> ').format
-    changes = [change.value for change in Change if change in pair.changes]
+    changes = [change.value for change in ResultChange if change in pair.changes]
     sides = (pair.row_a, pair.row_b)
     return (
         pair.b.label,
-        Markup("").join(badge(" bad" if change in _BAD else "", change) for change in changes),
-        *map(_ending, sides),
-        *map(_hazard_time, sides),
+        Markup("").join(badge(" bad" if change in _WORSE_CHANGES else "", change) for change in changes),
+        *map(_ending_html, sides),
+        *map(_hazard_time_text, sides),
         Markup("<br>").join(map(Markup("<code>{}</code>").format, dict.fromkeys((pair.a.id, pair.b.id)))),
     )
 
 
-def _ending(row: Row) -> str:
+def _ending_html(row: Row) -> str:
     from markupsafe import Markup
 
     details = [name for name, _ in row.hazards] + [f"alert {name}" for name in row.alerts]
@@ -186,12 +196,12 @@ def _ending(row: Row) -> str:
     return Markup('<span class="ending {0}">{0}</span> {1}').format(row.ending, ", ".join(details))
 
 
-def _hazard_time(row: Row) -> str:
+def _hazard_time_text(row: Row) -> str:
     time = time_to_hazard(row)
     return "" if time is None else f"{time:.2f}"
 
 
-def pair_line(pair: Pair) -> dict[str, object]:
+def pair_cells(pair: ExperimentPair) -> dict[str, object]:
     """Return a pair's line in pairs.csv. Times are in simulated seconds."""
     planned = plan_row(pair.b)
     line: dict[str, object] = {
@@ -200,7 +210,7 @@ def pair_line(pair: Pair) -> dict[str, object]:
         **{name: planned[name] for name in ("module", "fault_type", "variant")},
         "value": "" if planned["value"] is None else str(planned["value"]),
         **{name: planned[name] for name in ("unit", "scenario", "method", "trigger")},
-        "changes": ";".join(change.value for change in Change if change in pair.changes),
+        "changes": ";".join(change.value for change in ResultChange if change in pair.changes),
     }
     sides = [dict(_side_cells(row)) for row in (pair.row_a, pair.row_b)]
     return line | {f"{k}_{s}": side[k] for k in sides[0] for s, side in zip("ab", sides, strict=True)}
@@ -218,10 +228,10 @@ def _side_cells(row: Row) -> Iterator[tuple[str, object]]:
     yield "delta_v", row.delta_v
 
 
-def _table(lines: Iterable[Mapping[str, object]], heads: tuple[str, ...] = ()) -> bytes:
-    made = list(lines)
+def _csv_bytes(lines: Iterable[Mapping[str, object]], heads: tuple[str, ...] = ()) -> bytes:
+    rows = list(lines)
     text = io.StringIO()
-    writer = csv.DictWriter(text, heads or tuple(made[0]), lineterminator="\n")
+    writer = csv.DictWriter(text, heads or tuple(rows[0]), lineterminator="\n")
     writer.writeheader()
-    writer.writerows(made)
+    writer.writerows(rows)
     return text.getvalue().encode()

@@ -5,19 +5,19 @@ from dataclasses import dataclass
 from typing import Any
 
 from mutator._common.hashing import plain
-from mutator.comparison.compared_runs import Side
-from mutator.comparison.pairs import Matching, Pair
+from mutator.comparison.compared_runs import ComparedRun
+from mutator.comparison.pairs import ExperimentMatching, ExperimentPair
 from mutator.store.run_folder import RunFolder
 from mutator.store.work_stretches import package_versions
 from mutator.store.work_stretches import told as ran_with
 
-_SHORT = 12  # shown digits of a digest
-_HEAD = ("campaign", "target", "seed", "reading")
-_PARTS = ("limit", "shard", "only", "exclude")  # choices that select some of the experiments
+_SHOWN_DIGEST_DIGITS = 12  # shown digits of a digest
+_HEAD_FIELDS = ("campaign", "target", "seed", "reading")
+_SELECTING_CHOICES = ("limit", "shard", "only", "exclude")  # choices that select some of the experiments
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Fact:
+class InputFact:
     """A named value of both runs."""
 
     name: str
@@ -25,12 +25,12 @@ class Fact:
     b: str
 
     @property
-    def differs(self) -> bool:
+    def is_different(self) -> bool:
         return self.a != self.b
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Files:
+class DifferingFiles:
     """Target files that differ between the runs, by path."""
 
     changed: tuple[str, ...]
@@ -38,45 +38,45 @@ class Files:
     only_b: tuple[str, ...]
 
 
-def facts(a: Side, b: Side) -> tuple[Fact, ...]:
+def input_facts(a: ComparedRun, b: ComparedRun) -> tuple[InputFact, ...]:
     """Everything that the runs' results depend on, with packages last."""
-    heads = [_facts(side) for side in (a, b)]
+    heads = [_facts_of_run(side) for side in (a, b)]
     names = dict.fromkeys(name for head in heads for name in head)
-    return tuple(Fact(name=n, a=heads[0].get(n, "-"), b=heads[1].get(n, "-")) for n in names)
+    return tuple(InputFact(name=n, a=heads[0].get(n, "-"), b=heads[1].get(n, "-")) for n in names)
 
 
-def _facts(side: Side) -> dict[str, str]:
+def _facts_of_run(side: ComparedRun) -> dict[str, str]:
     head, stretches = side.folder.head, side.folder.stretches
-    told = {name: str(getattr(head, name)) for name in _HEAD}
+    values = {name: str(getattr(head, name)) for name in _HEAD_FIELDS}
     if len(seeds := side.folder.seeds) > 1:
-        told["seed"] = f"{seeds[0]} to {seeds[-1]}"
-    told["setting"] = ", ".join(dict.fromkeys(c for e in side.experiments for c in e.setting)) or "-"
-    told["chosen"] = ", ".join(f"{k} {v}" for k, v in plain(head.choices).items() if v is not None) or "-"
-    told |= {f"digest of {name}": value[:_SHORT] for name, value in head.sources.items()}
+        values["seed"] = f"{seeds[0]} to {seeds[-1]}"
+    values["setting"] = ", ".join(dict.fromkeys(c for e in side.experiments for c in e.setting)) or "-"
+    values["chosen"] = ", ".join(f"{k} {v}" for k, v in plain(head.choices).items() if v is not None) or "-"
+    values |= {f"digest of {name}": value[:_SHOWN_DIGEST_DIGITS] for name, value in head.sources.items()}
     if scale := side.folder.scale:
         bounds = ", ".join(f"{name} from {least:.3g} m/s" for name, least, _ in scale.classes[1:])
-        told["scale of severity"] = f"{scale.name}: {bounds}"
-    told["digest of plan"] = head.plan[:_SHORT]
-    told["mutator"] = head.provenance.mutator
-    return told | ran_with(stretches) | {f"package {k}": v for k, v in package_versions(stretches).items()}
+        values["scale of severity"] = f"{scale.name}: {bounds}"
+    values["digest of plan"] = head.plan[:_SHOWN_DIGEST_DIGITS]
+    values["mutator"] = head.provenance.mutator
+    return values | ran_with(stretches) | {f"package {k}": v for k, v in package_versions(stretches).items()}
 
 
-def files(a: RunFolder, b: RunFolder) -> Files:
+def differing_files(a: RunFolder, b: RunFolder) -> DifferingFiles:
     """Return the target's files that differ."""
     of_a, of_b = a.head.target_files, b.head.target_files
-    return Files(
+    return DifferingFiles(
         changed=tuple(sorted(path for path in of_a if path in of_b and of_a[path] != of_b[path])),
         only_a=tuple(sorted(set(of_a) - set(of_b))),
         only_b=tuple(sorted(set(of_b) - set(of_a))),
     )
 
 
-def remarks(a: Side, b: Side, matching: Matching) -> tuple[str, ...]:
+def pair_remarks(a: ComparedRun, b: ComparedRun, matching: ExperimentMatching) -> tuple[str, ...]:
     """Return remarks on the number of pairs that differ in each input."""
-    told: tuple[tuple[str, Callable[[Pair], bool]], ...] = (
+    checks: tuple[tuple[str, Callable[[ExperimentPair], bool]], ...] = (
         ("with different injections", lambda p: p.a.fault.injections != p.b.fault.injections),
         ("with different trigger conditions", lambda p: p.a.trigger.condition != p.b.trigger.condition),
-        ("with different holds or trigger times", lambda p: _hold(p.a) != _hold(p.b)),
+        ("with different holds or trigger times", lambda p: _hold_settings(p.a) != _hold_settings(p.b)),
         ("with different scenario files", lambda p: p.a.scenario_digest != p.b.scenario_digest),
         ("with different seeds", lambda p: p.a.seed != p.b.seed),
         (
@@ -84,39 +84,49 @@ def remarks(a: Side, b: Side, matching: Matching) -> tuple[str, ...]:
             lambda p: p.a.after_hazard != p.b.after_hazard,
         ),
     )
-    counts = ((_count(matching.pairs, differs), what) for what, differs in told)
+    counts = ((_count_differing(matching.pairs, differs), what) for what, differs in checks)
     return tuple(f"Pairs {what}: {n} of {len(matching.pairs)}." for n, what in counts if n)
 
 
-def parts_remark(a: Side, b: Side) -> str:
+def campaign_parts_remark(a: ComparedRun, b: ComparedRun) -> str:
     """Return a remark that the runs are different parts of a campaign; empty if they are the same part."""
     of_a, of_b = (
-        {name: value for name in _PARTS if (value := getattr(side.folder.head.choices, name)) is not None}
+        {
+            name: value
+            for name in _SELECTING_CHOICES
+            if (value := getattr(side.folder.head.choices, name)) is not None
+        }
         for side in (a, b)
     )
     if of_a == of_b:
         return ""
-    told = [
+    choices = [
         f"{side.name} has {', '.join(f'--{name} {value}' for name, value in chosen.items()) or 'everything'}"
         for side, chosen in ((a, of_a), (b, of_b))
     ]
-    return f"The runs are different parts of a campaign: {', '.join(told)}. Only their overlap is compared."
+    return (
+        f"The runs are different parts of a campaign: {', '.join(choices)}. Only their overlap is compared."
+    )
 
 
-def severity_remarks(a: Side, b: Side) -> tuple[str, ...]:
+def severity_remarks(a: ComparedRun, b: ComparedRun) -> tuple[str, ...]:
     scales = [side.folder.scale for side in (a, b)]
     if None in scales:
-        (without,) = [s for s, scale in zip((a, b), scales, strict=True) if not scale][:1]
-        return (f"Severity is not compared: {without.name} has no severity classes.",) if any(scales) else ()
+        (unclassified,) = [s for s, scale in zip((a, b), scales, strict=True) if not scale][:1]
+        return (
+            (f"Severity is not compared: {unclassified.name} has no severity classes.",)
+            if any(scales)
+            else ()
+        )
     if scales[0] == scales[1]:
         return ()
     return (f"The runs have different severity scales; only that of {b.name} is used.",)
 
 
-def _hold(experiment: Any) -> tuple[object, ...]:
+def _hold_settings(experiment: Any) -> tuple[object, ...]:
     trigger, fault = experiment.trigger, experiment.fault
     return (fault.hold or trigger.hold, trigger.hold_s, trigger.armed_after_s)
 
 
-def _count(pairs: Iterable[Pair], differs: Callable[[Pair], bool]) -> int:
+def _count_differing(pairs: Iterable[ExperimentPair], differs: Callable[[ExperimentPair], bool]) -> int:
     return sum(map(differs, pairs))

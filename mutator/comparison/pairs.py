@@ -6,15 +6,15 @@ from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
 
-from mutator.comparison.compared_runs import Side, key_of
+from mutator.comparison.compared_runs import ComparedRun, experiment_key
 from mutator.model import Experiment, Outcome, Status
 from mutator.results.result_rows import Row
 
-_HARM = {Outcome.NOT_ACTIVATED: 0, Outcome.MASKED: 0, Outcome.SDC: 1, Outcome.HAZARD: 2}
-_TIME_DIGITS = 6  # decimals of a time from activation; absorbs rounding errors
+_HARM_BY_OUTCOME = {Outcome.NOT_ACTIVATED: 0, Outcome.MASKED: 0, Outcome.SDC: 1, Outcome.HAZARD: 2}
+_TIME_DECIMALS = 6  # decimals of a time from activation; absorbs rounding errors
 
 
-class Change(StrEnum):
+class ResultChange(StrEnum):
     """A change in the second run of a pair, relative to the first. `comparison.Gate` explains the changes for
     the worse.
     """
@@ -38,7 +38,7 @@ class Change(StrEnum):
 
 
 @dataclass(frozen=True)
-class Pair:
+class ExperimentPair:
     """One experiment in both runs, with its rows."""
 
     a: Experiment
@@ -47,21 +47,21 @@ class Pair:
     row_b: Row
 
     @property
-    def usable(self) -> bool:
+    def is_usable(self) -> bool:
         """Whether both runs have a valid result for the fault."""
         return self.row_a.usable and self.row_b.usable
 
     @cached_property
-    def changes(self) -> frozenset[Change]:
+    def changes(self) -> frozenset[ResultChange]:
         """All changes; empty for equal results."""
-        return frozenset(_changes(self.row_a, self.row_b))
+        return frozenset(_changes_between(self.row_a, self.row_b))
 
 
 @dataclass(frozen=True, kw_only=True)
-class Matching:
+class ExperimentMatching:
     """The experiments of two runs, in plan order."""
 
-    pairs: tuple[Pair, ...]
+    pairs: tuple[ExperimentPair, ...]
     only_a: tuple[Experiment, ...]  # not in the other run's plan
     only_b: tuple[Experiment, ...]
     no_result_a: tuple[Experiment, ...]  # planned in both runs, but this run has no result (yet)
@@ -69,75 +69,77 @@ class Matching:
     ambiguous: tuple[Experiment, ...]  # in either run; another experiment of that run has the same key
 
 
-def match(a: Side, b: Side) -> Matching:
+def match_experiments(a: ComparedRun, b: ComparedRun) -> ExperimentMatching:
     """Match experiments by id, then the remaining ones by key, unless several in one run share that key."""
     by_id = {e.id: e for e in b.experiments}
-    same = {e.id for e in a.experiments if e.id in by_id}
-    rest_a = [e for e in a.experiments if e.id not in same]
-    rest_b = [e for e in b.experiments if e.id not in same]
-    counts_a, counts_b = Counter(map(key_of, rest_a)), Counter(map(key_of, rest_b))
-    by_key = {key_of(e): e for e in rest_b}
-    clear = {key for key in counts_a if counts_a[key] == counts_b[key] == 1}
+    shared_ids = {e.id for e in a.experiments if e.id in by_id}
+    rest_a = [e for e in a.experiments if e.id not in shared_ids]
+    rest_b = [e for e in b.experiments if e.id not in shared_ids]
+    counts_a, counts_b = Counter(map(experiment_key, rest_a)), Counter(map(experiment_key, rest_b))
+    by_key = {experiment_key(e): e for e in rest_b}
+    unambiguous = {key for key in counts_a if counts_a[key] == counts_b[key] == 1}
     partners = [
-        (e, by_id[e.id] if e.id in same else by_key[key_of(e)])
+        (e, by_id[e.id] if e.id in shared_ids else by_key[experiment_key(e)])
         for e in a.experiments
-        if e.id in same or key_of(e) in clear
+        if e.id in shared_ids or experiment_key(e) in unambiguous
     ]
-    return Matching(
+    return ExperimentMatching(
         pairs=tuple(
-            Pair(x, y, a.rows[x.id], b.rows[y.id]) for x, y in partners if x.id in a.rows and y.id in b.rows
+            ExperimentPair(x, y, a.row_by_id[x.id], b.row_by_id[y.id])
+            for x, y in partners
+            if x.id in a.row_by_id and y.id in b.row_by_id
         ),
-        only_a=tuple(e for e in rest_a if key_of(e) not in counts_b),
-        only_b=tuple(e for e in rest_b if key_of(e) not in counts_a),
-        no_result_a=tuple(x for x, _ in partners if x.id not in a.rows),
-        no_result_b=tuple(y for _, y in partners if y.id not in b.rows),
+        only_a=tuple(e for e in rest_a if experiment_key(e) not in counts_b),
+        only_b=tuple(e for e in rest_b if experiment_key(e) not in counts_a),
+        no_result_a=tuple(x for x, _ in partners if x.id not in a.row_by_id),
+        no_result_b=tuple(y for _, y in partners if y.id not in b.row_by_id),
         ambiguous=tuple(
             e
             for e in (*rest_a, *rest_b)
-            if (key := key_of(e)) in counts_a and key in counts_b and key not in clear
+            if (key := experiment_key(e)) in counts_a and key in counts_b and key not in unambiguous
         ),
     )
 
 
-def _changes(a: Row, b: Row) -> Iterable[Change]:
+def _changes_between(a: Row, b: Row) -> Iterable[ResultChange]:
     if not (a.usable and b.usable):
         if a.usable != b.usable:
-            yield Change.HARNESS_ERROR if a.usable else Change.MENDED
+            yield ResultChange.HARNESS_ERROR if a.usable else ResultChange.MENDED
         return
     if (a.status is Status.OK) != (b.status is Status.OK):
-        yield Change.NEW_CRASH if a.status is Status.OK else Change.CRASH_GONE
+        yield ResultChange.NEW_CRASH if a.status is Status.OK else ResultChange.CRASH_GONE
     elif a.ending != b.ending:
-        yield _by_harm(_harm(b) - _harm(a))
+        yield _change_by_harm(_harm(b) - _harm(a))
     yield from _hazard_changes(a, b)
     if a.severity != b.severity:
-        yield Change.HIGHER_SEVERITY if a.severity < b.severity else Change.LOWER_SEVERITY
+        yield ResultChange.HIGHER_SEVERITY if a.severity < b.severity else ResultChange.LOWER_SEVERITY
     if bool(a.alerts) != bool(b.alerts):
-        yield Change.LOST_ALERT if a.alerts else Change.NEW_ALERT
+        yield ResultChange.LOST_ALERT if a.alerts else ResultChange.NEW_ALERT
 
 
-def _by_harm(difference: int) -> Change:
+def _change_by_harm(difference: int) -> ResultChange:
     if difference:
-        return Change.WORSE if difference > 0 else Change.BETTER
-    return Change.OTHERWISE
+        return ResultChange.WORSE if difference > 0 else ResultChange.BETTER
+    return ResultChange.OTHERWISE
 
 
 def _harm(row: Row) -> int:
-    return _HARM[row.outcome] if row.outcome else 0
+    return _HARM_BY_OUTCOME[row.outcome] if row.outcome else 0
 
 
-def _hazard_changes(a: Row, b: Row) -> Iterable[Change]:
+def _hazard_changes(a: Row, b: Row) -> Iterable[ResultChange]:
     if bool(a.hazards) != bool(b.hazards):
-        yield Change.HAZARD_GONE if a.hazards else Change.NEW_HAZARD
+        yield ResultChange.HAZARD_GONE if a.hazards else ResultChange.NEW_HAZARD
     elif a.hazards:
         if {name for name, _ in b.hazards} - {name for name, _ in a.hazards}:
-            yield Change.OTHER_HAZARD
+            yield ResultChange.OTHER_HAZARD
         before, after = time_to_hazard(a), time_to_hazard(b)
         if before is not None and after is not None and before != after:
-            yield Change.EARLIER_HAZARD if after < before else Change.LATER_HAZARD
+            yield ResultChange.EARLIER_HAZARD if after < before else ResultChange.LATER_HAZARD
 
 
 def time_to_hazard(row: Row) -> float | None:
     """Time from activation to the first hazard, s; None without a hazard."""
     if not row.hazards or row.t_activation is None:
         return None
-    return round(row.hazards[0][1] - row.t_activation, _TIME_DIGITS)
+    return round(row.hazards[0][1] - row.t_activation, _TIME_DECIMALS)

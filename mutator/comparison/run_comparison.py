@@ -6,26 +6,32 @@ from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
 
-from mutator.comparison.compared_runs import Side, read_side
+from mutator.comparison.compared_runs import ComparedRun, load_compared_run
 from mutator.comparison.input_differences import (
-    Fact,
-    Files,
-    facts,
-    files,
-    parts_remark,
-    remarks,
+    DifferingFiles,
+    InputFact,
+    campaign_parts_remark,
+    differing_files,
+    input_facts,
+    pair_remarks,
     severity_remarks,
 )
 from mutator.comparison.metric_sheets import metrics_sheets, severity_sheet
 from mutator.comparison.pair_sheets import (
-    Names,
+    RunNames,
     changes_sheet,
     endings_sheet,
-    frame_of,
+    pairs_frame,
     rates_sheets,
     times_sheets,
 )
-from mutator.comparison.pairs import Change, Matching, Pair, match, time_to_hazard
+from mutator.comparison.pairs import (
+    ExperimentMatching,
+    ExperimentPair,
+    ResultChange,
+    match_experiments,
+    time_to_hazard,
+)
 from mutator.errors import MutatorError
 from mutator.model import Experiment
 from mutator.results.result_rows import Row
@@ -35,17 +41,21 @@ from mutator.statistics.statistics_sheet import Sheet
 class Gate(StrEnum):
     """What a gate fails on: a change for the worse, or an unmatched experiment."""
 
-    NEW_HAZARD = Change.NEW_HAZARD.value  #: a hazard, although the first run has none
+    NEW_HAZARD = ResultChange.NEW_HAZARD.value  #: a hazard, although the first run has none
     #: another hazard, although the first run already has one
-    OTHER_HAZARD = Change.OTHER_HAZARD.value
+    OTHER_HAZARD = ResultChange.OTHER_HAZARD.value
     HIGHER_SEVERITY = (
-        Change.HIGHER_SEVERITY.value
+        ResultChange.HIGHER_SEVERITY.value
     )  #: a contact of a higher class, or a contact although the first run has none
-    EARLIER_HAZARD = Change.EARLIER_HAZARD.value  #: less time from activation to the first hazard
-    LOST_ALERT = Change.LOST_ALERT.value  #: no alert, although the first run has one
-    WORSE = Change.WORSE.value  #: a worse outcome, in the order no effect, sdc, hazard; includes a new hazard
-    NEW_CRASH = Change.NEW_CRASH.value  #: the controller crashes or does not finish
-    HARNESS_ERROR = Change.HARNESS_ERROR.value  #: the second run has no result, although the first has one
+    EARLIER_HAZARD = ResultChange.EARLIER_HAZARD.value  #: less time from activation to the first hazard
+    LOST_ALERT = ResultChange.LOST_ALERT.value  #: no alert, although the first run has one
+    WORSE = (
+        ResultChange.WORSE.value
+    )  #: a worse outcome, in the order no effect, sdc, hazard; includes a new hazard
+    NEW_CRASH = ResultChange.NEW_CRASH.value  #: the controller crashes or does not finish
+    HARNESS_ERROR = (
+        ResultChange.HARNESS_ERROR.value
+    )  #: the second run has no result, although the first has one
     UNMATCHED = "unmatched"  #: an experiment that only one of the runs has
     SEVERITY_S0 = "severity:S0"  #: a contact of class S0 or worse; in the first run a milder one or none
     SEVERITY_S1 = "severity:S1"  #: a contact of class S1 or worse; in the first run a milder one or none
@@ -54,67 +64,72 @@ class Gate(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Finding:
+class GateFinding:
     """An experiment on which a gate fails, and why. If both runs have it, the id is the second run's."""
 
     gate: Gate
     experiment_id: str
-    words: str
+    description: str
 
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
     """Two matched runs. `alerts_notes` has a note on the alerts of each run's fault-free runs, or ''."""
 
-    a: Side
-    b: Side
-    matching: Matching
+    a: ComparedRun
+    b: ComparedRun
+    matching: ExperimentMatching
     alerts_notes: tuple[str, str] = ("", "")
 
     @cached_property
-    def names(self) -> Names:
+    def names(self) -> RunNames:
         """The display names of the runs, made distinct if they are equal."""
         a, b = self.a.name, self.b.name
-        return Names(a=a, b=b) if a != b else Names(a=f"A: {a}", b=f"B: {b}")
+        return RunNames(a=a, b=b) if a != b else RunNames(a=f"A: {a}", b=f"B: {b}")
 
     @property
-    def pairs(self) -> tuple[Pair, ...]:
+    def pairs(self) -> tuple[ExperimentPair, ...]:
         return self.matching.pairs
 
     @cached_property
-    def changed(self) -> tuple[Pair, ...]:
-        """The pairs with any change: new hazards first, then in the order of `Change` and the plan."""
-        order = list(Change)
+    def changed_pairs(self) -> tuple[ExperimentPair, ...]:
+        """The pairs with any change: new hazards first, then in the order of `ResultChange` and the plan."""
+        order = list(ResultChange)
         changed = (pair for pair in self.pairs if pair.changes)
         return tuple(sorted(changed, key=lambda pair: sorted(map(order.index, pair.changes))))
 
-    def having(self, change: Change) -> tuple[Pair, ...]:
+    def pairs_with(self, change: ResultChange) -> tuple[ExperimentPair, ...]:
         return tuple(p for p in self.pairs if change in p.changes)
 
     @cached_property
-    def facts(self) -> tuple[Fact, ...]:
-        return facts(self.a, self.b)
+    def facts(self) -> tuple[InputFact, ...]:
+        return input_facts(self.a, self.b)
 
     @cached_property
-    def files(self) -> Files:
-        return files(self.a.folder, self.b.folder)
+    def files(self) -> DifferingFiles:
+        return differing_files(self.a.folder, self.b.folder)
 
     @cached_property
     def remarks(self) -> tuple[str, ...]:
         """Caveats to read before the tables."""
         noted = zip((self.names.a, self.names.b), self.alerts_notes, strict=True)
-        own = tuple(f"{name}: {note}" for name, note in noted if note)
+        alert_remarks = tuple(f"{name}: {note}" for name, note in noted if note)
         first = (self.parts_remark,) if self.parts_remark else ()
-        return first + remarks(self.a, self.b, self.matching) + severity_remarks(self.a, self.b) + own
+        return (
+            first
+            + pair_remarks(self.a, self.b, self.matching)
+            + severity_remarks(self.a, self.b)
+            + alert_remarks
+        )
 
     @cached_property
     def parts_remark(self) -> str:
-        return parts_remark(self.a, self.b)
+        return campaign_parts_remark(self.a, self.b)
 
     @cached_property
     def sheets(self) -> tuple[Sheet, ...]:
         """The tables, most important first."""
-        frame = frame_of(self.pairs)
+        frame = pairs_frame(self.pairs)
         rates, rates_by_type = rates_sheets(frame, self.names)
         spans, spans_by_type = times_sheets(frame, self.names)
         counts = (endings_sheet(self.pairs, self.names), changes_sheet(self.pairs))
@@ -127,7 +142,7 @@ class Comparison:
         )
 
     @cached_property
-    def unmatched(self) -> tuple[tuple[str, Experiment], ...]:
+    def unmatched_experiments(self) -> tuple[tuple[str, Experiment], ...]:
         """The experiments that could not be compared, with reasons."""
         m, names = self.matching, self.names
         groups: tuple[tuple[str, Sequence[Experiment]], ...] = (
@@ -140,7 +155,7 @@ class Comparison:
         return tuple((why, experiment) for why, group in groups for experiment in group)
 
     @property
-    def incomplete(self) -> int:
+    def missing_result_count(self) -> int:
         """The number of missing results among experiments that both runs planned."""
         m = self.matching
         return (
@@ -150,21 +165,21 @@ class Comparison:
         )
 
 
-def compare(
+def compare_runs(
     run_a: Path, run_b: Path, only: str | None = None, alerts_notes: tuple[str, str] = ("", "")
 ) -> Comparison:
     """Compare two run folders; `only` filters experiments by plan columns.
 
     Raise MutatorError if no experiment has a partner, and CheckFailed if a run's equivalence check failed.
     """
-    a, b = read_side(run_a, only), read_side(run_b, only)
+    a, b = load_compared_run(run_a, only), load_compared_run(run_b, only)
     scale = b.folder.scale if a.folder.scale else None  # classify both runs by the same scale, or neither
-    a, b = a.classed(scale), b.classed(scale)
-    matching = match(a, b)
+    a, b = a.classified_by(scale), b.classified_by(scale)
+    matching = match_experiments(a, b)
     if not matching.pairs:
         raise MutatorError(
-            f"no experiment of {a.name} has a partner in {b.name} (experiments with a result: {len(a.rows)} "
-            f"and {len(b.rows)})",
+            f"no experiment of {a.name} has a partner in {b.name} (experiments with a result: "
+            f"{len(a.row_by_id)} and {len(b.row_by_id)})",
             where=run_b,
             argument="only",
             expected="runs of the same faults, scenarios and triggers",
@@ -173,23 +188,32 @@ def compare(
     return Comparison(a=a, b=b, matching=matching, alerts_notes=alerts_notes)
 
 
-def findings(comparison: Comparison, gates: Sequence[Gate]) -> tuple[Finding, ...]:
-    found: list[Finding] = []
+def findings_of_gates(comparison: Comparison, gates: Sequence[Gate]) -> tuple[GateFinding, ...]:
+    gate_findings: list[GateFinding] = []
     for gate in gates:
         if gate is Gate.UNMATCHED:
             m = comparison.matching
-            strangers = (*m.only_a, *m.only_b, *m.ambiguous)
-            found += [Finding(gate=gate, experiment_id=e.id, words=e.label) for e in strangers]
+            unmatched = (*m.only_a, *m.only_b, *m.ambiguous)
+            gate_findings += [
+                GateFinding(gate=gate, experiment_id=e.id, description=e.label) for e in unmatched
+            ]
             continue
         _, is_severity, least = gate.value.partition(":")
-        pairs = _reaching(comparison, least) if is_severity else comparison.having(Change(gate.value))
-        found += [
-            Finding(gate=gate, experiment_id=p.b.id, words=f"{p.b.label}: {ending_change(p)}") for p in pairs
+        pairs = (
+            _pairs_reaching_class(comparison, least)
+            if is_severity
+            else comparison.pairs_with(ResultChange(gate.value))
+        )
+        gate_findings += [
+            GateFinding(
+                gate=gate, experiment_id=p.b.id, description=f"{p.b.label}: {describe_ending_change(p)}"
+            )
+            for p in pairs
         ]
-    return tuple(found)
+    return tuple(gate_findings)
 
 
-def _reaching(comparison: Comparison, least: str) -> tuple[Pair, ...]:
+def _pairs_reaching_class(comparison: Comparison, least: str) -> tuple[ExperimentPair, ...]:
     """Return the pairs that reach the severity class `least` in the second run but not in the first."""
     for side in (comparison.a, comparison.b):
         if side.folder.scale is None:
@@ -200,15 +224,15 @@ def _reaching(comparison: Comparison, least: str) -> tuple[Pair, ...]:
                 expected="two runs planned with a manifest that has `severity`",
                 remedy="omit the severity gate, or rerun the campaign",
             )
-    return tuple(p for p in comparison.pairs if p.usable and p.row_a.severity < least <= p.row_b.severity)
+    return tuple(p for p in comparison.pairs if p.is_usable and p.row_a.severity < least <= p.row_b.severity)
 
 
-def ending_change(pair: Pair) -> str:
+def describe_ending_change(pair: ExperimentPair) -> str:
     """How a pair's outcome changed, for example `sdc -> hazard (NEAR 7.10 s after activation)`."""
-    return f"{_ending(pair.row_a)} -> {_ending(pair.row_b)}"
+    return f"{_describe_ending(pair.row_a)} -> {_describe_ending(pair.row_b)}"
 
 
-def _ending(row: Row) -> str:
+def _describe_ending(row: Row) -> str:
     time = time_to_hazard(row)
     details = []
     if row.hazards:

@@ -9,7 +9,7 @@ import pandas as pd
 from mutator.figures import style
 from mutator.statistics.results_frame import hazard_names
 from mutator.statistics.shares import share
-from mutator.statistics.tallies import Tally, by_kind
+from mutator.statistics.tallies import Tally, tally_by_fault_type
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,7 +31,7 @@ def hazard_sets(frame: pd.DataFrame) -> pd.Series:
 
 @style.shipped_style()
 def draw(frame: pd.DataFrame) -> "Figure":
-    tallies = by_kind(frame)
+    tallies = tally_by_fault_type(frame)
     methods = sorted({method for method, _ in tallies})
     hazards = frame.groupby("kind")["is_hazard"].sum()
     kinds = sorted(hazards.index, key=lambda kind: (-hazards[kind], kind))

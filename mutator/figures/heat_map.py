@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import pandas as pd
 
 from mutator.figures import style
-from mutator.statistics.tallies import tally
+from mutator.statistics.tallies import tally_of_runs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,7 +34,7 @@ def draw(frame: pd.DataFrame) -> "Figure":
 def _panel(axis: "Axes", frame: pd.DataFrame, kinds: list[str], scenarios: list[str]) -> "AxesImage":
     import numpy as np
 
-    groups = {(str(k), str(s)): tally(group) for (k, s), group in frame.groupby(["kind", "scenario"])}
+    groups = {(str(k), str(s)): tally_of_runs(group) for (k, s), group in frame.groupby(["kind", "scenario"])}
     rates = np.full((len(kinds), len(scenarios)), np.nan)
     for (kind, scenario), found in groups.items():
         place = kinds.index(kind), scenarios.index(scenario)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import pandas as pd
 
 from mutator.figures import style
-from mutator.statistics.event_times import Spread, propagation
+from mutator.statistics.event_times import TimeSpread, propagation_times
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 @style.shipped_style()
 def draw(frame: pd.DataFrame) -> "Figure":
     methods, scenarios = sorted(frame["method"].unique()), sorted(frame["scenario"].unique())
-    spreads = {(m, s): propagation(group) for (m, s), group in frame.groupby(["method", "scenario"])}
+    spreads = {(m, s): propagation_times(group) for (m, s), group in frame.groupby(["method", "scenario"])}
     steps = list(next(iter(spreads.values())))
     figure, axes = style.blank(6.2, 2, 2)
     for axis, step in zip(axes, steps, strict=True):
@@ -37,12 +37,12 @@ def draw(frame: pd.DataFrame) -> "Figure":
     return figure
 
 
-def _method(axis: "Axes", spreads: Sequence[tuple[float, Spread]], method: str) -> None:
+def _method(axis: "Axes", spreads: Sequence[tuple[float, TimeSpread]], method: str) -> None:
     colour, marker = style.method_look(method)
     known = [(x, spread) for x, spread in spreads if spread.n]
     xs = [x for x, _ in known]
-    lower = [s.lower for _, s in known]
-    upper = [s.upper for _, s in known]
+    lower = [s.lower_quartile for _, s in known]
+    upper = [s.upper_quartile for _, s in known]
     height = [b - a for a, b in zip(lower, upper, strict=True)]
     axis.bar(
         xs, height, 0.28, lower, color=colour, alpha=0.35, edgecolor=colour, label=f"{method}: quartiles"
@@ -54,7 +54,7 @@ def _method(axis: "Axes", spreads: Sequence[tuple[float, Spread]], method: str) 
     for x, s in known:
         axis.annotate(
             str(s.n),
-            (x, max(s.upper, s.mean)),
+            (x, max(s.upper_quartile, s.mean)),
             xytext=(0, 4),
             textcoords="offset points",
             ha="center",

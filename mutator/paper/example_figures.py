@@ -29,7 +29,8 @@ def example_drawings(
 ) -> tuple[Drawing, ...]:
     """Return a drawing for each wanted figure. If a figure cannot be drawn, its drawing gives the reason.
 
-    `frame` comes from `statistics.results_frame.load`. Traces come from stored series, so nothing is rerun.
+    `frame` comes from `statistics.results_frame.load_usable_results`. Traces come from stored series, so
+    nothing is rerun.
     """
     traces = Traces(workspace, folder) if workspace else None
     made = []

@@ -1,11 +1,12 @@
 """Measures for published observations: numbers computed from a frame of results, each with an interval.
 
-`runs` comes from `mutator.statistics.results_frame.load`. `of`, `part` and `against` are pandas queries on
-it; an empty query selects all runs. Reports show the call for each claim, which you can repeat in Python:
+`runs` comes from `mutator.statistics.results_frame.load_usable_results`. `of`, `part` and `against` are
+pandas queries on it; an empty query selects all runs. Reports show the call for each claim, which you can
+repeat in Python:
 
     from mutator.paper.measures import *
-    from mutator.statistics.results_frame import load
-    runs = load(Path("results.csv"))
+    from mutator.statistics.results_frame import load_usable_results
+    runs = load_usable_results(Path("results.csv"))
 """
 
 import math
@@ -19,7 +20,7 @@ from mutator._common.text import counted
 from mutator.statistics import event_times, guided_against_random
 from mutator.statistics.shares import CONFIDENCE, Share
 from mutator.statistics.shares import share as wilson
-from mutator.statistics.tallies import by_kind
+from mutator.statistics.tallies import tally_by_fault_type
 
 __all__ = [
     "Path",
@@ -71,8 +72,11 @@ def clustered_difference(runs: pd.DataFrame, *, of: str) -> Estimate:
         _share(chosen, f'method == "{how}"', "is_hazard")
         for how in (guided_against_random.GUIDED, guided_against_random.RANDOM)
     )
-    found = guided_against_random.resampled(chosen, "injected")  # `chosen` has only the runs to count
-    faults = counted(found.clusters, "fault")
+    found = guided_against_random.resampled_rate_difference(
+        chosen,
+        "injected",  # `chosen` has only the runs to count
+    )
+    faults = counted(found.fault_count, "fault")
     return Estimate(
         estimate=found.difference,
         low=found.low,
@@ -84,7 +88,7 @@ def clustered_difference(runs: pd.DataFrame, *, of: str) -> Estimate:
 
 def stratified(runs: pd.DataFrame, *, of: str) -> Estimate:
     """Return the odds ratio of a hazard, guided against random, over all fault types (Mantel-Haenszel)."""
-    parts = guided_against_random.strata(by_kind(_query(runs, of)), "injected")
+    parts = guided_against_random.strata_with_both_methods(tally_by_fault_type(_query(runs, of)), "injected")
     found = guided_against_random.mantel_haenszel(parts)
     types = counted(found.strata, "fault type")
     said = f"- ({types})"
@@ -110,7 +114,7 @@ def paired(runs: pd.DataFrame, *, of: str) -> Estimate:
     """
     from statsmodels.stats.proportion import proportion_confint  # type: ignore[import-untyped]
 
-    matched = guided_against_random.mcnemar(_query(guided_against_random.pairs(runs), of))
+    matched = guided_against_random.mcnemar_of_pairs(_query(guided_against_random.matched_pairs(runs), of))
     unlike = matched.first_only + matched.second_only
     low = high = estimate = math.nan
     if unlike:
@@ -122,7 +126,7 @@ def paired(runs: pd.DataFrame, *, of: str) -> Estimate:
         high=high,
         n=unlike,
         count=matched.first_only,
-        text=f"{counted(matched.pairs, 'pair')}; hazard only in the guided run: {matched.first_only}, "
+        text=f"{counted(matched.pair_count, 'pair')}; hazard only in the guided run: {matched.first_only}, "
         f"only in the random run: {matched.second_only} (McNemar p {matched.p:.2g})",
     )
 
@@ -152,13 +156,13 @@ def median_time(runs: pd.DataFrame, *, of: str) -> Estimate:
         nan = math.nan
         return Estimate(estimate=nan, low=nan, high=nan, n=0, text="- (the ends of the runs are not known)")
     ends = {str(scenario): float(group["t_end"].iloc[0]) for scenario, group in chosen.groupby("scenario")}
-    found = event_times.reaction(chosen, ends, 0.0)
+    found = event_times.reaction_times(chosen, ends, 0.0)
     median, low, high = found.median, found.median_low, found.median_high
-    if found.at_risk and math.isnan(low):  # the curve stays above one half or jumps past it
+    if found.runs_alerted_first and math.isnan(low):  # the curve stays above one half or jumps past it
         median = math.inf if math.isnan(median) else median
-        if found.at_risk >= _BOUNDS_A_MEDIAN:
+        if found.runs_alerted_first >= _BOUNDS_A_MEDIAN:
             low = high = median
-    return _seconds(median, low, high, found.at_risk)
+    return _seconds(median, low, high, found.runs_alerted_first)
 
 
 def of_share(one: Share) -> Estimate:

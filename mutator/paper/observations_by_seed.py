@@ -8,7 +8,7 @@ import pandas as pd
 from mutator._common.tables import Table
 from mutator.paper.observations import JudgedObservation, Verdict, judge
 from mutator.statistics.seed_spread import seeds_of
-from mutator.statistics.statistics_sheet import Cell, Sheet
+from mutator.statistics.statistics_sheet import Sheet, SheetCell
 
 BySeed = Mapping[str, Sequence[JudgedObservation]]
 
@@ -61,7 +61,7 @@ def sheet(by_seed: BySeed) -> Sheet:
     )
 
 
-def _cells(by_seed: BySeed) -> Iterator[tuple[Cell, ...]]:
+def _cells(by_seed: BySeed) -> Iterator[tuple[SheetCell, ...]]:
     for seed, judged in by_seed.items():
         for one in judged:
             for claim in one.claims:

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from mutator._common.tables import Table
 from mutator.paper.observations import FEWEST, JudgedClaim, JudgedObservation
-from mutator.statistics.statistics_sheet import Cell, Sheet
+from mutator.statistics.statistics_sheet import Sheet, SheetCell
 
 RULES = f"""\
 A claim is decided by the 95 % interval of its number, not by the number itself. *above x*: the claim holds if
@@ -19,9 +19,9 @@ uncertainty is at least as large."""
 
 SESSION = """\
 from mutator.paper.measures import *
-from mutator.statistics.results_frame import load
+from mutator.statistics.results_frame import load_usable_results
 
-runs = load(Path("results.csv"))"""
+runs = load_usable_results(Path("results.csv"))"""
 
 HEADS = ("claim", "", "the paper", "verdict on its counts", "here", "rule", "verdict")
 
@@ -95,7 +95,7 @@ def sheet(observations: Sequence[JudgedObservation]) -> Sheet:
     )
 
 
-def _cells(observations: Sequence[JudgedObservation]) -> Iterator[tuple[Cell, ...]]:
+def _cells(observations: Sequence[JudgedObservation]) -> Iterator[tuple[SheetCell, ...]]:
     for observation in observations:
         for one in observation.claims:
             head = (observation.number, one.number, int(one.claim.needed), one.claim.says)

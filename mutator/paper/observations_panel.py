@@ -14,7 +14,7 @@ from mutator.paper.published_counts import has_paper, load_paper
 from mutator.report.panel import Panel, rendered
 from mutator.report.panels.tables_panel import csv_files
 from mutator.report.reported_run import ReportedRun
-from mutator.statistics.results_frame import slim
+from mutator.statistics.results_frame import select_columns
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -69,7 +69,7 @@ def build_observations_panel(run: ReportedRun) -> Panel | None:
         return None
     ends = run.ends() or {}
     words = re.findall(r"\w+", read_bounded(file, MAX_BYTES).decode())
-    frame = slim(run.frame, *words)  # the queries use only columns that the file names
+    frame = select_columns(run.frame, *words)  # the queries use only columns that the file names
     frame = frame.assign(t_end=frame["scenario"].map(ends))
     judged = observations.judge(file, frame, list(_lacks(run, missing)))
     coverage = _coverage(run, len(kinds), missing)

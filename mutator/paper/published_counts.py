@@ -7,7 +7,7 @@ from pydantic import Field
 
 from mutator.config.sources import Source
 from mutator.config.yaml_files import StrictModel, read
-from mutator.statistics.published_counts import Published
+from mutator.statistics.published_counts import PublishedCounts
 from mutator.statistics.tallies import Tally
 
 FILES = ("paper_summary.yaml", "paper_coverage.yaml", "paper_times.yaml")
@@ -23,18 +23,18 @@ class Paper:
     least_alert_to_hazard_s: float  # the scenarios' smallest and largest mean
     most_alert_to_hazard_s: float
 
-    def published(self) -> Published:
+    def published(self) -> PublishedCounts:
         least, most = self.least_alert_to_hazard_s, self.most_alert_to_hazard_s
-        return Published(
+        return PublishedCounts(
             source="paper",
             by_scenario=self.summary,
-            by_kind=self.coverage,
+            by_fault_type=self.coverage,
             scenario_title="the paper's table II",
-            kind_title="the paper's table III",
+            fault_type_title="the paper's table III",
             counts_note="The paper gives the counts; their intervals are computed here.",
-            kind_note="The paper has only hazards/activated; hazards/injected is computed here.",
+            fault_type_note="The paper has only hazards/activated; hazards/injected is computed here.",
             times_note=f"The paper's mean times from alert to hazard lie between {least:g} and {most:g} s.",
-            driver_s=self.driver_reaction_s,
+            driver_reaction_s=self.driver_reaction_s,
         )
 
 

@@ -9,7 +9,7 @@ from mutator.config.sources import Source
 from mutator.config.yaml_files import load
 from mutator.errors import MutatorError
 from mutator.paper.published_counts import FILES, Paper, load_paper
-from mutator.statistics.tallies import Tally, total
+from mutator.statistics.tallies import Tally, sum_tallies
 from mutator.workspace import Workspace
 
 _METHODS = ("guided", "random")
@@ -81,7 +81,7 @@ def _sums(paper: Paper, coverage: Source, summary: Path) -> Iterator[MutatorErro
     """Yield differences between the sums of both tables, which count the same experiments."""
 
     def of(counts: dict[tuple[str, str], Tally], method: str) -> Tally:
-        return total(tally for (how, _), tally in counts.items() if how == method)
+        return sum_tallies(tally for (how, _), tally in counts.items() if how == method)
 
     for method in _METHODS:
         kinds, scenarios = of(paper.coverage, method), of(paper.summary, method)

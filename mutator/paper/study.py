@@ -6,10 +6,10 @@ from mutator.paper.observations_panel import build_observations_panel
 from mutator.paper.published_counts import has_paper, load_paper
 from mutator.paper.published_counts_check import check_paper
 from mutator.report.reported_run import PublishedWork, ReportedRun
-from mutator.statistics.published_counts import Published
+from mutator.statistics.published_counts import PublishedCounts
 
 
-def published(run: ReportedRun) -> Published | None:
+def published(run: ReportedRun) -> PublishedCounts | None:
     """Return the paper's counts if the library cites them and the run has any of the paper's fault types."""
     references = run.workspace.references if run.workspace else None
     if references is None or not has_paper(references):

@@ -10,7 +10,7 @@ from mutator._common.processes import processes_for, shared
 from mutator.model import Fault, Record
 from mutator.outcomes.fault_paths import FaultPaths, PathInputs, UntimedPath
 from mutator.results.ranking import places
-from mutator.statistics.event_times import Alerts
+from mutator.statistics.event_times import AlertsByExperiment
 from mutator.store.run_folder import RunFolder
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ class Seen:
     places: np.ndarray
     path_numbers: np.ndarray
     untimed_paths: tuple[UntimedPath, ...]
-    alerts: Alerts
+    alerts: AlertsByExperiment
     timings: "DataFrame"
 
     @classmethod

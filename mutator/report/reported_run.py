@@ -18,8 +18,8 @@ from mutator.report.panel import Panel
 from mutator.report.source_lines import SourceLines
 from mutator.results.result_rows import Row, rows_of
 from mutator.results.table_reader import Results
-from mutator.statistics.published_counts import Published
-from mutator.statistics.results_frame import prepare
+from mutator.statistics.published_counts import PublishedCounts
+from mutator.statistics.results_frame import prepare_results
 from mutator.store import plan_file
 from mutator.store.planned_experiments import Planned
 from mutator.store.run_folder import RunFolder
@@ -62,7 +62,7 @@ class ReportedRun:
             folder=folder,
             workspace=workspace,
             results=results,
-            frame=prepare(results.assign(**{PLACE: seen.places, UNTIMED_PATH: seen.path_numbers})),
+            frame=prepare_results(results.assign(**{PLACE: seen.places, UNTIMED_PATH: seen.path_numbers})),
             engines=summarize_engines(folder, records, seen.timings),
             study=_find_published_work(folder) if workspace else None,
             seen=seen,
@@ -123,7 +123,7 @@ class PublishedWork:
 
     about: str
     check: Callable[[Workspace], Iterable[MutatorError]]
-    published: Callable[[ReportedRun], Published | None]
+    published: Callable[[ReportedRun], PublishedCounts | None]
     panels: tuple[Callable[[ReportedRun], Panel | None], ...]
     drawings: Callable[[ReportedRun], tuple[Drawing, ...]]
 

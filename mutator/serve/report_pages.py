@@ -94,9 +94,9 @@ class Shown:
         return report_builder.build_report(folder, self._workspace).files
 
     def _comparison(self, a: Path, b: Path) -> dict[str, bytes]:
-        made = comparing.compare(a, b, None, (self._alerts(a), self._alerts(b)))
+        made = comparing.compare_runs(a, b, None, (self._alerts(a), self._alerts(b)))
         return {
-            "index.html": comparison_files.page(made).encode(),
+            "index.html": comparison_files.render_page(made).encode(),
             "pairs.csv": comparison_files.pairs_csv(made),
             "unmatched.csv": comparison_files.unmatched_csv(made),
         }

@@ -154,7 +154,9 @@ def _with_policy(send: Send) -> Send:
 def policy() -> str:
     """Return the policy for pages: they can run only code from `mutator.web`, as files or inline by hash."""
     scripts = [_hash(f"\n{asset(name)}") for name in assets(".js")]
-    styles = [_hash(f"\n{asset(name)}") for name in assets(".css")] + [_hash(f"\n{comparison_files.style()}")]
+    styles = [_hash(f"\n{asset(name)}") for name in assets(".css")] + [
+        _hash(f"\n{comparison_files.page_style()}")
+    ]
     return "; ".join(
         (
             "default-src 'none'",

@@ -6,8 +6,8 @@ from dataclasses import astuple
 import pandas as pd
 
 from mutator.statistics import event_times
-from mutator.statistics.published_counts import Published
-from mutator.statistics.statistics_sheet import Cell, Sheet
+from mutator.statistics.published_counts import PublishedCounts
+from mutator.statistics.statistics_sheet import Sheet, SheetCell
 
 _ALERT_NOTE = (
     " Alert to hazard: only if the alert came first. Hazards that would follow after the end of the run are "
@@ -15,10 +15,12 @@ _ALERT_NOTE = (
 )
 
 
-def propagation_sheet(frame: pd.DataFrame, published: Published | None, *, alerts: bool = True) -> Sheet:
-    lines: list[tuple[Cell, ...]] = []
-    for method, scenario, group in _groups(frame):
-        for step, spread in event_times.propagation(group).items():
+def propagation_sheet(
+    frame: pd.DataFrame, published: PublishedCounts | None, *, alerts: bool = True
+) -> Sheet:
+    lines: list[tuple[SheetCell, ...]] = []
+    for method, scenario, group in _groups_with_totals(frame):
+        for step, spread in event_times.propagation_times(group).items():
             if alerts or "alert" not in step:
                 lines.append((method, scenario, step, *astuple(spread)))
     return Sheet(
@@ -42,36 +44,41 @@ def propagation_sheet(frame: pd.DataFrame, published: Published | None, *, alert
     )
 
 
-def reaction_sheet(frame: pd.DataFrame, ends: Mapping[str, float], driver_s: float) -> Sheet:
-    lines: list[tuple[Cell, ...]] = []
-    for method, scenario, group in _groups(frame):
-        found = event_times.reaction(group, ends, driver_s)
-        median: tuple[Cell, ...] = (found.median, found.median_low, found.median_high)
-        counts = (found.at_risk, found.events, found.at_risk - found.events, found.too_late)
-        lines.append((method, scenario, *counts, *median, found.survival, found.in_time))
-    late = f"{driver_s:g} s"
+def reaction_sheet(frame: pd.DataFrame, ends: Mapping[str, float], driver_reaction_s: float) -> Sheet:
+    lines: list[tuple[SheetCell, ...]] = []
+    for method, scenario, group in _groups_with_totals(frame):
+        reaction = event_times.reaction_times(group, ends, driver_reaction_s)
+        median: tuple[SheetCell, ...] = (reaction.median, reaction.median_low, reaction.median_high)
+        counts = (
+            reaction.runs_alerted_first,
+            reaction.hazards_after_alert,
+            reaction.runs_alerted_first - reaction.hazards_after_alert,
+            reaction.runs_alerted_too_late,
+        )
+        lines.append((method, scenario, *counts, *median, reaction.no_hazard_share, reaction.late_hazards))
+    reaction_text = f"{driver_reaction_s:g} s"
     return Sheet(
         name="alert_to_hazard",
         title="From alert to hazard, censored",
         note="The table covers runs whose first alert came before any hazard. Runs without a hazard are "
         "censored at their end. Median: Kaplan-Meier with its 95 % interval, `-` or `inf` if not reached; if "
         "the curve is flat at one half, the middle of the flat part. The last columns: the share of alerts "
-        f"that no hazard follows within {late}, the driver's reaction time (Kaplan-Meier); and, of the "
-        f"hazards that follow an alert, the share that come more than {late} later. Alerts with or after the "
-        "first hazard are counted separately.",
+        f"that no hazard follows within {reaction_text}, the driver's reaction time (Kaplan-Meier); and, of "
+        f"the hazards that follow an alert, the share that come more than {reaction_text} later. Alerts with "
+        "or after the first hazard are counted separately.",
         heads=(
             *("method", "scenario", "alerts first", "then hazard", "censored", "alert not before hazard"),
             *("median, s", "median, low, s", "median, high, s"),
-            *(f"no hazard within {late}", f"hazards later than {late}"),
+            *(f"no hazard within {reaction_text}", f"hazards later than {reaction_text}"),
         ),
         lines=tuple(lines),
     )
 
 
-def alerts_sheet(frame: pd.DataFrame, alerts: event_times.Alerts) -> Sheet:
-    lines: list[tuple[Cell, ...]] = []
+def alerts_sheet(frame: pd.DataFrame, alerts: event_times.AlertsByExperiment) -> Sheet:
+    lines: list[tuple[SheetCell, ...]] = []
     for method, group in frame.groupby("method"):
-        shares = event_times.alerts_before(group, alerts)
+        shares = event_times.alerts_before_hazards(group, alerts)
         lines += [(str(method), hazard, alert, share) for (hazard, alert), share in shares.items()]
     return Sheet(
         name="alerts_before_hazards",
@@ -84,7 +91,7 @@ def alerts_sheet(frame: pd.DataFrame, alerts: event_times.Alerts) -> Sheet:
 
 
 def orders_sheet(frame: pd.DataFrame) -> Sheet:
-    lines: list[tuple[Cell, ...]] = []
+    lines: list[tuple[SheetCell, ...]] = []
     for (method, module), group in frame.groupby(["method", "module"]):
         lines += [
             (str(method), str(module), order, n) for order, n in event_times.hazard_orders(group).items()
@@ -98,7 +105,7 @@ def orders_sheet(frame: pd.DataFrame) -> Sheet:
     )
 
 
-def _groups(frame: pd.DataFrame) -> Iterator[tuple[str, str, pd.DataFrame]]:
+def _groups_with_totals(frame: pd.DataFrame) -> Iterator[tuple[str, str, pd.DataFrame]]:
     """Yield the groups by method and scenario. After the scenarios of a method comes its total."""
     for method, of_method in frame.groupby("method"):
         for scenario, group in of_method.groupby("scenario"):

@@ -17,144 +17,165 @@ import pandas as pd
 from mutator.statistics.results_frame import hazard_names
 from mutator.statistics.shares import CONFIDENCE, Share, share
 
-Alerts = Mapping[str, tuple[tuple[str, float], ...]]
-_EQUAL = 1e-9  # shares closer than this are equal, because a curve is a product of rounded fractions
+AlertsByExperiment = Mapping[str, tuple[tuple[str, float], ...]]
+_SHARE_TOLERANCE = (
+    1e-9  # shares closer than this are equal, because a curve is a product of rounded fractions
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Spread:
+class TimeSpread:
     """The mean and quartiles of `n` times in s. NaN if there are none."""
 
     n: int
     mean: float
-    lower: float
+    lower_quartile: float
     median: float
-    upper: float
+    upper_quartile: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Reaction:
+class ReactionTimes:
     """Times (s) and shares from the first alert to a hazard. NaN: not reached or not defined.
 
-    `at_risk` is the number of runs with an alert before any hazard. Of these, `events` then had a hazard; the
-    others are censored at their end. `median` is the time at which the Kaplan-Meier curve crosses one half.
-    If the curve is flat at one half, `median` is the middle of the flat section, as in R's `survfit` and SAS;
-    if the flat section reaches the end of the curve, `median` is the section's beginning. From `median_low`
-    to `median_high`, the curve's log-log transformed interval contains one half (Brookmeyer and Crowley
-    1982). A bound is infinite if the runs do not reach it. `survival` is the Kaplan-Meier share of alerts
-    without a hazard within the driver's reaction time; `in_time` is the share, among the hazards after an
-    alert, of those that came later than this reaction time.
+    `runs_alerted_first` is the number of runs with an alert before any hazard. Of these,
+    `hazards_after_alert` then had a hazard; the others are censored at their end. `median` is the time at
+    which the Kaplan-Meier curve crosses one half. If the curve is flat at one half, `median` is the middle of
+    the flat section, as in R's `survfit` and SAS; if the flat section reaches the end of the curve, `median`
+    is the section's beginning. From `median_low` to `median_high`, the curve's log-log transformed interval
+    contains one half (Brookmeyer and Crowley 1982). A bound is infinite if the runs do not reach it.
+    `no_hazard_share` is the Kaplan-Meier share of alerts without a hazard within the driver's reaction time;
+    `late_hazards` is the share, among the hazards after an alert, of those that came later than this reaction
+    time.
     """
 
-    at_risk: int
-    events: int
+    runs_alerted_first: int
+    hazards_after_alert: int
     median: float
     median_low: float
     median_high: float
-    survival: float
-    in_time: Share
-    too_late: int  # runs with the first alert after the first hazard; no other number includes them
+    no_hazard_share: float
+    late_hazards: Share
+    runs_alerted_too_late: (
+        int  # runs with the first alert after the first hazard; no other number includes them
+    )
 
 
-def spread(times: pd.Series) -> Spread:
-    known = times.dropna()
-    if known.empty:
-        return Spread(n=0, mean=math.nan, lower=math.nan, median=math.nan, upper=math.nan)
-    lower, median, upper = (float(known.quantile(q)) for q in (0.25, 0.5, 0.75))
-    return Spread(n=len(known), mean=float(known.mean()), lower=lower, median=median, upper=upper)
+def spread_of_times(times: pd.Series) -> TimeSpread:
+    present = times.dropna()
+    if present.empty:
+        return TimeSpread(
+            n=0, mean=math.nan, lower_quartile=math.nan, median=math.nan, upper_quartile=math.nan
+        )
+    lower, median, upper = (float(present.quantile(q)) for q in (0.25, 0.5, 0.75))
+    return TimeSpread(
+        n=len(present), mean=float(present.mean()), lower_quartile=lower, median=median, upper_quartile=upper
+    )
 
 
-def propagation(frame: pd.DataFrame) -> dict[str, Spread]:
+def propagation_times(frame: pd.DataFrame) -> dict[str, TimeSpread]:
     """Return the times from activation to the first actuator difference, alert and hazard, and from the first
     alert to the first hazard if the alert came first.
     """
     start = frame["t_activation"]
     reaction = frame["t_hazard"] - frame["t_alert"]
     return {
-        "activation to manifest": spread(frame["t_manifest"] - start),
-        "activation to alert": spread(frame["t_alert"] - start),
-        "activation to hazard": spread(frame["t_hazard"] - start),
-        "alert to hazard": spread(reaction[_warned(frame)]),
+        "activation to manifest": spread_of_times(frame["t_manifest"] - start),
+        "activation to alert": spread_of_times(frame["t_alert"] - start),
+        "activation to hazard": spread_of_times(frame["t_hazard"] - start),
+        "alert to hazard": spread_of_times(reaction[_has_alert_first(frame)]),
     }
 
 
-def reaction(frame: pd.DataFrame, ends: Mapping[str, float], driver_s: float) -> Reaction:
+def reaction_times(
+    frame: pd.DataFrame, end_by_scenario: Mapping[str, float], driver_reaction_s: float
+) -> ReactionTimes:
     """Return the Kaplan-Meier estimate (statsmodels) over the runs with an alert before any hazard.
 
-    `ends` maps each scenario to the end of its runs, in simulated seconds. Crashed and timed-out runs are
-    left out, because their ends are unknown.
+    `end_by_scenario` has the end of each scenario's runs, in simulated seconds. Crashed and timed-out runs
+    are left out, because their ends are unknown.
     """
     from statsmodels.duration.survfunc import SurvfuncRight  # type: ignore[import-untyped]
 
     alerted = frame[frame["is_alert"] & (frame["status"] == "ok")]
-    first = alerted[~alerted["is_hazard"] | _warned(alerted)]
+    first = alerted[~alerted["is_hazard"] | _has_alert_first(alerted)]
     status = first["is_hazard"].astype(int)
-    times = first["t_hazard"].fillna(first["scenario"].map(ends)) - first["t_alert"]
+    times = first["t_hazard"].fillna(first["scenario"].map(end_by_scenario)) - first["t_alert"]
     # rounded, so that a hazard exactly at the driver's reaction time is not later
-    late = times.round(6) > driver_s
+    late = times.round(6) > driver_reaction_s
     events = int(status.sum())
-    found = {
-        "at_risk": len(first),
-        "events": events,
-        "too_late": len(alerted) - len(first),
+    counts = {
+        "runs_alerted_first": len(first),
+        "hazards_after_alert": events,
+        "runs_alerted_too_late": len(alerted) - len(first),
     }
-    in_time = share(int((late & first["is_hazard"]).sum()), events)
+    late_hazards = share(int((late & first["is_hazard"]).sum()), events)
     if not events:
         nan = math.nan
-        survival = 1.0 if len(first) else nan
-        return Reaction(
-            **found, median=nan, median_low=nan, median_high=nan, survival=survival, in_time=in_time
+        no_hazard_share = 1.0 if len(first) else nan
+        return ReactionTimes(
+            **counts,
+            median=nan,
+            median_low=nan,
+            median_high=nan,
+            no_hazard_share=no_hazard_share,
+            late_hazards=late_hazards,
         )
     curve = SurvfuncRight(times.to_numpy().round(6), status.to_numpy())
-    reached = curve.surv_prob[curve.surv_times <= driver_s]
-    low, high = _median_interval(curve)
-    return Reaction(
-        **found,
-        median=_median(curve),
+    reached = curve.surv_prob[curve.surv_times <= driver_reaction_s]
+    low, high = _median_time_interval(curve)
+    return ReactionTimes(
+        **counts,
+        median=_median_time(curve),
         median_low=low,
         median_high=high,
-        survival=float(reached[-1]) if len(reached) else 1.0,
-        in_time=in_time,
+        no_hazard_share=float(reached[-1]) if len(reached) else 1.0,
+        late_hazards=late_hazards,
     )
 
 
-def _median(curve: Any) -> float:
-    """Return the time at which a Kaplan-Meier curve crosses one half, as defined in `Reaction`; NaN if it
-    does not.
+def _median_time(curve: Any) -> float:
+    """Return the time at which a Kaplan-Meier curve crosses one half, as defined in `ReactionTimes`; NaN if
+    it does not.
     """
-    (reached,) = np.nonzero(curve.surv_prob < 0.5 + _EQUAL)
+    (reached,) = np.nonzero(curve.surv_prob < 0.5 + _SHARE_TOLERANCE)
     if not reached.size:
         return math.nan
     first, *later = curve.surv_times[reached]
-    is_flat = curve.surv_prob[reached[0]] > 0.5 - _EQUAL
+    is_flat = curve.surv_prob[reached[0]] > 0.5 - _SHARE_TOLERANCE
     return float((first + later[0]) / 2 if is_flat and later else first)
 
 
-def _median_interval(curve: Any) -> tuple[float, float]:
+def _median_time_interval(curve: Any) -> tuple[float, float]:
     """Return the interval of the median time. Infinite or NaN: not reached."""
     with np.errstate(all="ignore"):  # the last point of the curve can be 0, which has no log
         low, high = curve.quantile_ci(0.5, alpha=1 - CONFIDENCE)
     # a curve that ends at 0 has no interval there, so the median's interval cannot end there
-    is_open = high == curve.surv_times[-1] and curve.surv_prob[-1] < _EQUAL
+    is_open = high == curve.surv_times[-1] and curve.surv_prob[-1] < _SHARE_TOLERANCE
     return float(low), math.inf if is_open else float(high)
 
 
-def alerts_before(frame: pd.DataFrame, alerts: Alerts) -> dict[tuple[str, str], Share]:
+def alerts_before_hazards(
+    frame: pd.DataFrame, alerts_by_experiment: AlertsByExperiment
+) -> dict[tuple[str, str], Share]:
     """Return, by (hazard, alert), the share of the runs with this hazard in which the alert came first. The
     names `any` and `none` mean at least one alert and no alert.
 
-    `alerts` has, by experiment id, the name and first time (s) of each alert of a run with a hazard.
+    `alerts_by_experiment` has the name and first time (s) of each alert of a run with a hazard.
     """
     shares: dict[tuple[str, str], Share] = {}
     for hazard in hazard_names(frame):
         ends = frame[f"t_{hazard.lower()}"].dropna()
         runs = frame.loc[ends.index, "experiment_id"]
-        before = [{name for name, t in alerts[run] if t < end} for run, end in zip(runs, ends, strict=True)]
+        before = [
+            {name for name, t in alerts_by_experiment[run] if t < end}
+            for run, end in zip(runs, ends, strict=True)
+        ]
         counts = Counter(name for names in before for name in names)
         warned = sum(bool(names) for names in before)
         if before:
-            told = {**dict(sorted(counts.items())), "any": warned, "none": len(before) - warned}
-            shares |= {(hazard, name): share(count, len(before)) for name, count in told.items()}
+            run_counts = {**dict(sorted(counts.items())), "any": warned, "none": len(before) - warned}
+            shares |= {(hazard, name): share(count, len(before)) for name, count in run_counts.items()}
     return shares
 
 
@@ -163,18 +184,18 @@ def hazard_orders(frame: pd.DataFrame) -> dict[str, int]:
     names = hazard_names(frame)
     rows = frame[frame["is_hazard"]]
     times = zip(*(rows[f"t_{name.lower()}"].tolist() for name in names), strict=True)
-    orders = Counter(_order(dict(zip(names, row, strict=True))) for row in times)
+    orders = Counter(_describe_order(dict(zip(names, row, strict=True))) for row in times)
     return dict(sorted((order, count) for order, count in orders.items() if order))
 
 
-def _order(times: Mapping[str, float]) -> str:
-    came = sorted((t, hazard) for hazard, t in times.items() if not math.isnan(t))
-    text = came[0][1] if came else ""
-    for (before, _), (t, hazard) in pairwise(came):
+def _describe_order(times: Mapping[str, float]) -> str:
+    sorted_times = sorted((t, hazard) for hazard, t in times.items() if not math.isnan(t))
+    text = sorted_times[0][1] if sorted_times else ""
+    for (before, _), (t, hazard) in pairwise(sorted_times):
         text += f" {'with' if t == before else 'then'} {hazard}"
     return text
 
 
-def _warned(frame: pd.DataFrame) -> pd.Series:
+def _has_alert_first(frame: pd.DataFrame) -> pd.Series:
     """Whether an alert came before the first hazard. An alert at the same time is no warning."""
     return frame["t_alert"] < frame["t_hazard"]

@@ -1,7 +1,7 @@
 """Compares guided with random triggers: stratified by fault type, on matched pairs, and resampled by fault.
 
 Each fault (a value at a location) is tried in every context and scenario. Plain tests wrongly treat these
-runs as independent, so `resampled` draws whole faults instead.
+runs as independent, so `resampled_rate_difference` draws whole faults instead.
 """
 
 import math
@@ -12,15 +12,15 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 
-from mutator.statistics.paired_statistics import Matched, resampled_interval
+from mutator.statistics.paired_statistics import PairCounts, resampled_interval
 from mutator.statistics.paired_statistics import mcnemar as exact_mcnemar
 from mutator.statistics.shares import CONFIDENCE
 from mutator.statistics.tallies import Tally
 
-Whole = Literal["activated", "injected"]
-WHOLES: tuple[Whole, ...] = ("activated", "injected")
+RateBase = Literal["activated", "injected"]
+RATE_BASES: tuple[RateBase, ...] = ("activated", "injected")
 GUIDED, RANDOM = "guided", "random"
-_PAIR = ["fault_id", "scenario", "row", "seed"]
+_PAIR_COLUMNS = ["fault_id", "scenario", "row", "seed"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,7 +32,7 @@ class Stratum:
     random: int
 
     @property
-    def table(self) -> list[list[int]]:
+    def contingency_table(self) -> list[list[int]]:
         """The counts [hazard, no hazard], first of guided and then of random faults."""
         return [
             [self.guided_hazards, self.guided - self.guided_hazards],
@@ -41,7 +41,7 @@ class Stratum:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Pooled:
+class PooledOddsRatio:
     """The Mantel-Haenszel estimate over fault types: above 1 if guided faults are more hazardous, NaN if
     undefined.
 
@@ -57,97 +57,97 @@ class Pooled:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Difference:
-    """The hazard rate of guided runs minus that of random runs, with its bootstrap interval over `clusters`
-    faults.
+class HazardRateDifference:
+    """The hazard rate of guided runs minus that of random runs, with its bootstrap interval over
+    `fault_count` faults.
     """
 
     difference: float
     low: float
     high: float
-    clusters: int
+    fault_count: int
 
 
-def strata(counts: Mapping[tuple[str, str], Tally], whole: Whole) -> tuple[Stratum, ...]:
+def strata_with_both_methods(counts: Mapping[tuple[str, str], Tally], base: RateBase) -> tuple[Stratum, ...]:
     """Return the fault types that have faults of both methods. `counts` has (method, fault type) as keys."""
-    made = []
+    strata = []
     for kind in dict.fromkeys(kind for _, kind in counts):
         guided, random = counts.get((GUIDED, kind)), counts.get((RANDOM, kind))
-        if guided and random and getattr(guided, whole) and getattr(random, whole):
-            made.append(
+        if guided and random and getattr(guided, base) and getattr(random, base):
+            strata.append(
                 Stratum(
                     kind=kind,
                     guided_hazards=guided.hazards,
-                    guided=getattr(guided, whole),
+                    guided=getattr(guided, base),
                     random_hazards=random.hazards,
-                    random=getattr(random, whole),
+                    random=getattr(random, base),
                 )
             )
-    return tuple(made)
+    return tuple(strata)
 
 
-def mantel_haenszel(parts: Sequence[Stratum]) -> Pooled:
+def mantel_haenszel(parts: Sequence[Stratum]) -> PooledOddsRatio:
     """Compare the odds of a hazard in guided and random runs, stratified by fault type (statsmodels)."""
     from statsmodels.stats.contingency_tables import StratifiedTable  # type: ignore[import-untyped]
 
-    telling = [s for s in parts if 0 < s.guided_hazards + s.random_hazards < s.guided + s.random]
-    if not telling:  # in each type all or none were hazards, so there are no odds to compare
+    informative = [s for s in parts if 0 < s.guided_hazards + s.random_hazards < s.guided + s.random]
+    if not informative:  # in each type all or none were hazards, so there are no odds to compare
         nan = math.nan
-        return Pooled(odds_ratio=nan, low=nan, high=nan, p=nan, p_equal=nan, strata=len(parts))
-    table = StratifiedTable([np.array(stratum.table) for stratum in telling])
+        return PooledOddsRatio(odds_ratio=nan, low=nan, high=nan, p=nan, p_equal=nan, strata=len(parts))
+    table = StratifiedTable([np.array(stratum.contingency_table) for stratum in informative])
     with np.errstate(all="ignore"):  # an odds ratio of 0 or infinity has no finite interval
         low, high = table.oddsratio_pooled_confint(alpha=1 - CONFIDENCE)
-        return Pooled(
+        return PooledOddsRatio(
             odds_ratio=float(table.oddsratio_pooled),
             low=float(low),
             high=float(high),
             p=float(table.test_null_odds(correction=False).pvalue),
-            p_equal=float(table.test_equal_odds().pvalue) if len(telling) > 1 else math.nan,
+            p_equal=float(table.test_equal_odds().pvalue) if len(informative) > 1 else math.nan,
             strata=len(parts),
         )
 
 
-def fisher(stratum: Stratum) -> float:
+def fisher_p(stratum: Stratum) -> float:
     from scipy.stats import fisher_exact  # type: ignore[import-untyped]
 
-    return float(fisher_exact(stratum.table).pvalue)
+    return float(fisher_exact(stratum.contingency_table).pvalue)
 
 
-def holm(p_values: Sequence[float]) -> tuple[float, ...]:
+def holm_adjusted(p_values: Sequence[float]) -> tuple[float, ...]:
     """Adjust p-values by Holm's method (Scandinavian Journal of Statistics 6, 1979): the k-th smallest of n
     is multiplied by n - k + 1; results are monotone and at most 1. NaN stays NaN.
     """
-    known = sorted((p, place) for place, p in enumerate(p_values) if not math.isnan(p))
+    sorted_values = sorted((p, place) for place, p in enumerate(p_values) if not math.isnan(p))
     adjusted, largest = [math.nan] * len(p_values), 0.0
-    for k, (p, place) in enumerate(known):
+    for k, (p, place) in enumerate(sorted_values):
         adjusted[place] = largest = max(largest, min(1.0, p * (len(p_values) - k)))
     return tuple(adjusted)
 
 
-def pairs(frame: pd.DataFrame) -> pd.DataFrame:
+def matched_pairs(frame: pd.DataFrame) -> pd.DataFrame:
     """Pair each guided run with the random run of the same fault, scenario, context row and seed.
 
     Columns end in `_guided` and `_random`. Runs without a partner (unfinished or failed) are left out.
     """
-    columns = [*_PAIR, "kind", "is_activated", "is_hazard"]
+    columns = [*_PAIR_COLUMNS, "kind", "is_activated", "is_hazard"]
     guided, random = (frame.loc[frame["method"] == how, columns] for how in (GUIDED, RANDOM))
     return guided.merge(
-        random.drop(columns="kind"), on=_PAIR, suffixes=("_guided", "_random"), validate="one_to_one"
+        random.drop(columns="kind"), on=_PAIR_COLUMNS, suffixes=("_guided", "_random"), validate="one_to_one"
     )
 
 
-def mcnemar(paired: pd.DataFrame) -> Matched:
+def mcnemar_of_pairs(paired: pd.DataFrame) -> PairCounts:
     return exact_mcnemar(paired["is_hazard_guided"], paired["is_hazard_random"])
 
 
-def resampled(frame: pd.DataFrame, whole: Whole) -> Difference:
-    data = _sums(frame[frame["is_activated"]] if whole == "activated" else frame)
-    seen = float(_rate_difference(*data))
-    low, high = (math.nan, math.nan) if math.isnan(seen) else resampled_interval(data, _rate_difference)
-    return Difference(difference=seen, low=low, high=high, clusters=len(data[0]))
+def resampled_rate_difference(frame: pd.DataFrame, base: RateBase) -> HazardRateDifference:
+    data = _counts_by_fault(frame[frame["is_activated"]] if base == "activated" else frame)
+    difference = float(_rate_difference(*data))
+    low, high = (math.nan, math.nan) if math.isnan(difference) else resampled_interval(data, _rate_difference)
+    return HazardRateDifference(difference=difference, low=low, high=high, fault_count=len(data[0]))
 
 
-def _sums(frame: pd.DataFrame) -> tuple[Any, Any, Any, Any]:
+def _counts_by_fault(frame: pd.DataFrame) -> tuple[Any, Any, Any, Any]:
     """Count, for each fault: guided hazards, random hazards, guided runs, random runs."""
     faults = sorted(frame["fault_id"].unique())
     guided, random = frame["method"] == GUIDED, frame["method"] == RANDOM

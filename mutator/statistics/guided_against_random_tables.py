@@ -3,27 +3,34 @@
 import pandas as pd
 
 from mutator.statistics import guided_against_random
-from mutator.statistics.guided_against_random import WHOLES, Whole
-from mutator.statistics.paired_statistics import Matched
-from mutator.statistics.published_counts import OURS, Published, by_source
+from mutator.statistics.guided_against_random import RATE_BASES, RateBase
+from mutator.statistics.paired_statistics import PairCounts
+from mutator.statistics.published_counts import THIS_RUN, PublishedCounts, counts_by_source
 from mutator.statistics.shares import share
-from mutator.statistics.statistics_sheet import Cell, P, Sheet
-from mutator.statistics.tallies import by_kind
+from mutator.statistics.statistics_sheet import PValue, Sheet, SheetCell
+from mutator.statistics.tallies import tally_by_fault_type
 
 
-def overall_sheet(frame: pd.DataFrame, published: Published | None) -> Sheet:
-    sources = by_source(published, by_kind(frame))
-    lines: list[tuple[Cell, ...]] = []
-    for whole in WHOLES:
+def hazard_odds_sheet(frame: pd.DataFrame, published: PublishedCounts | None) -> Sheet:
+    sources = counts_by_source(published, tally_by_fault_type(frame))
+    lines: list[tuple[SheetCell, ...]] = []
+    for base in RATE_BASES:
         for source, counts in sources.items():
-            parts = guided_against_random.strata(counts, whole)
+            parts = guided_against_random.strata_with_both_methods(counts, base)
             pooled = guided_against_random.mantel_haenszel(parts)
             rates = (
                 share(sum(s.guided_hazards for s in parts), sum(s.guided for s in parts)),
                 share(sum(s.random_hazards for s in parts), sum(s.random for s in parts)),
             )
-            odds = (pooled.strata, pooled.odds_ratio, pooled.low, pooled.high, P(pooled.p), P(pooled.p_equal))
-            lines.append((whole, source, *rates, *odds, *_resampled(frame, whole, source)))
+            odds = (
+                pooled.strata,
+                pooled.odds_ratio,
+                pooled.low,
+                pooled.high,
+                PValue(pooled.p),
+                PValue(pooled.p_equal),
+            )
+            lines.append((base, source, *rates, *odds, *_difference_cells(frame, base, source)))
     return Sheet(
         name="guided_against_random",
         title="Guided against random: hazards",
@@ -42,26 +49,26 @@ def overall_sheet(frame: pd.DataFrame, published: Published | None) -> Sheet:
     )
 
 
-def _resampled(frame: pd.DataFrame, whole: Whole, source: str) -> tuple[Cell, ...]:
-    if source != OURS:  # resampling needs single runs, which are not published
+def _difference_cells(frame: pd.DataFrame, base: RateBase, source: str) -> tuple[SheetCell, ...]:
+    if source != THIS_RUN:  # resampling needs single runs, which are not published
         return (None,) * 4
-    found = guided_against_random.resampled(frame, whole)
-    return (found.difference, found.low, found.high, found.clusters)
+    estimate = guided_against_random.resampled_rate_difference(frame, base)
+    return (estimate.difference, estimate.low, estimate.high, estimate.fault_count)
 
 
-def kinds_sheet(frame: pd.DataFrame, published: Published | None) -> Sheet:
-    sources = by_source(published, by_kind(frame))
-    lines: list[tuple[Cell, ...]] = []
-    for whole in WHOLES:
+def hazards_by_fault_type_sheet(frame: pd.DataFrame, published: PublishedCounts | None) -> Sheet:
+    sources = counts_by_source(published, tally_by_fault_type(frame))
+    lines: list[tuple[SheetCell, ...]] = []
+    for base in RATE_BASES:
         for source, counts in sources.items():
-            parts = guided_against_random.strata(counts, whole)
-            p_values = [guided_against_random.fisher(stratum) for stratum in parts]
+            parts = guided_against_random.strata_with_both_methods(counts, base)
+            p_values = [guided_against_random.fisher_p(stratum) for stratum in parts]
             for stratum, p, adjusted in zip(
-                parts, p_values, guided_against_random.holm(p_values), strict=True
+                parts, p_values, guided_against_random.holm_adjusted(p_values), strict=True
             ):
                 guided = share(stratum.guided_hazards, stratum.guided)
                 random = share(stratum.random_hazards, stratum.random)
-                lines.append((whole, source, stratum.kind, guided, random, P(p), P(adjusted)))
+                lines.append((base, source, stratum.kind, guided, random, PValue(p), PValue(adjusted)))
     return Sheet(
         name="guided_against_random_by_fault_type",
         title="Guided against random by fault type",
@@ -72,20 +79,25 @@ def kinds_sheet(frame: pd.DataFrame, published: Published | None) -> Sheet:
     )
 
 
-def pairs_sheet(frame: pd.DataFrame) -> Sheet:
-    paired = guided_against_random.pairs(frame)
-    lines: list[tuple[Cell, ...]] = []
-    for which, some in (
+def matched_pairs_sheet(frame: pd.DataFrame) -> Sheet:
+    paired = guided_against_random.matched_pairs(frame)
+    lines: list[tuple[SheetCell, ...]] = []
+    for selection, selected in (
         ("all", paired),
         ("guided one activated", paired[paired["is_activated_guided"]]),
     ):
-        if some.empty:
+        if selected.empty:
             continue
-        kinds = {str(kind): guided_against_random.mcnemar(group) for kind, group in some.groupby("kind")}
-        adjusted = guided_against_random.holm([matched.p for matched in kinds.values()])
-        lines.append((which, "total", *_cells(guided_against_random.mcnemar(some)), None))
+        kinds = {
+            str(kind): guided_against_random.mcnemar_of_pairs(group)
+            for kind, group in selected.groupby("kind")
+        }
+        adjusted = guided_against_random.holm_adjusted([matched.p for matched in kinds.values()])
+        lines.append(
+            (selection, "total", *_pair_cells(guided_against_random.mcnemar_of_pairs(selected)), None)
+        )
         lines += [
-            (which, kind, *_cells(matched), P(p))
+            (selection, kind, *_pair_cells(matched), PValue(p))
             for (kind, matched), p in zip(kinds.items(), adjusted, strict=True)
         ]
     return Sheet(
@@ -100,6 +112,6 @@ def pairs_sheet(frame: pd.DataFrame) -> Sheet:
     )
 
 
-def _cells(matched: Matched) -> tuple[Cell, ...]:
-    counts = (matched.pairs, matched.both, matched.first_only, matched.second_only, matched.neither)
-    return (*counts, P(matched.p))
+def _pair_cells(matched: PairCounts) -> tuple[SheetCell, ...]:
+    counts = (matched.pair_count, matched.both, matched.first_only, matched.second_only, matched.neither)
+    return (*counts, PValue(matched.p))

@@ -16,15 +16,15 @@ from mutator.model import OPERATORS, Fault, Status
 from mutator.results.table_columns import alerts_of
 from mutator.statistics.paired_statistics import resampled_interval
 from mutator.statistics.shares import Share, share
-from mutator.statistics.statistics_sheet import Cell, Sheet, text_of
+from mutator.statistics.statistics_sheet import Sheet, SheetCell, cell_text
 from mutator.triggers.kinds import ALWAYS
 
-GoldenAlerts = Mapping[tuple[str, str], frozenset[str]]  # (scenario, seed or "") -> names of alerts
+AlertsByGoldenRun = Mapping[tuple[str, str], frozenset[str]]  # (scenario, seed or "") -> names of alerts
 
 PERMANENT, TRANSIENT, EITHER = "permanent", "transient", "either"
-ALL, MUTANTS, DRIVES = "all", "mutants", "drives"
+ALL_MUTANTS, MUTANTS, DRIVES = "all", "mutants", "drives"
 _EFFECTS = ("actuator changed", "new alert", "hazard", "crash or timeout")
-_ALERT, _ACTIVE = _EFFECTS[1], "active"
+_ALERT_EFFECT, _ACTIVE_COLUMN = _EFFECTS[1], "active"
 _HEADS = ("of", "counted", "fault", "number", "not activated", *_EFFECTS, "no effect")
 _NOTE = (
     "This table shows how operator mutants affect the closed loop. *Permanent* mutants are active in the "
@@ -35,12 +35,14 @@ _NOTE = (
     "and in the total. *No effect*: none of the four effects; some of these mutants can be equivalent to the "
     "original."
 )
-_SEVERAL = " The chosen mutants are counted together, without weights for different sampling rates."
-_UNKNOWN_ALERTS = " The fault-free runs cannot be read, so alerts are not compared with theirs."
+_SEVERAL_SELECTIONS_NOTE = (
+    " The chosen mutants are counted together, without weights for different sampling rates."
+)
+_UNKNOWN_ALERTS_NOTE = " The fault-free runs cannot be read, so alerts are not compared with theirs."
 
 
-def drives_of(
-    frame: pd.DataFrame, faults: Mapping[str, Fault], golden_alerts: GoldenAlerts | None
+def mutant_drives(
+    frame: pd.DataFrame, faults: Mapping[str, Fault], golden_alerts: AlertsByGoldenRun | None
 ) -> pd.DataFrame:
     """Return a frame with a row for each usable experiment of an operator mutant.
 
@@ -48,35 +50,43 @@ def drives_of(
     transient), a flag `active`, and a flag for each effect. A crashed or timed-out drive is active. Without
     `golden_alerts`, there is no flag for alerts.
     """
-    found = frame[frame["module"] == OPERATORS]
-    broken = found["status"].isin([Status.CRASHED.value, Status.TIMEOUT.value])
+    mutant_runs = frame[frame["module"] == OPERATORS]
+    is_broken = mutant_runs["status"].isin([Status.CRASHED.value, Status.TIMEOUT.value])
     flags = {
-        _ACTIVE: found["is_activated"] | broken,
-        **dict(zip(_EFFECTS, (found["is_manifested"], False, found["is_hazard"], broken), strict=True)),
+        _ACTIVE_COLUMN: mutant_runs["is_activated"] | is_broken,
+        **dict(
+            zip(
+                _EFFECTS,
+                (mutant_runs["is_manifested"], False, mutant_runs["is_hazard"], is_broken),
+                strict=True,
+            )
+        ),
     }
     if golden_alerts is None:
-        del flags[_ALERT]
+        del flags[_ALERT_EFFECT]
     else:
-        flags[_ALERT] = _new_alerts(found, golden_alerts)
-    permanent = found["trigger"] == ALWAYS
+        flags[_ALERT_EFFECT] = _has_new_alerts(mutant_runs, golden_alerts)
+    permanent = mutant_runs["trigger"] == ALWAYS
     return pd.DataFrame(
         {
-            "mutant": found["fault_id"],
-            "operator": found["fault_type"],
-            "function": found["fault_id"].map({name: function_of(fault) for name, fault in faults.items()}),
+            "mutant": mutant_runs["fault_id"],
+            "operator": mutant_runs["fault_type"],
+            "function": mutant_runs["fault_id"].map(
+                {name: function_label(fault) for name, fault in faults.items()}
+            ),
             "fault": np.where(permanent, PERMANENT, TRANSIENT),
             **flags,
         }
     )
 
 
-def function_of(fault: Fault) -> str:
-    place = fault.injections[0].location
-    return f"{place.path}::{place.function}"
+def function_label(fault: Fault) -> str:
+    location = fault.injections[0].location
+    return f"{location.path}::{location.function}"
 
 
-def _new_alerts(found: pd.DataFrame, golden_alerts: GoldenAlerts) -> list[bool]:
-    rows = zip(found["scenario"], found["seed"].astype(str), found["alerts"], strict=True)
+def _has_new_alerts(mutant_runs: pd.DataFrame, golden_alerts: AlertsByGoldenRun) -> list[bool]:
+    rows = zip(mutant_runs["scenario"], mutant_runs["seed"].astype(str), mutant_runs["alerts"], strict=True)
     return [
         not golden_alerts.get((scenario, seed), golden_alerts.get((scenario, ""), frozenset())).issuperset(
             alerts_of(alerts)
@@ -85,88 +95,93 @@ def _new_alerts(found: pd.DataFrame, golden_alerts: GoldenAlerts) -> list[bool]:
     ]
 
 
-def score_sheet(
+def mutation_score_sheet(
     frame: pd.DataFrame,
     faults: Mapping[str, Fault],
-    golden_alerts: GoldenAlerts | None,
-    told: Sequence[str] = (),
+    golden_alerts: AlertsByGoldenRun | None,
+    operator_notes: Sequence[str] = (),
 ) -> Sheet:
     """Return the score in total, by operator and by function, for permanent and transient faults. Without
     results of operator mutants, it has no lines. `faults` are those of the plan. `golden_alerts` are the
-    alerts that golden runs raise (None: not known). `told` describes the available mutants and exclusions.
+    alerts that golden runs raise (None: not known). `operator_notes` describe the available mutants and
+    exclusions.
     """
-    drives = drives_of(frame, faults, golden_alerts)
+    drives = mutant_drives(frame, faults, golden_alerts)
     planned = {name for name, fault in faults.items() if fault.module == OPERATORS}
     missing = len(planned - set(drives["mutant"]))
     without = f" Without a result, and therefore not counted: {missing} of {len(planned)}." if missing else ""
-    chosen = f" Chosen: {'; '.join(f'`{text}`' for text in told)}." if told else ""
-    chosen += _SEVERAL if len(told) > 1 and any(" draw" in text for text in told) else ""
+    chosen = f" Chosen: {'; '.join(f'`{text}`' for text in operator_notes)}." if operator_notes else ""
+    chosen += (
+        _SEVERAL_SELECTIONS_NOTE
+        if len(operator_notes) > 1 and any(" draw" in text for text in operator_notes)
+        else ""
+    )
     return Sheet(
         name="mutation_score",
         title="Mutation score",
-        note=_NOTE + ("" if golden_alerts is not None else _UNKNOWN_ALERTS) + chosen + without,
+        note=_NOTE + ("" if golden_alerts is not None else _UNKNOWN_ALERTS_NOTE) + chosen + without,
         heads=_HEADS,
         lines=tuple(_lines(drives)),
     )
 
 
-def totals(sheet: Sheet) -> Table:
+def totals_table(sheet: Sheet) -> Table:
     """Return the lines for all mutants, with fewer columns."""
     rows = [
-        (f"{'all' if lasting == EITHER else lasting} {counted}", *map(_short, cells))
-        for name, counted, lasting, *cells in sheet.lines
-        if name == ALL
+        (f"{'all' if fault_kind == EITHER else fault_kind} {counted}", *map(_short_text, cells))
+        for name, counted, fault_kind, *cells in sheet.lines
+        if name == ALL_MUTANTS
     ]
     return Table(heads=("mutation score", *_HEADS[3:]), rows=rows, right=range(1, len(_HEADS) - 2))
 
 
-def _short(cell: Cell) -> str:
+def _short_text(cell: SheetCell) -> str:
     if not isinstance(cell, Share) or math.isnan(cell.low):
-        return text_of(cell)
+        return cell_text(cell)
     return f"{100 * cell.rate:.1f} % ({100 * cell.low:.0f} to {100 * cell.high:.0f})"
 
 
-def _lines(drives: pd.DataFrame) -> Iterator[tuple[Cell, ...]]:
+def _lines(drives: pd.DataFrame) -> Iterator[tuple[SheetCell, ...]]:
     if drives.empty:
         return
-    yield from _of_mutants(ALL, drives)
+    yield from _lines_by_fault_kind(ALL_MUTANTS, drives)
     if drives["fault"].nunique() > 1:
-        yield _line(ALL, MUTANTS, EITHER, _any_drive(drives))
+        yield _line(ALL_MUTANTS, MUTANTS, EITHER, _flags_by_mutant(drives))
     if drives.duplicated(["mutant", "fault"]).any():
-        for lasting, some in drives.groupby("fault"):
-            yield _line(ALL, DRIVES, str(lasting), some.set_index("mutant"))
+        for fault_kind, group in drives.groupby("fault"):
+            yield _line(ALL_MUTANTS, DRIVES, str(fault_kind), group.set_index("mutant"))
     for groups in ("operator", "function"):
-        for name, some in drives.groupby(groups):
-            yield from _of_mutants(str(name), some)
+        for name, group in drives.groupby(groups):
+            yield from _lines_by_fault_kind(str(name), group)
 
 
-def _of_mutants(name: str, drives: pd.DataFrame) -> Iterator[tuple[Cell, ...]]:
-    for lasting, some in drives.groupby("fault"):
-        yield _line(name, MUTANTS, str(lasting), _any_drive(some))
+def _lines_by_fault_kind(name: str, drives: pd.DataFrame) -> Iterator[tuple[SheetCell, ...]]:
+    for fault_kind, group in drives.groupby("fault"):
+        yield _line(name, MUTANTS, str(fault_kind), _flags_by_mutant(group))
 
 
-def _any_drive(drives: pd.DataFrame) -> pd.DataFrame:
-    flags = [name for name in (_ACTIVE, *_EFFECTS) if name in drives]
+def _flags_by_mutant(drives: pd.DataFrame) -> pd.DataFrame:
+    flags = [name for name in (_ACTIVE_COLUMN, *_EFFECTS) if name in drives]
     return drives.groupby("mutant")[flags].any()
 
 
-def _line(name: str, counted: str, lasting: str, flags: pd.DataFrame) -> tuple[Cell, ...]:
+def _line(name: str, counted: str, fault_kind: str, flags: pd.DataFrame) -> tuple[SheetCell, ...]:
     """Return a line of the sheet. `flags` has a row for each counted item and is indexed by mutant."""
-    active = flags[flags[_ACTIVE]]
-    known = [effect for effect in _EFFECTS if effect in active]
-    cells = [_share(active[effect]) if effect in active else None for effect in _EFFECTS]
-    no_effect = int((~active[known].any(axis=1)).sum())
-    return (name, counted, lasting, len(flags), len(flags) - len(active), *cells, no_effect)
+    active = flags[flags[_ACTIVE_COLUMN]]
+    effects = [effect for effect in _EFFECTS if effect in active]
+    cells = [_share_of_flag(active[effect]) if effect in active else None for effect in _EFFECTS]
+    no_effect = int((~active[effects].any(axis=1)).sum())
+    return (name, counted, fault_kind, len(flags), len(flags) - len(active), *cells, no_effect)
 
 
-def _share(flag: "pd.Series[bool]") -> Share:
+def _share_of_flag(flag: "pd.Series[bool]") -> Share:
     """Return the share of a flag. If a mutant has several rows, the interval resamples whole mutants."""
-    count, of = int(flag.sum()), len(flag)
+    count, total = int(flag.sum()), len(flag)
     if flag.index.is_unique:
-        return share(count, of)
+        return share(count, total)
     sums = flag.groupby(level=0).agg(["sum", "count"])
     low, high = resampled_interval((sums["sum"].to_numpy(), sums["count"].to_numpy()), _rate)
-    return Share(count=count, of=of, low=low, high=high)
+    return Share(count=count, of=total, low=low, high=high)
 
 
 def _rate(counts: Any, wholes: Any, axis: int = -1) -> Any:

@@ -16,12 +16,12 @@ import pandas as pd
 from mutator.statistics.shares import CONFIDENCE
 
 RESAMPLES = 9999
-_SEED = 1  # fixed, so that resampling is deterministic
-_DIGITS = 9  # decimals of a time difference; absorbs rounding errors
+_RESAMPLING_SEED = 1  # fixed, so that resampling is deterministic
+_TIME_DECIMALS = 9  # decimals of a time difference; absorbs rounding errors
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Matched:
+class PairCounts:
     """Numbers of pairs with the event under both conditions, only the first, only the second, or neither. `p`
     is from McNemar's exact test that the event is equally likely under both.
     """
@@ -33,12 +33,12 @@ class Matched:
     p: float
 
     @property
-    def pairs(self) -> int:
+    def pair_count(self) -> int:
         return self.both + self.first_only + self.second_only + self.neither
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Difference:
+class PairedDifference:
     """The difference of a rate or time, second minus first, with its interval. NaN: not defined."""
 
     difference: float
@@ -47,19 +47,19 @@ class Difference:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Times:
+class PairedTimes:
     """The times of `n` complete pairs in s: both medians, and the median difference (second minus first) with
     its exact interval. `p` is from Wilcoxon's test that the differences are symmetric about 0.
     """
 
-    n: int
-    first: float
-    second: float
-    median: Difference
+    pair_count: int
+    first_median: float
+    second_median: float
+    median_difference: PairedDifference
     p: float
 
 
-def mcnemar(first: pd.Series, second: pd.Series) -> Matched:
+def mcnemar(first: pd.Series, second: pd.Series) -> PairCounts:
     """Compare two flags of each pair with McNemar's exact test (statsmodels)."""
     from statsmodels.stats.contingency_tables import (  # type: ignore[import-untyped]
         mcnemar as exact_mcnemar,
@@ -68,7 +68,7 @@ def mcnemar(first: pd.Series, second: pd.Series) -> Matched:
     both, neither = int((first & second).sum()), int((~first & ~second).sum())
     first_only, second_only = int((first & ~second).sum()), int((~first & second).sum())
     test = exact_mcnemar([[both, first_only], [second_only, neither]], exact=True)
-    return Matched(
+    return PairCounts(
         both=both,
         first_only=first_only,
         second_only=second_only,
@@ -77,15 +77,15 @@ def mcnemar(first: pd.Series, second: pd.Series) -> Matched:
     )
 
 
-def rate_difference(first: pd.Series, second: pd.Series, cluster: pd.Series) -> Difference:
+def rate_difference(first: pd.Series, second: pd.Series, cluster: pd.Series) -> PairedDifference:
     """Return the difference of a flag's rates, second minus first, with its `resampled_interval` over
     clusters.
     """
     change = second.astype(int) - first.astype(int)
     sums = change.groupby(cluster.to_numpy()).agg(["sum", "count"])
-    low, high = resampled_interval((sums["sum"].to_numpy(), sums["count"].to_numpy()), _mean)
-    seen = float(change.mean()) if len(change) else math.nan
-    return Difference(difference=seen, low=low, high=high)
+    low, high = resampled_interval((sums["sum"].to_numpy(), sums["count"].to_numpy()), _mean_change)
+    difference = float(change.mean()) if len(change) else math.nan
+    return PairedDifference(difference=difference, low=low, high=high)
 
 
 def resampled_interval(clusters: Sequence[np.ndarray], statistic: Callable[..., Any]) -> tuple[float, float]:
@@ -109,43 +109,49 @@ def resampled_interval(clusters: Sequence[np.ndarray], statistic: Callable[..., 
             batch=500,
             confidence_level=CONFIDENCE,
             method="percentile",
-            rng=np.random.default_rng(_SEED),
+            rng=np.random.default_rng(_RESAMPLING_SEED),
         ).confidence_interval
     low, high = float(interval.low), float(interval.high)
     return (low, high) if low < high else (math.nan, math.nan)
 
 
-def _mean(changes: Any, pairs: Any, axis: int = -1) -> Any:
+def _mean_change(changes: Any, pairs: Any, axis: int = -1) -> Any:
     return np.sum(changes, axis=axis) / np.sum(pairs, axis=axis)
 
 
-def times(first: pd.Series, second: pd.Series) -> Times:
+def paired_times(first: pd.Series, second: pd.Series) -> PairedTimes:
     """Compare the times of complete pairs (scipy): medians, the median difference with an exact interval from
     order statistics, and p of Wilcoxon's signed-rank test (NaN if no time differs).
     """
     from scipy.stats import quantile_test
 
-    known = first.notna() & second.notna()
-    before, after = first[known], second[known]
+    is_complete = first.notna() & second.notna()
+    before, after = first[is_complete], second[is_complete]
     if before.empty:
         nan = math.nan
-        return Times(n=0, first=nan, second=nan, median=Difference(difference=nan, low=nan, high=nan), p=nan)
-    change = (after - before).round(_DIGITS)
+        return PairedTimes(
+            pair_count=0,
+            first_median=nan,
+            second_median=nan,
+            median_difference=PairedDifference(difference=nan, low=nan, high=nan),
+            p=nan,
+        )
+    change = (after - before).round(_TIME_DECIMALS)
     interval = quantile_test(change.to_numpy(), p=0.5).confidence_interval(CONFIDENCE)
-    return Times(
-        n=len(change),
-        first=float(before.median()),
-        second=float(after.median()),
-        median=Difference(
+    return PairedTimes(
+        pair_count=len(change),
+        first_median=float(before.median()),
+        second_median=float(after.median()),
+        median_difference=PairedDifference(
             difference=float(change.median()), low=float(interval.low), high=float(interval.high)
         ),
-        p=wilcoxon(before, after),
+        p=wilcoxon_p(before, after),
     )
 
 
-def wilcoxon(first: pd.Series, second: pd.Series) -> float:
+def wilcoxon_p(first: pd.Series, second: pd.Series) -> float:
     """Return the p-value of Wilcoxon's signed-rank test on pairs without NaN; NaN if no pair differs."""
     from scipy.stats import wilcoxon as signed_rank
 
-    change = (second - first).round(_DIGITS)
+    change = (second - first).round(_TIME_DECIMALS)
     return float(signed_rank(change.to_numpy()).pvalue) if change.any() else math.nan

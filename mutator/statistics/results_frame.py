@@ -14,26 +14,26 @@ from mutator.results.outcome_counting import UNUSABLE
 from mutator.results.table_columns import hazards_of
 from mutator.results.table_reader import Results
 
-_RANDOM = "random/"  # prefix of a random run's trigger: random/C1
+_RANDOM_PREFIX = "random/"  # prefix of a random run's trigger: random/C1
 
 
-def load(results: Path) -> pd.DataFrame:
+def load_usable_results(results: Path) -> pd.DataFrame:
     """Load the usable experiments of a run folder, in order, given its results.csv. MutatorError if the
     results.parquet next to it is invalid.
 
     Harness errors and invalid mutants are left out; crashes and timeouts are kept.
     """
-    return prepare(Results(results.parent).frame())
+    return prepare_results(Results(results.parent).frame())
 
 
-def prepare(frame: pd.DataFrame) -> pd.DataFrame:
+def prepare_results(frame: pd.DataFrame) -> pd.DataFrame:
     """Select the usable experiments of a frame from `Results.frame`, and add the derived columns."""
     unusable = frame["status"].isin([str(status) for status in UNUSABLE])
     if unusable.any():
         frame = frame[~unusable]
     frame = frame.reset_index(drop=True)
     frame["kind"] = frame["module"] + "/" + frame["fault_type"]
-    frame["row"] = frame["trigger"].str.removeprefix(_RANDOM)
+    frame["row"] = frame["trigger"].str.removeprefix(_RANDOM_PREFIX)
     frame["t_hazard"] = frame[[f"t_{hazard.lower()}" for hazard in hazard_names(frame)]].min(axis=1)
     for flag, time in (
         ("is_activated", "t_activation"),
@@ -45,7 +45,7 @@ def prepare(frame: pd.DataFrame) -> pd.DataFrame:
     return frame
 
 
-_SHARED = (
+_SHARED_COLUMNS = (
     "experiment_id",
     "fault_id",
     "module",
@@ -59,13 +59,13 @@ _SHARED = (
 )
 
 
-def slim(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
+def select_columns(frame: pd.DataFrame, *more_columns: str) -> pd.DataFrame:
     """Keep only the columns that most statistics need, and those in `more`. Selecting from a million rows
     with all columns takes seconds.
     """
     flags = [hazard.lower() for hazard in hazard_names(frame)]
-    wanted = {*_SHARED, *flags, *more}
-    return frame[[name for name in frame.columns if name in wanted or name.startswith(("t_", "is_"))]]
+    selected = {*_SHARED_COLUMNS, *flags, *more_columns}
+    return frame[[name for name in frame.columns if name in selected or name.startswith(("t_", "is_"))]]
 
 
 def hazard_names(frame: pd.DataFrame) -> tuple[str, ...]:

@@ -13,9 +13,9 @@ import pandas as pd
 from mutator.statistics.paired_statistics import resampled_interval
 from mutator.statistics.results_frame import hazard_names
 from mutator.statistics.shares import share
-from mutator.statistics.statistics_sheet import Cell, Rate, Sheet
+from mutator.statistics.statistics_sheet import PercentRate, Sheet, SheetCell
 
-ALL = "all"  # label of the lines for all faults
+ALL_FAULTS = "all"  # label of the lines for all faults
 _NOTE = (
     "All seeds: the share over all runs, with its 95 % Wilson interval. Between seeds: the 95 % interval "
     "from 9,999 resamples of whole seeds (none if all seeds agree). Least and largest: the smallest and the "
@@ -26,7 +26,7 @@ _HEADS = (
     *("least", "seed of the least", "largest", "seed of the largest", "seeds"),
 )
 _INJECTED, _ACTIVATED, _HAZARDS = "injected", "activated", "hazards"
-_BY_KIND = ((_ACTIVATED, _INJECTED), (_HAZARDS, _ACTIVATED), (_HAZARDS, _INJECTED))
+_SHARES_BY_FAULT_TYPE = ((_ACTIVATED, _INJECTED), (_HAZARDS, _ACTIVATED), (_HAZARDS, _INJECTED))
 
 
 def seeds_of(frame: pd.DataFrame) -> list[str]:
@@ -37,7 +37,7 @@ def seeds_of(frame: pd.DataFrame) -> list[str]:
 def seeds_sheet(frame: pd.DataFrame, *, alerts: bool = True) -> Sheet:
     """Tabulate each share over all faults and by method. With a single seed, the table has no lines."""
     methods = sorted(map(str, frame["method"].unique()))
-    groups = {ALL: np.ones(len(frame), dtype=bool)}
+    groups = {ALL_FAULTS: np.ones(len(frame), dtype=bool)}
     if len(methods) > 1:
         groups |= {name: (frame["method"] == name).to_numpy() for name in methods}
     return Sheet(
@@ -45,11 +45,11 @@ def seeds_sheet(frame: pd.DataFrame, *, alerts: bool = True) -> Sheet:
         title="Spread between seeds",
         note=_NOTE,
         heads=_HEADS,
-        lines=tuple(_lines(frame, groups, _shares(frame, alerts=alerts))),
+        lines=tuple(_lines(frame, groups, _shares_to_list(frame, alerts=alerts))),
     )
 
 
-def kinds_sheet(frame: pd.DataFrame) -> Sheet:
+def seeds_by_fault_type_sheet(frame: pd.DataFrame) -> Sheet:
     kinds = sorted(map(str, frame["kind"].unique()))
     groups = {name: (frame["kind"] == name).to_numpy() for name in kinds}
     return Sheet(
@@ -57,22 +57,22 @@ def kinds_sheet(frame: pd.DataFrame) -> Sheet:
         title="Spread between seeds by fault type",
         note=_NOTE,
         heads=("fault type", *_HEADS[1:]),
-        lines=tuple(_lines(frame, groups, _BY_KIND)),
+        lines=tuple(_lines(frame, groups, _SHARES_BY_FAULT_TYPE)),
     )
 
 
-def _shares(frame: pd.DataFrame, *, alerts: bool) -> list[tuple[str, str]]:
+def _shares_to_list(frame: pd.DataFrame, *, alerts: bool) -> list[tuple[str, str]]:
     """Return the shares to compute, each as (what is counted, the base)."""
-    made = [(_ACTIVATED, _INJECTED), ("manifested", _ACTIVATED), *_BY_KIND[1:]]
-    made += [(name, whole) for name in hazard_names(frame) for whole in (_ACTIVATED, _INJECTED)]
+    shares = [(_ACTIVATED, _INJECTED), ("manifested", _ACTIVATED), *_SHARES_BY_FAULT_TYPE[1:]]
+    shares += [(name, whole) for name in hazard_names(frame) for whole in (_ACTIVATED, _INJECTED)]
     if alerts:
-        made += [("alerts", _ACTIVATED), ("alerts", _INJECTED)]
-        made += [("hazards without alert", whole) for whole in (_ACTIVATED, _HAZARDS)]
-        made += [("alerts without hazard", _ACTIVATED)]
-    return made
+        shares += [("alerts", _ACTIVATED), ("alerts", _INJECTED)]
+        shares += [("hazards without alert", whole) for whole in (_ACTIVATED, _HAZARDS)]
+        shares += [("alerts without hazard", _ACTIVATED)]
+    return shares
 
 
-def _flags(frame: pd.DataFrame) -> dict[str, np.ndarray]:
+def _event_flags(frame: pd.DataFrame) -> dict[str, np.ndarray]:
     hazard, alert = (frame[name].to_numpy(dtype=bool) for name in ("is_hazard", "is_alert"))
     return {
         _INJECTED: np.ones(len(frame), dtype=bool),
@@ -88,30 +88,33 @@ def _flags(frame: pd.DataFrame) -> dict[str, np.ndarray]:
 
 def _lines(
     frame: pd.DataFrame, groups: Mapping[str, np.ndarray], shares: Sequence[tuple[str, str]]
-) -> Iterator[tuple[Cell, ...]]:
+) -> Iterator[tuple[SheetCell, ...]]:
     seeds = seeds_of(frame)
     if len(seeds) < 2:
         return
-    codes, flags = pd.Index(seeds).get_indexer(pd.Index(frame["seed"].astype(str))), _flags(frame)
+    codes, flags = pd.Index(seeds).get_indexer(pd.Index(frame["seed"].astype(str))), _event_flags(frame)
     for group, chosen in groups.items():
         for part, whole in shares:
-            of = chosen & flags[whole] & (codes >= 0)
+            is_in_whole = chosen & flags[whole] & (codes >= 0)
             counts, wholes = (
-                np.bincount(codes[rows], minlength=len(seeds)) for rows in (of & flags[part], of)
+                np.bincount(codes[rows], minlength=len(seeds))
+                for rows in (is_in_whole & flags[part], is_in_whole)
             )
-            yield (group, part, whole, *_spread(seeds, counts, wholes))
+            yield (group, part, whole, *_spread_cells(seeds, counts, wholes))
 
 
-def _spread(seeds: Sequence[str], counts: np.ndarray, wholes: np.ndarray) -> tuple[Cell, ...]:
+def _spread_cells(seeds: Sequence[str], counts: np.ndarray, wholes: np.ndarray) -> tuple[SheetCell, ...]:
     low, high = resampled_interval((counts, wholes), _rate)
-    known = [(count / of, int(seed)) for seed, count, of in zip(seeds, counts, wholes, strict=True) if of]
-    least, largest = min(known, default=None), min(known, key=lambda k: (-k[0], k[1]), default=None)
+    rates = [
+        (count / total, int(seed)) for seed, count, total in zip(seeds, counts, wholes, strict=True) if total
+    ]
+    least, largest = min(rates, default=None), min(rates, key=lambda k: (-k[0], k[1]), default=None)
     return (
         share(int(counts.sum()), int(wholes.sum())),
-        *(Rate(low), Rate(high)),
-        *((Rate(least[0]), least[1]) if least else (None, None)),
-        *((Rate(largest[0]), largest[1]) if largest else (None, None)),
-        len(known),
+        *(PercentRate(low), PercentRate(high)),
+        *((PercentRate(least[0]), least[1]) if least else (None, None)),
+        *((PercentRate(largest[0]), largest[1]) if largest else (None, None)),
+        len(rates),
     )
 
 

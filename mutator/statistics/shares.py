@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 CONFIDENCE = 0.95
-_DIGITS = 12
+_DECIMALS = 12
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,4 +38,4 @@ def share(count: int, of: int) -> Share:
         return Share(count=count, of=of, low=math.nan, high=math.nan)
     low, high = proportion_confint(count, of, alpha=1 - CONFIDENCE, method="wilson")
     # rounded, because last bits differ between machines, and the interval of 0 of n must begin at exactly 0
-    return Share(count=count, of=of, low=round(float(low), _DIGITS), high=round(float(high), _DIGITS))
+    return Share(count=count, of=of, low=round(float(low), _DECIMALS), high=round(float(high), _DECIMALS))

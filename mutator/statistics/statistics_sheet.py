@@ -13,24 +13,24 @@ from mutator.statistics.shares import Share
 if TYPE_CHECKING:
     import pandas as pd
 
-_SHARE_COLUMNS = ("count", "of", "rate", "low", "high")
+_SHARE_HEADINGS = ("count", "of", "rate", "low", "high")
 
 
-class P(float):
+class PValue(float):
     """A p-value. Very small ones are displayed as a bound, because the approximation is no more precise."""
 
     def __str__(self) -> str:
         return "< 0.0001" if self < 0.0001 else f"{float(self):.4f}"
 
 
-class Rate(float):
+class PercentRate(float):
     """A share alone, displayed in %."""
 
     def __str__(self) -> str:
         return "-" if math.isnan(self) else f"{100 * float(self):.1f} %"
 
 
-Cell = Share | float | int | str | None
+SheetCell = Share | float | int | str | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,58 +43,64 @@ class Sheet:
     title: str
     note: str
     heads: tuple[str, ...]
-    lines: tuple[tuple[Cell, ...], ...]
+    lines: tuple[tuple[SheetCell, ...], ...]
 
     def table(self) -> Table:
-        return Table(heads=self.heads, rows=[[text_of(cell) for cell in line] for line in self.lines])
+        return Table(heads=self.heads, rows=[[cell_text(cell) for cell in line] for line in self.lines])
 
-    def markdown(self) -> str:
+    def as_markdown(self) -> str:
         return f"## {self.title}\n\n{self.note}\n\n{self.table().as_markdown()}\n"
 
-    def csv(self) -> str:
+    def as_csv(self) -> str:
         """Return the table as CSV. A share becomes five columns: count, of, rate, and both ends of its
         interval (fractions).
         """
-        columns, lines = self._unfolded(_number)
+        columns, lines = self._with_shares_unfolded(_csv_number)
         out = io.StringIO()
         writer = csv.writer(out, lineterminator="\n")
         writer.writerow(columns)
         writer.writerows(lines)
         return out.getvalue()
 
-    def frame(self) -> "pd.DataFrame":
+    def as_frame(self) -> "pd.DataFrame":
         """Return the columns of the CSV as a pandas frame, with full precision."""
         import pandas as pd
 
-        columns, lines = self._unfolded(float)
+        columns, lines = self._with_shares_unfolded(float)
         return pd.DataFrame(lines, columns=columns)
 
-    def _unfolded(self, number: Callable[[float], object]) -> tuple[list[str], list[list[object]]]:
+    def _with_shares_unfolded(
+        self, number: Callable[[float], object]
+    ) -> tuple[list[str], list[list[object]]]:
         wide = [any(isinstance(line[i], Share) for line in self.lines) for i in range(len(self.heads))]
         columns = [
             name
             for head, is_wide in zip(self.heads, wide, strict=True)
-            for name in ([f"{head}: {part}" for part in _SHARE_COLUMNS] if is_wide else [head])
+            for name in ([f"{head}: {part}" for part in _SHARE_HEADINGS] if is_wide else [head])
         ]
-        return columns, [_values(line, wide, number) for line in self.lines]
+        return columns, [_line_values(line, wide, number) for line in self.lines]
 
 
-def _values(line: Sequence[Cell], wide: Sequence[bool], number: Callable[[float], object]) -> list[object]:
+def _line_values(
+    line: Sequence[SheetCell], wide: Sequence[bool], number: Callable[[float], object]
+) -> list[object]:
     values: list[object] = []
     for cell, is_wide in zip(line, wide, strict=True):
         if isinstance(cell, Share):
             values += [cell.count, cell.of, *map(number, (cell.rate, cell.low, cell.high))]
         else:
             value = number(cell) if isinstance(cell, float) else cell
-            values += [value, *[None] * (len(_SHARE_COLUMNS) - 1)] if is_wide else [value]
+            values += [value, *[None] * (len(_SHARE_HEADINGS) - 1)] if is_wide else [value]
     return values
 
 
-def _number(value: float) -> str:
+def _csv_number(value: float) -> str:
     return "" if math.isnan(value) else f"{value:.6g}"
 
 
-def text_of(cell: Cell) -> str:
+def cell_text(cell: SheetCell) -> str:
     if cell is None or (isinstance(cell, float) and math.isnan(cell)):
         return "-"
-    return str(cell) if isinstance(cell, P | Rate) or not isinstance(cell, float) else f"{cell:.3g}"
+    return (
+        str(cell) if isinstance(cell, PValue | PercentRate) or not isinstance(cell, float) else f"{cell:.3g}"
+    )

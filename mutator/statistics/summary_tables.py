@@ -2,10 +2,10 @@
 
 from collections.abc import Iterable
 
-from mutator.statistics.published_counts import OURS, Counts, Published
+from mutator.statistics.published_counts import THIS_RUN, PublishedCounts, TallyByGroup
 from mutator.statistics.shares import Share, share
-from mutator.statistics.statistics_sheet import Cell, Sheet
-from mutator.statistics.tallies import Tally, total
+from mutator.statistics.statistics_sheet import Sheet, SheetCell
+from mutator.statistics.tallies import Tally, sum_tallies
 
 _MEASURES = (
     ("activated", "injected"),
@@ -18,21 +18,29 @@ _MEASURES = (
     ("hazards_no_alerts", "hazards"),
     ("alerts_no_hazards", "activated"),
 )
-_WORDS = {"hazards_no_alerts": "hazards without alert", "alerts_no_hazards": "alerts without hazard"}
+_HEADING_BY_MEASURE = {
+    "hazards_no_alerts": "hazards without alert",
+    "alerts_no_hazards": "alerts without hazard",
+}
 _NOTE = "Shares with 95 % Wilson intervals; in brackets, the count and the total."
 
 
-def summary_sheet(method: str, ours: Counts, published: Published | None, *, alerts: bool = True) -> Sheet:
-    scenarios = sorted({scenario for how, scenario in ours if how == method})
-    theirs = published.by_scenario if published else {}
-    sources = _sources(method, ours, published, theirs, scenarios)
-    lines: list[tuple[Cell, ...]] = []
+def summary_sheet(
+    method: str, run_counts: TallyByGroup, published: PublishedCounts | None, *, alerts: bool = True
+) -> Sheet:
+    scenarios = sorted({scenario for how, scenario in run_counts if how == method})
+    published_tallies = published.by_scenario if published else {}
+    sources = _tallies_by_source(method, run_counts, published, published_tallies, scenarios)
+    lines: list[tuple[SheetCell, ...]] = []
     for part, whole in _MEASURES:
         if "alerts" in part and not alerts:
             continue
         for source, tallies in sources.items():
-            cells = [_share(one, part, whole) for one in (*tallies.values(), _total(tallies.values()))]
-            lines.append((_WORDS.get(part, part), whole, source, *cells))
+            cells = [
+                _share_of_tally(tally, part, whole)
+                for tally in (*tallies.values(), _total_of_published(tallies.values()))
+            ]
+            lines.append((_HEADING_BY_MEASURE.get(part, part), whole, source, *cells))
     notes = (_NOTE, published.counts_note if published else "", "The total covers the scenarios shown.")
     return Sheet(
         name=f"summary_{method}",
@@ -43,22 +51,26 @@ def summary_sheet(method: str, ours: Counts, published: Published | None, *, ale
     )
 
 
-def coverage_sheet(method: str, ours: Counts, published: Published | None) -> Sheet:
-    kinds = sorted({kind for how, kind in ours if how == method})
-    theirs = published.by_kind if published else {}
+def coverage_sheet(method: str, run_counts: TallyByGroup, published: PublishedCounts | None) -> Sheet:
+    kinds = sorted({kind for how, kind in run_counts if how == method})
+    published_tallies = published.by_fault_type if published else {}
     # fault types in the order of the publication, then the rest
-    kinds = list(dict.fromkeys([kind for _, kind in theirs if kind in kinds] + kinds))
-    sources = _sources(method, ours, published, theirs, kinds)
-    lines: list[tuple[Cell, ...]] = []
+    kinds = list(dict.fromkeys([kind for _, kind in published_tallies if kind in kinds] + kinds))
+    sources = _tallies_by_source(method, run_counts, published, published_tallies, kinds)
+    lines: list[tuple[SheetCell, ...]] = []
     for kind in (*kinds, "total"):
         for source, tallies in sources.items():
-            one = _total(tallies.values()) if kind == "total" else tallies[kind]
-            cells = [_share(one, *measure) for measure in (_MEASURES[0], _MEASURES[2], _MEASURES[3])]
+            tally = _total_of_published(tallies.values()) if kind == "total" else tallies[kind]
+            cells = [
+                _share_of_tally(tally, *measure) for measure in (_MEASURES[0], _MEASURES[2], _MEASURES[3])
+            ]
             lines.append((kind, source, *cells))
-    notes = (_NOTE, *((published.counts_note, published.kind_note) if published else ()))
+    notes = (_NOTE, *((published.counts_note, published.fault_type_note) if published else ()))
     return Sheet(
         name=f"coverage_{method}",
-        title=_title(f"Hazard coverage by fault type, {method}", published.kind_title if published else ""),
+        title=_title(
+            f"Hazard coverage by fault type, {method}", published.fault_type_title if published else ""
+        ),
         note=" ".join(notes),
         heads=("fault type", "from", "activated/injected", "hazards/activated", "hazards/injected"),
         lines=tuple(lines),
@@ -69,23 +81,27 @@ def _title(title: str, published: str) -> str:
     return f"{title} ({published})" if published else title
 
 
-def _sources(
-    method: str, ours: Counts, published: Published | None, theirs: Counts, names: Iterable[str]
+def _tallies_by_source(
+    method: str,
+    run_counts: TallyByGroup,
+    published: PublishedCounts | None,
+    published_tallies: TallyByGroup,
+    names: Iterable[str],
 ) -> dict[str, dict[str, Tally | None]]:
     """Return the published counts, if any, and those of the run, by group. None: not published."""
     groups = list(names)
-    known = {name: theirs.get((method, name)) for name in groups}
+    published_by_name = {name: published_tallies.get((method, name)) for name in groups}
     sources: dict[str, dict[str, Tally | None]] = {}
-    if published and any(known.values()):
-        sources[published.source] = known
-    sources[OURS] = {name: ours[method, name] for name in groups}
+    if published and any(published_by_name.values()):
+        sources[published.source] = published_by_name
+    sources[THIS_RUN] = {name: run_counts[method, name] for name in groups}
     return sources
 
 
-def _total(tallies: Iterable[Tally | None]) -> Tally:
-    return total(one for one in tallies if one is not None)
+def _total_of_published(tallies: Iterable[Tally | None]) -> Tally:
+    return sum_tallies(tally for tally in tallies if tally is not None)
 
 
-def _share(one: Tally | None, part: str, whole: str) -> Share | None:
-    count, of = (getattr(one, part), getattr(one, whole)) if one else (None, None)
+def _share_of_tally(tally: Tally | None, part: str, whole: str) -> Share | None:
+    count, of = (getattr(tally, part), getattr(tally, whole)) if tally else (None, None)
     return None if count is None or of is None else share(count, of)

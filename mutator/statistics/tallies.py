@@ -24,7 +24,7 @@ class Tally:
     alerts_no_hazards: int | None = None
 
 
-def tally(frame: pd.DataFrame) -> Tally:
+def tally_of_runs(frame: pd.DataFrame) -> Tally:
     hazard, alert = frame["is_hazard"], frame["is_alert"]
     return Tally(
         injected=len(frame),
@@ -37,19 +37,19 @@ def tally(frame: pd.DataFrame) -> Tally:
     )
 
 
-def total(tallies: Iterable[Tally]) -> Tally:
+def sum_tallies(tallies: Iterable[Tally]) -> Tally:
     """Return the sum over groups. A count is None if it is None in any group."""
-    all_of_them = list(tallies)
+    summands = list(tallies)
     sums: dict[str, Any] = {}
     for field in fields(Tally):
-        counts = [getattr(one, field.name) for one in all_of_them]
+        counts = [getattr(tally, field.name) for tally in summands]
         sums[field.name] = None if None in counts else sum(counts)
     return Tally(**sums)
 
 
-def by_scenario(frame: pd.DataFrame) -> dict[tuple[str, str], Tally]:
-    return {(str(m), str(s)): tally(group) for (m, s), group in frame.groupby(["method", "scenario"])}
+def tally_by_scenario(frame: pd.DataFrame) -> dict[tuple[str, str], Tally]:
+    return {(str(m), str(s)): tally_of_runs(group) for (m, s), group in frame.groupby(["method", "scenario"])}
 
 
-def by_kind(frame: pd.DataFrame) -> dict[tuple[str, str], Tally]:
-    return {(str(m), str(k)): tally(group) for (m, k), group in frame.groupby(["method", "kind"])}
+def tally_by_fault_type(frame: pd.DataFrame) -> dict[tuple[str, str], Tally]:
+    return {(str(m), str(k)): tally_of_runs(group) for (m, k), group in frame.groupby(["method", "kind"])}

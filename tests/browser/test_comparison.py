@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from mutator.comparison import comparison_files
-from mutator.comparison.run_comparison import Comparison, compare
+from mutator.comparison.run_comparison import Comparison, compare_runs
 from mutator.model import Experiment, Outcome
 from mutator.workspace import Workspace
 
@@ -23,7 +23,7 @@ def worse(e: Experiment) -> dict[str, Any]:
 
 @pytest.fixture
 def found(toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path]) -> Comparison:
-    few = compare(write_run(toycar, tmp_path / "before"), write_run(toycar, tmp_path / "after", worse))
+    few = compare_runs(write_run(toycar, tmp_path / "before"), write_run(toycar, tmp_path / "after", worse))
     return dataclasses.replace(
         few, matching=dataclasses.replace(few.matching, pairs=few.matching.pairs * COPIES)
     )
@@ -37,17 +37,17 @@ def test_a_long_comparison_is_cut_and_can_be_filtered(
     serious_faults: Callable[[Any], list[str]],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(comparison_files, "SHOWN", SHOWN)
+    monkeypatch.setattr(comparison_files, "MOST_SHOWN_ROWS", SHOWN)
     page = browser.new_page()
     errors: list[str] = []
     page.on("pageerror", lambda error: errors.append(str(error)))
-    page.goto(comparison_files.write(found, tmp_path / "out").page.as_uri())
-    total, seen = len(found.changed), page.locator("#changed tr:visible")
+    page.goto(comparison_files.write_comparison(found, tmp_path / "out").page.as_uri())
+    total, seen = len(found.changed_pairs), page.locator("#changed tr:visible")
     assert total == 24 * COPIES
     assert seen.count() == 1 + SHOWN
     assert "silence" in seen.nth(1).inner_text()
     assert page.inner_text("#shown") == f"{total} of {total}, the first {SHOWN} are shown"
-    last = found.changed[-1].b
+    last = found.changed_pairs[-1].b
     page.fill("#words", last.id)
     assert seen.count() == 1 + COPIES
     assert last.fault.spec in seen.nth(1).inner_text()

@@ -5,18 +5,18 @@ import dataclasses
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mutator.comparison.pairs import Change, Pair
+from mutator.comparison.pairs import ExperimentPair, ResultChange
 from mutator.model import Outcome, Status
 from mutator.results.result_rows import Row
 
 MIRROR = {
-    Change.NEW_HAZARD: Change.HAZARD_GONE,
-    Change.EARLIER_HAZARD: Change.LATER_HAZARD,
-    Change.LOST_ALERT: Change.NEW_ALERT,
-    Change.WORSE: Change.BETTER,
-    Change.NEW_CRASH: Change.CRASH_GONE,
-    Change.HARNESS_ERROR: Change.MENDED,
-    Change.OTHERWISE: Change.OTHERWISE,
+    ResultChange.NEW_HAZARD: ResultChange.HAZARD_GONE,
+    ResultChange.EARLIER_HAZARD: ResultChange.LATER_HAZARD,
+    ResultChange.LOST_ALERT: ResultChange.NEW_ALERT,
+    ResultChange.WORSE: ResultChange.BETTER,
+    ResultChange.NEW_CRASH: ResultChange.CRASH_GONE,
+    ResultChange.HARNESS_ERROR: ResultChange.MENDED,
+    ResultChange.OTHERWISE: ResultChange.OTHERWISE,
 }
 MIRROR |= {after: before for before, after in MIRROR.items()}
 TIME = st.sampled_from([2.0, 2.5, 3.0, 7.25])
@@ -46,12 +46,12 @@ def rows(draw: st.DrawFn) -> Row:
 
 @given(rows())
 def test_a_run_does_not_differ_from_itself(row: Row) -> None:
-    assert Pair(None, None, row, dataclasses.replace(row)).changes == set()  # type: ignore[arg-type]
+    assert ExperimentPair(None, None, row, dataclasses.replace(row)).changes == set()  # type: ignore[arg-type]
 
 
 @given(rows(), rows())
 def test_swapping_two_runs_swaps_better_and_worse(a: Row, b: Row) -> None:
     """A different hazard has no opposite change."""
-    there = Pair(None, None, a, b).changes - {Change.OTHER_HAZARD}  # type: ignore[arg-type]
-    back = Pair(None, None, b, a).changes - {Change.OTHER_HAZARD}  # type: ignore[arg-type]
+    there = ExperimentPair(None, None, a, b).changes - {ResultChange.OTHER_HAZARD}  # type: ignore[arg-type]
+    back = ExperimentPair(None, None, b, a).changes - {ResultChange.OTHER_HAZARD}  # type: ignore[arg-type]
     assert {MIRROR[change] for change in there} == back

@@ -9,7 +9,7 @@ from mutator.outcomes.fault_free_runs import alerts_by_drive
 from mutator.report.panel import Panel, rendered
 from mutator.report.panels.tables_panel import sheet_files
 from mutator.report.reported_run import ReportedRun
-from mutator.statistics.mutation_score import score_sheet
+from mutator.statistics.mutation_score import mutation_score_sheet
 from mutator.statistics.statistics_sheet import Sheet
 from mutator.store import plan_file
 
@@ -29,7 +29,7 @@ def build_mutation_score_panel(run: ReportedRun) -> Panel | None:
     if not (run.results["module"] == OPERATORS).any():
         return None
     runs = run.fault_free()
-    score = score_sheet(
+    score = mutation_score_sheet(
         run.frame,
         plan_file.read_faults(run.folder.path),
         alerts_by_drive(runs) if runs else None,
@@ -39,7 +39,7 @@ def build_mutation_score_panel(run: ReportedRun) -> Panel | None:
     return Panel(
         anchor="score",
         link="Score",
-        markdown=score.markdown().rstrip(),
+        markdown=score.as_markdown().rstrip(),
         html=html,
         style="report/source.css",
         files=sheet_files([score]),

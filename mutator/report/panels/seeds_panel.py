@@ -4,8 +4,8 @@ from mutator._common.tables import Table
 from mutator.report.panel import Panel, rendered
 from mutator.report.panels.tables_panel import sheet_files
 from mutator.report.reported_run import ReportedRun
-from mutator.statistics.seed_spread import ALL, kinds_sheet, seeds_of, seeds_sheet
-from mutator.statistics.statistics_sheet import Sheet, text_of
+from mutator.statistics.seed_spread import ALL_FAULTS, seeds_by_fault_type_sheet, seeds_of, seeds_sheet
+from mutator.statistics.statistics_sheet import Sheet, cell_text
 
 _HTML = """\
 <h2>Seeds</h2>
@@ -25,9 +25,9 @@ def build_seeds_panel(run: ReportedRun) -> Panel | None:
     seeds = seeds_of(run.frame)
     if len(seeds) < 2:
         return None
-    sheets = (seeds_sheet(run.frame, alerts=run.folder.has_alerts), kinds_sheet(run.frame))
+    sheets = (seeds_sheet(run.frame, alerts=run.folder.has_alerts), seeds_by_fault_type_sheet(run.frame))
     about = f"{len(seeds)} seeds ({seeds[0]} to {seeds[-1]}). Each seed repeats the campaign with new draws."
-    markdown = "\n\n".join(["## Seeds", about, *(f"#{sheet.markdown().rstrip()}" for sheet in sheets)])
+    markdown = "\n\n".join(["## Seeds", about, *(f"#{sheet.as_markdown().rstrip()}" for sheet in sheets)])
     html = rendered(_HTML, about=about, sheets=sheets)
     return Panel(
         anchor="seeds",
@@ -43,9 +43,9 @@ def _summary(sheet: Sheet) -> Table:
     """Return the lines over all faults, with fewer columns."""
     rows = []
     for faults, part, whole, share, *cells, _ in sheet.lines:
-        if faults == ALL:
-            low, high, least, its, largest, other = map(text_of, cells)
+        if faults == ALL_FAULTS:
+            low, high, least, its, largest, other = map(cell_text, cells)
             ends = [f"{least} (seed {its})", f"{largest} (seed {other})"] if its != "-" else ["-", "-"]
-            rows.append([f"{part} / {whole}", text_of(share), f"{low} to {high}", *ends])
+            rows.append([f"{part} / {whole}", cell_text(share), f"{low} to {high}", *ends])
     heads = ("share", "all seeds, 95 % of runs", "95 % between seeds", "least", "largest")
     return Table(heads=heads, rows=rows)

@@ -9,8 +9,8 @@ from mutator.outcomes.fault_free_runs import fault_free_table, own_alerts
 from mutator.report.panel import Panel, rendered
 from mutator.report.reported_run import ReportedRun
 from mutator.results.outcome_counting import count_table, counts_by, hazard_names, kinds
-from mutator.statistics.metric_tables import metrics_sheet, severity_sheet, tolerant_times_sheet
-from mutator.statistics.published_counts import Published
+from mutator.statistics.metric_tables import fault_tolerant_times_sheet, metrics_sheet, severity_sheet
+from mutator.statistics.published_counts import PublishedCounts
 from mutator.statistics.sheet_selection import run_sheets
 from mutator.statistics.statistics_sheet import Sheet
 from mutator.store.run_folder import RunFolder
@@ -75,7 +75,7 @@ def build_tables_panel(run: ReportedRun) -> Panel:
     fault_free = fault_free_table(runs, alerts=run.folder.has_alerts) if runs else None
     if fault_free:
         parts += ["## Fault-free runs", FAULT_FREE, fault_free.as_markdown()]
-    parts += [sheet.markdown().rstrip() for sheet in sheets]
+    parts += [sheet.as_markdown().rstrip() for sheet in sheets]
     html = rendered(
         _HTML,
         title="Tables",
@@ -104,7 +104,7 @@ def build_published_panel(run: ReportedRun) -> Panel | None:
     if not sheets:
         return None
     title = "Tables next to the published ones"
-    markdown = "\n\n".join([f"## {title}", *(f"#{sheet.markdown().rstrip()}" for sheet in sheets)])
+    markdown = "\n\n".join([f"## {title}", *(f"#{sheet.as_markdown().rstrip()}" for sheet in sheets)])
     html = rendered(_HTML, title=title, counts=(), fault_free=None, sheets=sheets)
     return Panel(anchor="tables", link="Tables", markdown=markdown, html=html, files=sheet_files(sheets))
 
@@ -119,7 +119,7 @@ def _counts(run: ReportedRun) -> list[tuple[str, Table]]:
     return made
 
 
-def _statistics(run: ReportedRun, published: Published | None) -> tuple[Sheet, ...]:
+def _statistics(run: ReportedRun, published: PublishedCounts | None) -> tuple[Sheet, ...]:
     alerts = run.seen.alerts if run.folder.has_alerts else None
     return run_sheets(run.frame, published, alerts, run.ends())
 
@@ -127,7 +127,7 @@ def _statistics(run: ReportedRun, published: Published | None) -> tuple[Sheet, .
 def _spreads(run: ReportedRun) -> tuple[Sheet, ...]:
     made = (
         severity_sheet(run.frame),
-        tolerant_times_sheet(run.frame, alerts=run.folder.has_alerts),
+        fault_tolerant_times_sheet(run.frame, alerts=run.folder.has_alerts),
         metrics_sheet(run.frame, run.folder.head.metrics),
     )
     return tuple(sheet for sheet in made if sheet.lines)
@@ -142,9 +142,9 @@ def _noted(sheet: Sheet, note: str) -> Sheet:
 
 def sheet_files(sheets: Collection[Sheet]) -> dict[str, bytes]:
     """Each table as tables/<name>.csv and <name>.md."""
-    texts = {f"{FOLDER}/{sheet.name}.md": sheet.markdown().encode() for sheet in sheets}
+    texts = {f"{FOLDER}/{sheet.name}.md": sheet.as_markdown().encode() for sheet in sheets}
     return texts | csv_files(sheets)
 
 
 def csv_files(sheets: Collection[Sheet]) -> dict[str, bytes]:
-    return {f"{FOLDER}/{sheet.name}.csv": sheet.csv().encode() for sheet in sheets}
+    return {f"{FOLDER}/{sheet.name}.csv": sheet.as_csv().encode() for sheet in sheets}

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from mutator.comparison.compared_runs import Side
-from mutator.comparison.pairs import Change, Pair, match
+from mutator.comparison.compared_runs import ComparedRun
+from mutator.comparison.pairs import ExperimentPair, ResultChange, match_experiments
 from mutator.model import Experiment, Method, Outcome, Status
 from mutator.results.result_rows import Row
 from mutator.store.run_folder import RunFolder
@@ -34,10 +34,10 @@ def row(experiment_id: str = "e", **given: Any) -> Row:
     return Row(ending=(fields["outcome"] or fields["status"]).value, **fields)
 
 
-def side(*experiments: Experiment, without: tuple[Experiment, ...] = ()) -> Side:
+def side(*experiments: Experiment, without: tuple[Experiment, ...] = ()) -> ComparedRun:
     """Return a run with these experiments; those in `without` have not run."""
     rows = {e.id: row(e.id) for e in experiments if e not in without}
-    return Side(folder=RunFolder(Path("run")), experiments=experiments, rows=rows)
+    return ComparedRun(folder=RunFolder(Path("run")), experiments=experiments, row_by_id=rows)
 
 
 def test_experiments_are_matched_by_fault_scenario_and_trigger(experiment: Make) -> None:
@@ -51,7 +51,7 @@ def test_experiments_are_matched_by_fault_scenario_and_trigger(experiment: Make)
         setting=("pictures",),
     )
     assert one.id != other.id
-    [pair] = match(side(one), side(other)).pairs
+    [pair] = match_experiments(side(one), side(other)).pairs
     assert (pair.a, pair.b) == (one, other)
 
 
@@ -68,13 +68,13 @@ def test_experiments_are_matched_by_fault_scenario_and_trigger(experiment: Make)
 )
 def test_an_experiment_without_a_match_is_reported(experiment: Make, other: dict[str, Any]) -> None:
     a, b = experiment(), experiment(**other)
-    found = match(side(a), side(b))
+    found = match_experiments(side(a), side(b))
     assert (found.pairs, found.only_a, found.only_b) == ((), (a,), (b,))
 
 
 def test_an_experiment_that_did_not_run_forms_no_pair(experiment: Make) -> None:
     a, b = experiment(value=1.0), experiment(value=2.0)
-    found = match(side(a, b, without=(a,)), side(a, b, without=(b,)))
+    found = match_experiments(side(a, b, without=(a,)), side(a, b, without=(b,)))
     assert (found.pairs, found.no_result_a, found.no_result_b) == ((), (a,), (b,))
 
 
@@ -83,11 +83,11 @@ def test_ambiguous_experiments_are_not_matched(experiment: Make) -> None:
     a = experiment()
     twin = dataclasses.replace(a, seed=8)
     third = dataclasses.replace(a, seed=9)
-    found = match(side(a, twin), side(third))
+    found = match_experiments(side(a, twin), side(third))
     assert (found.pairs, found.ambiguous) == ((), (a, twin, third))
-    found = match(side(a, twin), side(twin, third))
+    found = match_experiments(side(a, twin), side(twin, third))
     assert [(p.a, p.b) for p in found.pairs] == [(a, third), (twin, twin)]
-    assert match(side(a, twin), side(a, twin)).ambiguous == ()
+    assert match_experiments(side(a, twin), side(a, twin)).ambiguous == ()
 
 
 HAZARD = {"outcome": Outcome.HAZARD, "hazards": (("H1", 5.0),)}
@@ -133,6 +133,6 @@ def test_each_kind_of_change_is_reported(
 ) -> None:
     """Times are compared relative to the activation."""
     e = experiment()
-    pair = Pair(e, e, row(**a), row(**b))
-    assert pair.changes == {Change(name) for name in changes.split()}
-    assert pair.usable == (not {"harness-error", "mended"} & set(changes.split()) and a != BROKEN)
+    pair = ExperimentPair(e, e, row(**a), row(**b))
+    assert pair.changes == {ResultChange(name) for name in changes.split()}
+    assert pair.is_usable == (not {"harness-error", "mended"} & set(changes.split()) and a != BROKEN)

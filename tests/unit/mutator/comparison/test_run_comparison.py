@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 
 from mutator.comparison import comparison_files
-from mutator.comparison.compared_runs import read_side
-from mutator.comparison.input_differences import facts, remarks
-from mutator.comparison.run_comparison import Comparison, Gate, compare, findings
+from mutator.comparison.compared_runs import load_compared_run
+from mutator.comparison.input_differences import input_facts, pair_remarks
+from mutator.comparison.run_comparison import Comparison, Gate, compare_runs, findings_of_gates
 from mutator.errors import CheckFailed, MutatorError
 from mutator.model import AfterHazard, Experiment, Outcome, Status
 from mutator.store.work_stretches import Stretch
@@ -47,7 +47,7 @@ def runs(
 
 @pytest.fixture(scope="module")
 def found(runs: tuple[Path, Path]) -> Comparison:
-    return compare(*runs)
+    return compare_runs(*runs)
 
 
 def lanes(found: Comparison) -> int:
@@ -55,7 +55,7 @@ def lanes(found: Comparison) -> int:
 
 
 def test_a_changed_source_file_is_named(found: Comparison) -> None:
-    assert [fact.name for fact in found.facts if fact.differs] == ["digest of target"]
+    assert [fact.name for fact in found.facts if fact.is_different] == ["digest of target"]
     assert comparison_files.files_text(found) == "Files of the target changed: toycar/driver.py."
     assert found.remarks == ()
 
@@ -63,17 +63,19 @@ def test_a_changed_source_file_is_named(found: Comparison) -> None:
 def test_pairs_in_which_one_run_stops_get_a_remark(found: Comparison) -> None:
     first, *rest = found.pairs
     stopped = replace(first, b=replace(first.b, after_hazard=AfterHazard.STOP))
-    (remark,) = remarks(found.a, found.b, replace(found.matching, pairs=(stopped, *rest)))
+    (remark,) = pair_remarks(found.a, found.b, replace(found.matching, pairs=(stopped, *rest)))
     assert remark.startswith("Pairs that end at a terminal hazard in only one run, where")
     assert remark.endswith(f": 1 of {len(found.pairs)}.")
 
 
 def test_a_gate_names_each_new_hazard_once(found: Comparison) -> None:
-    new = findings(found, [Gate.NEW_HAZARD])
+    new = findings_of_gates(found, [Gate.NEW_HAZARD])
     assert 0 < len(new) <= lanes(found)
-    assert all("sensor/lane/shifted" in f.words and "masked -> hazard (H3 2.00 s" in f.words for f in new)
-    assert findings(found, [Gate.UNMATCHED, Gate.LOST_ALERT, Gate.HARNESS_ERROR]) == ()
-    assert found.incomplete == 0
+    assert all(
+        "sensor/lane/shifted" in f.description and "masked -> hazard (H3 2.00 s" in f.description for f in new
+    )
+    assert findings_of_gates(found, [Gate.UNMATCHED, Gate.LOST_ALERT, Gate.HARNESS_ERROR]) == ()
+    assert found.missing_result_count == 0
 
 
 def test_the_tables_agree_with_the_pairs(found: Comparison) -> None:
@@ -81,7 +83,7 @@ def test_the_tables_agree_with_the_pairs(found: Comparison) -> None:
     endings, changes, rates, _, by_type, _ = found.sheets
     assert sum(sum(line[1:]) for line in endings.lines) == len(found.pairs) == 24  # type: ignore[arg-type]
     total = dict(zip(changes.heads, changes.lines[-1], strict=True))
-    new = len(findings(found, [Gate.NEW_HAZARD]))
+    new = len(findings_of_gates(found, [Gate.NEW_HAZARD]))
     assert (total["pairs"], total["new-hazard"]) == (24, new)
     [hazard] = [line for line in rates.lines if line[0] == "hazard"]
     line = dict(zip(rates.heads, hazard, strict=True))
@@ -97,33 +99,33 @@ def test_the_tables_agree_with_the_pairs(found: Comparison) -> None:
 
 
 def test_a_run_compared_with_itself_has_no_changes(runs: tuple[Path, Path]) -> None:
-    found = compare(runs[1], runs[1])
-    assert found.changed == ()
-    assert not any(fact.differs for fact in found.facts)
-    assert findings(found, [gate for gate in Gate if not gate.value.startswith("severity:")]) == ()
-    assert "None of them changed" in comparison_files.summary(found)
+    found = compare_runs(runs[1], runs[1])
+    assert found.changed_pairs == ()
+    assert not any(fact.is_different for fact in found.facts)
+    assert findings_of_gates(found, [gate for gate in Gate if not gate.value.startswith("severity:")]) == ()
+    assert "None of them changed" in comparison_files.summary_text(found)
 
 
 def test_differing_versions_are_reported(runs: tuple[Path, Path]) -> None:
-    sides = [read_side(runs[0]) for _ in "ab"]
+    sides = [load_compared_run(runs[0]) for _ in "ab"]
     old = Stretch(python="CPython 3.11.7", packages={"numpy": "2.0"}, platform="Linux", cpu="Cray 1")
     new = replace(old, python="CPython 3.12.1", packages={"numpy": "2.1", "cv": "5"})
     for side, stretches in zip(sides, ((old,), (old, new)), strict=True):
         vars(side.folder)["head"] = replace(side.folder.head, stretches=stretches)
-    differing = {f.name: (f.a, f.b) for f in facts(*sides) if f.differs}
+    differing = {f.name: (f.a, f.b) for f in input_facts(*sides) if f.is_different}
     python = {"python": ("CPython 3.11.7", "CPython 3.11.7, CPython 3.12.1")}
     assert differing == python | {"package numpy": ("2.0", "2.0, 2.1"), "package cv": ("-", "5")}
 
 
 def test_a_comparison_can_be_filtered(runs: tuple[Path, Path]) -> None:
-    found = compare(*runs, only='fault_type == "lane"')
+    found = compare_runs(*runs, only='fault_type == "lane"')
     assert len(found.pairs) == lanes(found) > 0
-    assert found.unmatched == ()
+    assert found.unmatched_experiments == ()
 
 
 def test_runs_without_a_common_experiment_are_refused(runs: tuple[Path, Path]) -> None:
     with pytest.raises(MutatorError, match="has a partner"):
-        compare(*runs, only="value == -1")
+        compare_runs(*runs, only="value == -1")
 
 
 def test_a_run_with_a_failed_proof_is_not_compared(
@@ -135,7 +137,7 @@ def test_a_run_with_a_failed_proof_is_not_compared(
     (after / "proof" / "0001-a.jsonl").write_text(lines)
     reseal(after)
     with pytest.raises(CheckFailed, match="reference engine"):
-        compare(runs[0], after)
+        compare_runs(runs[0], after)
 
 
 def test_missing_results_do_not_affect_rates(toycar: Workspace, tmp_path: Path, write_run: Write) -> None:
@@ -144,14 +146,14 @@ def test_missing_results_do_not_affect_rates(toycar: Workspace, tmp_path: Path, 
     b = write_run(
         toycar, tmp_path / "b", lambda e: {"lane": broken, "silence": None}.get(e.fault.fault_type, HAZARD)
     )
-    found = compare(a, b)
+    found = compare_runs(a, b)
     kinds = [e.fault.fault_type for e in found.b.experiments]
-    assert found.incomplete == kinds.count("lane") + kinds.count("silence") > 0
-    assert dict(comparison_files.reasons(found)) == {"without a result in b": kinds.count("silence")}
-    assert len(findings(found, [Gate.HARNESS_ERROR])) == kinds.count("lane")
+    assert found.missing_result_count == kinds.count("lane") + kinds.count("silence") > 0
+    assert dict(comparison_files.count_by_reason(found)) == {"without a result in b": kinds.count("silence")}
+    assert len(findings_of_gates(found, [Gate.HARNESS_ERROR])) == kinds.count("lane")
     rates = found.sheets[2]
     assert {line[1] for line in rates.lines} == {kinds.count("distance")}
-    assert "a run has a harness error or an invalid mutant" in comparison_files.summary(found)
+    assert "a run has a harness error or an invalid mutant" in comparison_files.summary_text(found)
 
 
 class Page(HTMLParser):
@@ -168,15 +170,17 @@ class Page(HTMLParser):
 
 
 def test_the_page_the_markdown_and_the_csv_file_list_every_change(found: Comparison, tmp_path: Path) -> None:
-    written = comparison_files.write(found, tmp_path / "out")
+    written = comparison_files.write_comparison(found, tmp_path / "out")
     pairs = list(csv.DictReader(written.pairs.open()))
     assert len(pairs) == 24
-    assert sum(p["changes"] == "new-hazard;worse" for p in pairs) == len(findings(found, [Gate.NEW_HAZARD]))
+    assert sum(p["changes"] == "new-hazard;worse" for p in pairs) == len(
+        findings_of_gates(found, [Gate.NEW_HAZARD])
+    )
     text = written.page.read_text()
     page = Page(text)
     assert page.loaded == []
     assert page.tags.count("b") == 0
-    for pair in found.changed:
+    for pair in found.changed_pairs:
         assert pair.b.id in text
         assert pair.b.id in written.markdown.read_text()
     assert {p.name for p in (tmp_path / "out" / "tables").iterdir()} == {
@@ -188,7 +192,8 @@ def test_comparing_again_gives_the_same_bytes(
     found: Comparison, runs: tuple[Path, Path], tmp_path: Path
 ) -> None:
     one, two = (
-        comparison_files.write(c, tmp_path / name) for c, name in ((found, "a"), (compare(*runs), "b"))
+        comparison_files.write_comparison(c, tmp_path / name)
+        for c, name in ((found, "a"), (compare_runs(*runs), "b"))
     )
     for a, b in ((one.page, two.page), (one.markdown, two.markdown), (one.pairs, two.pairs)):
         assert a.read_bytes() == b.read_bytes()
@@ -197,9 +202,9 @@ def test_comparing_again_gives_the_same_bytes(
 def test_a_long_page_shows_the_first_changes_without_scripts(
     found: Comparison, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(comparison_files, "SHOWN", 3)
-    text = comparison_files.write(found, tmp_path / "out").page.read_text()
+    monkeypatch.setattr(comparison_files, "MOST_SHOWN_ROWS", 3)
+    text = comparison_files.write_comparison(found, tmp_path / "out").page.read_text()
     rows = [line for line in text.splitlines() if '<span class="change' in line]
-    assert len(rows) == len(found.changed) > 3
+    assert len(rows) == len(found.changed_pairs) > 3
     assert "#changed:not([data-filtered]) tbody tr:nth-child(n + 4) { display: none; }" in text
     assert f"At most 3 of the {len(rows)} experiments are shown at once" in text

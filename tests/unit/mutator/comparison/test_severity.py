@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from mutator.comparison.comparison_files import pair_line, summary
-from mutator.comparison.pairs import Change
-from mutator.comparison.run_comparison import Comparison, Gate, compare, findings
+from mutator.comparison.comparison_files import pair_cells, summary_text
+from mutator.comparison.pairs import ResultChange
+from mutator.comparison.run_comparison import Comparison, Gate, compare_runs, findings_of_gates
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Method, Outcome
 from mutator.workspace import Workspace
@@ -75,30 +75,32 @@ def runs(
 
 @pytest.fixture(scope="module")
 def found(runs: tuple[Path, ...]) -> Comparison:
-    return compare(runs[0], runs[1])
+    return compare_runs(runs[0], runs[1])
 
 
-def kinds(found: Comparison, change: Change) -> set[tuple[str, str]]:
-    pairs = found.having(change)
+def kinds(found: Comparison, change: ResultChange) -> set[tuple[str, str]]:
+    pairs = found.pairs_with(change)
     return {(p.b.fault.fault_type, f"{p.row_a.severity}>{p.row_b.severity}") for p in pairs}
 
 
 def test_each_change_of_severity_is_listed(found: Comparison) -> None:
-    assert kinds(found, Change.HIGHER_SEVERITY) == {("lane", "S1>S3"), ("distance", ">S2")}
-    assert kinds(found, Change.LOWER_SEVERITY) == {("lane", "S1>")}
-    assert "higher-severity" in summary(found)
-    line = pair_line(found.having(Change.HIGHER_SEVERITY)[0])
+    assert kinds(found, ResultChange.HIGHER_SEVERITY) == {("lane", "S1>S3"), ("distance", ">S2")}
+    assert kinds(found, ResultChange.LOWER_SEVERITY) == {("lane", "S1>")}
+    assert "higher-severity" in summary_text(found)
+    line = pair_cells(found.pairs_with(ResultChange.HIGHER_SEVERITY)[0])
     assert (line["delta_v_b"], line["severity_b"]) in {(12.0, "S3"), (5.0, "S2")}
 
 
 def test_a_gate_finds_new_and_more_severe_contacts(found: Comparison) -> None:
-    counts = {gate: len(findings(found, [gate])) for gate in Gate if gate.value.startswith("severity:")}
+    counts = {
+        gate: len(findings_of_gates(found, [gate])) for gate in Gate if gate.value.startswith("severity:")
+    }
     distance = sum(p.b.fault.fault_type == "distance" for p in found.pairs)
     harder = sum(p.b.fault.fault_type == "lane" and p.b.method is Method.GUIDED for p in found.pairs)
     assert 0 < harder < distance + harder
     assert list(counts.values()) == [distance, distance, distance + harder, harder]
-    assert any("S2, delta-v 5.0 m/s" in f.words for f in findings(found, [Gate.SEVERITY_S2]))
-    assert len(findings(found, [Gate.HIGHER_SEVERITY])) == distance + harder
+    assert any("S2, delta-v 5.0 m/s" in f.description for f in findings_of_gates(found, [Gate.SEVERITY_S2]))
+    assert len(findings_of_gates(found, [Gate.HIGHER_SEVERITY])) == distance + harder
 
 
 def test_the_medians_of_metrics_are_compared(found: Comparison) -> None:
@@ -123,19 +125,19 @@ def test_the_table_of_severity_classes_contains_each_pair_once(found: Comparison
 
 
 def test_the_scale_of_the_second_run_applies_to_both_runs(runs: tuple[Path, ...]) -> None:
-    found = compare(runs[0], runs[2])
-    assert found.changed == ()
+    found = compare_runs(runs[0], runs[2])
+    assert found.changed_pairs == ()
     assert {p.row_a.severity for p in found.pairs} == {"", "S2"}
     assert found.remarks[-1] == "The runs have different severity scales; only that of strict is used."
-    assert [fact.name for fact in found.facts if fact.differs] == ["scale of severity"]
+    assert [fact.name for fact in found.facts if fact.is_different] == ["scale of severity"]
 
 
 @pytest.mark.parametrize("order", [(0, 3), (3, 0)])
 def test_without_severity_classes_no_change_of_severity_is_reported(
     runs: tuple[Path, ...], order: tuple[int, int]
 ) -> None:
-    found = compare(*(runs[i] for i in order))
-    assert not found.having(Change.HIGHER_SEVERITY) + found.having(Change.LOWER_SEVERITY)
+    found = compare_runs(*(runs[i] for i in order))
+    assert not found.pairs_with(ResultChange.HIGHER_SEVERITY) + found.pairs_with(ResultChange.LOWER_SEVERITY)
     assert "Severity is not compared: without has no severity classes." in found.remarks
     with pytest.raises(MutatorError, match="without has no severity classes"):
-        findings(found, [Gate.SEVERITY_S1])
+        findings_of_gates(found, [Gate.SEVERITY_S1])

@@ -14,7 +14,7 @@ from mutator.figures.drawings import Drawing, drawing_files
 from mutator.paper.example_figures import candidates, example_drawings
 from mutator.paper.unsafe_actions import WANTED, Pair, Wanted
 from mutator.report import report_builder
-from mutator.statistics.results_frame import load
+from mutator.statistics.results_frame import load_usable_results
 from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -53,7 +53,9 @@ def drawn(place: Path, wanted: Wanted) -> Drawing:
     toy = place / "toy"
     workspace = Workspace(library=toy / "fault_library", templates=toy / "templates")
     run = place / "run"
-    [drawing] = example_drawings(RunFolder.open(run), load(run / "results.csv"), workspace, [wanted])
+    [drawing] = example_drawings(
+        RunFolder.open(run), load_usable_results(run / "results.csv"), workspace, [wanted]
+    )
     return drawing
 
 
@@ -110,7 +112,7 @@ def test_a_missing_input_is_reported_instead_of_a_figure(place: Path) -> None:
     shutil.rmtree(place / "toy" / "tree")
     assert drawn(place, BRAKE).note.startswith("No figure: ")
     run = place / "run"
-    [nowhere] = example_drawings(RunFolder.open(run), load(run / "results.csv"), None, [BRAKE])
+    [nowhere] = example_drawings(RunFolder.open(run), load_usable_results(run / "results.csv"), None, [BRAKE])
     assert "no fault library" in nowhere.note
 
 

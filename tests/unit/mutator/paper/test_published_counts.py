@@ -9,10 +9,10 @@ import pytest
 from mutator.errors import MutatorError
 from mutator.paper.published_counts import Paper, load_paper
 from mutator.statistics import guided_against_random
-from mutator.statistics.guided_against_random_tables import kinds_sheet, overall_sheet
+from mutator.statistics.guided_against_random_tables import hazard_odds_sheet, hazards_by_fault_type_sheet
 from mutator.statistics.shares import share
 from mutator.statistics.summary_tables import coverage_sheet, summary_sheet
-from mutator.statistics.tallies import Tally, by_kind, by_scenario, total
+from mutator.statistics.tallies import Tally, sum_tallies, tally_by_fault_type, tally_by_scenario
 
 from ..statistics.results_frame import results
 
@@ -26,7 +26,7 @@ def paper() -> Paper:
 
 
 def of(counts: dict[tuple[str, str], Tally], method: str) -> Tally:
-    return total(one for (how, _), one in counts.items() if how == method)
+    return sum_tallies(one for (how, _), one in counts.items() if how == method)
 
 
 def test_the_cited_tables_have_the_sums_that_the_paper_gives(paper: Paper) -> None:
@@ -62,7 +62,7 @@ def test_the_guided_advantage_reverses_per_injected_fault(paper: Paper) -> None:
 
 def test_our_counts_are_in_the_row_below_the_papers(paper: Paper) -> None:
     frame = results(HIT, HIT | {"alerts": "fcw", "t_alert": 9}, {}, {"scenario": "S9", "t_activation": 2})
-    lines = summary_sheet("guided", by_scenario(frame), paper.published()).table().rows
+    lines = summary_sheet("guided", tally_by_scenario(frame), paper.published()).table().rows
     hazards = [line[2:] for line in lines if line[:2] == ["hazards", "activated"]]
     assert hazards[0][:3] == ["paper", "35.1 % (215/613; 31.4 to 38.9)", "-"]
     assert hazards[1][0] == "here"
@@ -77,7 +77,7 @@ def test_our_counts_are_in_the_row_below_the_papers(paper: Paper) -> None:
 
 def test_hazards_are_given_per_activated_and_per_injected_fault(paper: Paper) -> None:
     frame = results({"fault_type": "zeta"}, HIT, {}, {"fault_type": "jamming", "t_activation": 3})
-    sheet = coverage_sheet("guided", by_kind(frame), paper.published())
+    sheet = coverage_sheet("guided", tally_by_fault_type(frame), paper.published())
     kinds = [line[0] for line in sheet.lines]
     assert kinds == [k for k in ("radar/chaff", "radar/jamming", "radar/zeta", "total") for _ in range(2)]
     chaff = sheet.table().rows[1]
@@ -85,12 +85,12 @@ def test_hazards_are_given_per_activated_and_per_injected_fault(paper: Paper) ->
 
 
 def test_the_csv_has_a_column_for_each_number(paper: Paper) -> None:
-    sheet = coverage_sheet("guided", by_kind(results(HIT)), paper.published())
-    lines = list(csv.DictReader(io.StringIO(sheet.csv())))
+    sheet = coverage_sheet("guided", tally_by_fault_type(results(HIT)), paper.published())
+    lines = list(csv.DictReader(io.StringIO(sheet.as_csv())))
     assert lines[0]["hazards/activated: count"] == "154"
     assert lines[0]["hazards/activated: of"] == "432"
     assert float(lines[0]["hazards/activated: rate"]) == pytest.approx(154 / 432, abs=1e-6)
-    assert "| radar/chaff | paper |" in sheet.markdown()
+    assert "| radar/chaff | paper |" in sheet.as_markdown()
 
 
 def test_contradictory_counts_are_reported_with_their_line(tmp_path: Path) -> None:
@@ -104,8 +104,10 @@ def test_contradictory_counts_are_reported_with_their_line(tmp_path: Path) -> No
 
 def test_within_fault_types_guided_faults_are_ahead_only_per_activated_fault(paper: Paper) -> None:
     activated, injected = (
-        guided_against_random.mantel_haenszel(guided_against_random.strata(paper.coverage, whole))
-        for whole in guided_against_random.WHOLES
+        guided_against_random.mantel_haenszel(
+            guided_against_random.strata_with_both_methods(paper.coverage, whole)
+        )
+        for whole in guided_against_random.RATE_BASES
     )
     assert activated.strata == injected.strata == 17
     assert injected.high < 1
@@ -115,7 +117,10 @@ def test_within_fault_types_guided_faults_are_ahead_only_per_activated_fault(pap
 
 def test_the_papers_counts_and_ours_get_the_same_statistical_tests(paper: Paper) -> None:
     frame = results(HIT, HIT | {"method": "random", "trigger": "random/C2"})
-    overall, kinds = overall_sheet(frame, paper.published()), kinds_sheet(frame, paper.published())
+    overall, kinds = (
+        hazard_odds_sheet(frame, paper.published()),
+        hazards_by_fault_type_sheet(frame, paper.published()),
+    )
     assert [line[:2] for line in overall.lines] == [
         (whole, source) for whole in ("activated", "injected") for source in ("paper", "here")
     ]

@@ -94,7 +94,7 @@ def test_the_score_equals_that_of_the_api(toycar: Workspace, run: Path) -> None:
         ("transient mutants", "7", "0"),
         ("all mutants", "7", "0"),
     ]
-    frame = loaded.mutation_score().frame()
+    frame = loaded.mutation_score().as_frame()
     line = frame[(frame["of"] == "arithmetic") & (frame["fault"] == "permanent")].iloc[0]
     assert (line["hazard: count"], line["hazard: of"], line["new alert"]) == (6, 6, None)
 

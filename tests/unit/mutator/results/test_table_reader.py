@@ -15,7 +15,7 @@ import pytest
 from pyarrow import parquet
 
 import mutator
-from mutator.comparison.compared_runs import read_side
+from mutator.comparison.compared_runs import load_compared_run
 from mutator.errors import MutatorError
 from mutator.execution.single_run import run_single
 from mutator.exports import Format
@@ -34,7 +34,7 @@ from mutator.results.table_columns import (
     result_columns,
 )
 from mutator.results.table_reader import Results, _table, frame_of, same_parquet
-from mutator.statistics.results_frame import hazard_names, load, prepare
+from mutator.statistics.results_frame import hazard_names, load_usable_results, prepare_results
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import read_head
@@ -132,9 +132,12 @@ def test_numbers_have_the_units_of_their_metric_or_channel(
 def test_every_way_of_reading_gives_the_same_hazards(run: Path) -> None:
     table = Results.up_to_date(run)
     rows = table.rows()
-    frame, statistics = table.indexed_frame(), load(run / "results.csv").set_index("experiment_id")
+    frame, statistics = (
+        table.indexed_frame(),
+        load_usable_results(run / "results.csv").set_index("experiment_id"),
+    )
     assert [row.experiment_id for row in rows] == list(frame.index)
-    assert read_side(run).rows == {row.experiment_id: row for row in rows}
+    assert load_compared_run(run).row_by_id == {row.experiment_id: row for row in rows}
     assert {row.hazards for row in rows} == {(), (("DROPPED", 4.0), ("CRUSHED", 4.5))}
     for row in rows:
         first = row.hazards[0][1] if row.hazards else None
@@ -160,7 +163,7 @@ def test_a_target_without_hazards_has_no_hazard_in_any_row(run: Path, reseal: Ca
     assert frame["hazard"].dropna().eq(False).all()
     assert frame["hazard"].notna().any()
     assert frame["t_hazard"].dtype == float
-    assert not load(run / "results.csv")["is_hazard"].any()
+    assert not load_usable_results(run / "results.csv")["is_hazard"].any()
     assert checked_hazards(table.frame()) == ()
 
 
@@ -333,7 +336,7 @@ def test_hazards_have_the_names_of_run_json(run: Path, reseal: Callable[[Path], 
     table = Results(run)
     assert checked_hazards(table.frame()) == ("CRUSHED", "Dropped")
     assert hazards_of(table.frame()) == hazards_of(table.indexed_frame()) == ("Dropped", "CRUSHED")
-    assert hazard_names(load(table.path)) == ("CRUSHED", "Dropped")
+    assert hazard_names(load_usable_results(table.path)) == ("CRUSHED", "Dropped")
     assert "way" in table.frame()
 
 
@@ -351,4 +354,4 @@ def test_a_frame_without_its_hazards_is_refused(run: Path) -> None:
     frame = Results.up_to_date(run).frame()
     assert hazards_of(frame[frame["status"] == "ok"].reset_index(drop=True)) == hazards_of(frame)
     with pytest.raises(MutatorError, match="without the names of its hazards"):
-        prepare(pd.DataFrame(frame.to_dict("list")))
+        prepare_results(pd.DataFrame(frame.to_dict("list")))

@@ -5,7 +5,7 @@ from typing import Any
 
 import pandas as pd
 
-from mutator.statistics.results_frame import prepare
+from mutator.statistics.results_frame import prepare_results
 
 _EMPTY = ("t_activation", "t_manifest", "h1", "t_h1", "h2", "t_h2", "h3", "t_h3", "t_alert")
 _ROW = {
@@ -27,4 +27,4 @@ def results(*rows: dict[str, Any]) -> pd.DataFrame:
     activated."""
     frame = pd.DataFrame([_ROW | {"experiment_id": str(i)} | row for i, row in enumerate(rows)])
     frame.attrs["hazards"] = ("H1", "H2", "H3")
-    return prepare(frame)
+    return prepare_results(frame)

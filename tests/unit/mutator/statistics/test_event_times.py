@@ -25,7 +25,9 @@ def run(alert: float = nan, hazard: float = nan, **more: Any) -> dict[str, Any]:
 
 
 def test_times_are_measured_from_the_activation() -> None:
-    found = event_times.propagation(results(run(7.0, 9.0, t_manifest=5.5), run(6.0, nan), run(nan, nan), {}))
+    found = event_times.propagation_times(
+        results(run(7.0, 9.0, t_manifest=5.5), run(6.0, nan), run(nan, nan), {})
+    )
     assert (found["activation to manifest"].n, found["activation to manifest"].mean) == (1, 0.5)
     assert (found["activation to alert"].n, found["activation to alert"].mean) == (2, 1.5)
     assert (found["activation to hazard"].n, found["activation to hazard"].median) == (1, 4.0)
@@ -34,10 +36,10 @@ def test_times_are_measured_from_the_activation() -> None:
 
 def test_a_reaction_time_needs_an_earlier_alert() -> None:
     frame = results(run(9.0, 9.0), run(9.5, 9.0), run(nan, 9.0))
-    assert event_times.propagation(frame)["alert to hazard"].n == 0
-    found = event_times.reaction(frame, ENDS, DRIVER_S)
-    assert (found.at_risk, found.events, found.too_late) == (0, 0, 2)
-    assert isnan(found.survival)
+    assert event_times.propagation_times(frame)["alert to hazard"].n == 0
+    found = event_times.reaction_times(frame, ENDS, DRIVER_S)
+    assert (found.runs_alerted_first, found.hazards_after_alert, found.runs_alerted_too_late) == (0, 0, 2)
+    assert isnan(found.no_hazard_share)
 
 
 def test_kaplan_meier_of_a_textbook_sample() -> None:
@@ -46,37 +48,42 @@ def test_kaplan_meier_of_a_textbook_sample() -> None:
         run(17.0, nan, scenario="S2"),
         run(nan, 8.0),
     )
-    found = event_times.reaction(frame, ENDS, DRIVER_S)
-    assert (found.at_risk, found.events) == (5, 4)
+    found = event_times.reaction_times(frame, ENDS, DRIVER_S)
+    assert (found.runs_alerted_first, found.hazards_after_alert) == (5, 4)
     assert found.median == 2.5
     assert found.median_low <= 2.5 <= found.median_high
-    assert found.survival == pytest.approx(0.8)
-    assert (found.in_time.count, found.in_time.of) == (3, 4)
+    assert found.no_hazard_share == pytest.approx(0.8)
+    assert (found.late_hazards.count, found.late_hazards.of) == (3, 4)
 
 
 def test_censored_times_raise_the_median() -> None:
     """A curve that never reaches one half has no median."""
     few = [run(10.0, 11.0 + i) for i in range(3)]
-    assert event_times.reaction(results(*few), ENDS, DRIVER_S).median == pytest.approx(2.0)
-    many = event_times.reaction(results(*few, *[run(10.0, nan)] * 7), ENDS, DRIVER_S)
+    assert event_times.reaction_times(results(*few), ENDS, DRIVER_S).median == pytest.approx(2.0)
+    many = event_times.reaction_times(results(*few, *[run(10.0, nan)] * 7), ENDS, DRIVER_S)
     assert isnan(many.median)
-    assert many.survival == pytest.approx(0.9)
+    assert many.no_hazard_share == pytest.approx(0.9)
 
 
 def test_alerts_without_any_hazard_have_no_median() -> None:
-    found = event_times.reaction(results(run(10.0, nan)), ENDS, DRIVER_S)
-    assert (found.survival, found.at_risk, found.events) == (1.0, 1, 0)
+    found = event_times.reaction_times(results(run(10.0, nan)), ENDS, DRIVER_S)
+    assert (found.no_hazard_share, found.runs_alerted_first, found.hazards_after_alert) == (1.0, 1, 0)
     assert isnan(found.median)
 
 
 def test_crashed_runs_are_left_out_of_censored_times() -> None:
     """How long they would have been observed is unknown."""
-    assert event_times.reaction(results(run(10.0, nan, status="crashed")), ENDS, DRIVER_S).at_risk == 0
+    assert (
+        event_times.reaction_times(
+            results(run(10.0, nan, status="crashed")), ENDS, DRIVER_S
+        ).runs_alerted_first
+        == 0
+    )
 
 
 def test_a_reaction_time_equal_to_the_drivers_is_not_longer() -> None:
     """11.8 - 10.0 is 1.8000000000000007 in floating point and counts as 1.8 s."""
-    assert event_times.reaction(results(run(10.0, 11.8)), ENDS, DRIVER_S).in_time.count == 0
+    assert event_times.reaction_times(results(run(10.0, 11.8)), ENDS, DRIVER_S).late_hazards.count == 0
 
 
 def test_alerts_are_counted_before_each_hazard() -> None:
@@ -87,7 +94,7 @@ def test_alerts_are_counted_before_each_hazard() -> None:
         "2": (),
         "3": (),
     }
-    found = event_times.alerts_before(frame, alerts)
+    found = event_times.alerts_before_hazards(frame, alerts)
     assert {key: (share.count, share.of) for key, share in found.items()} == {
         ("H1", "fcw"): (2, 3),
         ("H1", "steer_saturated"): (1, 3),

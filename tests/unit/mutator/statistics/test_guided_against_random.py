@@ -9,8 +9,8 @@ import pytest
 
 from mutator.statistics import guided_against_random
 from mutator.statistics.guided_against_random import Stratum
-from mutator.statistics.guided_against_random_tables import pairs_sheet
-from mutator.statistics.paired_statistics import Matched
+from mutator.statistics.guided_against_random_tables import matched_pairs_sheet
+from mutator.statistics.paired_statistics import PairCounts
 
 from .results_frame import results
 
@@ -60,8 +60,8 @@ def test_strata_without_hazards_do_not_affect_the_odds_ratio() -> None:
 
 
 def test_holm_adjusts_as_in_the_textbook() -> None:
-    assert guided_against_random.holm([0.01, 0.04, 0.03]) == pytest.approx((0.03, 0.06, 0.06))
-    assert guided_against_random.holm([]) == ()
+    assert guided_against_random.holm_adjusted([0.01, 0.04, 0.03]) == pytest.approx((0.03, 0.06, 0.06))
+    assert guided_against_random.holm_adjusted([]) == ()
 
 
 @pytest.mark.slow
@@ -75,14 +75,14 @@ def test_holm_adjusts_as_statsmodels_does() -> None:
             for _ in range(draw.randint(1, 20))
         ]
         np.testing.assert_array_equal(
-            guided_against_random.holm(p_values), multipletests(p_values, method="holm")[1]
+            guided_against_random.holm_adjusted(p_values), multipletests(p_values, method="holm")[1]
         )
 
 
 def test_pairs_have_the_same_fault_scenario_and_row(frame: pd.DataFrame) -> None:
-    found = guided_against_random.pairs(frame)
+    found = guided_against_random.matched_pairs(frame)
     assert list(found["fault_id"]) == ["a", "b", "c", "d", "e"]
-    assert guided_against_random.mcnemar(found) == Matched(
+    assert guided_against_random.mcnemar_of_pairs(found) == PairCounts(
         both=1, first_only=1, second_only=2, neither=1, p=1.0
     )
 
@@ -90,13 +90,13 @@ def test_pairs_have_the_same_fault_scenario_and_row(frame: pd.DataFrame) -> None
 def test_mcnemar_is_exact() -> None:
     """If all eight discordant pairs have the same sign, p is twice a half to the eighth."""
     made = [row for i in range(8) for row in pair(str(i), HIT, RAN)]
-    assert guided_against_random.mcnemar(guided_against_random.pairs(results(*made))).p == pytest.approx(
-        2 * 0.5**8
-    )
+    assert guided_against_random.mcnemar_of_pairs(
+        guided_against_random.matched_pairs(results(*made))
+    ).p == pytest.approx(2 * 0.5**8)
 
 
 def test_pairs_are_counted_per_injected_and_per_activated_fault(frame: pd.DataFrame) -> None:
-    lines = [line[:7] for line in pairs_sheet(frame).lines]
+    lines = [line[:7] for line in matched_pairs_sheet(frame).lines]
     assert lines == [
         ("all", "total", 5, 1, 1, 2, 1),
         ("all", "radar/chaff", 5, 1, 1, 2, 1),
@@ -109,7 +109,9 @@ def test_resampling_draws_whole_faults() -> None:
     """Copies of a run in other scenarios add no information."""
     once = [row for i in range(12) for row in pair(str(i), HIT if i < 8 else RAN, HIT if i < 4 else RAN)]
     often = [row | {"scenario": s} for s in ("S1", "S2", "S3", "S4") for row in once]
-    single, copied = (guided_against_random.resampled(results(*rows), "injected") for rows in (once, often))
+    single, copied = (
+        guided_against_random.resampled_rate_difference(results(*rows), "injected") for rows in (once, often)
+    )
     assert single.difference == pytest.approx(4 / 12)
     assert single == copied
     assert single.low < 4 / 12 < single.high
@@ -118,7 +120,7 @@ def test_resampling_draws_whole_faults() -> None:
 def test_faults_that_all_agree_have_no_interval() -> None:
     for guided in (RAN, HIT):
         rows = [row for i in range(3) for row in pair(str(i), guided, RAN)]
-        found = guided_against_random.resampled(results(*rows), "injected")
+        found = guided_against_random.resampled_rate_difference(results(*rows), "injected")
         assert found.difference == float(guided is HIT)
         assert math.isnan(found.low) and math.isnan(found.high)
 
@@ -126,7 +128,7 @@ def test_faults_that_all_agree_have_no_interval() -> None:
 @pytest.mark.filterwarnings("error")
 def test_an_interval_needs_both_methods_in_every_draw() -> None:
     """If each fault has runs of one method only, some resamples have no difference."""
-    found = guided_against_random.resampled(
+    found = guided_against_random.resampled_rate_difference(
         results(HIT | {"fault_id": "a"}, RAN | {"fault_id": "b", "method": "random"}), "activated"
     )
     assert found.difference == 1.0
@@ -134,6 +136,6 @@ def test_an_interval_needs_both_methods_in_every_draw() -> None:
 
 
 def test_a_difference_needs_runs_of_both_methods() -> None:
-    found = guided_against_random.resampled(results(HIT, RAN), "activated")
+    found = guided_against_random.resampled_rate_difference(results(HIT, RAN), "activated")
     assert math.isnan(found.difference)
     assert math.isnan(found.low)

@@ -8,7 +8,7 @@ import pytest
 
 from mutator.statistics import median_intervals
 from mutator.statistics.median_intervals import median_difference, median_interval
-from mutator.statistics.metric_tables import metrics_sheet, severity_sheet, tolerant_times_sheet
+from mutator.statistics.metric_tables import fault_tolerant_times_sheet, metrics_sheet, severity_sheet
 from mutator.targets.target_facts import MetricFacts
 
 METRICS = [
@@ -51,7 +51,7 @@ def test_each_metric_has_its_spread_by_fault_type() -> None:
 def test_without_values_there_is_no_table() -> None:
     frame = FRAME[FRAME["kind"] == "a/y"]
     assert metrics_sheet(frame, []).lines == ()
-    assert tolerant_times_sheet(frame).lines == ()
+    assert fault_tolerant_times_sheet(frame).lines == ()
     assert severity_sheet(frame.drop(columns="severity")).lines == ()
 
 
@@ -67,13 +67,13 @@ def test_severity_classes_are_counted_by_fault_type() -> None:
 
 
 def test_times_to_a_hazard_need_an_earlier_event() -> None:
-    told = [line[:6] for line in tolerant_times_sheet(FRAME).lines]
+    told = [line[:6] for line in fault_tolerant_times_sheet(FRAME).lines]
     assert told == [
         ("a/x", "activation to hazard", 5, 1.0, 2.0, 3.0),
         ("a/x", "manifestation to hazard", 3, 0.5, 1.75, 3.0),
         ("a/x", "alert to hazard", 2, 1.0, 1.75, 2.5),
     ]
-    assert len(tolerant_times_sheet(FRAME, alerts=False).lines) == 2
+    assert len(fault_tolerant_times_sheet(FRAME, alerts=False).lines) == 2
 
 
 @pytest.mark.parametrize("pairs", [False, True])
@@ -82,7 +82,7 @@ def test_the_interval_of_a_median_resamples_whole_faults(
 ) -> None:
     """A simple loop that copies the runs of each drawn fault gives the same interval."""
     monkeypatch.setattr(median_intervals, "RESAMPLES", 40)
-    monkeypatch.setattr(median_intervals, "_CELLS", 300)  # the draws need several batches
+    monkeypatch.setattr(median_intervals, "_MOST_CELLS", 300)  # the draws need several batches
     rng = np.random.default_rng(3)
     cluster = pd.Series(rng.integers(0, 6, 30))
     first, second = pd.Series(rng.normal(0, 1, 30)), pd.Series(rng.normal(1, 1, 30).round(1))

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from mutator.model import OPERATORS, Experiment, Fault
-from mutator.statistics.mutation_score import drives_of, score_sheet
+from mutator.statistics.mutation_score import mutant_drives, mutation_score_sheet
 from mutator.statistics.shares import share
 
 from .results_frame import results
@@ -43,7 +43,7 @@ def lines(sheet: Any) -> dict[tuple[str, str, str], dict[str, Any]]:
 
 def test_a_mutant_is_counted_once_for_all_its_runs(faults: dict[str, Fault]) -> None:
     frame = results(drive("a", HIT), drive("a", ACTIVE), drive("b", CHANGED), drive("c", {}))
-    found = lines(score_sheet(frame, faults, GOLDEN))
+    found = lines(mutation_score_sheet(frame, faults, GOLDEN))
     total = found["all", "mutants", "permanent"]
     assert (total["number"], total["not activated"], total["no effect"]) == (3, 1, 0)
     assert total["actuator changed"] == share(2, 2)
@@ -57,7 +57,7 @@ def test_a_mutant_is_counted_once_for_all_its_runs(faults: dict[str, Fault]) -> 
 
 def test_permanent_and_transient_mutants_have_separate_lines(faults: dict[str, Fault]) -> None:
     frame = results(drive("a", HIT), drive("a", ACTIVE, trigger="C1"), drive("b", ACTIVE, trigger="C1"))
-    found = lines(score_sheet(frame, faults, GOLDEN))
+    found = lines(mutation_score_sheet(frame, faults, GOLDEN))
     assert found["all", "mutants", "permanent"]["hazard"] == share(1, 1)
     assert found["all", "mutants", "transient"]["hazard"] == share(0, 2)
     assert found["all", "mutants", "either"]["hazard"] == share(1, 2)
@@ -68,14 +68,14 @@ def test_alerts_of_the_fault_free_run_are_not_attributed_to_a_mutant(faults: dic
     frame = results(
         drive("a", ACTIVE, alerts="own", t_alert="2.0"), drive("b", ACTIVE, alerts="own;brake", t_alert="2.0")
     )
-    found = lines(score_sheet(frame, faults, GOLDEN))
+    found = lines(mutation_score_sheet(frame, faults, GOLDEN))
     assert found["all", "mutants", "permanent"]["new alert"] == share(1, 2)
     assert found["all", "mutants", "permanent"]["no effect"] == 1
-    unknown = score_sheet(frame, faults, None)
+    unknown = mutation_score_sheet(frame, faults, None)
     assert lines(unknown)["all", "mutants", "permanent"]["new alert"] is None
     assert "alerts are not compared" in unknown.note
     of_a_seed = {("S1", "1"): frozenset({"own", "brake"})}
-    assert not drives_of(frame, faults, of_a_seed)["new alert"].any()
+    assert not mutant_drives(frame, faults, of_a_seed)["new alert"].any()
 
 
 def test_harness_errors_are_excluded_from_all_shares(faults: dict[str, Fault]) -> None:
@@ -85,7 +85,7 @@ def test_harness_errors_are_excluded_from_all_shares(faults: dict[str, Fault]) -
         drive("c", {}, status="harness_error"),
         drive("d", {}, status="invalid_mutant"),
     )
-    sheet = score_sheet(frame, faults, GOLDEN, ["pkg/**: 4 of 9 mutants; left out: 5"])
+    sheet = mutation_score_sheet(frame, faults, GOLDEN, ["pkg/**: 4 of 9 mutants; left out: 5"])
     assert "Chosen: `pkg/**: 4 of 9 mutants; left out: 5`." in sheet.note
     total = lines(sheet)["all", "mutants", "permanent"]
     assert (total["number"], total["not activated"]) == (2, 0)
@@ -98,26 +98,26 @@ def test_the_note_warns_of_several_draws(faults: dict[str, Fault]) -> None:
     """The draws have different populations, and the overall share has no weights."""
     small, large = "a: 4 draws of 9 mutants of operators", "b: 4 draws of 900 mutants of operators"
     frame = results(drive("a", HIT))
-    assert "without weights" in score_sheet(frame, faults, GOLDEN, [small, large]).note
-    assert "without weights" not in score_sheet(frame, faults, GOLDEN, [small]).note
+    assert "without weights" in mutation_score_sheet(frame, faults, GOLDEN, [small, large]).note
+    assert "without weights" not in mutation_score_sheet(frame, faults, GOLDEN, [small]).note
 
 
 def test_scores_are_given_by_operator(faults: dict[str, Fault]) -> None:
     frame = results(drive("a", HIT), drive("b", ACTIVE, fault_type="branch"), {"fault_id": "x"} | HIT)
-    found = lines(score_sheet(frame, faults, GOLDEN))
+    found = lines(mutation_score_sheet(frame, faults, GOLDEN))
     assert found["arithmetic", "mutants", "permanent"]["hazard"] == share(1, 1)
     assert found["branch", "mutants", "permanent"]["hazard"] == share(0, 1)
     assert found["all", "mutants", "permanent"]["number"] == 2
 
 
 def test_a_run_without_operators_has_no_score(faults: dict[str, Fault]) -> None:
-    assert not score_sheet(results(HIT), {"a": replace(faults["a"], module="radar")}, GOLDEN).lines
+    assert not mutation_score_sheet(results(HIT), {"a": replace(faults["a"], module="radar")}, GOLDEN).lines
 
 
 def test_intervals_of_drives_resample_mutants(faults: dict[str, Fault]) -> None:
     frame = results(*(drive(name, HIT if name == "a" else ACTIVE) for name in "ab" for _ in range(10)))
-    found = lines(score_sheet(frame, faults, GOLDEN))["all", "drives", "permanent"]["hazard"]
+    found = lines(mutation_score_sheet(frame, faults, GOLDEN))["all", "drives", "permanent"]["hazard"]
     assert (found.low, found.high) == (0.0, 1.0)
     alike = results(*(drive(name, HIT) for name in "ab" for _ in range(2)))
-    told = lines(score_sheet(alike, faults, GOLDEN))["all", "drives", "permanent"]["hazard"]
+    told = lines(mutation_score_sheet(alike, faults, GOLDEN))["all", "drives", "permanent"]["hazard"]
     assert str(told) == "100.0 % (4/4)"

@@ -7,7 +7,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mutator.statistics.paired_statistics import Difference, Matched, mcnemar, rate_difference, times
+from mutator.statistics.paired_statistics import (
+    PairCounts,
+    PairedDifference,
+    mcnemar,
+    paired_times,
+    rate_difference,
+)
 
 
 def flags(text: str) -> pd.Series:
@@ -16,13 +22,19 @@ def flags(text: str) -> pd.Series:
 
 def test_mcnemar_uses_the_pairs_that_differ() -> None:
     found = mcnemar(flags("1111111100"), flags("1000000010"))
-    assert (found.both, found.first_only, found.second_only, found.neither, found.pairs) == (1, 7, 1, 1, 10)
+    assert (found.both, found.first_only, found.second_only, found.neither, found.pair_count) == (
+        1,
+        7,
+        1,
+        1,
+        10,
+    )
     assert found.p == pytest.approx(2 * (1 + 8) / 2**8)
 
 
 def test_equal_flags_have_a_p_value_of_one_and_no_interval() -> None:
     same = flags("1100")
-    assert mcnemar(same, same) == Matched(both=2, first_only=0, second_only=0, neither=2, p=1.0)
+    assert mcnemar(same, same) == PairCounts(both=2, first_only=0, second_only=0, neither=2, p=1.0)
     found = rate_difference(same, same, pd.Series(list("abcd")))
     assert found.difference == 0.0
     assert math.isnan(found.low) and math.isnan(found.high)
@@ -47,18 +59,18 @@ def test_one_fault_has_no_interval() -> None:
 def test_median_times_use_pairs_with_both_times() -> None:
     first = pd.Series([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, None, 9.0])
     second = first + pd.Series([0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.0, None])
-    found = times(first, second)
-    assert (found.n, found.first, found.second) == (7, 4.0, 4.8)
-    assert found.median == Difference(difference=0.8, low=0.5, high=1.1)
+    found = paired_times(first, second)
+    assert (found.pair_count, found.first_median, found.second_median) == (7, 4.0, 4.8)
+    assert found.median_difference == PairedDifference(difference=0.8, low=0.5, high=1.1)
     assert found.p == pytest.approx(2 / 2**7)
 
 
 def test_equal_or_missing_times_have_no_result() -> None:
     same = pd.Series([1.0, 0.1 + 0.2])
-    assert math.isnan(times(same, pd.Series([1.0, 0.3])).p)
-    none = times(pd.Series([None], dtype=float), pd.Series([1.0]))
-    assert none.n == 0
-    assert math.isnan(none.median.difference)
+    assert math.isnan(paired_times(same, pd.Series([1.0, 0.3])).p)
+    none = paired_times(pd.Series([None], dtype=float), pd.Series([1.0]))
+    assert none.pair_count == 0
+    assert math.isnan(none.median_difference.difference)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -81,7 +93,7 @@ def test_the_median_difference_lies_between_order_statistics(size: int) -> None:
     """As in a sign test by hand, the interval drops as many differences at each end as 95 % coverage allows.
     With fewer than six differences, there is no interval."""
     change = pd.Series(np.random.default_rng(size).normal(0.3, 1.0, size))
-    found = times(pd.Series(np.zeros(size)), change).median
+    found = paired_times(pd.Series(np.zeros(size)), change).median_difference
     tails = [sum(math.comb(size, k) for k in range(i + 1)) / 2**size for i in range(size)]
     outside = [i for i, tail in enumerate(tails) if tail <= 0.025]
     if outside:
@@ -102,4 +114,4 @@ def test_wilcoxon_is_exact_for_few_pairs(size: int) -> None:
     ]
     least = min(ranks[change > 0].sum(), ranks[change < 0].sum())
     expected = min(1.0, 2 * sum(total <= least for total in sums) / 2**size)
-    assert times(pd.Series(np.zeros(size)), change).p == pytest.approx(expected)
+    assert paired_times(pd.Series(np.zeros(size)), change).p == pytest.approx(expected)

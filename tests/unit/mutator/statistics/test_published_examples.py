@@ -8,7 +8,7 @@ import pytest
 from mutator.paper.measures import mean_time, of_difference, paired
 from mutator.statistics import guided_against_random
 from mutator.statistics.guided_against_random import Stratum
-from mutator.statistics.paired_statistics import mcnemar, times
+from mutator.statistics.paired_statistics import mcnemar, paired_times
 from mutator.statistics.shares import share
 
 from . import by_hand
@@ -67,7 +67,7 @@ def test_breslow_day(tables: list[tuple[int, int, int, int]], p: float) -> None:
 def test_fisher(table: tuple[int, int, int, int], p: float) -> None:
     """Fisher's test gives the p-values of R's `fisher.test` for the lady tasting tea and the convictions
     of twins, and that of SAS for Berkeley's department B (Pennsylvania State University, STAT 504)."""
-    assert guided_against_random.fisher(stratum(*table)) == pytest.approx(p, rel=2e-4)
+    assert guided_against_random.fisher_p(stratum(*table)) == pytest.approx(p, rel=2e-4)
 
 
 def test_mcnemar() -> None:
@@ -82,10 +82,10 @@ def test_wilcoxon() -> None:
     differences."""
     before = pd.Series([1.83, 0.50, 1.62, 2.48, 1.68, 1.88, 1.55, 3.06, 1.30])
     after = pd.Series([0.878, 0.647, 0.598, 2.05, 1.06, 1.29, 1.06, 3.14, 1.29])
-    found = times(before, after)
+    found = paired_times(before, after)
     assert found.p == pytest.approx(0.0390625)
     differences = sorted((after - before).round(9))
-    assert (found.median.low, found.median.high) == (differences[1], differences[7])
+    assert (found.median_difference.low, found.median_difference.high) == (differences[1], differences[7])
 
 
 def test_newcombe() -> None:

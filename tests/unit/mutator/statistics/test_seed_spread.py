@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mutator.statistics.seed_spread import kinds_sheet, seeds_of, seeds_sheet
+from mutator.statistics.seed_spread import seeds_by_fault_type_sheet, seeds_of, seeds_sheet
 from mutator.statistics.statistics_sheet import Sheet
 
 from .results_frame import results
@@ -27,7 +27,7 @@ def cells(sheet: Sheet, *names: str) -> dict[str, Any]:
 
 def test_one_seed_has_no_spread() -> None:
     frame = results(*seed(7, 3))
-    assert seeds_sheet(frame).lines == kinds_sheet(frame).lines == ()
+    assert seeds_sheet(frame).lines == seeds_by_fault_type_sheet(frame).lines == ()
 
 
 def test_the_lowest_and_the_highest_seed_are_shown() -> None:
@@ -70,5 +70,5 @@ def test_each_method_and_fault_type_has_separate_lines() -> None:
     assert {line[0] for line in sheet.lines} == {"all", "guided", "random"}
     assert not [line for line in sheet.lines if "alert" in str(line[1])]
     assert cells(sheet, "random", "hazards", "injected")["largest"] == 0.9
-    assert {line[0] for line in kinds_sheet(frame).lines} == {"radar/chaff", "radar/fog"}
-    assert cells(kinds_sheet(frame), "radar/fog", "hazards", "injected")["seeds"] == 1
+    assert {line[0] for line in seeds_by_fault_type_sheet(frame).lines} == {"radar/chaff", "radar/fog"}
+    assert cells(seeds_by_fault_type_sheet(frame), "radar/fog", "hazards", "injected")["seeds"] == 1

@@ -3,7 +3,7 @@
 import math
 
 from mutator.statistics.sheet_selection import run_sheets
-from mutator.statistics.statistics_sheet import P, Sheet
+from mutator.statistics.statistics_sheet import PValue, Sheet
 
 from .results_frame import results
 
@@ -31,6 +31,8 @@ def test_one_method_without_published_numbers_has_only_counts() -> None:
 
 
 def test_numbers_are_written_plainly() -> None:
-    sheet = Sheet(name="n", title="T", note="N.", heads=("a", "b", "c"), lines=((math.nan, P(1e-20), None),))
+    sheet = Sheet(
+        name="n", title="T", note="N.", heads=("a", "b", "c"), lines=((math.nan, PValue(1e-20), None),)
+    )
     assert sheet.table().rows == [["-", "< 0.0001", "-"]]
-    assert sheet.csv() == "a,b,c\n,1e-20,\n"
+    assert sheet.as_csv() == "a,b,c\n,1e-20,\n"

@@ -7,10 +7,10 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.results.table_columns import result_columns
-from mutator.statistics.results_frame import load
+from mutator.statistics.results_frame import load_usable_results
 from mutator.statistics.shares import share
 from mutator.statistics.summary_tables import coverage_sheet, summary_sheet
-from mutator.statistics.tallies import Tally, by_kind, by_scenario
+from mutator.statistics.tallies import Tally, tally_by_fault_type, tally_by_scenario
 from tests.made_head import made_head
 from tests.made_up_results import write_results
 
@@ -27,16 +27,16 @@ def test_wilson_interval_of_a_published_example() -> None:
 
 
 def test_a_table_without_published_counts_has_only_ours() -> None:
-    coverage = coverage_sheet("guided", by_kind(results(HIT)), None)
+    coverage = coverage_sheet("guided", tally_by_fault_type(results(HIT)), None)
     assert [line[1] for line in coverage.lines] == ["here", "here"]
-    summary = summary_sheet("guided", by_scenario(results(HIT)), None)
+    summary = summary_sheet("guided", tally_by_scenario(results(HIT)), None)
     assert {line[2] for line in summary.lines} == {"here"}
-    assert "paper" not in coverage.markdown() + summary.markdown()
+    assert "paper" not in coverage.as_markdown() + summary.as_markdown()
 
 
 def test_crashes_count_as_injected_and_harness_errors_do_not() -> None:
     frame = results(HIT, {"status": "harness_error"}, {"status": "invalid_mutant"}, {"status": "crashed"})
-    assert by_scenario(frame)["guided", "S1"] == Tally(
+    assert tally_by_scenario(frame)["guided", "S1"] == Tally(
         injected=2,
         activated=1,
         manifested=1,
@@ -49,9 +49,9 @@ def test_crashes_count_as_injected_and_harness_errors_do_not() -> None:
 
 def test_a_missing_file_or_column_is_reported(tmp_path: Path) -> None:
     with pytest.raises(MutatorError, match=r"results\.parquet"):
-        load(tmp_path / "results.csv")
+        load_usable_results(tmp_path / "results.csv")
     (tmp_path / "run.json").write_text(json.dumps(made_head(hazards=[])))
     columns = result_columns((), ())
     write_results(tmp_path, [column for column in columns if column.name != "module"], [])
     with pytest.raises(MutatorError, match="no column 'module'"):
-        load(tmp_path / "results.csv")
+        load_usable_results(tmp_path / "results.csv")

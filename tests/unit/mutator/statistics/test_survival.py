@@ -11,7 +11,7 @@ import pytest
 from scipy.stats import CensoredData, ecdf
 
 from mutator.statistics import event_times
-from mutator.statistics.event_times import Reaction
+from mutator.statistics.event_times import ReactionTimes
 
 from .results_frame import results
 
@@ -22,21 +22,21 @@ FLAT = {"flat at one half": 1.165, "flat at one half, censored": 2.5}
 ALERT_S = 5.0
 
 
-def reaction(sample: dict[str, Any], driver_s: float = 1.8) -> Reaction:
+def reaction(sample: dict[str, Any], driver_s: float = 1.8) -> ReactionTimes:
     """Reaction times of runs with an alert at 5 s, followed by a hazard or by the end of the scenario."""
     rows, ends = [], {}
     for i, (time, event) in enumerate(zip(sample["times"], sample["status"], strict=True)):
         ends[f"S{i}"] = ALERT_S + time
         row = {"scenario": f"S{i}", "t_activation": 1.0, "t_alert": ALERT_S, "alerts": "fcw"}
         rows.append(row | ({"t_h1": ALERT_S + time} if event else {}))
-    return event_times.reaction(results(*rows), ends, driver_s)
+    return event_times.reaction_times(results(*rows), ends, driver_s)
 
 
 @pytest.mark.parametrize("sample", LIFELINES.values(), ids=LIFELINES)
 def test_the_curve_equals_that_of_lifelines(sample: dict[str, Any]) -> None:
-    found = [reaction(sample, at).survival for at in sample["at"]]
+    found = [reaction(sample, at).no_hazard_share for at in sample["at"]]
     assert found == pytest.approx(sample["survival"], abs=1e-12)
-    assert reaction(sample, sample["at"][0] / 2).survival == 1.0
+    assert reaction(sample, sample["at"][0] / 2).no_hazard_share == 1.0
 
 
 @pytest.mark.parametrize(("name", "sample"), LIFELINES.items(), ids=LIFELINES)
@@ -46,7 +46,10 @@ def test_the_median_equals_that_of_lifelines_except_for_flat_halves(
     """If the curve stays at one half for some time, lifelines returns the beginning of that time, and the
     report its middle."""
     found = reaction(sample)
-    assert (found.at_risk, found.events) == (len(sample["times"]), sum(sample["status"]))
+    assert (found.runs_alerted_first, found.hazards_after_alert) == (
+        len(sample["times"]),
+        sum(sample["status"]),
+    )
     if name in FLAT:
         assert sample["median"] < found.median == pytest.approx(FLAT[name])
     else:
@@ -73,7 +76,7 @@ def test_the_published_curve_of_freireich() -> None:
     """The curve for 6-MP and the medians are in Kleinbaum and Klein, Survival Analysis: A Self-Learning Text,
     chapter 2."""
     drug, placebo = LIFELINES["6-MP"], LIFELINES["placebo"]
-    curve = [round(reaction(drug, week).survival, 3) for week in (6, 7, 10, 13, 16, 22, 23)]
+    curve = [round(reaction(drug, week).no_hazard_share, 3) for week in (6, 7, 10, 13, 16, 22, 23)]
     assert curve == [0.857, 0.807, 0.753, 0.690, 0.627, 0.538, 0.448]
     assert (reaction(drug).median, reaction(placebo).median) == (23.0, 8.0)
 
