@@ -36,7 +36,7 @@ from mutator.execution.cluster.bundle import Bundle
 from mutator.execution.cluster.cluster_choice import parse
 from mutator.execution.cluster.piece_queue import Board
 from mutator.execution.cluster.pieces import Ending, Piece, Result
-from mutator.store.checksummed_blocks import as_block
+from mutator.store.checksummed_blocks import block_bytes
 from mutator.store.patch_files import packed_patches
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_packing import EXPERIMENT
@@ -145,7 +145,7 @@ def work(run: str, data: bytes) -> bytes:
         records=tuple(line.replace(b"@", name.encode()) for name in piece.lines),
         timings=tuple(timing.replace(b"@", name.encode()) for name in piece.lines),
         patches=packed_patches((name, patch) for name in piece.lines),
-        series=b"".join(as_block(EXPERIMENT, f"{name} {piece.golden}", series) for name in piece.lines),
+        series=b"".join(block_bytes(EXPERIMENT, f"{name} {piece.golden}", series) for name in piece.lines),
     ).packed()
 
 

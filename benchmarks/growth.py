@@ -28,7 +28,7 @@ from mutator.statistics.results_frame import load_usable_results
 from mutator.store import file_digests, plan_file
 from mutator.store.check_results import FILE as CHECKS
 from mutator.store.checksummed_lines import LineWriter
-from mutator.store.file_digests import Digest
+from mutator.store.file_digests import FileDigest
 from mutator.store.patch_files import PatchWriter
 from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
@@ -148,7 +148,9 @@ def opening(size: int, out: Path) -> dict[str, float]:
     paths = [golden / name for golden in goldens for name in head.golden_files]
     names = [path.relative_to(folder.path).as_posix() for path in paths]
     checks = b'{"schema": "checks/1", "results": []}'
-    with file_digests.rewriting(out, dict.fromkeys(names, Digest.of(data)) | {CHECKS: Digest.of(checks)}):
+    with file_digests.rewriting_files(
+        out, dict.fromkeys(names, FileDigest.of_bytes(data)) | {CHECKS: FileDigest.of_bytes(checks)}
+    ):
         for path in paths:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(data)

@@ -37,8 +37,8 @@ from mutator.preflight.preflight_rules import digest_of
 from mutator.store import file_digests, plan_file
 from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
-from mutator.store.checksummed_blocks import as_block
-from mutator.store.file_digests import Digest
+from mutator.store.checksummed_blocks import block_bytes
+from mutator.store.file_digests import FileDigest
 from mutator.store.patch_files import _Packer
 from mutator.store.records import SCHEMA, line_of
 from mutator.store.run_folder import GoldenRun, RunFolder
@@ -138,8 +138,8 @@ def goldens(workspace: Workspace, folder: RunFolder, experiments: Sequence[Exper
     checks = {"schema": CHECKS_SCHEMA, "digest": "", "results": [], "goldens": known}
     data = json.dumps(checks | {"packages": [], "run_cpu_s": 1.0}).encode()
     files = [path for path in (run / "golden").rglob("*") if path.is_file()]
-    coming = {path.relative_to(run).as_posix(): Digest.of(path.read_bytes()) for path in files}
-    with file_digests.rewriting(run, coming | {CHECKS: Digest.of(data)}):
+    coming = {path.relative_to(run).as_posix(): FileDigest.of_bytes(path.read_bytes()) for path in files}
+    with file_digests.rewriting_files(run, coming | {CHECKS: FileDigest.of_bytes(data)}):
         (run / CHECKS).write_bytes(data)
 
 
@@ -195,7 +195,7 @@ def write_segments(
             for count, number in enumerate(n for n in range(len(ids)) if n // PIECE % WORKERS == worker):
                 of_patch = _patch_of(count, len(patches))
                 kind, content = blocks[of_patch]
-                packed.write(as_block(kind, ids[number], content))
+                packed.write(block_bytes(kind, ids[number], content))
                 record_lines.write(lines[number % len(lines)](ids[number], of_patch))
                 timing_lines.write(
                     b'"cpu_s":0.%03d,"engine":"forked","experiment_id":"%b","host":"made-up",'

@@ -33,7 +33,7 @@ from mutator.model import (
 from mutator.mutants.anchors import ParsedFile, parsed
 from mutator.store import file_digests
 from mutator.store.checksummed_lines import LineWriter, read_segment
-from mutator.store.file_digests import Digest
+from mutator.store.file_digests import FileDigest
 from mutator.store.patch_files import Patches, PatchWriter, rewrite
 from mutator.store.plan_choices import Choices
 from mutator.store.records import SCHEMA
@@ -386,7 +386,9 @@ def write_finished(write_run: Callable[..., Path]) -> Callable[..., Path]:
         for scenario, changes in folder.head.goldens:
             place = folder.golden(scenario, tuple(changes)).relative_to(folder.path)
             new |= {f"{place}/{name}": name.encode() for name in folder.head.golden_files}
-        with file_digests.rewriting(out, {name: Digest.of(data) for name, data in new.items()}):
+        with file_digests.rewriting_files(
+            out, {name: FileDigest.of_bytes(data) for name, data in new.items()}
+        ):
             for name, data in new.items():
                 (out / name).parent.mkdir(parents=True, exist_ok=True)
                 (out / name).write_bytes(data)
@@ -410,10 +412,10 @@ def reseal() -> Callable[..., None]:
             for line in content:
                 writer.append(line)
             writer.close()
-        known = file_digests.read(run)
+        known = file_digests.load_ledger(run)
         names = [name for name, one in known.files.items() if one.lines is None and (run / name).exists()]
-        files = {name: Digest.of((run / name).read_bytes()) for name in names}
-        file_digests.write(run, dataclasses.replace(known, files=files))
+        files = {name: FileDigest.of_bytes((run / name).read_bytes()) for name in names}
+        file_digests.save_ledger(run, dataclasses.replace(known, files=files))
         file_digests.close_segments(run, finished=finished)
 
     return compute

@@ -4,8 +4,8 @@ from mutator._common.caches import clear as clear_caches
 from mutator._common.caches import entries as cache_entries
 from mutator._common.caches import folder as cache_folder
 from mutator._common.caches import prune as prune_caches
-from mutator.store.cleaning import check as check_run_folder
-from mutator.store.cleaning import clean as delete_run_folder
+from mutator.store.cleaning import delete_run as delete_run_folder
+from mutator.store.cleaning import list_deletable_files as check_run_folder
 
 __all__ = [
     "cache_entries",

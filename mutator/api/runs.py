@@ -216,7 +216,7 @@ class Run(RunContents):
 
     def delete(self) -> None:
         """Delete the run folder; MutatorError if it is in use, or if it holds files that no run writes."""
-        cleaning.clean(self.path)
+        cleaning.delete_run(self.path)
 
     def finish_deletion(self) -> bool:
         """Finish a deletion that another command has started; return whether the folder is gone."""

@@ -54,7 +54,7 @@ def seeds_and_sessions(folder: RunFolder) -> Problems:
         got = f"choice of the reading {folder.head.choices.reading}"
         yield MutatorError(got, where=folder.path / HEAD, expected=_of(folder, "reading"))
     patterns = [stretch.records for stretch in folder.stretches]
-    for name in file_digests.segments(folder.path):
+    for name in file_digests.list_segments(folder.path):
         stem = name.partition("/")[2].removesuffix(".jsonl")
         if not any(fnmatchcase(stem, pattern) for pattern in patterns):
             yield MutatorError(

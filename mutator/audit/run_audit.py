@@ -30,7 +30,7 @@ from mutator.store import file_digests, plan_file
 from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.checksummed_blocks import read_blocks
-from mutator.store.file_digests import Digest
+from mutator.store.file_digests import FileDigest
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN, HEAD
 from mutator.workspace import Workspace
@@ -114,7 +114,7 @@ def audit_checks(folder: RunFolder, workspace: Workspace | None) -> list[Check]:
 def _files(folder: RunFolder) -> int:
     """Return the number of files with digests."""
     try:
-        return len(file_digests.read(folder.path).names)
+        return len(file_digests.load_ledger(folder.path).names)
     except MutatorError:
         return 0
 
@@ -122,7 +122,7 @@ def _files(folder: RunFolder) -> int:
 def _content(folder: RunFolder) -> Problems:
     yield from folder.problems(anew=True)
     for path in filter(Path.is_file, folder.patches.files()):
-        if read_blocks(path).damaged:
+        if read_blocks(path).is_damaged:
             yield MutatorError(
                 "damaged blocks",
                 where=path,
@@ -155,7 +155,7 @@ def _plan(folder: RunFolder) -> Problems:
     for key, found, value in head.differences(follows):
         expected = f"{short(value)}, which follows from {plan_file.EXPERIMENTS} and {CAMPAIGN}"
         yield MutatorError(f"{key} {short(found)}", where=run / HEAD, expected=expected)
-    if Digest.of_file(run / CSV) != Digest.of(plan_csv(plan)):
+    if FileDigest.of_file(run / CSV) != FileDigest.of_bytes(plan_csv(plan)):
         yield MutatorError(
             "differs from the plan", where=run / CSV, expected=f"the rows of {plan_file.EXPERIMENTS}"
         )

@@ -23,10 +23,10 @@ from mutator.campaigns.plan import load_plan
 from mutator.errors import MutatorError, Outside, TooLarge
 from mutator.model import Status
 from mutator.store import file_digests, integrity
-from mutator.store.allowed_contents import ASIDE
+from mutator.store.allowed_contents import DAMAGED_FOLDER
 from mutator.store.checksummed_blocks import read_blocks
-from mutator.store.checksummed_lines import Segment, read_segment, written
-from mutator.store.file_digests import Digest, Ledger
+from mutator.store.checksummed_lines import Segment, line_file_bytes, read_segment
+from mutator.store.file_digests import DigestLedger, FileDigest
 from mutator.store.patch_files import rewrite
 from mutator.store.records import LINE_SCHEMAS
 from mutator.store.run_folder import RunFolder
@@ -43,7 +43,7 @@ def repair(folder: RunFolder, workspace: Workspace | None = None) -> list[str]:
     """
     with owned(folder.path, patience_s=0.0), raising_disk_full(folder.path):
         renewed = list(_renewed_ledger(folder))
-        ledger = file_digests.settled(folder.path)
+        ledger = file_digests.settled_ledger(folder.path)
         lost = _lost_patches(folder)
         changes = [*_files(folder, ledger), *_segments(folder, ledger, lost)]
         for name, *_ in changes:
@@ -61,30 +61,36 @@ def _renewed_ledger(folder: RunFolder) -> Iterator[str]:
     """If the ledger itself is damaged, write a new one from the current files."""
     run = folder.path
     try:
-        file_digests.read(run)
+        file_digests.load_ledger(run)
     except Outside:
         raise  # somebody wrote this on purpose
     except MutatorError:
         below = (path for name in ("plan", "golden") for path in (run / name).rglob("*"))
-        names = [*integrity.TOP, *(path.relative_to(run).as_posix() for path in below)]
-        found = file_digests.of_files(run, [name for name in names if file_digests.may_name(name)])
+        names = [*integrity.TOP_FILES, *(path.relative_to(run).as_posix() for path in below)]
+        found = file_digests.digests_of_files(
+            run, [name for name in names if file_digests.is_ledger_name(name)]
+        )
         _put_aside(run, file_digests.FILE)
-        file_digests.write(run, Ledger(files={name: one for name, one in found.items() if one}))
+        file_digests.save_ledger(run, DigestLedger(files={name: one for name, one in found.items() if one}))
         yield f"{file_digests.FILE} rebuilt from the current files: only an earlier seal can confirm them"
 
 
-def _files(folder: RunFolder, ledger: Ledger) -> Iterator[_Change]:
+def _files(folder: RunFolder, ledger: DigestLedger) -> Iterator[_Change]:
     """Damaged files, rebuilt or set aside, and files that do not belong in the folder."""
     run = folder.path
     for name, known in ledger.files.items():
-        if known.lines is not None or name in integrity.WHOLE or known.is_of(Digest.below(run, name)):
+        if (
+            known.lines is not None
+            or name in integrity.IRREPLACEABLE_FILES
+            or known.has_same_bytes(FileDigest.of_file_below(run, name))
+        ):
             continue
-        if name == CSV and known.is_of(Digest.of(data := plan_csv(load_plan(folder)))):
+        if name == CSV and known.has_same_bytes(FileDigest.of_bytes(data := plan_csv(load_plan(folder)))):
             yield name, data, f"{name} rebuilt from the plan"
         else:
             yield name, None, f"{name} set aside: `mutator run` rebuilds it"
     if ledger.finished:
-        for path in integrity.strangers(run, ledger):
+        for path in integrity.unexpected_files(run, ledger):
             name = path.relative_to(run).as_posix()
             yield name, None, f"{name} set aside: the finished run had no such file"
 
@@ -114,20 +120,20 @@ def _drop_patches(folder: RunFolder, lost: Collection[str]) -> list[str]:
             continue
         found = read_blocks(path)
         names = dict.fromkeys(block.key for block in found.blocks)
-        if not found.damaged and not names.keys() & set(lost):
+        if not found.is_damaged and not names.keys() & set(lost):
             continue
         _put_aside(run, name)
-        if found.damaged:
+        if found.is_damaged:
             said.append(f"{name}: damaged blocks set aside")
         kept = ((one, patches.read(one)) for one in names if one not in lost)
         rewrite(path, [(one, data) for one, data in kept if data is not None])
     return said
 
 
-def _segments(folder: RunFolder, ledger: Ledger, lost: Collection[str]) -> Iterator[_Change]:
+def _segments(folder: RunFolder, ledger: DigestLedger, lost: Collection[str]) -> Iterator[_Change]:
     """Segments with invalid lines, and their remaining content."""
     run, planned = folder.path, folder.share()
-    strangers = set(integrity.strangers(run, ledger)) if ledger.finished else set()
+    strangers = set(integrity.unexpected_files(run, ledger)) if ledger.finished else set()
     for kind, schema in LINE_SCHEMAS.items():
         done: set[str] = set()
         for path in sorted({*(run / kind).glob("*.jsonl")} - strangers):
@@ -140,35 +146,35 @@ def _segments(folder: RunFolder, ledger: Ledger, lost: Collection[str]) -> Itera
             dropped = lost if kind == "records" else ()
             kept = list(_kept(_trusted(segment, known, data), planned, dropped, done))
             gone = max(0, data.count(b"\n") - 1 - len(kept))
-            if gone or segment.damaged or not _in_place(segment, schema, known, data):
+            if gone or segment.damaged_lines or not _in_place(segment, schema, known, data):
                 head = {"schema": schema, "plan": folder.head.plan}
                 said = f"{name}: {counted(gone, 'line')} set aside, {len(kept)} kept"
-                yield name, written(path, head, kept), said
+                yield name, line_file_bytes(path, head, kept), said
     for name, known in ledger.files.items():
         if known.lines is not None and not os.path.lexists(inside(run, name)):
             yield name, None, f"{name} is gone"
 
 
-def _in_place(segment: Segment, schema: str, known: Digest | None, data: bytes) -> bool:
+def _in_place(segment: Segment, schema: str, known: FileDigest | None, data: bytes) -> bool:
     try:
         segment.check_head(schema)
     except MutatorError:
         return False
-    return known is None or known.is_of(Digest.of(data))
+    return known is None or known.has_same_bytes(FileDigest.of_bytes(data))
 
 
-def _trusted(segment: Segment, known: Digest | None, data: bytes) -> list[dict[str, Any]]:
+def _trusted(segment: Segment, known: FileDigest | None, data: bytes) -> list[dict[str, Any]]:
     """Return the content of the trustworthy lines after the head.
 
     If all checksums match although the file's digest changed, somebody recomputed the checksums. Lines are
     then trusted only if the file was merely extended, and only up to the old length.
     """
     numbers = list(segment.lines)
-    whole = segment.damaged or known is None or known.is_of(Digest.of(data))
+    whole = segment.damaged_lines or known is None or known.has_same_bytes(FileDigest.of_bytes(data))
     if not whole and known is not None and known.lines is not None and len(numbers) >= known.lines:
         numbers = numbers[: known.lines]
         first = b"".join(segment.lines[number] + b"\n" for number in numbers)
-        numbers = numbers if known.is_of(Digest.of(first)) else []
+        numbers = numbers if known.has_same_bytes(FileDigest.of_bytes(first)) else []
     return [segment.content(number) for number in numbers if number > 1]
 
 
@@ -193,10 +199,10 @@ def _put_aside(run: Path, name: str) -> None:
     path = inside(run, name)
     if not os.path.lexists(path):
         return
-    place, number = f"{ASIDE}/{name}", 1
+    place, number = f"{DAMAGED_FOLDER}/{name}", 1
     while os.path.lexists(inside(run, place)):
         number += 1
-        place = f"{ASIDE}/{name}.{number}"
+        place = f"{DAMAGED_FOLDER}/{name}.{number}"
     if path.is_dir():
         move_below(run, name, place)
         return
@@ -209,17 +215,17 @@ def _put_aside(run: Path, name: str) -> None:
         move_below(run, name, place)
 
 
-def _carry_out(run: Path, changes: list[_Change], ledger: Ledger) -> None:
+def _carry_out(run: Path, changes: list[_Change], ledger: DigestLedger) -> None:
     """Apply the changes. The run is then no longer finished, unless only plan.csv was rebuilt."""
     coming = {
         name: None
         if data is None
-        else Digest.of(data, data.count(b"\n") if name.endswith(".jsonl") else None)
+        else FileDigest.of_bytes(data, data.count(b"\n") if name.endswith(".jsonl") else None)
         for name, data, _ in changes
         if not name.startswith("timings/")
     }
     finished = ledger.finished and {*coming} <= {CSV}
-    with file_digests.rewriting(run, coming, finished=finished):
+    with file_digests.rewriting_files(run, coming, finished=finished):
         for name, data, _ in changes:
             if data is None:
                 unlink_below(run, name)

@@ -135,7 +135,7 @@ def golden_files(folder: RunFolder) -> dict[str, str]:
 
 
 def _sha256(folder: RunFolder, names: Sequence[str]) -> dict[str, str]:
-    found = file_digests.of_files(folder.path, names)
+    found = file_digests.digests_of_files(folder.path, names)
     return {name: one.sha256 for name, one in found.items() if one}
 
 
@@ -153,7 +153,7 @@ def _records(
         segment = bare_segment(path)
         for number, line in intact_lines(path):
             if number > 1 and (ending := ending_on(line)).counts:
-                found[ending.experiment_id] = digest(sealed(segment.body_of(line)))
+                found[ending.experiment_id] = digest(sealed(segment.without_checksum(line)))
     return found
 
 

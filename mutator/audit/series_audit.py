@@ -43,7 +43,7 @@ def _problems(
     yield from _packed(folder, there, manifest)
     yield from _kept(folder, there, manifest)
     for path in segments(run):
-        if read_blocks(path).damaged:
+        if read_blocks(path).is_damaged:
             yield MutatorError(
                 "damaged blocks",
                 where=path,

@@ -26,7 +26,7 @@ from mutator.model import Experiment
 from mutator.results.plan_columns import PLAN_COLUMNS, plan_row
 from mutator.store import file_digests, plan_file
 from mutator.store.allowed_contents import check_contents
-from mutator.store.file_digests import Digest, DigestingFile, Ledger
+from mutator.store.file_digests import DigestingFile, DigestLedger, FileDigest
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN, HEAD, SCHEMA, Provenance, RunHead
 from mutator.targets.manifest import TargetManifest
@@ -101,7 +101,7 @@ def freeze_owned(plan: Plan | Planning, out: Path, workspace: Workspace) -> tupl
         return folder, tally
     tally, found, places, files = _written(plan, out)
     head = _head(plan, tally, found, workspace, places).as_json()
-    file_digests.write(out, Ledger(files=files | {HEAD: Digest.of(head)}))
+    file_digests.save_ledger(out, DigestLedger(files=files | {HEAD: FileDigest.of_bytes(head)}))
     write_atomic(out / HEAD, head)  # last, because this file makes the folder a run folder
     return RunFolder.open(out), tally
 
@@ -116,7 +116,9 @@ def _counted(plan: Plan | Planning, each: Callable[[Part], None] = lambda part: 
     return tally, known
 
 
-def _written(plan: Plan | Planning, out: Path) -> tuple[Tally, str, list[plan_file.Chunk], dict[str, Digest]]:
+def _written(
+    plan: Plan | Planning, out: Path
+) -> tuple[Tally, str, list[plan_file.Chunk], dict[str, FileDigest]]:
     """Write the plan's files part by part; return totals, digest, chunk positions and file digests."""
     plan_file.make_folder(out)
     write_atomic(out / CAMPAIGN, plan.campaign.source)
@@ -134,7 +136,7 @@ def _written(plan: Plan | Planning, out: Path) -> tuple[Tally, str, list[plan_fi
 
         tally, found = _counted(plan, write)
     files = {
-        CAMPAIGN: Digest.of(plan.campaign.source),
+        CAMPAIGN: FileDigest.of_bytes(plan.campaign.source),
         CSV: rows.digest,
         plan_file.EXPERIMENTS: lines.digest,
         plan_file.FAULTS: faults.digest,

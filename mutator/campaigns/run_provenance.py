@@ -124,5 +124,5 @@ def add_machine(folder: RunFolder, machine: Machine) -> RunFolder:
 
 def _with_stretches(folder: RunFolder, stretches: tuple[Stretch, ...]) -> RunFolder:
     """Write run.json with these stretches of work, and return the folder as it is then."""
-    file_digests.rewrite(folder.path, HEAD, replace(folder.head, stretches=stretches).as_json())
+    file_digests.rewrite_file(folder.path, HEAD, replace(folder.head, stretches=stretches).as_json())
     return RunFolder(folder.path)

@@ -126,7 +126,7 @@ class Session:
         self.secret = token_bytes(_SECRET_BYTES)
         self.golden_digests: Mapping[str, str] = {}
         self.written = WrittenFiles()
-        self._ledger: file_digests.Ledger | None = None  # as it was when the work began
+        self._ledger: file_digests.DigestLedger | None = None  # as it was when the work began
         self.working = ""  # the present workers, if known
         self._began = time.monotonic()
         self._done_before = 0
@@ -164,13 +164,13 @@ class Session:
                 accept=self.accept_versions,
             )
             self.golden_digests = golden_digests(self.folder)
-            self._ledger = file_digests.read(self.folder.path)
+            self._ledger = file_digests.load_ledger(self.folder.path)
         self.pending = left
         self._records = None if left else records
 
     def note_machine(self, machine: Machine) -> None:
         self.folder = add_machine(self.folder, machine)
-        self._ledger = file_digests.read(self.folder.path)
+        self._ledger = file_digests.load_ledger(self.folder.path)
 
     def worker_name(self, name: str) -> str:
         """Return a name for a worker's files that no session used before."""
@@ -252,8 +252,8 @@ class Session:
             return
         with self._noting_full_disk():
             changed = []
-            if not file_digests.is_as(run, self._ledger):
-                file_digests.write(run, self._ledger)
+            if not file_digests.is_ledger_unchanged(run, self._ledger):
+                file_digests.save_ledger(run, self._ledger)
                 changed.append(file_digests.FILE)
             changed += self.written.set_others_aside(run)
             if changed and not self.problem:

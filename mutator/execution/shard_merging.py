@@ -24,7 +24,7 @@ from mutator.store.allowed_contents import check_contents
 from mutator.store.approvals import FILE as REVIEWED
 from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
-from mutator.store.file_digests import Digest, Ledger
+from mutator.store.file_digests import DigestLedger, FileDigest
 from mutator.store.patch_files import PatchWriter
 from mutator.store.records import endings
 from mutator.store.run_folder import RunFolder
@@ -72,7 +72,7 @@ def merge(shards: Sequence[Path], out: Path, *, accept_versions: bool = False) -
                 _copy(folders, out, stretches)
             return table_building.build(out)
         except BaseException:
-            cleaning.clear(out)
+            cleaning.delete_unfinished_run(out)
             raise
 
 
@@ -82,7 +82,7 @@ def _make_empty(out: Path) -> None:
         check_contents(out.resolve())
     if any(out.glob(f"{_MARK}*")):
         with owned(out, patience_s=0.0):
-            cleaning.clear(out)
+            cleaning.delete_unfinished_run(out)
     make_run_folder(out)
 
 
@@ -194,7 +194,7 @@ def _stretches(folders: Sequence[RunFolder], *, accept: bool) -> Iterator[Stretc
 def _copy(folders: Sequence[RunFolder], out: Path, stretches: Sequence[Stretch]) -> None:
     """Copy all content. The head is written last, so that an unfinished copy is not a run folder."""
     first = folders[0]
-    ledger = file_digests.settled(first.path)
+    ledger = file_digests.settled_ledger(first.path)
     reviewed = all((folder.path / REVIEWED).exists() for folder in folders)
     files = {
         name: one
@@ -213,7 +213,7 @@ def _copy(folders: Sequence[RunFolder], out: Path, stretches: Sequence[Stretch])
     _pack_series(folders, out)
     choices = replace(first.head.choices, shard=None)
     head = replace(first.head, choices=choices, stretches=tuple(stretches)).as_json()
-    file_digests.write(out, Ledger(files=files | {HEAD: Digest.of(head)}))
+    file_digests.save_ledger(out, DigestLedger(files=files | {HEAD: FileDigest.of_bytes(head)}))
     file_digests.close_segments(out, finished=True)
     write_atomic(out / HEAD, head)
 

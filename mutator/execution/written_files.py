@@ -32,8 +32,8 @@ class WrittenFiles:
 
     def set_others_aside(self, run: Path) -> list[str]:
         """Move new files of lines that no worker wrote so to `damaged/`; return their names."""
-        known = file_digests.read(run).files
-        found = [name for name in file_digests.segments(run) if name not in known]
+        known = file_digests.load_ledger(run).files
+        found = [name for name in file_digests.list_segments(run) if name not in known]
         lost = [name for name in self._sums if name not in found]
         others = [name for name in found if not self._is_as_written(run, name)]
         with raising_disk_full(run):

@@ -120,8 +120,8 @@ def needless(folder: RunFolder) -> str | None:
 
 def drop(folder: RunFolder) -> None:
     """Remove a proof that is no longer needed."""
-    gone = {name: None for name in file_digests.segments(folder.path) if name.startswith(f"{FOLDER}/")}
-    with file_digests.rewriting(folder.path, gone):
+    gone = {name: None for name in file_digests.list_segments(folder.path) if name.startswith(f"{FOLDER}/")}
+    with file_digests.rewriting_files(folder.path, gone):
         remove_folder(folder.path / FOLDER)
 
 

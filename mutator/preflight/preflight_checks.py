@@ -27,7 +27,7 @@ from mutator.preflight.preflight_rules import (
 from mutator.preflight.preflight_runs import AGAIN, GOLDEN, NULL, CheckDriver, Notify, Runs
 from mutator.store import file_digests, plan_file
 from mutator.store.check_results import FILE, SCHEMA, CheckResult
-from mutator.store.file_digests import Digest
+from mutator.store.file_digests import FileDigest
 from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.kinds import always
@@ -169,9 +169,11 @@ class _Checks:
         run, golden = self.folder.path, self.kept / "golden"
         golden.mkdir(parents=True, exist_ok=True)
         files = {f"golden/{path.relative_to(golden).as_posix()}": path for path in golden.rglob("*")}
-        new = {name: Digest.of(read_bounded(path)) for name, path in files.items() if path.is_file()}
-        gone = {name: None for name in file_digests.read(run).names if name.startswith("golden/")}
-        with file_digests.rewriting(run, {**gone, **new, FILE: Digest.of(checks)}):
+        new = {
+            name: FileDigest.of_bytes(read_bounded(path)) for name, path in files.items() if path.is_file()
+        }
+        gone = {name: None for name in file_digests.load_ledger(run).names if name.startswith("golden/")}
+        with file_digests.rewriting_files(run, {**gone, **new, FILE: FileDigest.of_bytes(checks)}):
             shutil.rmtree(run / "golden", ignore_errors=True)
             golden.rename(run / "golden")
             write_atomic(run / FILE, checks)

@@ -14,13 +14,28 @@ from mutator.report.page_series import series_facts
 from mutator.report.panel import FOLDER
 from mutator.store import file_digests
 from mutator.store import series_folder as series_store
-from mutator.store.allowed_contents import ASIDE, SCRATCH, SIGNATURE, TRACES, belongs
+from mutator.store.allowed_contents import (
+    DAMAGED_FOLDER,
+    SCRATCH_FOLDER,
+    SIGNATURE_FILES,
+    TRACES_FOLDER,
+    is_allowed_name,
+)
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
 SCHEMA = "report/1"
 FILE = f"{FOLDER}/made_from.json"
-_NOT_READ = {FOLDER, "exports", series_store.FOLDER, TRACES, ASIDE, SCRATCH, "workers", *SIGNATURE}
+_NOT_READ = {
+    FOLDER,
+    "exports",
+    series_store.FOLDER,
+    TRACES_FOLDER,
+    DAMAGED_FOLDER,
+    SCRATCH_FOLDER,
+    "workers",
+    *SIGNATURE_FILES,
+}
 _ASSETS = (".css", ".html", ".js", ".txt")
 _LINKED = (".mp4", ".gif")  # the report contains only the names of such files
 
@@ -30,7 +45,7 @@ def made_from(folder: RunFolder, workspace: Workspace | None) -> str:
     run = folder.path
     series = [
         series_facts(folder),
-        file_digests.sha256(run / series_store.FOLDER / f"{series_store.INDEX}.js"),
+        file_digests.sha256_of_file(run / series_store.FOLDER / f"{series_store.INDEX}.js"),
     ]
     return digest([SCHEMA, _sources(), run.name, list(_files_of(run)), series, _library(folder, workspace)])
 
@@ -86,12 +101,12 @@ def _files_of(run: Path) -> Iterator[tuple[str, str]]:
     """Yield the names and digests of the files that a report can read. What does not belong in a run folder
     is not opened.
     """
-    tops = [top for top in sorted(run.iterdir()) if top.name not in _NOT_READ and belongs(top.name)]
+    tops = [top for top in sorted(run.iterdir()) if top.name not in _NOT_READ and is_allowed_name(top.name)]
     for top in tops:
         inside = sorted(top.rglob("*")) if top.is_dir() else [top]
         for path in (path for path in inside if not path.is_dir() and not path.name.startswith(".")):
             name = path.relative_to(run).as_posix()
-            yield name, "" if path.suffix in _LINKED else file_digests.sha256(path)
+            yield name, "" if path.suffix in _LINKED else file_digests.sha256_of_file(path)
 
 
 def _library(folder: RunFolder, workspace: Workspace | None) -> object:
@@ -112,4 +127,4 @@ def _digests(folder: Path, pattern: str) -> list[tuple[str, str]]:
 
 
 def _named(folder: Path, paths: Iterable[Path]) -> list[tuple[str, str]]:
-    return sorted((p.relative_to(folder).as_posix(), file_digests.sha256(p)) for p in paths)
+    return sorted((p.relative_to(folder).as_posix(), file_digests.sha256_of_file(p)) for p in paths)

@@ -18,7 +18,7 @@ from mutator.results import propagation_columns
 from mutator.results.table_columns import TIMINGS, Finished, cells_of, columns_of
 from mutator.results.table_files import CsvTable, ParquetTable, csv_lines, record_batch
 from mutator.store import file_digests, plan_file
-from mutator.store.file_digests import Digest
+from mutator.store.file_digests import FileDigest
 from mutator.store.planned_experiments import Planned
 from mutator.store.run_folder import RunFolder
 
@@ -50,7 +50,7 @@ def build(run: Path) -> Path:
         paths = {name: inside(folder.path, name) for name in reversed(TABLES)}
         made = {name: stack.enter_context(half_written(path)) for name, path in paths.items()}
         write(folder, made)
-        now = {name: found.sha256 for name, path in made.items() if (found := Digest.of_file(path))}
+        now = {name: found.sha256 for name, path in made.items() if (found := FileDigest.of_file(path))}
         # Record old and new digests before the tables are replaced at the end of the block. Otherwise a kill
         # could leave tables that look edited.
         before = _unedited(folder, now)
@@ -115,7 +115,7 @@ def _made_from(folder: RunFolder) -> str:
     run = folder.path
     lines = sorted(path for kind in ("records", "timings") for path in (run / kind).glob("*.jsonl"))
     files = [plan_file.EXPERIMENTS, plan_file.FAULTS, *(path.relative_to(run).as_posix() for path in lines)]
-    found = list(file_digests.of_files(run, files).items())
+    found = list(file_digests.digests_of_files(run, files).items())
     head = folder.head
     told = (head.hazards, head.compared, head.metrics, head.severity, head.channels, head.structure)
     columns = [(one.name, one.type) for one in (*columns_of(head), *propagation_columns.COLUMNS, *TIMINGS)]
@@ -123,7 +123,7 @@ def _made_from(folder: RunFolder) -> str:
 
 
 def _found(folder: RunFolder) -> dict[str, str | None]:
-    found = file_digests.of_files(folder.path, TABLES)
+    found = file_digests.digests_of_files(folder.path, TABLES)
     return {name: one.sha256 if one else None for name, one in found.items()}
 
 

@@ -17,27 +17,30 @@ from mutator.errors import Outside
 from mutator.store import file_digests
 from mutator.store.run_head import CAMPAIGN, HEAD
 
-SCRATCH, ASIDE, TRACES = "work", "damaged", "traces"
-SIGNATURE = ("seal.json", "seal.json.sig")
-_TABLES = ("results", "propagation", "timings")
-CONTENT = (  # all files that a run folder can contain; * matches any text, including folders
+SCRATCH_FOLDER, DAMAGED_FOLDER, TRACES_FOLDER = "work", "damaged", "traces"
+SIGNATURE_FILES = ("seal.json", "seal.json.sig")
+_EXPORTED_TABLES = ("results", "propagation", "timings")
+ALLOWED_FILE_GLOBS = (  # all files that a run folder can contain; * matches any text, including folders
     *(HEAD, file_digests.FILE, CAMPAIGN, "plan.csv", "plan/*.jsonl", "reviewed.json", "checks.json"),
-    *SIGNATURE,
+    *SIGNATURE_FILES,
     *("golden/*/*", "patches/*.blocks"),
     *("records/*.jsonl", "timings/*.jsonl", "proof/*.jsonl"),
     *("series/*.js", "series/*.blocks"),
-    *(f"{TRACES}/*/*", *(f"plots/*.{kind}" for kind in ("svg", "jpg", "png", "mp4", "gif"))),
+    *(f"{TRACES_FOLDER}/*/*", *(f"plots/*.{kind}" for kind in ("svg", "jpg", "png", "mp4", "gif"))),
     *("results.csv", "results.parquet", "propagation.parquet", "timings.parquet", "results.json"),
     *("report/*.md", "report/*.html", "report/made_from.json", "report/series/*.js"),
     *("report/tables/*.csv", "report/figures/*.svg", "report/figures/*.png", "report/compare-*/*.csv"),
-    *("exports/mcap/*.mcap", *(f"exports/{name}.{kind}" for name in _TABLES for kind in ("csv", "parquet"))),
-    *(f"{ASIDE}/*", "owner.lock", "workers/*", f"{SCRATCH}/*"),
+    *(
+        "exports/mcap/*.mcap",
+        *(f"exports/{name}.{kind}" for name in _EXPORTED_TABLES for kind in ("csv", "parquet")),
+    ),
+    *(f"{DAMAGED_FOLDER}/*", "owner.lock", "workers/*", f"{SCRATCH_FOLDER}/*"),
 )
-FOLDERS = {pattern.partition("/")[0] for pattern in CONTENT if "/" in pattern}
-_ALL_FOLDERS = FOLDERS | {f"report/{name}" for name in ("series", "tables", "figures")}
+TOP_FOLDERS = {pattern.partition("/")[0] for pattern in ALLOWED_FILE_GLOBS if "/" in pattern}
+_ALL_FOLDERS = TOP_FOLDERS | {f"report/{name}" for name in ("series", "tables", "figures")}
 _ALL_FOLDERS |= {"series/kept", "exports/mcap"}
 # what targets wrote, and what `verify --repair` set aside; nothing in them is reached by its name
-_CLOSED = (SCRATCH, ASIDE, f"{TRACES}/*/{SCRATCH}")
+_UNCHECKED_FOLDERS = (SCRATCH_FOLDER, DAMAGED_FOLDER, f"{TRACES_FOLDER}/*/{SCRATCH_FOLDER}")
 
 
 def check_contents(run: Path) -> None:
@@ -47,28 +50,32 @@ def check_contents(run: Path) -> None:
     Folders that can contain anything only have to be folders.
     """
     tops: dict[str, str] = {}  # names in `run` itself
-    for name, entry in entries_below(run, is_closed):
+    for name, entry in entries_below(run, is_unchecked_folder):
         if not is_plain(entry):
             raise not_plain(Path(entry.path))
         if not entry.name.isprintable():
-            raise _refused(f"the name {entry.name!a}", run, "names of printable characters")
+            raise _outside_error(f"the name {entry.name!a}", run, "names of printable characters")
         if is_deep(name):
-            raise _refused("deeply nested folders", run, "few folders in each other")
+            raise _outside_error("deeply nested folders", run, "few folders in each other")
         if name in _ALL_FOLDERS and not entry.is_dir():
-            raise _refused("a file", Path(entry.path), "a folder")
+            raise _outside_error("a file", Path(entry.path), "a folder")
         if "/" not in name and (before := tops.setdefault(name.casefold(), name)) != name:
-            raise _refused(f"both {before!a} and {name!a}", run, "names that differ not only in case")
+            raise _outside_error(f"both {before!a} and {name!a}", run, "names that differ not only in case")
 
 
-def belongs(name: str) -> bool:
+def is_allowed_name(name: str) -> bool:
     """Whether a run folder can contain a folder or file of this name, which is not a path."""
-    return name in FOLDERS or any(fnmatchcase(name, pattern) for pattern in CONTENT if "/" not in pattern)
+    return name in TOP_FOLDERS or any(
+        fnmatchcase(name, pattern) for pattern in ALLOWED_FILE_GLOBS if "/" not in pattern
+    )
 
 
-def is_closed(name: str) -> bool:
+def is_unchecked_folder(name: str) -> bool:
     """Whether the folder of this name in a run folder can contain anything."""
-    return any(fnmatchcase(name, pattern) and name.count("/") == pattern.count("/") for pattern in _CLOSED)
+    return any(
+        fnmatchcase(name, pattern) and name.count("/") == pattern.count("/") for pattern in _UNCHECKED_FOLDERS
+    )
 
 
-def _refused(got: str, where: Path, expected: str) -> Outside:
+def _outside_error(got: str, where: Path, expected: str) -> Outside:
     return Outside(got, where=where, expected=expected, remedy="rename or delete what does not belong here")

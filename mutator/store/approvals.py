@@ -16,7 +16,7 @@ _DIGEST_SCHEMA = "review-digest/1"
 
 
 def write_approvals(run: Path, approvals: dict[str, Any]) -> None:
-    file_digests.rewrite(run, FILE, json_bytes(approvals))
+    file_digests.rewrite_file(run, FILE, json_bytes(approvals))
 
 
 def review_digest(run: Path) -> str | None:

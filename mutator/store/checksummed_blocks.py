@@ -16,10 +16,10 @@ from pathlib import Path
 from mutator._common.bounded import MOST_DATA, read_bounded
 from mutator._common.files import raising_disk_full
 
-_MARK = b"FIB1"
-_HEAD, _CHECK = struct.Struct("<4sBHI"), 8
-_SEARCHED = 8  # how many times the bytes of a file a search may verify
-_BATCH, _BATCH_S = 32, 2.0  # at most this many blocks, and seconds, between two syncs
+_BLOCK_MARK = b"FIB1"
+_HEAD_STRUCT, _CHECKSUM_BYTES = struct.Struct("<4sBHI"), 8
+_MOST_SEARCH_READS = 8  # how many times the bytes of a file a search may verify
+_MOST_UNSYNCED, _MOST_UNSYNCED_S = 32, 2.0  # at most this many blocks, and seconds, between two syncs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,7 +33,7 @@ class Block:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Blocks:
+class BlockFile:
     """The content of a block file.
 
     An incomplete last block is not damage: a killed process can leave one.
@@ -41,7 +41,7 @@ class Blocks:
 
     path: Path
     blocks: tuple[Block, ...]
-    damaged: bool
+    is_damaged: bool
 
 
 class BlockWriter:
@@ -58,8 +58,8 @@ class BlockWriter:
             self._fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
 
     def append(self, kind: int, key: str, data: bytes) -> None:
-        self.extend(as_block(kind, key, data))
-        if self._unsynced >= _BATCH:
+        self.extend(block_bytes(kind, key, data))
+        if self._unsynced >= _MOST_UNSYNCED:
             self.sync()
 
     def extend(self, blocks: bytes) -> None:
@@ -74,7 +74,7 @@ class BlockWriter:
                 raise
         self._end += len(blocks)
         self._unsynced += 1
-        if time.monotonic() - self._synced_at > _BATCH_S:
+        if time.monotonic() - self._synced_at > _MOST_UNSYNCED_S:
             self.sync()
 
     def sync(self) -> None:
@@ -91,61 +91,63 @@ class BlockWriter:
             os.close(self._fd)
 
 
-def as_block(kind: int, key: str, data: bytes) -> bytes:
+def block_bytes(kind: int, key: str, data: bytes) -> bytes:
     text = key.encode()
-    head = _HEAD.pack(_MARK, kind, len(text), len(data))
-    check = sha256(b"".join((head, text, data))).digest()[:_CHECK]
+    head = _HEAD_STRUCT.pack(_BLOCK_MARK, kind, len(text), len(data))
+    check = sha256(b"".join((head, text, data))).digest()[:_CHECKSUM_BYTES]
     return b"".join((head, check, text, data))
 
 
-def read_blocks(path: Path) -> Blocks:
-    found = list(_verified(read_bounded(path, MOST_DATA)))
-    blocks = tuple(block for block in found if block is not None)
-    return Blocks(path=path, blocks=blocks, damaged=len(blocks) < len(found))
+def read_blocks(path: Path) -> BlockFile:
+    parts = list(_intact_or_none(read_bounded(path, MOST_DATA)))
+    blocks = tuple(block for block in parts if block is not None)
+    return BlockFile(path=path, blocks=blocks, is_damaged=len(blocks) < len(parts))
 
 
 def intact_blocks(path: Path) -> Iterator[Block]:
-    yield from (block for block in _verified(read_bounded(path, MOST_DATA)) if block is not None)
+    yield from (block for block in _intact_or_none(read_bounded(path, MOST_DATA)) if block is not None)
 
 
-def _verified(data: bytes) -> Iterator[Block | None]:
+def _intact_or_none(data: bytes) -> Iterator[Block | None]:
     """Yield the intact blocks, and None for each damaged part."""
-    at, search = 0, _Search(data)
+    at, search = 0, _BlockSearch(data)
     while at < len(data):
         block = _block_at(data, at)
         if block is not None:
             yield block
             at = block.offset + len(block.data)
             continue
-        following = search.after(at)
-        if following is not None or not _is_cut(data, at):
+        following = search.next_block_after(at)
+        if following is not None or not _is_cut_off(data, at):
             yield None
         at = len(data) if following is None else following
 
 
 def _block_at(data: bytes, at: int) -> Block | None:
-    begin = at + _HEAD.size + _CHECK
+    begin = at + _HEAD_STRUCT.size + _CHECKSUM_BYTES
     if begin > len(data):
         return None
-    end = _end(data, at)
+    end = _claimed_end(data, at)
     if end is None or end > len(data):
         return None
-    _, kind, of_key, _ = _HEAD.unpack_from(data, at)
-    check = data[at + _HEAD.size : begin]
-    if sha256(data[at : at + _HEAD.size] + data[begin:end]).digest()[:_CHECK] != check:
+    _, kind, key_length, _ = _HEAD_STRUCT.unpack_from(data, at)
+    check = data[at + _HEAD_STRUCT.size : begin]
+    if sha256(data[at : at + _HEAD_STRUCT.size] + data[begin:end]).digest()[:_CHECKSUM_BYTES] != check:
         return None
-    offset = begin + of_key
+    offset = begin + key_length
     key = data[begin:offset].decode(errors="replace")
     return Block(kind=kind, key=key, data=data[offset:end], offset=offset)
 
 
-def _end(data: bytes, at: int) -> int | None:
+def _claimed_end(data: bytes, at: int) -> int | None:
     """Return where the block that begins at this offset says that it ends; None if none begins there."""
-    mark, _, of_key, of_data = _HEAD.unpack_from(data, at)
-    return at + _HEAD.size + _CHECK + of_key + of_data if mark == _MARK else None
+    mark, _, key_length, data_length = _HEAD_STRUCT.unpack_from(data, at)
+    return (
+        at + _HEAD_STRUCT.size + _CHECKSUM_BYTES + key_length + data_length if mark == _BLOCK_MARK else None
+    )
 
 
-class _Search:
+class _BlockSearch:
     """Finds the next intact block after damage.
 
     Bytes in the damaged part can look like many long blocks, so the search ends when it has verified a
@@ -154,20 +156,20 @@ class _Search:
 
     def __init__(self, data: bytes) -> None:
         self._data = data
-        self._left = _SEARCHED * len(data)
+        self._remaining_bytes = _MOST_SEARCH_READS * len(data)
 
-    def after(self, at: int) -> int | None:
-        while self._left > 0 and (at := self._data.find(_MARK, at + 1)) >= 0:
+    def next_block_after(self, at: int) -> int | None:
+        while self._remaining_bytes > 0 and (at := self._data.find(_BLOCK_MARK, at + 1)) >= 0:
             if _block_at(self._data, at) is not None:
                 return at
-            end = _end(self._data, at) if at + _HEAD.size <= len(self._data) else None
-            self._left -= end - at if end and end <= len(self._data) else 0
+            end = _claimed_end(self._data, at) if at + _HEAD_STRUCT.size <= len(self._data) else None
+            self._remaining_bytes -= end - at if end and end <= len(self._data) else 0
         return None
 
 
-def _is_cut(data: bytes, at: int) -> bool:
+def _is_cut_off(data: bytes, at: int) -> bool:
     """Return whether the block that begins at this offset is cut off by the end of the file."""
-    if len(data) - at < _HEAD.size + _CHECK:
-        return _MARK.startswith(data[at : at + len(_MARK)])
-    end = _end(data, at)
+    if len(data) - at < _HEAD_STRUCT.size + _CHECKSUM_BYTES:
+        return _BLOCK_MARK.startswith(data[at : at + len(_BLOCK_MARK)])
+    end = _claimed_end(data, at)
     return end is not None and end > len(data)

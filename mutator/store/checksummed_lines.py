@@ -19,45 +19,47 @@ from mutator._common.files import check_schema, raising_disk_full, writing_atomi
 from mutator._common.hashing import canonical
 from mutator.errors import MutatorError
 
-_BATCH = 32  # the most lines between two syncs
-_BATCH_S = 2.0  # the longest time between two syncs
-_KEY, _WIDTH, _AFTER = b'{"sum":"', 16, b'",'
-_SUM = slice(len(_KEY), len(_KEY) + _WIDTH)
-_BODY = len(_KEY) + _WIDTH + len(_AFTER)
+_MOST_UNSYNCED = 32  # the most lines between two syncs
+_MOST_UNSYNCED_S = 2.0  # the longest time between two syncs
+_CHECKSUM_KEY, _CHECKSUM_DIGITS, _AFTER_CHECKSUM = b'{"sum":"', 16, b'",'
+_CHECKSUM_SLICE = slice(len(_CHECKSUM_KEY), len(_CHECKSUM_KEY) + _CHECKSUM_DIGITS)
+_BODY_START = len(_CHECKSUM_KEY) + _CHECKSUM_DIGITS + len(_AFTER_CHECKSUM)
 
 
 class LineWriter:
     """Append checksummed JSON lines to a new file, synced in batches.
 
-    The first line is `head`, which contains the schema, with the file's name added. `first` is called before
-    each sync, to sync the data to which the lines refer. If a line does not fit on the disk, it is removed
-    again, and DiskFull is raised.
+    The first line is `head`, which contains the schema, with the file's name added. `before_sync` is called
+    before each sync, to sync the data to which the lines refer. If a line does not fit on the disk, it is
+    removed again, and DiskFull is raised.
     """
 
-    def __init__(self, path: Path, head: Mapping[str, Any], first: Callable[[], None] = lambda: None) -> None:
+    def __init__(
+        self, path: Path, head: Mapping[str, Any], before_sync: Callable[[], None] = lambda: None
+    ) -> None:
         self.path = path
-        self._first = first
+        self._before_sync = before_sync
         self._unsynced = 0
         self._synced_at = time.monotonic()
         with raising_disk_full(path):
             path.parent.mkdir(parents=True, exist_ok=True)
             self._fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
         self._end = 0
-        self._sum = sha256()
-        self._last = b""
-        self.append(_head(path, head))
+        self._hash = sha256()
+        self._last_checksum = b""
+        self.append(_head_with_file_name(path, head))
 
     def append(self, value: Mapping[str, Any]) -> None:
         self.extend([canonical(value).encode()])
-        if self._unsynced >= _BATCH:
+        if self._unsynced >= _MOST_UNSYNCED:
             self.sync()
 
     def extend(self, values: Iterable[bytes]) -> None:
         """Append lines of canonical text. Only elapsed time triggers a sync."""
-        lines, last = [], self._last
+        lines, last_checksum = [], self._last_checksum
         for value in values:
-            lines.append(_line(last, value[1:]))
-            last = lines[-1][_SUM]
+            lines.append(_checksummed_line(last_checksum, value[1:]))
+            last_checksum = lines[-1][_CHECKSUM_SLICE]
         data = b"".join(lines)
         with raising_disk_full(self.path):
             try:
@@ -68,20 +70,20 @@ class LineWriter:
                 os.ftruncate(self._fd, self._end)
                 raise
         self._end += len(data)
-        self._sum.update(data)
-        self._last = last
+        self._hash.update(data)
+        self._last_checksum = last_checksum
         self._unsynced += len(lines)
-        if time.monotonic() - self._synced_at > _BATCH_S:
+        if time.monotonic() - self._synced_at > _MOST_UNSYNCED_S:
             self.sync()
 
     @property
     def sha256(self) -> str:
         """The digest of all bytes that this object wrote."""
-        return self._sum.hexdigest()
+        return self._hash.hexdigest()
 
     def sync(self) -> None:
         """Sync the file, so that appended lines survive a power cut."""
-        self._first()
+        self._before_sync()
         with raising_disk_full(self.path):
             os.fsync(self._fd)
         self._unsynced = 0
@@ -104,10 +106,10 @@ class Segment:
 
     path: Path
     lines: Mapping[int, bytes]
-    damaged: tuple[int, ...]
-    end: int
+    damaged_lines: tuple[int, ...]
+    end_offset: int
 
-    def problem(self, number: int) -> MutatorError:
+    def damage_error(self, number: int) -> MutatorError:
         run = self.path.parent.parent
         mend = f"set it aside with `mutator verify {run} --repair`, then fill the gap with `mutator run`"
         return MutatorError(
@@ -125,24 +127,24 @@ class Segment:
         except (ValueError, RecursionError):
             value = None
         if not isinstance(value, dict):
-            raise self.problem(number)
+            raise self.damage_error(number)
         value.pop("sum", None)
         return value
 
     def body(self, number: int) -> bytes:
         """Return a line without its checksum."""
-        return self.body_of(self.lines[number])
+        return self.without_checksum(self.lines[number])
 
-    def body_of(self, line: bytes) -> bytes:
-        return line[_BODY:]
+    def without_checksum(self, line: bytes) -> bytes:
+        return line[_BODY_START:]
 
-    def check_head(self, schema: str) -> None:
+    def check_head(self, expected_schema: str) -> None:
         """Raise MutatorError for another schema, or a file that was written under another name."""
         if 1 not in self.lines:
             return
         head = self.content(1)
-        check_schema(head.get("schema"), schema, self.path)
-        if head.get("file") != _name(self.path):
+        check_schema(head.get("schema"), expected_schema, self.path)
+        if head.get("file") != _name_with_folder(self.path):
             raise MutatorError(
                 f"was written as {head.get('file')}",
                 where=self.path,
@@ -155,8 +157,8 @@ class Segment:
 
         MutatorError for damage, or another schema or file name.
         """
-        if self.damaged:
-            raise self.problem(self.damaged[0])
+        if self.damaged_lines:
+            raise self.damage_error(self.damaged_lines[0])
         self.check_head(schema)
         yield from ((number, self.content(number)) for number in self.lines if number > 1)
 
@@ -165,18 +167,18 @@ def read_segment(path: Path, data: bytes | None = None) -> Segment:
     """Verify the lines of a file. `data` has its bytes, if they were already read. MutatorError if the file
     is missing.
     """
-    data = _read(path) if data is None else data
+    data = _read_bytes(path) if data is None else data
     end = data.rfind(b"\n") + 1
     lines: dict[int, bytes] = {}
     damaged: list[int] = []
-    last = b""
+    last_checksum = b""
     for number, line in enumerate(data[:end].split(b"\n")[:-1], start=1):
-        if _is_intact(last, line):
+        if _is_intact(last_checksum, line):
             lines[number] = line
         else:
             damaged.append(number)
-        last = line[_SUM]
-    return Segment(path=path, lines=lines, damaged=tuple(damaged), end=end)
+        last_checksum = line[_CHECKSUM_SLICE]
+    return Segment(path=path, lines=lines, damaged_lines=tuple(damaged), end_offset=end)
 
 
 def verified_lines(path: Path, schema: str) -> Iterator[tuple[int, int, bytes]]:
@@ -184,48 +186,48 @@ def verified_lines(path: Path, schema: str) -> Iterator[tuple[int, int, bytes]]:
 
     MutatorError for a damaged line, a missing file, or another schema or file name.
     """
-    last, offset = b"", 0
-    with _opened(path) as file:
+    last_checksum, offset = b"", 0
+    with _open_lines(path) as file:
         for number, line in enumerate(bounded_lines(file, path), start=1):
             if not line.endswith(b"\n"):  # incomplete, because the process was killed
                 return
             data = line[:-1]
-            if not _is_intact(last, data):
-                raise bare_segment(path).problem(number)
+            if not _is_intact(last_checksum, data):
+                raise bare_segment(path).damage_error(number)
             if number == 1:
                 bare_segment(path, {1: data}).check_head(schema)
             else:
                 yield number, offset, data
-            last = line[_SUM]
+            last_checksum = line[_CHECKSUM_SLICE]
             offset += len(line)
 
 
 def intact_lines(path: Path) -> Iterator[tuple[int, bytes]]:
     """Yield the number and bytes of each complete, intact line. MutatorError if the file is missing."""
-    last = b""
-    with _opened(path) as file:
+    last_checksum = b""
+    with _open_lines(path) as file:
         for number, line in enumerate(bounded_lines(file, path), start=1):
             data = line[:-1]
-            if line.endswith(b"\n") and _is_intact(last, data):
+            if line.endswith(b"\n") and _is_intact(last_checksum, data):
                 yield number, data
-            last = line[_SUM]
+            last_checksum = line[_CHECKSUM_SLICE]
 
 
 def bare_segment(path: Path, lines: Mapping[int, bytes] | None = None) -> Segment:
-    return Segment(path=path, lines=lines or {}, damaged=(), end=0)
+    return Segment(path=path, lines=lines or {}, damaged_lines=(), end_offset=0)
 
 
-def _is_intact(last: bytes, line: bytes) -> bool:
-    found = sha256(last + line[_BODY:]).hexdigest()[:_WIDTH].encode()
-    return line[:_BODY] == b"".join((_KEY, found, _AFTER))
+def _is_intact(last_checksum: bytes, line: bytes) -> bool:
+    checksum = sha256(last_checksum + line[_BODY_START:]).hexdigest()[:_CHECKSUM_DIGITS].encode()
+    return line[:_BODY_START] == b"".join((_CHECKSUM_KEY, checksum, _AFTER_CHECKSUM))
 
 
-def _read(path: Path) -> bytes:
-    with _opened(path) as file:
+def _read_bytes(path: Path) -> bytes:
+    with _open_lines(path) as file:
         return read_open(file, path, MOST_DATA)
 
 
-def _opened(path: Path) -> BinaryIO:
+def _open_lines(path: Path) -> BinaryIO:
     if path.is_file():
         return open_regular(path)
     raise MutatorError(
@@ -236,35 +238,35 @@ def _opened(path: Path) -> BinaryIO:
     )
 
 
-def written(path: Path, head: Mapping[str, Any], values: Iterable[Mapping[str, Any]]) -> bytes:
+def line_file_bytes(path: Path, head: Mapping[str, Any], values: Iterable[Mapping[str, Any]]) -> bytes:
     """Return the bytes of a file at `path` after `values` were appended."""
     lines = [b""]
-    for value in (_head(path, head), *values):
-        lines.append(_line(lines[-1][_SUM], canonical(value).encode()[1:]))
+    for value in (_head_with_file_name(path, head), *values):
+        lines.append(_checksummed_line(lines[-1][_CHECKSUM_SLICE], canonical(value).encode()[1:]))
     return b"".join(lines)
 
 
-def write_copy(path: Path, head: Mapping[str, Any], lines: Iterable[bytes]) -> None:
+def write_with_new_head(path: Path, head: Mapping[str, Any], lines: Iterable[bytes]) -> None:
     """Write a file with a new head, then lines of other files, with new checksums."""
-    first = _line(b"", canonical(_head(path, head)).encode()[1:])
+    head_line = _checksummed_line(b"", canonical(_head_with_file_name(path, head)).encode()[1:])
     with writing_atomic(path) as file:
-        file.write(first)
-        last = first[_SUM]
+        file.write(head_line)
+        last_checksum = head_line[_CHECKSUM_SLICE]
         for line in lines:
-            copied = _line(last, line[_BODY:])
+            copied = _checksummed_line(last_checksum, line[_BODY_START:])
             file.write(copied)
-            last = copied[_SUM]
+            last_checksum = copied[_CHECKSUM_SLICE]
 
 
-def _line(last: bytes, body: bytes) -> bytes:
+def _checksummed_line(last_checksum: bytes, body: bytes) -> bytes:
     """Make a line of its checksum and `body`, an object without its opening brace."""
-    checksum = sha256(last + body).hexdigest()[:_WIDTH].encode()
-    return b"".join((_KEY, checksum, _AFTER, body, b"\n"))
+    checksum = sha256(last_checksum + body).hexdigest()[:_CHECKSUM_DIGITS].encode()
+    return b"".join((_CHECKSUM_KEY, checksum, _AFTER_CHECKSUM, body, b"\n"))
 
 
-def _head(path: Path, head: Mapping[str, Any]) -> dict[str, Any]:
-    return {**head, "file": _name(path)}
+def _head_with_file_name(path: Path, head: Mapping[str, Any]) -> dict[str, Any]:
+    return {**head, "file": _name_with_folder(path)}
 
 
-def _name(path: Path) -> str:
+def _name_with_folder(path: Path) -> str:
     return f"{path.parent.name}/{path.name}"

@@ -25,16 +25,19 @@ from mutator.errors import MutatorError, Outside
 from mutator.store.checksummed_lines import read_segment
 
 SCHEMA, FILE = "digests/1", "digests.json"
-_WORTH_THREADS = 20_000_000  # the least number of bytes for which threads save time
-SEGMENTS = ("records", "proof")  # folders of append-only files; digests are added when the files are closed
-_NAMES = re.compile(  # what the ledger may name
+_MIN_BYTES_FOR_THREADS = 20_000_000  # the least number of bytes for which threads save time
+SEGMENT_FOLDERS = (
+    "records",
+    "proof",
+)  # folders of append-only files; digests are added when the files are closed
+_LEDGER_NAME_PATTERN = re.compile(  # what the ledger may name
     r"(run\.json|campaign\.yaml|plan\.csv|plan/(experiments|faults)\.jsonl|(checks|reviewed)\.json"
     r"|golden/.+/.+|(records|proof)/[^/]+\.jsonl)"
 )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Digest:
+class FileDigest:
     """The size and hash of a file when it was written; `lines` for segments only."""
 
     size: int  # bytes
@@ -42,26 +45,26 @@ class Digest:
     lines: int | None = None
 
     @classmethod
-    def of(cls, data: bytes, lines: int | None = None) -> "Digest":
+    def of_bytes(cls, data: bytes, lines: int | None = None) -> "FileDigest":
         return cls(size=len(data), sha256=digest(data), lines=lines)
 
     @classmethod
-    def of_file(cls, path: Path) -> "Digest | None":
+    def of_file(cls, path: Path) -> "FileDigest | None":
         """Compute the digest of a file; None if it is missing."""
         try:
             with open_regular(path) as file:
-                return cls._of_open(file, path)
+                return cls._of_open_file(file, path)
         except OSError as err:
             if not is_no_file(err):
                 raise
             return None
 
     @classmethod
-    def below(cls, run: Path, name: str) -> "Digest | None":
+    def of_file_below(cls, run: Path, name: str) -> "FileDigest | None":
         """Compute the digest of a file below `run`; None if it is missing, or not a plain file."""
         try:
             with open_below(run, name) as file:
-                return cls._of_open(file, inside(run, name))
+                return cls._of_open_file(file, inside(run, name))
         except Outside:
             return None
         except OSError as err:
@@ -70,29 +73,29 @@ class Digest:
             return None
 
     @classmethod
-    def _of_open(cls, file: BufferedReader, where: Path) -> "Digest":
+    def _of_open_file(cls, file: BufferedReader, where: Path) -> "FileDigest":
         check_open(file, where)
         return cls(
             sha256=hashlib.file_digest(file, "sha256").hexdigest(), size=os.fstat(file.fileno()).st_size
         )
 
-    def is_of(self, found: "Digest | None") -> bool:
-        return found is not None and (found.size, found.sha256) == (self.size, self.sha256)
+    def has_same_bytes(self, other: "FileDigest | None") -> bool:
+        return other is not None and (other.size, other.sha256) == (self.size, self.sha256)
 
 
-def of_files(run: Path, names: Sequence[str]) -> dict[str, Digest | None]:
+def digests_of_files(run: Path, names: Sequence[str]) -> dict[str, FileDigest | None]:
     """Compute the digests of files of a run folder, in parallel: hashing releases the interpreter lock."""
-    sizes = {name: _size(inside(run, name)) for name in names}
-    if sum(sizes.values()) < _WORTH_THREADS:
-        return {name: Digest.below(run, name) for name in names}
+    sizes = {name: _size_or_zero(inside(run, name)) for name in names}
+    if sum(sizes.values()) < _MIN_BYTES_FOR_THREADS:
+        return {name: FileDigest.of_file_below(run, name) for name in names}
     largest_first = sorted(names, key=lambda name: -sizes[name])
     with ThreadPoolExecutor(usable_cores()) as pool:
-        digests = pool.map(partial(Digest.below, run), largest_first)
-        found = dict(zip(largest_first, digests, strict=True))
-    return {name: found[name] for name in names}
+        largest_digests = pool.map(partial(FileDigest.of_file_below, run), largest_first)
+        digest_by_name = dict(zip(largest_first, largest_digests, strict=True))
+    return {name: digest_by_name[name] for name in names}
 
 
-def _size(path: Path) -> int:
+def _size_or_zero(path: Path) -> int:
     try:
         return path.lstat().st_size
     except OSError:
@@ -111,42 +114,44 @@ class DigestingFile:
         self._size += len(data)
 
     @property
-    def digest(self) -> Digest:
-        return Digest(size=self._size, sha256=self._hash.hexdigest())
+    def digest(self) -> FileDigest:
+        return FileDigest(size=self._size, sha256=self._hash.hexdigest())
 
 
-def sha256(path: Path) -> str:
+def sha256_of_file(path: Path) -> str:
     """Return the SHA-256 of a file, which can be larger than memory; '' if it is missing."""
-    found = Digest.of_file(path)
-    return found.sha256 if found else ""
+    file_digest = FileDigest.of_file(path)
+    return file_digest.sha256 if file_digest else ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Ledger:
+class DigestLedger:
     """The content of `digests.json`.
 
     `files`: digests by name in the run folder; `rewriting`: files that are being rewritten, with their
     new digests (None: deleted); `finished`: whether every experiment has a final record.
     """
 
-    files: Mapping[str, Digest]
-    rewriting: Mapping[str, Digest | None] = field(default_factory=dict)
+    files: Mapping[str, FileDigest]
+    rewriting: Mapping[str, FileDigest | None] = field(default_factory=dict)
     finished: bool = False
 
-    def accepts(self, name: str, found: Digest | None) -> bool:
+    def accepts(self, name: str, current: FileDigest | None) -> bool:
         """Return whether a digest of a file is valid. A file being rewritten can be old, new or missing."""
-        known = self.files.get(name)
+        before = self.files.get(name)
         if name not in self.rewriting:
-            return known.is_of(found) if known else found is None
-        coming = self.rewriting[name]
-        return found is None or any(one is not None and one.is_of(found) for one in (known, coming))
+            return before.has_same_bytes(current) if before else current is None
+        after = self.rewriting[name]
+        return current is None or any(
+            valid is not None and valid.has_same_bytes(current) for valid in (before, after)
+        )
 
     @property
     def names(self) -> list[str]:
         return [*self.files, *(name for name in self.rewriting if name not in self.files)]
 
 
-def read(run: Path) -> Ledger:
+def load_ledger(run: Path) -> DigestLedger:
     """Read the ledger of a run folder; MutatorError if it is missing or changed."""
     path = run / FILE
     remedy = "restore it from a copy of the run folder; without it, changed results cannot be detected"
@@ -163,77 +168,84 @@ def read(run: Path) -> Ledger:
         )
     try:
         for name in (*data["files"], *data["rewriting"]):
-            if not may_name(check_name(name, path)):
+            if not is_ledger_name(check_name(name, path)):
                 raise Outside(f"names {name!a}", where=path, expected="files of a run", remedy=remedy)
-        return Ledger(
-            files={name: Digest(**value) for name, value in data["files"].items()},
-            rewriting={name: value and Digest(**value) for name, value in data["rewriting"].items()},
+        return DigestLedger(
+            files={name: FileDigest(**value) for name, value in data["files"].items()},
+            rewriting={name: value and FileDigest(**value) for name, value in data["rewriting"].items()},
             finished=data["finished"],
         )
     except (KeyError, TypeError, AttributeError) as err:
         raise MutatorError(f"not a list of digests ({err})", where=path, remedy=remedy) from None
 
 
-def may_name(name: str) -> bool:
+def is_ledger_name(name: str) -> bool:
     """Whether the ledger has the digest of the file of this name in a run folder."""
-    return bool(_NAMES.fullmatch(name))
+    return bool(_LEDGER_NAME_PATTERN.fullmatch(name))
 
 
-def is_as(run: Path, ledger: Ledger) -> bool:
+def is_ledger_unchanged(run: Path, ledger: DigestLedger) -> bool:
     """Whether the ledger of a run folder is this one, and intact."""
     try:
-        return read(run) == ledger
+        return load_ledger(run) == ledger
     except MutatorError:
         return False
 
 
-def write(run: Path, ledger: Ledger) -> None:
+def save_ledger(run: Path, ledger: DigestLedger) -> None:
     data: dict[str, Any] = {
         "schema": SCHEMA,
         "finished": ledger.finished,
-        "files": {name: _plain(ledger.files[name]) for name in sorted(ledger.files)},
-        "rewriting": {name: one and _plain(one) for name, one in sorted(ledger.rewriting.items())},
+        "files": {name: _as_json(ledger.files[name]) for name in sorted(ledger.files)},
+        "rewriting": {
+            name: new_digest and _as_json(new_digest) for name, new_digest in sorted(ledger.rewriting.items())
+        },
     }
     write_json(run / FILE, {"schema": SCHEMA, "sum": digest(data), **data})
 
 
-def _plain(one: Digest) -> dict[str, Any]:
-    return {key: value for key, value in asdict(one).items() if value is not None}
+def _as_json(file_digest: FileDigest) -> dict[str, Any]:
+    return {key: value for key, value in asdict(file_digest).items() if value is not None}
 
 
 @contextmanager
-def rewriting(
-    run: Path, coming: Mapping[str, Digest | None], *, finished: bool | None = None
+def rewriting_files(
+    run: Path, new_digests: Mapping[str, FileDigest | None], *, finished: bool | None = None
 ) -> Iterator[None]:
     """Announce that the `with` block changes files (None: deletes them); confirm the changes at its end.
 
     If the process is killed within the block, the folder can still be opened, and the files rewritten.
     `finished` is as in `close_segments`, but applies from the start of the block.
     """
-    before = settled(run)
+    before = settled_ledger(run)
     before = replace(before, finished=before.finished if finished is None else finished)
-    write(run, replace(before, rewriting=coming))
+    save_ledger(run, replace(before, rewriting=new_digests))
     yield
-    files = {name: one for name, one in before.files.items() if name not in coming}
-    write(run, replace(before, files=files | {name: one for name, one in coming.items() if one}))
+    files = {name: file_digest for name, file_digest in before.files.items() if name not in new_digests}
+    save_ledger(
+        run,
+        replace(
+            before, files=files | {name: new_digest for name, new_digest in new_digests.items() if new_digest}
+        ),
+    )
 
 
-def rewrite(run: Path, name: str, data: bytes) -> None:
-    with rewriting(run, {name: Digest.of(data)}):
+def rewrite_file(run: Path, name: str, data: bytes) -> None:
+    with rewriting_files(run, {name: FileDigest.of_bytes(data)}):
         write_below(run, name, data)
 
 
-def settled(run: Path) -> Ledger:
+def settled_ledger(run: Path) -> DigestLedger:
     """Return the ledger without announcements. Files are accepted as a killed command left them."""
-    known = read(run)
-    files = dict(known.files)
-    for name, coming in known.rewriting.items():
-        found = Digest.below(run, name)
-        if found is None:
+    ledger = load_ledger(run)
+    files = dict(ledger.files)
+    for name, new_digest in ledger.rewriting.items():
+        current = FileDigest.of_file_below(run, name)
+        if current is None:
             files.pop(name, None)
-        elif coming is not None and coming.is_of(found):
-            files[name] = coming
-    return replace(known, files=files, rewriting={})
+        elif new_digest is not None and new_digest.has_same_bytes(current):
+            files[name] = new_digest
+    return replace(ledger, files=files, rewriting={})
 
 
 def close_segments(run: Path, *, finished: bool | None = None) -> None:
@@ -241,27 +253,27 @@ def close_segments(run: Path, *, finished: bool | None = None) -> None:
 
     `finished`: whether the run is now finished (None: unchanged). MutatorError for a damaged line.
     """
-    before = settled(run)
+    before = settled_ledger(run)
     files = dict(before.files)
-    for name in segments(run):
+    for name in list_segments(run):
         if name not in files:
-            files[name] = _closed(run, name)
+            files[name] = _close_segment(run, name)
     after = replace(before, files=files, finished=before.finished if finished is None else finished)
-    if after != read(run):
-        write(run, after)
+    if after != load_ledger(run):
+        save_ledger(run, after)
 
 
-def segments(run: Path) -> list[str]:
-    return sorted(f"{kind}/{path.name}" for kind in SEGMENTS for path in (run / kind).glob("*.jsonl"))
+def list_segments(run: Path) -> list[str]:
+    return sorted(f"{kind}/{path.name}" for kind in SEGMENT_FOLDERS for path in (run / kind).glob("*.jsonl"))
 
 
-def _closed(run: Path, name: str) -> Digest:
+def _close_segment(run: Path, name: str) -> FileDigest:
     with open_below(run, name) as file:
         data = read_open(file, inside(run, name), MOST_DATA)
         os.fsync(file.fileno())
     segment = read_segment(inside(run, name), data)
-    if segment.damaged:
-        raise segment.problem(segment.damaged[0])
-    if segment.end < len(data):  # not cut in place: the file can have a second name elsewhere
-        write_below(run, name, data[: segment.end])
-    return Digest.of(data[: segment.end], lines=len(segment.lines))
+    if segment.damaged_lines:
+        raise segment.damage_error(segment.damaged_lines[0])
+    if segment.end_offset < len(data):  # not cut in place: the file can have a second name elsewhere
+        write_below(run, name, data[: segment.end_offset])
+    return FileDigest.of_bytes(data[: segment.end_offset], lines=len(segment.lines))

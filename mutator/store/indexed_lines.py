@@ -15,14 +15,16 @@ from mutator._common.hashing import from_json
 from mutator.errors import MutatorError
 from mutator.store.checksummed_lines import bare_segment, verified_lines
 
-_OPEN = 16  # the most files to keep open
-_ID = re.compile(rb'"experiment_id":"([^"\\]+)"')  # matches once in a line of canonical JSON
+_MOST_OPEN_FILES = 16  # the most files to keep open
+_EXPERIMENT_ID_PATTERN = re.compile(
+    rb'"experiment_id":"([^"\\]+)"'
+)  # matches once in a line of canonical JSON
 
 T = TypeVar("T")
 
 
 class IndexedLines(Mapping[str, T], Generic[T]):
-    """Map each experiment to the object that `made` creates from its line, in order of first appearance.
+    """Map each experiment to the object that `parse` creates from its line, in order of first appearance.
 
     `replaces(line, known)` decides whether a second line of an experiment replaces the first, or raises an
     error. MutatorError for a damaged line or unexpected content.
@@ -32,49 +34,55 @@ class IndexedLines(Mapping[str, T], Generic[T]):
         self,
         paths: Iterable[Path],
         schema: str,
-        made: Callable[[dict[str, Any]], T],
-        replaces: Callable[["Line", "Line"], bool],
+        parse: Callable[[dict[str, Any]], T],
+        replaces: Callable[["IndexedLine", "IndexedLine"], bool],
     ) -> None:
-        self._made = made
-        self._files = Files(list(paths))
+        self._parse = parse
+        self._files = OpenFiles(list(paths))
         self._index: dict[str, int] = {}
-        self._last: tuple[str, T] | None = None  # because some callers read an experiment twice in a row
-        self._file, self._number, self._offset, self._length = (array(code) for code in "HLQL")
+        self._last_parsed: tuple[str, T] | None = (
+            None  # because some callers read an experiment twice in a row
+        )
+        self._file_numbers, self._line_numbers, self._offsets, self._lengths = (
+            array(code) for code in "HLQL"
+        )
         for file, path in enumerate(self._files.paths):
-            self._read(file, path, schema, replaces)
+            self._index_file(file, path, schema, replaces)
 
-    def _read(self, file: int, path: Path, schema: str, replaces: Callable[["Line", "Line"], bool]) -> None:
+    def _index_file(
+        self, file: int, path: Path, schema: str, replaces: Callable[["IndexedLine", "IndexedLine"], bool]
+    ) -> None:
         for number, offset, data in verified_lines(path, schema):
-            name = _name(data)
+            name = _experiment_id_on(data)
             if name is None:
-                raise self._problem(path, number)
-            known = self._index.setdefault(name, len(self._offset))
-            if known == len(self._offset):
-                for column in (self._file, self._number, self._offset, self._length):
+                raise self._damage_error(path, number)
+            place = self._index.setdefault(name, len(self._offsets))
+            if place == len(self._offsets):
+                for column in (self._file_numbers, self._line_numbers, self._offsets, self._lengths):
                     column.append(0)
-            elif not replaces(Line(path, number, data), self.line(name)):
+            elif not replaces(IndexedLine(path, number, data), self.line_of(name)):
                 continue
-            self._file[known], self._number[known] = file, number
-            self._offset[known], self._length[known] = offset, len(data)
+            self._file_numbers[place], self._line_numbers[place] = file, number
+            self._offsets[place], self._lengths[place] = offset, len(data)
 
-    def line(self, name: str) -> "Line":
+    def line_of(self, name: str) -> "IndexedLine":
         at = self._index[name]
-        file = self._file[at]
-        data = self._files.read(file, self._offset[at], self._length[at])
-        return Line(self._files.paths[file], self._number[at], data)
+        file = self._file_numbers[at]
+        data = self._files.read_part(file, self._offsets[at], self._lengths[at])
+        return IndexedLine(self._files.paths[file], self._line_numbers[at], data)
 
     def __getitem__(self, name: str) -> T:
-        last = self._last  # another thread can replace it in the meantime
+        last = self._last_parsed  # another thread can replace it in the meantime
         if last is None or last[0] != name:
-            self._last = last = name, self._read_one(name)
+            self._last_parsed = last = name, self._parse_line_of(name)
         return last[1]
 
-    def _read_one(self, name: str) -> T:
-        line = self.line(name)
+    def _parse_line_of(self, name: str) -> T:
+        line = self.line_of(name)
         try:
-            return self._made(line.content())
+            return self._parse(line.content())
         except (KeyError, TypeError, ValueError, AttributeError, RecursionError):
-            raise self._problem(line.path, line.number) from None
+            raise self._damage_error(line.path, line.number) from None
 
     def __contains__(self, name: object) -> bool:
         return name in self._index
@@ -85,14 +93,14 @@ class IndexedLines(Mapping[str, T], Generic[T]):
     def __len__(self) -> int:
         return len(self._index)
 
-    def problem(self, line: "Line") -> MutatorError:
-        return self._problem(line.path, line.number)
+    def damage_error(self, line: "IndexedLine") -> MutatorError:
+        return self._damage_error(line.path, line.number)
 
-    def _problem(self, path: Path, number: int) -> MutatorError:
-        return bare_segment(path).problem(number)
+    def _damage_error(self, path: Path, number: int) -> MutatorError:
+        return bare_segment(path).damage_error(number)
 
 
-class Line:
+class IndexedLine:
     def __init__(self, path: Path, number: int, data: bytes) -> None:
         self.path, self.number, self.data = path, number, data
 
@@ -105,12 +113,12 @@ class Line:
         return value
 
 
-def _name(data: bytes) -> str | None:
-    found = _ID.search(data)
-    return found[1].decode() if found else None
+def _experiment_id_on(data: bytes) -> str | None:
+    match = _EXPERIMENT_ID_PATTERN.search(data)
+    return match[1].decode() if match else None
 
 
-class Files:
+class OpenFiles:
     """Read parts of files, and keep a few files open."""
 
     def __init__(self, paths: list[Path]) -> None:
@@ -118,10 +126,10 @@ class Files:
         self._open: dict[int, int] = {}
         self._lock = Lock()
 
-    def read(self, file: int, offset: int, length: int) -> bytes:
+    def read_part(self, file: int, offset: int, length: int) -> bytes:
         with self._lock:  # no thread closes a file while another reads it
             if file not in self._open:
-                if len(self._open) >= _OPEN:
+                if len(self._open) >= _MOST_OPEN_FILES:
                     os.close(self._open.pop(next(iter(self._open))))
                 self._open[file] = os.open(self.paths[file], os.O_RDONLY | os.O_CLOEXEC)
             return os.pread(self._open[file], length, offset)

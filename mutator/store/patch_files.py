@@ -13,7 +13,7 @@ from mutator._common.below import inside
 from mutator._common.bounded import unpacked
 from mutator._common.files import write_atomic
 from mutator._common.hashing import digest
-from mutator.store.checksummed_blocks import Block, BlockWriter, as_block, intact_blocks, read_blocks
+from mutator.store.checksummed_blocks import Block, BlockWriter, block_bytes, intact_blocks, read_blocks
 
 FOLDER, SUFFIX = "patches", ".blocks"
 WHOLE, BESIDE = 0, 1  # kinds of blocks: a complete patch, or a difference from the last complete one
@@ -135,7 +135,7 @@ class Patches:
         place = self._places.get(experiment_id)
         if place is not None:
             return place.path
-        damaged = (one for one in self.files() if not one.is_file() or read_blocks(one).damaged)
+        damaged = (one for one in self.files() if not one.is_file() or read_blocks(one).is_damaged)
         lost = inside(self.run / FOLDER, f"{worker}{SUFFIX}") if worker else self.run / FOLDER
         return next(damaged, lost)
 
@@ -164,5 +164,5 @@ def packed_patches(patches: Iterable[tuple[str, bytes]]) -> bytes:
     packer, blocks = _Packer(), []
     for experiment_id, data in patches:
         kind, content = packer.block(data)
-        blocks.append(as_block(kind, experiment_id, content))
+        blocks.append(block_bytes(kind, experiment_id, content))
     return b"".join(blocks)

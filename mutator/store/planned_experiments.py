@@ -7,7 +7,7 @@ from pathlib import Path
 from mutator.errors import MutatorError
 from mutator.model import Experiment
 from mutator.store import plan_file
-from mutator.store.indexed_lines import Files
+from mutator.store.indexed_lines import OpenFiles
 from mutator.store.plan_lines import id_of
 
 
@@ -20,7 +20,7 @@ class Planned(Mapping[str, Experiment]):
     def __init__(self, run: Path) -> None:
         self._path = run / plan_file.EXPERIMENTS
         self._faults = plan_file.read_faults(run)
-        self._files = Files([self._path])
+        self._files = OpenFiles([self._path])
         self._index: dict[str, int] = {}
         self._offsets = array("Q", [0])
         offset = 0
@@ -35,7 +35,7 @@ class Planned(Mapping[str, Experiment]):
     def __getitem__(self, name: str) -> Experiment:
         number = self._index[name]
         begin, end = self._offsets[number : number + 2]
-        line = self._files.read(0, begin, end - begin)
+        line = self._files.read_part(0, begin, end - begin)
         return plan_file.experiment_on(self._path, number + 1, line, self._faults)
 
     def __contains__(self, name: object) -> bool:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from mutator._common.below import inside
 from mutator.errors import CheckFailed, MutatorError
 from mutator.model import Activation, Outcome, Record, RunError, Status
-from mutator.store.indexed_lines import IndexedLines, Line
+from mutator.store.indexed_lines import IndexedLine, IndexedLines
 from mutator.store.timings import TIMINGS, TIMINGS_SCHEMA
 
 SCHEMA = "records/2"
@@ -92,11 +92,11 @@ def ending_on(line: bytes) -> Ending:
 def endings(records: Mapping[str, Record]) -> Iterator[Ending]:
     for name in records:
         if isinstance(records, IndexedLines):
-            line = records.line(name)
+            line = records.line_of(name)
             try:
                 yield ending_on(line.data)
             except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
-                raise records.problem(line) from None
+                raise records.damage_error(line) from None
         else:
             one = records[name]
             yield Ending(name, one.status.value, one.outcome.value if one.outcome else None, one.patch)
@@ -112,7 +112,7 @@ def read_records(run: Path, folder: str = "records") -> IndexedLines[Record]:
     return IndexedLines(paths, SCHEMA, record_from, _replaces)
 
 
-def _replaces(line: Line, known: Line) -> bool:
+def _replaces(line: IndexedLine, known: IndexedLine) -> bool:
     record, before = (record_from(one.content()) for one in (line, known))
     if record.status is Status.HARNESS_ERROR:
         return False

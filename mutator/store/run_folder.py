@@ -17,7 +17,7 @@ from mutator._common.hashing import plain
 from mutator.errors import MutatorError
 from mutator.model import AfterHazard, Experiment, Limits, Record
 from mutator.store import file_digests, integrity, plan_file
-from mutator.store.allowed_contents import SCRATCH, TRACES, check_contents
+from mutator.store.allowed_contents import SCRATCH_FOLDER, TRACES_FOLDER, check_contents
 from mutator.store.patch_files import Patches
 from mutator.store.records import read_records
 from mutator.store.run_head import HEAD, RunHead, StoredGolden, read_head
@@ -105,18 +105,18 @@ class RunFolder:
         """
         for _ in range(_LOOKS):
             try:
-                ledger = file_digests.read(self.path)
+                ledger = file_digests.load_ledger(self.path)
             except MutatorError as err:
                 return [err]
-            found = list(integrity.problems(self.path, self.head, ledger, self.shard, anew=anew))
-            if not found or file_digests.read(self.path) == ledger:
+            found = list(integrity.run_problems(self.path, self.head, ledger, self.shard, ignore_cache=anew))
+            if not found or file_digests.load_ledger(self.path) == ledger:
                 break
         return found
 
     @property
     def finished(self) -> bool:
         """Whether every experiment has a final record, and the equivalence check is complete."""
-        return file_digests.read(self.path).finished
+        return file_digests.load_ledger(self.path).finished
 
     @cached_property
     def head(self) -> RunHead:
@@ -211,7 +211,7 @@ class RunFolder:
 
     def traces_of(self, experiment_id: str) -> Path:
         """Return the folder of the traces that `rerun --trace` keeps."""
-        return inside(self.path / TRACES, experiment_id)
+        return inside(self.path / TRACES_FOLDER, experiment_id)
 
     @cached_property
     def patches(self) -> Patches:
@@ -242,12 +242,12 @@ class RunFolder:
         return plan_file.canary_from(self.path / HEAD, self.head.canary)
 
     def share(self) -> dict[str, int]:
-        return integrity.share(self.path, self.head, self.shard)
+        return integrity.planned_positions(self.path, self.head, self.shard)
 
     @property
     def work(self) -> Path:
         """Scratch folder. It can be deleted while no command owns the run folder."""
-        return self.path / SCRATCH
+        return self.path / SCRATCH_FOLDER
 
     def find(self, prefix: str) -> str:
         """Return the only planned experiment whose id starts with `prefix`; MutatorError if not unique."""

@@ -6,7 +6,7 @@ from typing import Any
 
 from mutator._common.below import inside
 from mutator.model import Record
-from mutator.store.checksummed_lines import LineWriter, verified_lines, write_copy
+from mutator.store.checksummed_lines import LineWriter, verified_lines, write_with_new_head
 from mutator.store.patch_files import PatchWriter
 from mutator.store.records import LINE_SCHEMAS, PROOF, RECORDS, line_of
 from mutator.store.run_folder import RunFolder
@@ -99,4 +99,4 @@ def copy_lines(folder: RunFolder, out: Path, suffix: str) -> None:
             place = inside(out / kind, f"{path.stem}{suffix}.jsonl")
             lines = verified_lines(path, schema)
             head = {"schema": schema, "plan": folder.head.plan}
-            write_copy(place, head, (line for _, _, line in lines))
+            write_with_new_head(place, head, (line for _, _, line in lines))

@@ -59,7 +59,7 @@ def runs(run: Path, workspace: Workspace) -> Path:
     head["about_hazards"] = [one | {"about": HTML} for one in head["about_hazards"]]
     for component in (head["structure"] or {}).get("components", {}).values():
         component["about"] = component["label"] = HTML
-    file_digests.rewrite(night, "run.json", json.dumps(head).encode())
+    file_digests.rewrite_file(night, "run.json", json.dumps(head).encode())
     edit_results(night, "longer", HTML)
     (night / "plots").mkdir(exist_ok=True)
     lines = (night / "plan/experiments.jsonl").read_text().splitlines()

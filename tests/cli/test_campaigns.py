@@ -18,7 +18,7 @@ import pytest
 from mutator.cli import campaigns
 from mutator.errors import MutatorError
 from mutator.store import approvals
-from mutator.store.allowed_contents import CONTENT
+from mutator.store.allowed_contents import ALLOWED_FILE_GLOBS
 from mutator.store.series_folder import SeriesFolder, read_kept
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
@@ -350,7 +350,7 @@ def test_clean_deletes_only_run_folders(cli: Cli, root: Path) -> None:
     assert Path("mine").exists()
 
 
-KNOWN = {pattern.partition("/")[0] for pattern in CONTENT}  # names in a run folder
+KNOWN = {pattern.partition("/")[0] for pattern in ALLOWED_FILE_GLOBS}  # names in a run folder
 
 
 @pytest.mark.slow

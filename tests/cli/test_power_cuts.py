@@ -90,9 +90,9 @@ def test_files_are_synced_before_the_records_that_refer_to_them(
         looks.append(len(names))
 
     monkeypatch.setattr(os, "fsync", look)
-    monkeypatch.setattr(checksummed_lines, "_BATCH", 2)
+    monkeypatch.setattr(checksummed_lines, "_MOST_UNSYNCED", 2)
     for module in (checksummed_lines, checksummed_blocks):
-        monkeypatch.setattr(module, "_BATCH_S", 1e9)
+        monkeypatch.setattr(module, "_MOST_UNSYNCED_S", 1e9)
     ran = cli(*WORDS)
     assert ran.code == 0, ran.err
     assert looks[0] == 1 and max(looks) == 4

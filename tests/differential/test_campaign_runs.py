@@ -91,9 +91,9 @@ def test_lost_records_run_again(
             run_campaign(toy, "small", out)
         assert mutator.verify(out, repair=True, workspace=toy).repaired
     else:
-        known = file_digests.read(out)
+        known = file_digests.load_ledger(out)
         files = {name: one for name, one in known.files.items() if not name.startswith("records/")}
-        file_digests.write(out, replace(known, files=files, finished=False))
+        file_digests.save_ledger(out, replace(known, files=files, finished=False))
     summary = run_campaign(toy, "small", out)
     assert (summary.exit_code, summary.ran) == (0, 3)
     assert results(out) == undisturbed

@@ -22,7 +22,7 @@ from mutator.execution.campaign_running import run_campaign
 from mutator.report import report_builder
 from mutator.store import file_digests
 from mutator.store.approvals import write_approvals
-from mutator.store.file_digests import Digest
+from mutator.store.file_digests import FileDigest
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 from tests.made_up_results import edit_results
@@ -116,9 +116,9 @@ def written(name: str, edit: Callable[[bytes], bytes]) -> Callable[[Path], None]
         is_new = not file.exists()
         file.write_bytes(edit(b"" if is_new else file.read_bytes()))
         if is_new and name.startswith("golden/"):
-            ledger = file_digests.read(run)
-            file_digests.write(
-                run, replace(ledger, files={**ledger.files, name: Digest.of(file.read_bytes())})
+            ledger = file_digests.load_ledger(run)
+            file_digests.save_ledger(
+                run, replace(ledger, files={**ledger.files, name: FileDigest.of_bytes(file.read_bytes())})
             )
 
     return apply
@@ -130,10 +130,10 @@ def harmless(table: bytes) -> bytes:
 
 def gone(name: str) -> Callable[[Path], None]:
     def apply(run: Path) -> None:
-        ledger = file_digests.read(run)
+        ledger = file_digests.load_ledger(run)
         shutil.rmtree(run / name)
         files = {key: one for key, one in ledger.files.items() if not key.startswith(f"{name}/")}
-        file_digests.write(run, replace(ledger, files=files))
+        file_digests.save_ledger(run, replace(ledger, files=files))
 
     return apply
 

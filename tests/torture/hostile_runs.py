@@ -13,7 +13,7 @@ from typing import Any
 from mutator._common.files import json_bytes
 from mutator._common.hashing import digest
 from mutator.store import file_digests
-from mutator.store.file_digests import Digest
+from mutator.store.file_digests import FileDigest
 from mutator.store.series_folder import Index, write_index
 from tests.made_up_results import edit_results
 
@@ -166,7 +166,7 @@ def _in_ledger(key: str, name: str) -> Trick:
     def put(sent: Sent) -> None:
         path = sent.run / file_digests.FILE
         data = json.loads(path.read_bytes())
-        mine = Digest.of((sent.home / "mine").read_bytes())
+        mine = FileDigest.of_bytes((sent.home / "mine").read_bytes())
         data[key][_filled(name, sent)] = {"size": mine.size, "sha256": mine.sha256}
         _write_ledger(path, data)
 

@@ -36,7 +36,7 @@ from mutator.execution.experiment_runner import Finished, Goldens, Runner
 from mutator.execution.worker import timing_of
 from mutator.model import Experiment
 from mutator.preflight.preflight_rules import look
-from mutator.store.checksummed_blocks import as_block
+from mutator.store.checksummed_blocks import block_bytes
 from mutator.store.patch_files import packed_patches
 from mutator.store.records import line_of
 from mutator.store.run_folder import GoldenRun
@@ -157,7 +157,7 @@ def _made(finished: list[Finished], name: str, *, proof: bool) -> Result:
         records=records,
         timings=tuple(canonical(timing_of(one, name)).encode() for one in finished),
         patches=packed_patches(patches),
-        series=b"".join(as_block(*series_block(experiment, one)) for experiment, one in series),
+        series=b"".join(block_bytes(*series_block(experiment, one)) for experiment, one in series),
         series_of=tuple(sorted({one.key for _, one in series})),
     )
 

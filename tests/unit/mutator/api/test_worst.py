@@ -10,7 +10,7 @@ from mutator.api.worst import worst_results
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import make_plan
 from mutator.model import Outcome, Record
-from mutator.store.checksummed_lines import written
+from mutator.store.checksummed_lines import line_file_bytes
 from mutator.store.records import SCHEMA, line_of
 from mutator.workspace import Workspace
 
@@ -24,7 +24,7 @@ def test_filtered_results_are_sorted_by_severity(
     made = [record(e.id, **(hazard if i % 5 == 0 else {})) for i, e in enumerate(plan.experiments)]
     path = run / "records" / "0001-main.jsonl"
     path.parent.mkdir()
-    path.write_bytes(written(path, {"schema": SCHEMA, "plan": plan.digest}, map(line_of, made)))
+    path.write_bytes(line_file_bytes(path, {"schema": SCHEMA, "plan": plan.digest}, map(line_of, made)))
     monkeypatch.setattr(module, "_BATCH", 7)
     rows, count = worst_results(run)
     assert count == len(rows) == 24 and [bool(row.hazards) for row in rows] == [True] * 5 + [False] * 19

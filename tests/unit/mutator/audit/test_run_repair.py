@@ -11,8 +11,8 @@ from mutator._common.locks import owned
 from mutator.audit.run_repair import _put_aside, repair
 from mutator.errors import MutatorError, Outside
 from mutator.store import file_digests, plan_file
-from mutator.store.checksummed_lines import read_segment, written
-from mutator.store.file_digests import Digest, Ledger
+from mutator.store.checksummed_lines import line_file_bytes, read_segment
+from mutator.store.file_digests import DigestLedger, FileDigest
 from mutator.store.patch_files import Patches
 from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
@@ -75,7 +75,9 @@ def test_a_segment_with_forged_checksums_loses_all_lines(run: Path) -> None:
     head, *lines = [json.loads(line) for line in (run / RECORDS).read_text().splitlines()]
     lines[4]["outcome"] = "sdc"
     values = [{k: v for k, v in line.items() if k != "sum"} for line in lines]
-    (run / RECORDS).write_bytes(written(run / RECORDS, {k: head[k] for k in ("schema", "plan")}, values))
+    (run / RECORDS).write_bytes(
+        line_file_bytes(run / RECORDS, {k: head[k] for k in ("schema", "plan")}, values)
+    )
     _, folder = repaired(run)
     assert folder.records() == {}
 
@@ -83,7 +85,9 @@ def test_a_segment_with_forged_checksums_loses_all_lines(run: Path) -> None:
 def test_added_lines_with_forged_checksums_are_removed(run: Path, made: Path) -> None:
     head, *lines = [json.loads(line) for line in (run / RECORDS).read_text().splitlines()]
     values = [{k: v for k, v in line.items() if k != "sum"} for line in [*lines, lines[0]]]
-    (run / RECORDS).write_bytes(written(run / RECORDS, {k: head[k] for k in ("schema", "plan")}, values))
+    (run / RECORDS).write_bytes(
+        line_file_bytes(run / RECORDS, {k: head[k] for k in ("schema", "plan")}, values)
+    )
     _, folder = repaired(run)
     assert folder.records() == RunFolder.open(made).records()
 
@@ -225,8 +229,10 @@ def test_links_are_not_followed(run: Path, name: str) -> None:
 def test_a_file_outside_that_the_ledger_names_stays(run: Path, name: str) -> None:
     """Verifying prints the remedy `--repair`, which must not move a file that somebody else named."""
     (run.parent / "setup.py").write_text("mine")
-    ledger = file_digests.read(run)
-    file_digests.write(run, Ledger(files={**ledger.files, name: Digest.of(b"not mine")}, finished=True))
+    ledger = file_digests.load_ledger(run)
+    file_digests.save_ledger(
+        run, DigestLedger(files={**ledger.files, name: FileDigest.of_bytes(b"not mine")}, finished=True)
+    )
     with pytest.raises(Outside, match=r"digests\.json"):
         repair(RunFolder.unverified(run))
     assert (run.parent / "setup.py").read_text() == "mine"
@@ -241,7 +247,7 @@ def test_a_file_outside_that_a_record_names_stays(run: Path) -> None:
     lines = [segment.content(number) for number in segment.lines if number > 1]
     lines[0] |= {"experiment_id": name, "patch": "ab" * 32}
     plan = RunFolder.unverified(run).head.plan
-    (run / RECORDS).write_bytes(written(run / RECORDS, {"schema": SCHEMA, "plan": plan}, lines))
+    (run / RECORDS).write_bytes(line_file_bytes(run / RECORDS, {"schema": SCHEMA, "plan": plan}, lines))
     repaired(run)
     assert mine.read_text() == "mine"
 

@@ -12,7 +12,7 @@ from mutator._common.hashing import canonical
 from mutator.audit.seal import seal_or_why_not, seals_of, unsealed_facts
 from mutator.store import file_digests
 from mutator.store.approvals import write_approvals
-from mutator.store.checksummed_lines import written
+from mutator.store.checksummed_lines import line_file_bytes
 from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -63,7 +63,7 @@ def test_a_retried_harness_error_does_not_affect_the_seal(made: Path, run: Path)
     head = {"schema": SCHEMA, "plan": folder.head.plan}
     path = run / "records" / "0002-a.jsonl"
     file_digests.close_segments(run, finished=False)
-    path.write_bytes(written(path, head, [{"experiment_id": name, "status": "harness_error"}]))
+    path.write_bytes(line_file_bytes(path, head, [{"experiment_id": name, "status": "harness_error"}]))
     file_digests.close_segments(run, finished=True)
     assert sealed(run) == sealed(made)
 
@@ -76,15 +76,17 @@ def edit(path: Path, old: str, new: str) -> None:
 
 def add(run: Path, name: str) -> None:
     (run / name).write_bytes(b"more")
-    ledger = file_digests.read(run)
-    file_digests.write(run, replace(ledger, files={**ledger.files, name: file_digests.Digest.of(b"more")}))
+    ledger = file_digests.load_ledger(run)
+    file_digests.save_ledger(
+        run, replace(ledger, files={**ledger.files, name: file_digests.FileDigest.of_bytes(b"more")})
+    )
 
 
 def rename(run: Path, name: str, other: str) -> None:
     (run / name).rename(run / other)
-    ledger = file_digests.read(run)
+    ledger = file_digests.load_ledger(run)
     files = {other if key == name else key: one for key, one in ledger.files.items()}
-    file_digests.write(run, replace(ledger, files=files))
+    file_digests.save_ledger(run, replace(ledger, files=files))
 
 
 CHANGES: dict[str, Callable[[Path], None]] = {

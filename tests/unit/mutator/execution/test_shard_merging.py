@@ -10,7 +10,7 @@ import pytest
 from mutator.errors import Outside
 from mutator.execution.shard_merging import merge
 from mutator.store import file_digests
-from mutator.store.file_digests import Digest
+from mutator.store.file_digests import FileDigest
 from mutator.workspace import Workspace
 
 
@@ -18,9 +18,9 @@ from mutator.workspace import Workspace
 def shard(toycar: Workspace, tmp_path: Path, write_finished: Callable[..., Path]) -> Path:
     run = write_finished(toycar, tmp_path / "sent" / "runs" / "part", shard="1/1")
     shutil.rmtree(run / "proof")
-    ledger = file_digests.read(run)
+    ledger = file_digests.load_ledger(run)
     files = {name: one for name, one in ledger.files.items() if not name.startswith("proof/")}
-    file_digests.write(run, replace(ledger, files=files))
+    file_digests.save_ledger(run, replace(ledger, files=files))
     return run
 
 
@@ -37,8 +37,10 @@ def test_a_single_shard_is_merged(shard: Path, out: Path) -> None:
 def test_a_file_that_the_ledger_should_not_name_is_not_copied(shard: Path, out: Path, name: str) -> None:
     theirs, mine = shard / name, out / name
     theirs.write_text("theirs")
-    ledger = file_digests.read(shard)
-    file_digests.write(shard, replace(ledger, files={**ledger.files, name: Digest.of(b"theirs")}))
+    ledger = file_digests.load_ledger(shard)
+    file_digests.save_ledger(
+        shard, replace(ledger, files={**ledger.files, name: FileDigest.of_bytes(b"theirs")})
+    )
     mine.parent.mkdir(parents=True, exist_ok=True)
     if mine.resolve().parent != out.resolve():
         mine.resolve().write_text("mine")

@@ -16,7 +16,7 @@ NAME = "records/0001-gw0.jsonl"
 
 @pytest.fixture
 def run(tmp_path: Path) -> Path:
-    file_digests.write(tmp_path, file_digests.Ledger(files={}))
+    file_digests.save_ledger(tmp_path, file_digests.DigestLedger(files={}))
     return tmp_path
 
 
@@ -39,7 +39,7 @@ def test_lines_that_were_changed_are_set_aside(run: Path) -> None:
     (run / NAME).write_bytes(lines + lines)
     assert written.set_others_aside(run) == [NAME]
     assert (run / "damaged" / NAME).read_bytes() == lines + lines
-    assert file_digests.segments(run) == []
+    assert file_digests.list_segments(run) == []
 
 
 def test_lines_of_nobody_are_set_aside_and_lost_lines_are_named(run: Path) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from mutator._common.hashing import plain
 from mutator.results.table_columns import SINCE, result_columns
 from mutator.store import file_digests, plan_file
-from mutator.store.file_digests import Ledger
+from mutator.store.file_digests import DigestLedger
 from mutator.store.plan_choices import Choices
 from mutator.store.work_stretches import Stretch
 from tests.made_head import made_head
@@ -69,7 +69,7 @@ def make_run(folder: Path, **head: object) -> Path:
     (folder / "run.json").write_text(json.dumps(HEAD | head))
     write_results(folder, COLUMNS, LINES)
     plan_file.write(folder, [], [])
-    file_digests.write(folder, Ledger(files={}))
+    file_digests.save_ledger(folder, DigestLedger(files={}))
     (folder / "plots").mkdir()
     (folder / "plots" / ("0" * 16 + "-14.50s.jpg")).write_bytes(b"picture")
     return folder

@@ -18,7 +18,7 @@ from mutator.report.most_dangerous import dangerous
 from mutator.report.panels.answers_panel import build_answers_panel
 from mutator.report.reported_run import ReportedRun
 from mutator.results.table_columns import SINCE, result_columns
-from mutator.store.checksummed_lines import written
+from mutator.store.checksummed_lines import line_file_bytes
 from mutator.store.run_folder import RunFolder
 from mutator.store.timings import TIMINGS_SCHEMA
 from mutator.targets.target_facts import MetricFacts
@@ -65,7 +65,7 @@ def run(tmp_path: Path) -> ReportedRun:
     costs.append(costs[0] | {"experiment_id": "7" * 16, "cpu_s": 0, "engine": "golden"})
     path = tmp_path / "timings" / "0001-main.jsonl"
     path.parent.mkdir()
-    path.write_bytes(written(path, {"schema": TIMINGS_SCHEMA, "plan": HEAD["plan"]}, costs))
+    path.write_bytes(line_file_bytes(path, {"schema": TIMINGS_SCHEMA, "plan": HEAD["plan"]}, costs))
     return ReportedRun.open(RunFolder.open(tmp_path), None)
 
 

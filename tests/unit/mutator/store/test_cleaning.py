@@ -11,8 +11,8 @@ from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import make_plan
 from mutator.errors import MutatorError
 from mutator.exports import Table, find_export
-from mutator.store.allowed_contents import CONTENT
-from mutator.store.cleaning import clean, finish_deletion
+from mutator.store.allowed_contents import ALLOWED_FILE_GLOBS
+from mutator.store.cleaning import delete_run, finish_deletion
 from mutator.workspace import Workspace
 
 PAGE = Path(__file__).parents[4] / "docs" / "reference" / "run-folder.md"
@@ -36,7 +36,7 @@ def test_everything_that_a_run_wrote_is_deleted(run: Path) -> None:
     (odd / "link").symlink_to(run.parent)
     (odd / "dangling").symlink_to("nowhere")
     os.mkfifo(odd / "pipe")
-    clean(run)
+    delete_run(run)
     assert not run.exists()
     assert run.parent.exists()
 
@@ -49,7 +49,7 @@ def test_the_file_of_each_export_is_no_stranger(run: Path, name: str) -> None:
         file = made if made.suffix else made / "1.mcap"
         file.parent.mkdir(parents=True, exist_ok=True)
         file.touch()
-    clean(run)
+    delete_run(run)
     assert not run.exists()
 
 
@@ -80,7 +80,7 @@ def test_a_run_folder_with_another_file_is_not_deleted(run: Path, stranger: str)
     before = contents(run)
     first = stranger.partition("/")[0] if "/" in stranger and not (run / stranger).is_file() else ""
     with pytest.raises(MutatorError, match="contains files that no run writes: ") as refused:
-        clean(run)
+        delete_run(run)
     assert (first or stranger.split("/")[0]) in refused.value.got
     assert "move them elsewhere" in str(refused.value)
     assert contents(run) == before
@@ -101,7 +101,7 @@ def test_a_foreign_folder_is_not_deleted_despite_its_run_json(tmp_path: Path) ->
         for name in names:
             (folder / name).touch()
         with pytest.raises(MutatorError) as refused:
-            clean(folder)
+            delete_run(folder)
         assert not names or refused.value.got == "contains files that no run writes: a, b, c and 2 more"
         assert len(contents(folder)) == 1 + len(names)
 
@@ -109,7 +109,7 @@ def test_a_foreign_folder_is_not_deleted_despite_its_run_json(tmp_path: Path) ->
 def test_a_folder_without_run_json_is_not_deleted(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").touch()
     with pytest.raises(MutatorError, match="not a run folder"):
-        clean(tmp_path)
+        delete_run(tmp_path)
     assert contents(tmp_path) == {tmp_path / "thesis.tex"}
 
 
@@ -117,32 +117,32 @@ def test_the_docs_list_the_same_names_as_cleaning() -> None:
     [listed] = re.findall(r"^DIR/\n(.*?)^```", PAGE.read_text(), re.MULTILINE | re.DOTALL)
     names = {name for line in listed.splitlines() for name in re.split(r" {2,}", line.strip())[0].split(", ")}
     inside = {name.partition("/")[0] for name in names if not name.startswith(".")}
-    assert inside == {pattern.partition("/")[0] for pattern in CONTENT}
+    assert inside == {pattern.partition("/")[0] for pattern in ALLOWED_FILE_GLOBS}
 
 
 def test_links_are_not_followed(run: Path, tmp_path: Path) -> None:
     link = tmp_path / "latest"
     link.symlink_to(run)
     with pytest.raises(MutatorError, match=r"a link to .*; name the link.s target"):
-        clean(link)
+        delete_run(link)
     elsewhere = tmp_path / "elsewhere"
     (elsewhere / "S1").mkdir(parents=True)
     (elsewhere / "S1" / "trace.npz").touch()
     (run / "golden").symlink_to(elsewhere)
     with pytest.raises(MutatorError, match="golden: a link, a pipe"):
-        clean(run)
+        delete_run(run)
     (run / "golden").unlink()
     (run / "plots").mkdir()
     (run / "plots" / "x.svg").symlink_to(elsewhere / "S1" / "trace.npz")
     with pytest.raises(MutatorError, match=r"plots/x\.svg: a link, a pipe"):
-        clean(run)
+        delete_run(run)
     assert (run / "run.json").exists()
     assert (elsewhere / "S1" / "trace.npz").exists()
 
 
 def test_files_written_during_a_deletion_are_deleted_too(run: Path) -> None:
     assert not finish_deletion(run)
-    clean(run)
+    delete_run(run)
     assert finish_deletion(run)
     (run / "report" / "tables").mkdir(parents=True)
     (run / "report" / "REPORT.md").write_text("of nothing")

@@ -12,7 +12,7 @@ from mutator._common.files import write_atomic
 from mutator.errors import MutatorError, Outside
 from mutator.store import file_digests
 from mutator.store.checksummed_lines import LineWriter
-from mutator.store.file_digests import Digest, Ledger
+from mutator.store.file_digests import DigestLedger, FileDigest
 
 NAMES = FIRST, SECOND = "plan.csv", "checks.json"
 
@@ -25,14 +25,14 @@ class Killed(BaseException):
 def run(tmp_path: Path) -> Path:
     for name in NAMES:
         (tmp_path / name).write_text(f"old {name}")
-    known = {name: Digest.of((tmp_path / name).read_bytes()) for name in NAMES}
-    file_digests.write(tmp_path, Ledger(files=known))
+    known = {name: FileDigest.of_bytes((tmp_path / name).read_bytes()) for name in NAMES}
+    file_digests.save_ledger(tmp_path, DigestLedger(files=known))
     return tmp_path
 
 
 def accepted(run: Path) -> bool:
-    ledger = file_digests.read(run)
-    return all(ledger.accepts(name, Digest.of_file(run / name)) for name in ledger.names)
+    ledger = file_digests.load_ledger(run)
+    return all(ledger.accepts(name, FileDigest.of_file(run / name)) for name in ledger.names)
 
 
 def segment(run: Path, name: str, *values: int) -> Path:
@@ -44,12 +44,12 @@ def segment(run: Path, name: str, *values: int) -> Path:
 
 
 def test_a_ledger_is_read_as_written(run: Path) -> None:
-    one = Digest(size=3, sha256="ab" * 32, lines=2)
-    ledger = Ledger(
+    one = FileDigest(size=3, sha256="ab" * 32, lines=2)
+    ledger = DigestLedger(
         files={"records/x.jsonl": one}, rewriting={"checks.json": one, "plan.csv": None}, finished=True
     )
-    file_digests.write(run, ledger)
-    assert file_digests.read(run) == ledger
+    file_digests.save_ledger(run, ledger)
+    assert file_digests.load_ledger(run) == ledger
 
 
 def test_every_changed_byte_is_found(run: Path) -> None:
@@ -58,17 +58,17 @@ def test_every_changed_byte_is_found(run: Path) -> None:
     for place in range(len(data)):
         path.write_bytes(data[:place] + bytes([data[place] ^ 1]) + data[place + 1 :])
         with pytest.raises(MutatorError, match=r"digests\.json"):
-            file_digests.read(run)
+            file_digests.load_ledger(run)
 
 
 @pytest.mark.parametrize("content", ["{}", '{"schema": "digests/1"}', "[]", "", '{"schema": "digests/9"}'])
 def test_a_file_that_is_not_a_ledger_is_refused(run: Path, content: str) -> None:
     (run / file_digests.FILE).write_text(content)
     with pytest.raises(MutatorError, match=r"digests\.json"):
-        file_digests.read(run)
+        file_digests.load_ledger(run)
     (run / file_digests.FILE).unlink()
     with pytest.raises(MutatorError, match=r"digests\.json: missing"):
-        file_digests.read(run)
+        file_digests.load_ledger(run)
 
 
 def test_a_forged_ledger_is_refused(run: Path) -> None:
@@ -76,7 +76,7 @@ def test_a_forged_ledger_is_refused(run: Path) -> None:
     data = {"schema": file_digests.SCHEMA, "finished": True, "files": [], "rewriting": {}}
     files.write_json(run / file_digests.FILE, data | {"sum": file_digests.digest(data)})
     with pytest.raises(MutatorError, match="not a list of digests"):
-        file_digests.read(run)
+        file_digests.load_ledger(run)
 
 
 @pytest.mark.parametrize("key", ["files", "rewriting"])
@@ -88,10 +88,10 @@ def test_a_forged_ledger_is_refused(run: Path) -> None:
     ],
 )
 def test_a_ledger_names_only_files_that_a_run_writes(run: Path, key: str, name: str) -> None:
-    one = Digest.of(b"")
-    file_digests.write(run, Ledger(**{"files": {}, "rewriting": {}} | {key: {name: one}}))  # type: ignore[arg-type]
+    one = FileDigest.of_bytes(b"")
+    file_digests.save_ledger(run, DigestLedger(**{"files": {}, "rewriting": {}} | {key: {name: one}}))  # type: ignore[arg-type]
     with pytest.raises(Outside, match=r"digests\.json"):
-        file_digests.read(run)
+        file_digests.load_ledger(run)
 
 
 def test_a_segment_with_a_second_name_is_not_cut_in_place(run: Path) -> None:
@@ -130,26 +130,26 @@ def kills(run: Path, work: Callable[[], Any], monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_a_kill_during_a_rewrite_leaves_a_valid_folder(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert kills(run, lambda: file_digests.rewrite(run, FIRST, b"new"), monkeypatch) == 3
+    assert kills(run, lambda: file_digests.rewrite_file(run, FIRST, b"new"), monkeypatch) == 3
     assert accepted(run) and (run / FIRST).read_text() == "new"
-    assert file_digests.read(run).rewriting == {}
+    assert file_digests.load_ledger(run).rewriting == {}
 
 
 def test_after_a_kill_a_file_is_old_or_new(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with monkeypatch.context() as patch, pytest.raises(Killed):
         patch.setattr(file_digests, "write_below", lambda run, name, data: (_ for _ in ()).throw(Killed))
-        file_digests.rewrite(run, FIRST, b"new")
+        file_digests.rewrite_file(run, FIRST, b"new")
     assert accepted(run)
     (run / FIRST).write_text("mine")
     assert not accepted(run)
 
 
 def test_a_file_announced_for_deletion_can_be_missing(run: Path) -> None:
-    with file_digests.rewriting(run, {FIRST: None}):
+    with file_digests.rewriting_files(run, {FIRST: None}):
         assert accepted(run)
         (run / FIRST).unlink()
         assert accepted(run)
-    assert file_digests.read(run).names == [SECOND] and accepted(run)
+    assert file_digests.load_ledger(run).names == [SECOND] and accepted(run)
 
 
 def test_a_closed_segment_is_in_the_ledger(run: Path) -> None:
@@ -157,9 +157,9 @@ def test_a_closed_segment_is_in_the_ledger(run: Path) -> None:
     whole = path.read_bytes()
     path.write_bytes(whole + b'{"sum":"0123')
     file_digests.close_segments(run)
-    known = file_digests.read(run).files["records/0001-gw0.jsonl"]
-    assert (path.read_bytes(), known) == (whole, Digest.of(whole, lines=3))
-    assert not file_digests.read(run).finished
+    known = file_digests.load_ledger(run).files["records/0001-gw0.jsonl"]
+    assert (path.read_bytes(), known) == (whole, FileDigest.of_bytes(whole, lines=3))
+    assert not file_digests.load_ledger(run).finished
     with path.open("ab") as file:
         file.write(b"{}\n")
     assert not accepted(run)

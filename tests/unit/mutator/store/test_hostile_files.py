@@ -15,9 +15,9 @@ from mutator.errors import MutatorError
 from mutator.outcomes.importers import npz
 from mutator.outcomes.trace_files import TraceRequest
 from mutator.store import series_format
-from mutator.store.checksummed_blocks import as_block, read_blocks
+from mutator.store.checksummed_blocks import block_bytes, read_blocks
 from mutator.store.checksummed_lines import read_segment, verified_lines
-from mutator.store.file_digests import Digest
+from mutator.store.file_digests import FileDigest
 from mutator.store.patch_files import WHOLE, Patches
 from mutator.store.plan_file import lines_of
 from mutator.store.series_folder import read_index
@@ -44,7 +44,7 @@ def sparse(tmp_path: Path) -> Path:
         lambda path: list(lines_of(path)),
         lambda path: read_blocks(path),
         lambda path: read_json(path, "run/3"),
-        Digest.of_file,
+        FileDigest.of_file,
     ],
 )
 def test_a_sparse_file_is_refused_by_each_reader(sparse: Path, read: object) -> None:
@@ -56,11 +56,11 @@ def test_bytes_that_look_like_many_long_blocks_are_not_all_verified(tmp_path: Pa
     path = tmp_path / "1.blocks"
     path.write_bytes((head + bytes(8)) * 200_000 + bytes(2_000_000))
     is_cheap(lambda: read_blocks(path))
-    assert read_blocks(path).damaged
+    assert read_blocks(path).is_damaged
 
 
 def test_blocks_between_damaged_parts_are_still_read(tmp_path: Path) -> None:
-    block = as_block(0, "key", b"data")
+    block = block_bytes(0, "key", b"data")
     path = tmp_path / "1.blocks"
     path.write_bytes((block + b"damage") * 1000)
     is_cheap(lambda: read_blocks(path))
@@ -71,7 +71,7 @@ def test_a_patch_that_unpacks_to_too_much_is_damaged(tmp_path: Path) -> None:
     packer = zlib.compressobj(9)
     data = b"".join(packer.compress(bytes(10**6)) for _ in range(100)) + packer.flush()
     (tmp_path / "patches").mkdir()
-    (tmp_path / "patches" / "1-1.blocks").write_bytes(as_block(WHOLE, "a" * 16, data))
+    (tmp_path / "patches" / "1-1.blocks").write_bytes(block_bytes(WHOLE, "a" * 16, data))
     is_cheap(lambda: Patches(tmp_path).read("a" * 16))
     assert Patches(tmp_path).read("a" * 16) is None
 

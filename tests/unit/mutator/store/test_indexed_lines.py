@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.store.checksummed_lines import LineWriter, written
+from mutator.store.checksummed_lines import LineWriter, line_file_bytes
 from mutator.store.indexed_lines import IndexedLines
 
 SCHEMA = "things/1"
@@ -15,7 +15,7 @@ SCHEMA = "things/1"
 def things(folder: Path, **files: list[dict[str, Any]]) -> IndexedLines[dict[str, Any]]:
     for name, lines in files.items():
         path = folder / f"{name}.jsonl"
-        path.write_bytes(written(path, {"schema": SCHEMA}, lines))
+        path.write_bytes(line_file_bytes(path, {"schema": SCHEMA}, lines))
     return opened(folder)
 
 

@@ -189,17 +189,17 @@ def test_a_plan_with_duplicates_or_missing_experiments_is_refused(
 
 
 def test_a_folder_that_is_being_written_is_not_damaged(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    real, seen = integrity.problems, []
+    real, seen = integrity.run_problems, []
 
     def look(*arguments: object, **more: object) -> list[MutatorError]:
         found = list(real(*arguments, **more))  # type: ignore[arg-type]
         if not seen:
             seen.append("the owner was faster")
-            file_digests.rewrite(run, "plan.csv", b"other")
+            file_digests.rewrite_file(run, "plan.csv", b"other")
             return [MutatorError("plan.csv changed")]
         return found
 
-    monkeypatch.setattr(integrity, "problems", look)
+    monkeypatch.setattr(integrity, "run_problems", look)
     RunFolder.open(run)
     assert seen
 

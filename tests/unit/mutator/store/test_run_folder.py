@@ -12,7 +12,7 @@ from mutator._common import locks
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import make_plan
 from mutator.errors import MutatorError
-from mutator.store.cleaning import clean
+from mutator.store.cleaning import delete_run
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -76,7 +76,7 @@ def test_a_unique_prefix_of_an_id_finds_the_experiment(folder: RunFolder) -> Non
 def test_a_run_folder_has_one_owner(folder: RunFolder) -> None:
     process = holder(folder, "owner")
     try:
-        for attempt in (lambda: locks.owned(folder.path).__enter__(), lambda: clean(folder.path)):
+        for attempt in (lambda: locks.owned(folder.path).__enter__(), lambda: delete_run(folder.path)):
             with pytest.raises(MutatorError, match=f"in use by process {process.pid}"):
                 attempt()
     finally:

@@ -63,7 +63,7 @@ def test_a_verified_run_is_only_compared_byte_for_byte(
     def look(*arguments: object) -> None:
         raise AssertionError("verified again")
 
-    monkeypatch.setattr(integrity, "id_problems", look)
+    monkeypatch.setattr(integrity, "record_problems", look)
     again = run_campaign(workspace, "small", run)
     for name in ("planned", "done", "ran", "outcomes", "proof", "seal", "results", "harness_errors"):
         assert getattr(again, name) == getattr(first, name), name
@@ -90,7 +90,7 @@ def test_a_change_after_verification_is_found(made: tuple[Workspace, Path], cach
 def test_a_damaged_entry_is_not_used(made: tuple[Workspace, Path], cache: Path) -> None:
     run = made[1]
     RunFolder.open(run)
-    key = integrity.content_key(run)
+    key = integrity.verified_content_key(run)
     assert verified_runs_cache.recall(key) == {"verified": True}
     [entry] = (cache / "mutator" / "runs").iterdir()
     entry.write_text(json.dumps(json.loads(entry.read_text()) | {"ended": {}}))
@@ -101,12 +101,12 @@ def test_a_damaged_entry_is_not_used(made: tuple[Workspace, Path], cache: Path) 
 
 def test_an_unfinished_run_has_no_entry(made: tuple[Workspace, Path], cache: Path) -> None:
     run = made[1]
-    ledger = file_digests.read(run)
+    ledger = file_digests.load_ledger(run)
     try:
-        file_digests.write(run, file_digests.Ledger(files=ledger.files))
-        assert integrity.content_key(run) == ""
+        file_digests.save_ledger(run, file_digests.DigestLedger(files=ledger.files))
+        assert integrity.verified_content_key(run) == ""
     finally:
-        file_digests.write(run, ledger)
+        file_digests.save_ledger(run, ledger)
 
 
 @pytest.mark.slow

@@ -18,7 +18,7 @@ from mutator.errors import MutatorError, MutatorWarning
 from mutator.exports import Format, Parts, Table
 from mutator.exports.write import export
 from mutator.model import Activation, Experiment, Outcome
-from mutator.store.cleaning import check
+from mutator.store.cleaning import list_deletable_files
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_folder import SeriesFolder, run_facts, write_kept
 from mutator.store.series_format import Points, Series, encode
@@ -223,4 +223,4 @@ def test_a_run_folder_with_exports_can_be_cleaned(run: Path) -> None:
         export(run, Format.CSV, None, parts=Parts(table=table))
         export(run, Format.PARQUET, None, parts=Parts(table=table))
     written = export(run, Format.MCAP, None)
-    assert {*written.iterdir()} <= {*check(run)}
+    assert {*written.iterdir()} <= {*list_deletable_files(run)}
