@@ -11,7 +11,7 @@ from setuptools.command.build_py import build_py
 
 CLONE = Path(__file__).resolve().parent
 SHIPPED = ("target", "fault_library", "templates")
-ARCHIVE = Path("mutator", "_common", "shipped.zip")  # where mutator/_common/shipped.py looks for it
+ARCHIVE = Path("mutator", "_common", "shipped.zip")  # where mutator/_common/shipped_files.py looks for it
 COMPILER = "ziglang>=0.13"  # a C compiler from the package index for machines without one
 
 sys.path.insert(0, str(CLONE / "target"))

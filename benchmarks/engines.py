@@ -30,7 +30,7 @@ from mutator.mutants.mutant_building import build  # noqa: E402
 from mutator.outcomes import golden_comparison  # noqa: E402
 from mutator.store.plan_choices import Choices  # noqa: E402
 from mutator.store.run_folder import GoldenRun  # noqa: E402
-from mutator.triggers.kinds import always  # noqa: E402
+from mutator.triggers.trigger_kinds import always  # noqa: E402
 from mutator.workspace import Workspace  # noqa: E402
 
 GOAL_OF_WARM = 1.15  # fork's CPU / (warm's CPU x share of time after activation)

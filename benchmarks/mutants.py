@@ -25,7 +25,7 @@ from mutator.mutants.anchors import parse_file
 from mutator.mutants.mutant_building import build, build_directly
 from mutator.operators.mutation_selection import find_mutations, sampled
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.kinds import always
+from mutator.triggers.trigger_kinds import always
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -35,7 +35,7 @@ from mutator.mutants.mutant_building import build  # noqa: E402
 from mutator.store.checksummed_lines import LineWriter  # noqa: E402
 from mutator.store.plan_choices import Choices  # noqa: E402
 from mutator.store.records import SCHEMA, line_of  # noqa: E402
-from mutator.triggers.kinds import always  # noqa: E402
+from mutator.triggers.trigger_kinds import always  # noqa: E402
 from mutator.workspace import Workspace  # noqa: E402
 
 GOAL_MS = 5.0

@@ -19,7 +19,7 @@ sys.path.insert(0, str(ROOT))
 from mutator.engines.job_tree_pool import BaseTree  # noqa: E402
 from mutator.mutants.mutant_building import build  # noqa: E402
 from mutator.mutants.probe import probe_path  # noqa: E402
-from mutator.triggers.kinds import always  # noqa: E402
+from mutator.triggers.trigger_kinds import always  # noqa: E402
 from mutator.workspace import Workspace  # noqa: E402
 
 GOAL = 1.02

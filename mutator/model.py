@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import Any
 
 from mutator._common.hashing import added, added_values, content_id, plain
-from mutator._common.yaml_records import mapping, written
+from mutator._common.yaml_dataclasses import mapping, written
 
 Value = int | float | str | bool | None
 

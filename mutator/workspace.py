@@ -7,28 +7,28 @@ from fnmatch import fnmatchcase
 from importlib import import_module
 from pathlib import Path
 
-from mutator._common.arguments import check_whole
-from mutator._common.below import check_inside, files_inside
-from mutator._common.bounded import MOST_WHOLE, check_open, open_regular
+from mutator._common.argument_checks import check_whole
+from mutator._common.bounded_reading import MOST_WHOLE, check_open, open_regular
+from mutator._common.confined_files import check_inside, files_inside
 from mutator._common.files import check_is_text
 from mutator._common.folder_search import environment_path, library_files, library_folder, templates_folder
-from mutator._common.shipped import shipped_folder
-from mutator._common.tables import Table
-from mutator._common.text import counted, one_of, suggestion
+from mutator._common.message_text import counted, one_of, suggestion
+from mutator._common.shipped_files import shipped_folder
+from mutator._common.table_rendering import Table
 from mutator.errors import MutatorError
-from mutator.faults.expansion import expand
 from mutator.faults.fault_model_files import load_fault_models
 from mutator.faults.fault_models import FaultModels
-from mutator.faults.readings import Readings, load_readings
-from mutator.faults.specs import FaultSpec, load_spec
+from mutator.faults.fault_specs import FaultSpec, load_spec
+from mutator.faults.library_readings import Readings, load_readings
+from mutator.faults.spec_expansion import expand
 from mutator.model import Fault
 from mutator.results.table_columns import check_names
-from mutator.stpa.analysis import Analysis, StructureModel, load_analysis, load_structure
+from mutator.stpa.analysis_files import Analysis, StructureModel, load_analysis, load_structure
 from mutator.stpa.context_tables import ContextTable, load_context_table
-from mutator.stpa.hazards import HazardList, load_hazards
+from mutator.stpa.hazard_list import HazardList, load_hazards
+from mutator.targets.contact_severity import Scale
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.manifest_files import load_manifest
-from mutator.targets.severity import Scale
 from mutator.targets.severity_model import load_scale
 
 _SANDBOX = "mutator.engines.sandbox"

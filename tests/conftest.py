@@ -40,7 +40,7 @@ from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.store.timings import TIMINGS_SCHEMA
 from mutator.store.work_stretches import Stretch
-from mutator.triggers.kinds import always
+from mutator.triggers.trigger_kinds import always
 from mutator.workspace import Workspace
 
 from .parsed_once import parsed_once

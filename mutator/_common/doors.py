@@ -17,8 +17,8 @@ from traceback import walk_tb
 from typing import TYPE_CHECKING, Any
 
 from mutator._common.files import is_disk_full
-from mutator._common.shortages import shortage
-from mutator._common.text import suggestion
+from mutator._common.message_text import suggestion
+from mutator._common.resource_shortages import shortage
 from mutator.errors import BadAddition, MutatorError, Signal
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from mutator._common.bounded import MOST_JSON, read_bounded
+from mutator._common.bounded_reading import MOST_JSON, read_bounded
 from mutator.errors import DiskFull, MutatorError
 
 _NO_SPACE = (errno.ENOSPC, errno.EDQUOT)

@@ -3,8 +3,8 @@
 import os
 from pathlib import Path
 
-from mutator._common.below import check_name, files_inside
-from mutator._common.shipped import shipped_folder
+from mutator._common.confined_files import check_name, files_inside
+from mutator._common.shipped_files import shipped_folder
 
 RUNS = Path("runs")
 RUN_HEAD = "run.json"  # the file that identifies a run folder

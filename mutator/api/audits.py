@@ -5,11 +5,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from mutator._common.arguments import check_type, check_whole
+from mutator._common.argument_checks import check_type, check_whole
+from mutator._common.folder_locks import owned
 from mutator._common.hashing import digest
-from mutator._common.locks import owned
-from mutator._common.tables import Table
-from mutator._common.text import counted
+from mutator._common.message_text import counted
+from mutator._common.table_rendering import Table
 from mutator.api.selection import WorkspaceLike, open_workspace
 from mutator.audit.run_audit import Check, audit_checks
 from mutator.audit.run_repair import repair as put_aside

@@ -1,9 +1,9 @@
 """What can be deleted: the caches on this machine, on which no result depends, and run folders."""
 
-from mutator._common.caches import clear as clear_caches
-from mutator._common.caches import entries as cache_entries
-from mutator._common.caches import folder as cache_folder
-from mutator._common.caches import prune as prune_caches
+from mutator._common.shared_cache import clear as clear_caches
+from mutator._common.shared_cache import entries as cache_entries
+from mutator._common.shared_cache import folder as cache_folder
+from mutator._common.shared_cache import prune as prune_caches
 from mutator.store.cleaning import delete_run as delete_run_folder
 from mutator.store.cleaning import list_deletable_files as check_run_folder
 

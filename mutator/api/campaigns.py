@@ -3,7 +3,7 @@
 import warnings
 from pathlib import Path
 
-from mutator._common.arguments import check_type, check_whole
+from mutator._common.argument_checks import check_type, check_whole
 from mutator.api.runs import Run
 from mutator.api.selection import WorkspaceLike, open_workspace
 from mutator.engines.engine_choice import check_offered

@@ -6,8 +6,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mutator._common.below import inside
-from mutator._common.tables import Table
+from mutator._common.confined_files import inside
+from mutator._common.table_rendering import Table
 from mutator.api.html import text_html
 from mutator.api.runs import Run, known_alerts_note, load_run
 from mutator.comparison import comparison_files

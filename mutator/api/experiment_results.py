@@ -12,8 +12,8 @@ from mutator.mutants.readable_patches import readable
 from mutator.outcomes.golden_comparison import Trace, on_steps
 from mutator.outcomes.trace_files import own_times
 from mutator.outcomes.verdict_rules import reaction_time, severity_of, since_activation, since_manifestation
+from mutator.targets.contact_severity import Scale
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.severity import Scale
 from mutator.targets.target_facts import ChannelFacts
 
 if TYPE_CHECKING:

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from html import escape
 
-from mutator._common.tables import Table
+from mutator._common.table_rendering import Table
 
 _COLOURS = {"+": "#116329", "-": "#a40e26", "@": "#0550ae"}
 

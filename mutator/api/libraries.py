@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 
-from mutator._common.shipped import write_library
+from mutator._common.shipped_files import write_library
 from mutator.api.selection import WorkspaceLike, open_workspace
 from mutator.checks import fast_engine_check, library_check
 from mutator.checks.doctor import examine
@@ -18,10 +18,10 @@ from mutator.mutants.possible_places import ListedPlace, places_of
 from mutator.onboarding.first_library import write_library_for
 from mutator.onboarding.source_survey import look_at
 from mutator.onboarding.todo_marks import unfilled
-from mutator.stpa.analysis import Analysis
-from mutator.stpa.checks import check_analysis
-from mutator.stpa.drawing import draw
-from mutator.targets.locations import check_file
+from mutator.stpa.analysis_checks import check_analysis
+from mutator.stpa.analysis_files import Analysis
+from mutator.stpa.structure_drawing import draw
+from mutator.targets.allowed_locations import check_file
 from mutator.workspace import Workspace
 
 

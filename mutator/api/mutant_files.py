@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from mutator._common.below import inside
+from mutator._common.confined_files import inside
 from mutator._common.files import make_folder
-from mutator._common.text import counted
+from mutator._common.message_text import counted
 from mutator.api.mutants import BuiltMutant, built
 from mutator.api.operator_mutants import OperatorChoice, operator_faults
 from mutator.api.selection import Bench, FaultChoice, WorkspaceLike, context_tables, open_workspace
@@ -17,7 +17,7 @@ from mutator.errors import MutatorError
 from mutator.model import Fault, Trigger
 from mutator.mutants.mutant_building import write_tree
 from mutator.store.plan_choices import Choices
-from mutator.triggers.kinds import always
+from mutator.triggers.trigger_kinds import always
 from mutator.workspace import Workspace
 
 COLUMNS = (

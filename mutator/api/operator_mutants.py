@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from mutator._common.arguments import check_whole
-from mutator._common.text import counted
+from mutator._common.argument_checks import check_whole
+from mutator._common.message_text import counted
 from mutator.api.selection import Bench
 from mutator.errors import MutatorError
 from mutator.model import Fault, Limits

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from mutator._common.below import inside
+from mutator._common.confined_files import inside
 from mutator._common.files import make_folder, write_atomic
 from mutator.api.selection import WorkspaceLike, open_workspace
 from mutator.campaigns.filters import compile_filter

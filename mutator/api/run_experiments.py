@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from mutator._common.below import inside
+from mutator._common.confined_files import inside
 from mutator._common.files import ScratchFolder
 from mutator.api.experiment_results import TraceFrames, trace_frame
 from mutator.api.run_contents import RunContents

@@ -6,8 +6,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mutator._common.tables import Table
-from mutator._common.text import one_of, seeds_text
+from mutator._common.message_text import one_of, seeds_text
+from mutator._common.table_rendering import Table
 from mutator.api.audits import Audit, verify
 from mutator.api.experiment_results import trace_frame
 from mutator.api.html import facts_html, text_html

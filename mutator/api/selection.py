@@ -9,18 +9,18 @@ from os import PathLike
 from pathlib import Path
 from typing import TypeAlias
 
-from mutator._common.arguments import check_number, check_whole
+from mutator._common.argument_checks import check_number, check_whole
 from mutator.campaigns.plan_warnings import changes_nothing
 from mutator.checks.library_check import check_spec
 from mutator.config import units
 from mutator.errors import MutatorError, MutatorWarning
-from mutator.faults.expansion import expand
 from mutator.faults.fault_models import FaultModels
-from mutator.faults.specs import FaultSpec, Variant
+from mutator.faults.fault_specs import FaultSpec, Variant
+from mutator.faults.spec_expansion import expand
 from mutator.model import Fault, Trigger
 from mutator.stpa.context_tables import ContextTable
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.kinds import TYPED, read_trigger
+from mutator.triggers.trigger_kinds import TYPED, read_trigger
 from mutator.workspace import Workspace
 
 WorkspaceLike: TypeAlias = "Workspace | str | PathLike[str] | None"

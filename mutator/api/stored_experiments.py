@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from mutator._common.arguments import check_type
-from mutator._common.below import inside
+from mutator._common.argument_checks import check_type
+from mutator._common.confined_files import inside
 from mutator._common.folder_search import run_folders
 from mutator.api.experiment_results import ExperimentResult
 from mutator.api.mutants import built
@@ -20,8 +20,8 @@ from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_folder import SeriesFolder, making_again
 from mutator.store.work_stretches import Stretch
+from mutator.targets.contact_severity import Scale
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.severity import Scale
 from mutator.targets.target_facts import ChannelFacts
 from mutator.workspace import Workspace
 

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from mutator._common.below import check_inside, check_plain, inside
-from mutator._common.bounded import read_bounded
+from mutator._common.bounded_reading import read_bounded
+from mutator._common.confined_files import check_inside, check_plain, inside
 from mutator._common.files import ScratchFolder
 from mutator._common.hashing import digest
 from mutator.api.experiment_results import ExperimentResult, TraceFrames, trace_frame
@@ -16,8 +16,8 @@ from mutator.figures.run_plot import save
 from mutator.model import Experiment, Method, Record
 from mutator.outcomes.golden_comparison import Trace, load_trace
 from mutator.outcomes.hazards_and_metrics import load_judged
+from mutator.targets.contact_severity import Scale
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.severity import Scale
 from mutator.targets.target_facts import ChannelFacts, channel_facts
 
 

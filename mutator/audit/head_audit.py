@@ -6,7 +6,7 @@ from fnmatch import fnmatchcase
 from itertools import islice
 from typing import Any
 
-from mutator._common.below import inside
+from mutator._common.confined_files import inside
 from mutator._common.files import read_json
 from mutator.audit.record_audit import Recorded
 from mutator.campaigns.freezing import target_facts

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from math import inf
 from pathlib import Path
 
-from mutator._common.below import inside
+from mutator._common.confined_files import inside
 from mutator._common.hashing import digest
-from mutator._common.text import counted
+from mutator._common.message_text import counted
 from mutator.engines.engine_jobs import FAST
 from mutator.errors import InvalidMutant, MutatorError
 from mutator.faults.fault_models import FaultModels

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 
-from mutator._common.below import inside
+from mutator._common.confined_files import inside
 from mutator._common.files import read_json
 from mutator._common.hashing import digest
 from mutator.audit.head_audit import checks as checks_of

@@ -11,11 +11,18 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from mutator._common.below import inside, move_below, open_below, unlink_below, write_below, writing_below
-from mutator._common.bounded import MOST_DATA, check_open, read_bounded
+from mutator._common.bounded_reading import MOST_DATA, check_open, read_bounded
+from mutator._common.confined_files import (
+    inside,
+    move_below,
+    open_below,
+    unlink_below,
+    write_below,
+    writing_below,
+)
 from mutator._common.files import raising_disk_full
-from mutator._common.locks import owned
-from mutator._common.text import counted
+from mutator._common.folder_locks import owned
+from mutator._common.message_text import counted
 from mutator.audit.record_audit import recorded
 from mutator.audit.series_repair import repair_series
 from mutator.campaigns.freezing import CSV, plan_csv

@@ -15,8 +15,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from mutator._common.below import inside
-from mutator._common.bounded import read_bounded
+from mutator._common.bounded_reading import read_bounded
+from mutator._common.confined_files import inside
 from mutator._common.files import read_json
 from mutator._common.hashing import canonical, digest
 from mutator.campaigns.freezing import CSV

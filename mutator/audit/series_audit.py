@@ -4,7 +4,7 @@ from collections.abc import Iterator, Set
 
 import numpy as np
 
-from mutator._common.below import inside
+from mutator._common.confined_files import inside
 from mutator.errors import MutatorError
 from mutator.outcomes.hazards_and_metrics import load_channels
 from mutator.outcomes.series_sampling import Sampler

@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from mutator._common.below import check_name, inside, unlink_below, write_below
+from mutator._common.confined_files import check_name, inside, unlink_below, write_below
 from mutator.audit.series_audit import series
 from mutator.errors import MutatorError
 from mutator.outcomes.hazards_and_metrics import load_channels

@@ -11,8 +11,8 @@ from contextlib import suppress
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 
-from mutator._common.below import open_below, write_below
-from mutator._common.bounded import read_bounded
+from mutator._common.bounded_reading import read_bounded
+from mutator._common.confined_files import open_below, write_below
 from mutator._common.hashing import canonical
 from mutator.audit.seal import Seals
 from mutator.errors import CheckFailed, MutatorError

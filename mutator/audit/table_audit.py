@@ -6,8 +6,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import BinaryIO
 
-from mutator._common.below import inside
-from mutator._common.bounded import bounded_lines
+from mutator._common.bounded_reading import bounded_lines
+from mutator._common.confined_files import inside
 from mutator.errors import MutatorError, TooLarge
 from mutator.results import table_building
 from mutator.results.table_reader import same_parquet

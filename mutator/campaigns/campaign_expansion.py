@@ -8,23 +8,23 @@ from fnmatch import fnmatchcase
 from itertools import chain
 from pathlib import Path
 
-from mutator._common.below import inside, is_inside
-from mutator._common.bounded import read_bounded
+from mutator._common.bounded_reading import read_bounded
+from mutator._common.confined_files import inside, is_inside
 from mutator._common.hashing import digest
-from mutator._common.text import one_of
+from mutator._common.message_text import one_of
 from mutator.campaigns.campaign_files import Campaign
 from mutator.campaigns.campaign_triggers import listed_triggers
 from mutator.campaigns.operator_faults import OperatorFault, OperatorFaults
 from mutator.campaigns.operator_selection import When
 from mutator.campaigns.sampling import spread
-from mutator.config.sources import Keys
+from mutator.config.yaml_sources import Keys
 from mutator.errors import MutatorError
-from mutator.faults.expansion import expand
-from mutator.faults.specs import FaultSpec
+from mutator.faults.fault_specs import FaultSpec
+from mutator.faults.spec_expansion import expand
 from mutator.model import Experiment, Fault, Method, Trigger
 from mutator.operators.executed_lines import GoldenDrive
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.kinds import always, at_time, draw_time
+from mutator.triggers.trigger_kinds import always, at_time, draw_time
 from mutator.workspace import Workspace
 
 _Numbered = tuple[int, Fault]  # a fault and its position among its variant's values

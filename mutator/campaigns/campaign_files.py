@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
-from mutator._common.below import check_library_name
-from mutator._common.bounded import read_bounded
+from mutator._common.bounded_reading import read_bounded
+from mutator._common.confined_files import check_library_name
 from mutator.campaigns.campaign_model import CampaignModel, Canary, SelectionModel
 from mutator.campaigns.campaign_triggers import (
     EVERY_READING,
@@ -15,10 +15,10 @@ from mutator.campaigns.campaign_triggers import (
 )
 from mutator.campaigns.installed_studies import Study, find_study
 from mutator.campaigns.operator_selection import OperatorSelection, When
-from mutator.config.sources import Keys, Source
 from mutator.config.yaml_files import read
+from mutator.config.yaml_sources import Keys, Source
 from mutator.errors import MutatorError
-from mutator.faults.readings import FILE, Readings
+from mutator.faults.library_readings import FILE, Readings
 from mutator.model import AfterHazard, Limits, Method
 
 SCHEMA = "campaign/1"

@@ -7,7 +7,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, mod
 from pydantic_core import PydanticKnownError
 
 from mutator._common.doors import OPERATORS
-from mutator._common.yaml_records import mapping, written
+from mutator._common.yaml_dataclasses import mapping, written
 from mutator.campaigns.campaign_triggers import (
     EVERY_READING,
     Triggers,

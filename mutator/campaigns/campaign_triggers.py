@@ -6,13 +6,13 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
-from mutator._common.yaml_records import mapping, written
-from mutator.config.sources import Keys, Source
+from mutator._common.yaml_dataclasses import mapping, written
 from mutator.config.yaml_files import StrictModel, Written
+from mutator.config.yaml_sources import Keys, Source
 from mutator.model import MOST, Hold, Trigger
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.conditions import check_condition
-from mutator.triggers.kinds import always, at_time
+from mutator.triggers.trigger_kinds import always, at_time
 
 EVERY_READING = "*"  # key of a value that applies to all readings
 _LIST: Keys = ("triggers", "list")

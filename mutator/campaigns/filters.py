@@ -9,7 +9,7 @@ import operator
 from collections.abc import Callable, Collection, Mapping
 from fnmatch import fnmatchcase
 
-from mutator._common.text import operator_hint
+from mutator._common.message_text import operator_hint
 from mutator.errors import MutatorError
 
 Row = Mapping[str, object]

@@ -14,8 +14,8 @@ from mutator._common.files import (
     write_atomic,
     writing_atomic,
 )
+from mutator._common.folder_locks import owned
 from mutator._common.hashing import digest, plain
-from mutator._common.locks import owned
 from mutator._common.version import VERSION
 from mutator.campaigns.plan import Plan, Planning
 from mutator.campaigns.plan_parts import Part, PlanDigest, Tally

@@ -18,7 +18,7 @@ from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory, TemporaryFile
 
-from mutator._common.below import open_below
+from mutator._common.confined_files import open_below
 from mutator.errors import MutatorError
 from mutator.store.work_stretches import CloneState
 

@@ -3,7 +3,7 @@
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-from mutator._common.text import counted
+from mutator._common.message_text import counted
 from mutator.campaigns.operator_selection import OperatorSelection, When
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels

@@ -9,9 +9,9 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mutator._common.arguments import check_type
-from mutator._common.tables import Table
-from mutator._common.text import counted, seeds_text
+from mutator._common.argument_checks import check_type
+from mutator._common.message_text import counted, seeds_text
+from mutator._common.table_rendering import Table
 from mutator.campaigns.campaign_expansion import Expansion
 from mutator.campaigns.campaign_files import Campaign, check_readings, load_campaign, load_study
 from mutator.campaigns.chunks import cut_runs
@@ -29,7 +29,7 @@ from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.store.run_head import CAMPAIGN
 from mutator.store.shards import Shard
-from mutator.targets.stopping import stop_source
+from mutator.targets.stop_code import stop_source
 from mutator.workspace import Workspace
 
 if TYPE_CHECKING:

@@ -3,7 +3,7 @@
 import warnings
 from collections.abc import Sequence
 
-from mutator._common.text import counted
+from mutator._common.message_text import counted
 from mutator.errors import MutatorWarning
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Experiment, Fault

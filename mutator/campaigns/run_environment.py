@@ -17,7 +17,7 @@ from packaging.utils import canonicalize_name
 
 from mutator.engines.target_processes import environment
 from mutator.store.work_stretches import Blas
-from mutator.targets.environment import THREADS
+from mutator.targets.process_environment import THREADS
 
 _BLAS = "import json, numpy, threadpoolctl; print(json.dumps(threadpoolctl.threadpool_info()))"
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mutator._common.bounded import read_bounded
+from mutator._common.bounded_reading import read_bounded
 from mutator._common.hashing import digest
 from mutator.faults.fault_models import FaultModels
 from mutator.targets.manifest import TargetManifest

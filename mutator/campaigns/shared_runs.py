@@ -4,7 +4,7 @@ from collections.abc import Hashable, Iterable, Sequence
 
 from mutator.model import Experiment
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.kinds import time_of
+from mutator.triggers.trigger_kinds import time_of
 
 
 def run_key(manifest: TargetManifest, experiment: Experiment) -> Hashable:

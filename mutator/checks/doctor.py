@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING
 
 from packaging.requirements import Requirement
 
-from mutator._common.cores import usable_cores
-from mutator._common.text import counted
+from mutator._common.cpu_cores import usable_cores
+from mutator._common.message_text import counted
 from mutator.checks.fast_engine_check import loading
 from mutator.checks.findings import Finding, Level
 from mutator.engines.sandbox import shortcoming as shortcoming_of_sandbox
 from mutator.errors import MutatorError
-from mutator.targets.requirements import MISSING, check_requirements, shortcoming
+from mutator.targets.required_packages import MISSING, check_requirements, shortcoming
 
 if TYPE_CHECKING:
     from mutator.workspace import Workspace

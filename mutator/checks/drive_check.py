@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from mutator._common.below import inside
-from mutator._common.cores import usable_cores
+from mutator._common.confined_files import inside
+from mutator._common.cpu_cores import usable_cores
 from mutator._common.files import ScratchFolder
 from mutator.campaigns.campaign_expansion import Expansion
 from mutator.campaigns.campaign_files import Campaign, load_campaign
@@ -34,7 +34,7 @@ from mutator.mutants.probe import is_probe
 from mutator.preflight import canary
 from mutator.preflight.preflight_rules import CheckRun, judge_golden, judge_null, look
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.kinds import always
+from mutator.triggers.trigger_kinds import always
 from mutator.workspace import Workspace
 
 _OTHER_HASH_SEED = 4242

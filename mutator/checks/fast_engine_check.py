@@ -3,11 +3,11 @@
 from dataclasses import replace
 
 from mutator._common.files import ScratchFolder
-from mutator._common.text import counted
+from mutator._common.message_text import counted
 from mutator.checks.findings import Finding, Level
 from mutator.engines.forkable import not_forked, not_loadable
 from mutator.errors import MutatorError, NotForkable
-from mutator.faults.expansion import expand
+from mutator.faults.spec_expansion import expand
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from mutator._common.below import inside
-from mutator._common.bounded import read_bounded
-from mutator._common.text import shown
+from mutator._common.bounded_reading import read_bounded
+from mutator._common.confined_files import inside
+from mutator._common.message_text import shown
 from mutator.errors import BadOutput
 from mutator.outcomes import golden_comparison
 from mutator.targets.manifest import TargetManifest

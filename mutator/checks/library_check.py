@@ -8,24 +8,24 @@ from typing import TypeVar
 from mutator.campaigns.campaign_files import Campaign, check_readings, load_campaign, load_study
 from mutator.campaigns.campaign_triggers import listed_triggers
 from mutator.campaigns.installed_studies import study_problems
-from mutator.config.sources import Keys
+from mutator.config.yaml_sources import Keys
 from mutator.errors import MutatorError
-from mutator.faults.expansion import expand
 from mutator.faults.fault_models import Example, FaultModel, FaultModels
-from mutator.faults.parameters import resolve
-from mutator.faults.readings import Readings
-from mutator.faults.specs import FaultSpec, Variant
+from mutator.faults.fault_specs import FaultSpec, Variant
+from mutator.faults.injection_parameters import resolve
+from mutator.faults.library_readings import Readings
+from mutator.faults.spec_expansion import expand
 from mutator.model import Fault
 from mutator.mutants.anchors import parse_file
 from mutator.mutants.injection_edits import edits_of, injection_edit
 from mutator.mutants.mutant_building import build
 from mutator.mutants.splicing import apply_edits, in_lines, joined, unsplice
 from mutator.onboarding.todo_marks import unfilled
-from mutator.stpa.checks import check_analysis
+from mutator.stpa.analysis_checks import check_analysis
 from mutator.stpa.context_tables import ContextTable
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.requirements import check_requirements
-from mutator.triggers.kinds import always
+from mutator.targets.required_packages import check_requirements
+from mutator.triggers.trigger_kinds import always
 from mutator.workspace import Workspace
 
 EXAMPLE_TAG = "example"

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from mutator._common.text import counted
+from mutator._common.message_text import counted
 from mutator.campaigns.campaign_files import Campaign
 from mutator.campaigns.campaign_triggers import listed_triggers
 from mutator.checks.findings import Finding, Level, Place
@@ -20,7 +20,7 @@ from mutator.model import Fault, FaultLocation, Injection, Method, Trigger
 from mutator.mutants.mutant_building import Mutant, build
 from mutator.preflight.unreached_triggers import decision_of, holds
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.kinds import always, at_time
+from mutator.triggers.trigger_kinds import always, at_time
 from mutator.workspace import Workspace
 
 _COUNT = "count_only"

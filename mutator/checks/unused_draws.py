@@ -10,8 +10,8 @@ from jinja2.sandbox import ImmutableSandboxedEnvironment
 
 from mutator.checks.findings import Finding, Level, Place
 from mutator.faults.fault_models import NAMES, FaultModels, SnippetKind
-from mutator.faults.injections import Drawn, InjectionSpec, reference
-from mutator.faults.specs import FaultSpec
+from mutator.faults.fault_specs import FaultSpec
+from mutator.faults.injection_specs import Drawn, InjectionSpec, reference
 
 _NAME = "draws"
 

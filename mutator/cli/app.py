@@ -15,10 +15,10 @@ import typer
 from typer.core import TyperGroup
 from typer.main import get_command
 
-from mutator._common import events
+from mutator._common import progress_events
 from mutator._common.files import disk_full, is_disk_full
 from mutator._common.interrupts import terminable
-from mutator._common.shortages import shortage
+from mutator._common.resource_shortages import shortage
 from mutator._common.version import VERSION
 from mutator.cli import (
     audits,
@@ -188,7 +188,7 @@ def _command() -> Any:
 
 def _answer(words: Sequence[str]) -> int:
     try:
-        events.open_events()
+        progress_events.open_events()
         # Not `app()`, which has its own handling of errors, interrupts and closed pipes.
         command = _command()
         if "_MUTATOR_COMPLETE" in os.environ:  # a shell asks for completions
@@ -250,7 +250,7 @@ def _warnings_in_one_line() -> Iterator[None]:
 
         def show(message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
             if issubclass(category, MutatorWarning):
-                events.warning(str(message))
+                progress_events.warning(str(message))
                 Terminal().note(f"warning: {message}")
             else:
                 others(message, category, *place, **more)
@@ -276,7 +276,7 @@ def _defect() -> int:
 
 
 def _say(text: str) -> None:
-    events.error(text)
+    progress_events.error(text)
     with remarking():
         print(text, file=sys.stderr)
 

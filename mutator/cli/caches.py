@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import mutator
-from mutator._common.text import counted
+from mutator._common.message_text import counted
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json
 from mutator.errors import MutatorError
 
 if TYPE_CHECKING:
-    from mutator._common.caches import Entry
+    from mutator._common.shared_cache import Entry
 
 _UNITS = {"B": 1, "KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
 

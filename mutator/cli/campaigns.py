@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import mutator
-from mutator._common.cores import usable_cores
-from mutator._common.text import counted, seeds_text
+from mutator._common.cpu_cores import usable_cores
+from mutator._common.message_text import counted, seeds_text
 from mutator.cli import completion
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import (

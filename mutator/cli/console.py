@@ -17,10 +17,10 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TextIO
 
-from mutator._common import events
+from mutator._common import progress_events
 from mutator._common.hashing import plain
-from mutator._common.tables import Table
-from mutator._common.text import folded
+from mutator._common.message_text import folded
+from mutator._common.table_rendering import Table
 from mutator.errors import MutatorError
 
 if TYPE_CHECKING:
@@ -65,12 +65,12 @@ class Terminal:
 
     def result(self, text: str, style: str | None = None) -> None:
         """Print the sentence that says what came out of the command."""
-        events.result(text)
+        progress_events.result(text)
         self.say(text, style)
 
     def link(self, kind: str, path: Path, text: str | None = None) -> None:
         """Print where a file was written: `kind: path`, or `text`."""
-        events.link(kind, path)
+        progress_events.link(kind, path)
         self.say(text or f"{kind}: {short_path(path)}")
 
     def note(self, text: str) -> None:
@@ -80,7 +80,7 @@ class Terminal:
 
     def complain(self, text: str) -> None:
         """Print an error to standard error."""
-        events.error(text)
+        progress_events.error(text)
         with remarking():
             _print(self.err, f"error: {text}", "bold red")
 
@@ -125,7 +125,7 @@ class Terminal:
 
     @contextmanager
     def wait(self, text: str) -> Iterator[None]:
-        events.phase(text)
+        progress_events.phase(text)
         if self.as_json or not self.err.is_terminal:
             yield
             return

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import mutator
-from mutator._common.text import counted
+from mutator._common.message_text import counted
 from mutator.api.experiment_results import describe
 from mutator.api.stored_experiments import StoredExperiment, newest_run, stored_run
 from mutator.api.worst import worst_results

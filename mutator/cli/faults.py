@@ -7,9 +7,9 @@ from typing import Annotated
 import typer
 
 import mutator
-from mutator._common.below import is_inside
+from mutator._common.confined_files import is_inside
 from mutator._common.doors import OPERATORS
-from mutator._common.text import counted
+from mutator._common.message_text import counted
 from mutator.cli import completion
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json, Manifest, Place, Reading, Run, Seed, Value, Variant, with_place

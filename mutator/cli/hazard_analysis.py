@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import mutator
-from mutator._common.text import counted
+from mutator._common.message_text import counted
 from mutator.cli.console import Terminal, error_text, short_path
 from mutator.cli.options import Json, Manifest, Place, with_place
 from mutator.errors import EXIT_CHECK_FAILED, MutatorError
 
 if TYPE_CHECKING:
-    from mutator.stpa.analysis import Analysis
+    from mutator.stpa.analysis_files import Analysis
     from mutator.stpa.context_tables import ContextTable
 
 EXAMPLES = """\b

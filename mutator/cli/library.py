@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import mutator
-from mutator._common.text import counted
+from mutator._common.message_text import counted
 from mutator.cli import completion
 from mutator.cli.console import Terminal, error_text, short_path, with_options
 from mutator.cli.options import Json, Manifest, Place, with_place

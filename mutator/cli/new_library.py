@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 
 import mutator
-from mutator._common.text import counted
+from mutator._common.message_text import counted
 from mutator.cli.console import Terminal, short_path, with_options
 from mutator.cli.options import Json
 from mutator.errors import MutatorError

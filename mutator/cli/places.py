@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import mutator
-from mutator._common.text import counted
+from mutator._common.message_text import counted
 from mutator.cli.console import Terminal
 from mutator.cli.options import Json, Manifest, Place, with_place
 

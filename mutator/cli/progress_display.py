@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from typing import TYPE_CHECKING
 
-from mutator._common import events
+from mutator._common import progress_events
 from mutator.cli.console import Terminal
 from mutator.execution.progress_text import Lines, count, endings, rate, remaining, title
 
@@ -18,7 +18,7 @@ def campaign_progress(terminal: Terminal) -> Iterator[Callable[["Progress"], Non
     with _live(terminal) if terminal.err.is_terminal else nullcontext(Lines(terminal.note)) as show:
 
         def notify(progress: "Progress") -> None:
-            events.phase(title(progress), progress.done, progress.total, progress.outcomes)
+            progress_events.phase(title(progress), progress.done, progress.total, progress.outcomes)
             show(progress)
 
         yield notify

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import mutator
-from mutator._common.text import counted
+from mutator._common.message_text import counted
 from mutator.cli import review_view
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json, Place, with_place

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from mutator._common.text import counted
+from mutator._common.message_text import counted
 from mutator.cli import review_view
 from mutator.cli.console import Terminal, short_path
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from mutator._common.text import counted
+from mutator._common.message_text import counted
 from mutator.cli.console import Terminal
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ import typer
 from typer.core import TyperGroup
 
 import mutator
-from mutator._common.text import counted
+from mutator._common.message_text import counted
 from mutator.cli import review_changes, review_view
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json, Place, with_place

@@ -12,7 +12,7 @@ from mutator.results.result_rows import Row, rows_of
 from mutator.results.table_reader import frame_of
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
-from mutator.targets.severity import Scale
+from mutator.targets.contact_severity import Scale
 from mutator.targets.target_facts import T_END
 
 

@@ -7,10 +7,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from mutator._common.below import inside
+from mutator._common.confined_files import inside
 from mutator._common.files import make_folder, write_atomic
-from mutator._common.tables import Table, markdown_line
-from mutator._common.text import counted
+from mutator._common.message_text import counted
+from mutator._common.table_rendering import Table, markdown_line
 from mutator.comparison.input_differences import InputFact
 from mutator.comparison.pairs import ExperimentPair, ResultChange, time_to_hazard
 from mutator.comparison.run_comparison import Comparison, Gate, describe_ending_change

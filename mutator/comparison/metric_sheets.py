@@ -11,7 +11,7 @@ from mutator.comparison.pairs import ExperimentPair
 from mutator.statistics.median_intervals import median_difference
 from mutator.statistics.paired_statistics import wilcoxon_p
 from mutator.statistics.statistics_sheet import PValue, Sheet, SheetCell
-from mutator.targets.severity import CLASSES
+from mutator.targets.contact_severity import CLASSES
 
 NO_CONTACT = "no contact"
 

@@ -13,11 +13,11 @@ import yaml
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError
 from pydantic_core import CoreSchema
 
-from mutator._common.bounded import read_bounded
+from mutator._common.bounded_reading import read_bounded
 from mutator._common.files import check_schema
-from mutator._common.text import counted, shown
-from mutator.config import problems
-from mutator.config.sources import Keys, Source
+from mutator._common.message_text import counted, shown
+from mutator.config import validation_messages
+from mutator.config.yaml_sources import Keys, Source
 from mutator.errors import MutatorError
 
 M = TypeVar("M", bound="StrictModel")
@@ -234,7 +234,9 @@ def read(
         return model.model_validate(body), source
     except ValidationError as error:
         found = error.errors(include_url=False)
-        got, expected, remedy, keys = problems.explain(problems.most_telling(found), model)
+        got, expected, remedy, keys = validation_messages.explain(
+            validation_messages.most_telling(found), model
+        )
         if len(found) > 1:
             remedy += f" ({counted(len(found) - 1, 'more mistake')} after this one)"
         raise source.error(keys, got, expected=expected, remedy=remedy) from None

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from mutator.mutants.probe import Probe
-from mutator.triggers.over_time import ARITHMETIC, COMPARE
+from mutator.triggers.trace_formulas import ARITHMETIC, COMPARE
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)  # hashed by identity, because hashing all values is slow

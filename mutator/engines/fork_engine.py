@@ -16,7 +16,7 @@ from pathlib import Path
 from secrets import token_bytes
 from typing import Any
 
-from mutator._common.bounded import read_bounded
+from mutator._common.bounded_reading import read_bounded
 from mutator._common.files import clear_place, disk_full, raising_disk_full, remove_folder, write_atomic
 from mutator._common.hashing import content_id
 from mutator.engines.code_swap import CodeSwap, plan_swap
@@ -38,8 +38,8 @@ from mutator.model import Limits, Status
 from mutator.mutants.mutant_building import Mutant, build
 from mutator.mutants.probe import Probe, probe_module, silent_report, state_after
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.stopping import stop_source
-from mutator.triggers.kinds import always
+from mutator.targets.stop_code import stop_source
+from mutator.triggers.trigger_kinds import always
 
 _Key = tuple[str, int, tuple[str, ...]]
 

@@ -17,9 +17,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mutator._common.bounded import read_bounded
+from mutator._common.bounded_reading import read_bounded
+from mutator._common.file_change_detection import UnchangedFiles
 from mutator._common.files import remove_folder
-from mutator._common.unchanged_files import UnchangedFiles
 from mutator.engines import bytecode
 from mutator.engines.job_tree import RunTree
 from mutator.engines.sandbox import Sandbox

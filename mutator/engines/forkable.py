@@ -11,7 +11,7 @@ from mutator.faults.fault_models import FaultModels
 from mutator.model import Fault
 from mutator.mutants.mutant_building import build
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.kinds import always
+from mutator.triggers.trigger_kinds import always
 
 
 def unfit(manifest: TargetManifest) -> NotForkable | None:

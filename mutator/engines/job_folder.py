@@ -17,7 +17,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from mutator._common.below import move_plain, open_folder, read_below
+from mutator._common.confined_files import move_plain, open_folder, read_below
 from mutator._common.files import clear_place
 from mutator.engines.target_processes import parsed_report, tail
 from mutator.errors import Outside

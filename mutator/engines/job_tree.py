@@ -11,7 +11,7 @@ from contextlib import suppress
 from importlib.machinery import all_suffixes
 from pathlib import Path
 
-from mutator._common.unchanged_files import UnchangedFiles
+from mutator._common.file_change_detection import UnchangedFiles
 
 _IMPORTED = tuple(all_suffixes())
 

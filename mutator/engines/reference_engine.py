@@ -11,10 +11,10 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from mutator._common.bounded import read_bounded
+from mutator._common.bounded_reading import read_bounded
+from mutator._common.file_change_detection import UnchangedFiles
 from mutator._common.files import clear_place, disk_full, raising_disk_full, remove_folder
 from mutator._common.hashing import digest
-from mutator._common.unchanged_files import UnchangedFiles
 from mutator.engines.engine_jobs import Execution, Job, Raised, RunMode, Setting, failed
 from mutator.engines.job_folder import OUTPUT, RunHome, is_disturbance, make_work
 from mutator.engines.job_tree_pool import BaseTree
@@ -35,7 +35,7 @@ from mutator.model import Limits, Status
 from mutator.mutants.anchors import parsed
 from mutator.mutants.probe import probe_module, state_after
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.stopping import stop_source
+from mutator.targets.stop_code import stop_source
 
 _CHILD = Path(__file__).parent / "in_target" / "run_once.py"
 _LOOK_UP_S = 0.5  # interval between two checks that the parent is alive

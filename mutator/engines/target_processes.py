@@ -12,13 +12,13 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any
 
-from mutator._common.below import open_below
+from mutator._common.confined_files import open_below
 from mutator._common.files import is_disk_full
 from mutator.engines.engine_jobs import Raised
 from mutator.engines.in_target import process_guard
 from mutator.errors import MutatorError, Outside
 from mutator.model import Limits, Status
-from mutator.targets.environment import FIXED, KEPT
+from mutator.targets.process_environment import FIXED, KEPT
 
 LOST = "lost"  # no process is left to report the ending
 PATIENCE_S = 60.0  # time for the guard's report, after a run's wall limit

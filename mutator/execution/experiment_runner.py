@@ -7,10 +7,10 @@ from functools import cache, lru_cache
 from pathlib import Path
 from typing import TypeVar
 
-from mutator._common.below import inside
-from mutator._common.bounded import read_bounded
+from mutator._common.bounded_reading import read_bounded
+from mutator._common.confined_files import inside
+from mutator._common.file_change_detection import UnchangedFiles
 from mutator._common.hashing import digest
-from mutator._common.unchanged_files import UnchangedFiles
 from mutator.campaigns.shared_runs import runs
 from mutator.engines.engine_jobs import Engine, Execution, Job, RunMode
 from mutator.errors import BadAddition, BadOutput, InvalidMutant, MutatorError

@@ -11,8 +11,8 @@ from typing import Any, Protocol
 
 import pytest
 
-from mutator._common.locks import living_workers
-from mutator._common.shortages import shortage
+from mutator._common.folder_locks import living_workers
+from mutator._common.resource_shortages import shortage
 from mutator.errors import HarnessErrors, MutatorError
 from mutator.execution.progress_reporting import followed
 from mutator.execution.progress_text import Lines

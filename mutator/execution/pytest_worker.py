@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from mutator._common.files import raising_disk_full
-from mutator._common.locks import register_worker
-from mutator._common.shortages import shortage
+from mutator._common.folder_locks import register_worker
+from mutator._common.resource_shortages import shortage
 from mutator.campaigns.chunks import Pending
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.errors import DiskFull, HarnessErrors, MutatorError, Shortage

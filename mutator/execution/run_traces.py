@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from mutator._common.below import inside
+from mutator._common.confined_files import inside
 from mutator.errors import MutatorError
 from mutator.execution.single_run import rerun
 from mutator.model import Experiment, Record

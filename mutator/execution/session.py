@@ -19,8 +19,8 @@ from secrets import token_bytes
 from typing import Any
 
 from mutator._common.files import clear_place, is_half_written
+from mutator._common.folder_locks import owned, wait_for_workers
 from mutator._common.interrupts import terminable
-from mutator._common.locks import owned, wait_for_workers
 from mutator.audit.seal import Seals, seals_of
 from mutator.campaigns.chunks import Pending, pending
 from mutator.campaigns.freezing import make_run_folder
@@ -47,7 +47,7 @@ from mutator.store.run_folder import RunFolder
 from mutator.store.run_progress import Progress, label
 from mutator.store.series_packing import pack, segments
 from mutator.store.work_stretches import Machine
-from mutator.targets.requirements import check_requirements
+from mutator.targets.required_packages import check_requirements
 from mutator.workspace import Workspace
 
 EXIT_INTERRUPTED = 130

@@ -7,10 +7,10 @@ from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
-from mutator._common.below import inside, open_below
+from mutator._common.confined_files import inside, open_below
 from mutator._common.files import raising_disk_full, read_json, write_atomic, writing_atomic
-from mutator._common.locks import owned
-from mutator._common.text import counted
+from mutator._common.folder_locks import owned
+from mutator._common.message_text import counted
 from mutator.audit.seal import OUTSIDE, without
 from mutator.campaigns.freezing import make_run_folder
 from mutator.campaigns.run_provenance import other_versions

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import mkdtemp
 
-from mutator._common.below import inside
+from mutator._common.confined_files import inside
 from mutator._common.files import make_folder, raising_disk_full, remove_folder, write_atomic
-from mutator._common.locks import alone_in
+from mutator._common.folder_locks import alone_in
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.run_provenance import check_sources
 from mutator.engines.engine_jobs import Job
@@ -21,7 +21,7 @@ from mutator.mutants.mutant_building import Mutant
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.requirements import check_requirements
+from mutator.targets.required_packages import check_requirements
 from mutator.workspace import Workspace
 
 

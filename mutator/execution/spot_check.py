@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from random import SystemRandom
 
-from mutator._common.below import inside
+from mutator._common.confined_files import inside
 from mutator._common.files import ScratchFolder
 from mutator.errors import MutatorError
 from mutator.execution.single_run import manifest_of, run_single

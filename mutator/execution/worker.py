@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from mutator._common import caches
-from mutator._common.below import inside
+from mutator._common import shared_cache
+from mutator._common.confined_files import inside
 from mutator._common.files import raising_disk_full
 from mutator.campaigns.chunks import Pending
 from mutator.campaigns.run_inputs import RunInputs
@@ -85,7 +85,7 @@ class Worker:
     def _make_room(self, seed: int) -> None:
         """Delete images of earlier seeds, which would fill the disk."""
         if len(self.folder.seeds) > 1 and seed != self._seed:
-            caches.make_room(self._manifest.cache_name)
+            shared_cache.make_room(self._manifest.cache_name)
         self._seed = seed
 
     def prove(self, sample: Sample) -> list[tuple[str, str]]:

@@ -4,7 +4,7 @@ import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 
-from mutator._common.below import open_below, read_below, unlink_below, write_below
+from mutator._common.confined_files import open_below, read_below, unlink_below, write_below
 from mutator._common.files import raising_disk_full
 from mutator.store import file_digests
 

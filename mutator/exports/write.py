@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from mutator._common.below import inside
+from mutator._common.confined_files import inside
 from mutator._common.doors import EXPORTS
 from mutator._common.files import make_folder, write_atomic
 from mutator.exports import ExportRequest, Parts, check_options, find_export

@@ -8,11 +8,11 @@ from typing import Literal
 from pydantic import Field
 
 from mutator._common import hashing
-from mutator._common.below import check_inside
-from mutator._common.bounded import read_bounded
+from mutator._common.bounded_reading import read_bounded
+from mutator._common.confined_files import check_inside
 from mutator.config import units
-from mutator.config.sources import Source
 from mutator.config.yaml_files import MAX_BYTES, StrictModel, Written, read
+from mutator.config.yaml_sources import Source
 from mutator.errors import MutatorError
 from mutator.faults import probe_templates
 from mutator.faults.fault_models import (

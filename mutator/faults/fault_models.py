@@ -7,11 +7,11 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Literal
 
-from mutator._common.text import suggestion
-from mutator._common.yaml_records import mapping, written
-from mutator.config.sources import Source
+from mutator._common.message_text import suggestion
+from mutator._common.yaml_dataclasses import mapping, written
+from mutator.config.yaml_sources import Source
 from mutator.errors import MutatorError
-from mutator.faults.injections import InjectionSpec
+from mutator.faults.injection_specs import InjectionSpec
 from mutator.faults.probe_templates import ProbeTemplates
 
 FILES = ("*.yaml", "*.j2")  # what a templates folder consists of

@@ -5,13 +5,13 @@ from typing import Any
 
 from pydantic import Field
 
-from mutator._common.text import shown
+from mutator._common.message_text import shown
 from mutator.config import units
-from mutator.config.instances import instance_condition
-from mutator.config.place_model import AtModel
-from mutator.config.sources import Keys, Source
+from mutator.config.instance_conditions import instance_condition
+from mutator.config.location_model import AtModel
 from mutator.config.yaml_files import StrictModel
-from mutator.faults.injections import DIMENSIONLESS, InjectionSpec, ParamSpec, ParamValue, reference
+from mutator.config.yaml_sources import Keys, Source
+from mutator.faults.injection_specs import DIMENSIONLESS, InjectionSpec, ParamSpec, ParamValue, reference
 from mutator.model import FIXED_ANCHORS, AnchorKind
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import accumulate
 from pathlib import Path
 
-from mutator.config.locations import PROBE_NAME
+from mutator.config.location_syntax import PROBE_NAME
 from mutator.errors import MutatorError
 
 CODE = f"{PROBE_NAME}.py.j2"

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from mutator._common.interrupts import held
-from mutator._common.text import counted, suggestion
+from mutator._common.message_text import counted, suggestion
 from mutator.errors import MutatorError
 from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS, Anchor, AnchorKind, FaultLocation
 from mutator.mutants.constants_and_defaults import FixedValue, choose_fixed, find_fixed

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from mutator._common.text import suggestion
+from mutator._common.message_text import suggestion
 from mutator.errors import MutatorError
 from mutator.model import AnchorKind, FaultLocation
 from mutator.mutants.expression_roles import blocks

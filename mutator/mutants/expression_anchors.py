@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from difflib import get_close_matches
 from pathlib import Path
 
-from mutator._common.text import counted
+from mutator._common.message_text import counted
 from mutator.errors import MutatorError
 from mutator.model import Anchor, AnchorKind, FaultLocation
 from mutator.mutants.expressions import Expression

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from mutator.config.locations import PROBE_NAME
+from mutator.config.location_syntax import PROBE_NAME
 from mutator.model import Injection
 
 IMPORT_TAG = "probe"  # on the line that imports the probe

@@ -4,8 +4,8 @@ import ast
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from mutator.config.instances import names_of
-from mutator.config.locations import base_name
+from mutator.config.instance_conditions import names_of
+from mutator.config.location_syntax import base_name
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel, FaultModels, Needs, SnippetKind
 from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS, AnchorKind, Injection
@@ -28,7 +28,7 @@ from mutator.mutants.splicing import (
 )
 from mutator.mutants.statement_texts import written_out
 from mutator.mutants.template_rendering import changed_value, snippet
-from mutator.targets.locations import check_location
+from mutator.targets.allowed_locations import check_location
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.source_tree import SourceTree
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from mutator._common.below import inside
+from mutator._common.confined_files import inside
 from mutator._common.hashing import content_id
 from mutator.errors import InvalidMutant, MutatorError
 from mutator.faults.fault_models import FaultModels

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from mutator.config.locations import as_written_at, assignable, dotted_name
+from mutator.config.location_syntax import as_written_at, assignable, dotted_name
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel, FaultModels, Needs, SnippetKind
 from mutator.model import Anchor, AnchorKind, FaultLocation

@@ -12,12 +12,12 @@ from itertools import chain
 from typing import Any
 
 from mutator._common.hashing import content_id
-from mutator.config.locations import PROBE_NAME
+from mutator.config.location_syntax import PROBE_NAME
 from mutator.errors import MutatorError
 from mutator.faults.probe_templates import ProbeTemplates, TemplatePart
 from mutator.model import Activation, Hold, Injection, Trigger
 from mutator.mutants.template_rendering import render
-from mutator.targets.observation import Observation
+from mutator.targets.observed_values import Observation
 from mutator.triggers.conditions import TIME, check_condition, to_code
 
 _IN_CODE = ("observed", "values", "counted", "sets")  # settings that the template of the code uses

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import libcst as cst
 
-from mutator.config.locations import assignable
+from mutator.config.location_syntax import assignable
 from mutator.mutants.name_scopes import FunctionNames, as_compiled
 from mutator.mutants.node_positions import Place, Positions, function_place, line_after, statement_place
 

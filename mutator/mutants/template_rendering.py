@@ -17,7 +17,7 @@ from typing import NoReturn
 from jinja2 import TemplateError, TemplateSyntaxError, Undefined
 
 from mutator.config import units
-from mutator.config.locations import PROBE_NAME, assignable, dotted_name
+from mutator.config.location_syntax import PROBE_NAME, assignable, dotted_name
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import NAMES, FaultModel, ParamSchema, SnippetKind
 from mutator.model import Value

@@ -10,8 +10,8 @@ from typing import Any
 import yaml
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from mutator._common.shipped import make_empty
-from mutator._common.text import counted
+from mutator._common.message_text import counted
+from mutator._common.shipped_files import make_empty
 from mutator.errors import MutatorWarning
 from mutator.onboarding.source_survey import Survey
 from mutator.onboarding.step_candidates import LoopCandidate, loop_candidates

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from importlib import metadata
 from pathlib import Path
 
-from mutator._common.below import check_inside
-from mutator._common.bounded import read_bounded
+from mutator._common.bounded_reading import read_bounded
+from mutator._common.confined_files import check_inside
 from mutator.errors import MutatorError, Outside
 from mutator.targets.roots import INSTALLED, installed_at
 from mutator.targets.source_tree import MOST_SOURCE

@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-from mutator._common.below import files_inside
-from mutator._common.bounded import read_bounded
+from mutator._common.bounded_reading import read_bounded
+from mutator._common.confined_files import files_inside
 from mutator.config.yaml_files import MAX_BYTES
 from mutator.errors import MutatorError
 

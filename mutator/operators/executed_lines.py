@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mutator._common import caches
-from mutator._common.bounded import read_bounded
+from mutator._common import shared_cache
+from mutator._common.bounded_reading import read_bounded
 from mutator._common.files import ScratchFolder, json_bytes, write_atomic
 from mutator._common.hashing import digest
 from mutator.engines.engine_jobs import Job
@@ -72,7 +72,7 @@ def _key(manifest: TargetManifest, drive: GoldenDrive) -> str:
 
 
 def _recalled(key: str) -> Executed | None:
-    path = caches.of_lines() / f"{key}.json"
+    path = shared_cache.of_lines() / f"{key}.json"
     try:
         data: dict[str, Any] = json.loads(read_bounded(path))
         if data["sum"] == digest([key, data["lines"]]):
@@ -85,7 +85,7 @@ def _recalled(key: str) -> Executed | None:
 
 def _remember(key: str, executed: Executed) -> None:
     lines = {file: sorted(numbers) for file, numbers in executed.items()}
-    path = caches.of_lines() / f"{key}.json"
+    path = shared_cache.of_lines() / f"{key}.json"
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_atomic(path, json_bytes({"sum": digest([key, lines]), "lines": lines}))

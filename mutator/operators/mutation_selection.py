@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
 from mutator._common.hashing import digest
+from mutator._common.message_text import counted, suggestion
 from mutator._common.random_streams import generator
-from mutator._common.text import counted, suggestion
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.mutants.anchors import parsed
@@ -14,7 +14,7 @@ from mutator.operators.equal_code_filter import distinct
 from mutator.operators.mutation_listing import mutations_of
 from mutator.operators.mutations import Mutation
 from mutator.operators.statement_facts import facts_of
-from mutator.targets.locations import check_file
+from mutator.targets.allowed_locations import check_file
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.source_tree import matches
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mutator._common.tables import Table
+from mutator._common.table_rendering import Table
 from mutator.outcomes.golden_comparison import load_record, load_trace
 from mutator.outcomes.hazards_and_metrics import judge_run
 from mutator.store.run_folder import GoldenRun, RunFolder

@@ -18,7 +18,7 @@ from mutator.outcomes.channel_departures import Departure
 from mutator.outcomes.fault_routes import PossibleRoute, chained, links_of, steps_from, structured
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import HEAD, REMEDY
-from mutator.stpa.analysis import Kind, StructureModel
+from mutator.stpa.analysis_files import Kind, StructureModel
 from mutator.targets.channels import Role
 from mutator.targets.target_facts import ChannelFacts
 

@@ -4,7 +4,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from mutator.stpa.analysis import Kind, StructureModel
+from mutator.stpa.analysis_files import Kind, StructureModel
 from mutator.targets.channels import Role
 
 

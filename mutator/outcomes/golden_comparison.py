@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from mutator._common.below import inside
-from mutator._common.bounded import MOST_JSON, read_bounded
+from mutator._common.bounded_reading import MOST_JSON, read_bounded
+from mutator._common.confined_files import inside
 from mutator._common.doors import IMPORTERS
 from mutator._common.hashing import digest
-from mutator._common.shortages import shortage
+from mutator._common.resource_shortages import shortage
 from mutator.errors import BadOutput, BadTrace, MutatorError
 from mutator.outcomes import trace_files
 from mutator.outcomes.trace_files import own_times

@@ -17,10 +17,10 @@ from mutator.outcomes.golden_comparison import (
     load_trace,
     on_steps,
 )
+from mutator.targets.contact_severity import DELTA_V
 from mutator.targets.criteria import Hazard, Metric
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.severity import DELTA_V
-from mutator.triggers import over_time, stl
+from mutator.triggers import temporal_logic, trace_formulas
 from mutator.triggers.conditions import GOLDEN, TIME, names_in
 
 Values = Mapping[str, np.ndarray]
@@ -76,7 +76,7 @@ def judge_run(
         if (end := _end(hazard, first, values)) is not None:
             ends[hazard.name] = end
         if hazard.metric is not None:
-            numbers = robust if robust is not None else over_time.numbers(hazard.margin, values)
+            numbers = robust if robust is not None else trace_formulas.numbers(hazard.margin, values)
             metrics.append((hazard.metric, numbers))
     measured = [metric for metric in manifest.metrics if golden is not None or not metric.uses_golden]
     metrics += [(metric, _numbers(metric, values)) for metric in measured]
@@ -105,7 +105,7 @@ def values_of(manifest: TargetManifest, trace: Trace) -> Values:
         values[channel.name] = on_steps(trace, channel.name, time).astype(float)
     for value in manifest.observation.derived:
         if value.name not in values and all(name in values for name in names_in(value.text)):
-            values[value.name] = over_time.numbers(value.text, values)
+            values[value.name] = trace_formulas.numbers(value.text, values)
     return values
 
 
@@ -118,7 +118,7 @@ def _golden_values(golden: Values, steps: np.ndarray) -> Values:
 
 def _robustness(hazard: Hazard, values: Values, manifest: TargetManifest) -> np.ndarray:
     try:
-        return stl.robustness(hazard.stl, values, manifest.step_s)
+        return temporal_logic.robustness(hazard.stl, values, manifest.step_s)
     except MutatorError as error:
         where = manifest.trace_file
         raise BadOutput(error.got, where=where, expected=error.expected, remedy=error.remedy) from None
@@ -129,7 +129,7 @@ def _first(
 ) -> float | None:
     if hazard.recorded:
         return record.get("hazards", {}).get(hazard.name)  # type: ignore[no-any-return]
-    holds = robust < 0.0 if robust is not None else over_time.holds(hazard.when, values)
+    holds = robust < 0.0 if robust is not None else trace_formulas.holds(hazard.when, values)
     return _first_of(_lasting(holds, values[TIME], hazard.for_s), values[TIME])
 
 
@@ -151,7 +151,7 @@ def _end(hazard: Hazard, first: float | None, values: Values) -> float | None:
         return first
     if not hazard.terminal:
         return None
-    return _first_of(over_time.holds(hazard.terminal, values), values[TIME])
+    return _first_of(trace_formulas.holds(hazard.terminal, values), values[TIME])
 
 
 def _numbers(metric: Metric, values: Values) -> np.ndarray:
@@ -159,9 +159,9 @@ def _numbers(metric: Metric, values: Values) -> np.ndarray:
     missing.
     """
     if metric.aggregate == "duration":
-        numbers = over_time.holds(metric.formula, values).astype(float)
+        numbers = trace_formulas.holds(metric.formula, values).astype(float)
     else:
-        numbers = over_time.numbers(metric.formula, values)
+        numbers = trace_formulas.numbers(metric.formula, values)
     return np.where(np.isnan(values[GOLDEN + TIME]), np.nan, numbers) if metric.uses_golden else numbers
 
 
@@ -176,7 +176,7 @@ def _aggregate(metric: Metric, numbers: np.ndarray, values: Values, t_end: float
         driven &= t_end is not None and time == time[driven].max(initial=-math.inf)
     counts = np.isfinite(numbers) & driven
     if metric.where:
-        counts &= over_time.holds(metric.where, values)
+        counts &= trace_formulas.holds(metric.where, values)
     if metric.aggregate in ("integral", "duration"):
         until = np.append(time[1:], time[-1:])  # each value lasts until the next step or the end of the drive
         lengths = np.minimum(until, math.inf if t_end is None else max(t_end, time[0])) - time

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from mutator._common.bounded import MOST_JSON, MOST_WHOLE, read_bounded
+from mutator._common.bounded_reading import MOST_JSON, MOST_WHOLE, read_bounded
 from mutator.errors import BadTrace
 
 _MAGIC = b"\x89MCAP0\r\n"

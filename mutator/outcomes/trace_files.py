@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from mutator._common.bounded import MOST_WHOLE
+from mutator._common.bounded_reading import MOST_WHOLE
 from mutator._common.doors import IMPORTERS
 from mutator.errors import BadTrace
 from mutator.targets.channels import Channel

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 
 from mutator.model import Activation, Outcome, Record
-from mutator.targets.severity import DELTA_V, Scale
+from mutator.targets.contact_severity import DELTA_V, Scale
 
 Events = Sequence[tuple[str, float]]  # (name, time in s), sorted by time
 

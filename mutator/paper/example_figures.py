@@ -5,7 +5,7 @@ from typing import Any
 
 import pandas as pd
 
-from mutator._common.text import counted
+from mutator._common.message_text import counted
 from mutator.errors import MutatorError
 from mutator.execution.run_traces import Traces
 from mutator.figures.drawings import Drawing

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from mutator._common.text import counted
+from mutator._common.message_text import counted
 from mutator.statistics import event_times, guided_against_random
 from mutator.statistics.shares import CONFIDENCE, Share
 from mutator.statistics.shares import share as wilson

@@ -12,8 +12,8 @@ from typing import Any
 import pandas as pd
 from pydantic import Field, model_validator
 
-from mutator.config.sources import Source
 from mutator.config.yaml_files import StrictModel, read
+from mutator.config.yaml_sources import Source
 from mutator.paper.measures import MEASURES, Estimate, of_difference, of_share
 from mutator.statistics.shares import share
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from mutator._common.tables import Table
+from mutator._common.table_rendering import Table
 from mutator.paper.observations import JudgedObservation, Verdict, judge
 from mutator.statistics.seed_spread import seeds_of
 from mutator.statistics.statistics_sheet import Sheet, SheetCell

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
-from mutator._common.tables import Table
+from mutator._common.table_rendering import Table
 from mutator.paper.observations import FEWEST, JudgedClaim, JudgedObservation
 from mutator.statistics.statistics_sheet import Sheet, SheetCell
 

@@ -4,8 +4,8 @@ import re
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from mutator._common.bounded import read_bounded
-from mutator._common.text import counted
+from mutator._common.bounded_reading import read_bounded
+from mutator._common.message_text import counted
 from mutator.config.yaml_files import MAX_BYTES
 from mutator.outcomes.fault_free_runs import own_alerts
 from mutator.paper import observations, observations_by_seed, observations_page

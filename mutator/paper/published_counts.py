@@ -5,8 +5,8 @@ from pathlib import Path
 
 from pydantic import Field
 
-from mutator.config.sources import Source
 from mutator.config.yaml_files import StrictModel, read
+from mutator.config.yaml_sources import Source
 from mutator.statistics.published_counts import PublishedCounts
 from mutator.statistics.tallies import Tally
 

@@ -5,8 +5,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from mutator.config.sources import Source
 from mutator.config.yaml_files import load
+from mutator.config.yaml_sources import Source
 from mutator.errors import MutatorError
 from mutator.paper.published_counts import FILES, Paper, load_paper
 from mutator.statistics.tallies import Tally, sum_tallies

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from mutator.engines.engine_jobs import Job
 from mutator.errors import MutatorError
-from mutator.faults.expansion import expand
+from mutator.faults.spec_expansion import expand
 from mutator.model import Experiment, Fault, fault_label
 from mutator.mutants.mutant_building import build
 from mutator.preflight.preflight_rules import CheckRun

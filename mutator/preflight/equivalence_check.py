@@ -14,7 +14,7 @@ from pathlib import Path
 
 from mutator._common.files import raising_disk_full, remove_folder
 from mutator._common.hashing import digest
-from mutator._common.text import counted
+from mutator._common.message_text import counted
 from mutator.campaigns.sampling import pick
 from mutator.engines.engine_jobs import RunMode
 from mutator.errors import CheckFailed

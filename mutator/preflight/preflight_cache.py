@@ -4,8 +4,8 @@ import platform
 import shutil
 from pathlib import Path
 
-from mutator._common import caches, kept_folders
-from mutator._common.below import inside
+from mutator._common import cached_folders, shared_cache
+from mutator._common.confined_files import inside
 from mutator._common.hashing import digest
 from mutator.preflight.unreached_triggers import FOLDER
 
@@ -14,7 +14,7 @@ def entry(key: str) -> Path:
     """Return the path for checks with this digest. Machines with a shared home folder have separate entries,
     because the digest might not cover everything that changes last digits.
     """
-    return inside(caches.of_checks(), digest([key, platform.node()]))
+    return inside(shared_cache.of_checks(), digest([key, platform.node()]))
 
 
 def store(place: Path, run: Path, file: str, observed: Path) -> None:
@@ -28,4 +28,4 @@ def store(place: Path, run: Path, file: str, observed: Path) -> None:
         if (observed / FOLDER).is_dir():
             shutil.copytree(observed / FOLDER, made / FOLDER)
 
-    kept_folders.store(place, fill)
+    cached_folders.store(place, fill)

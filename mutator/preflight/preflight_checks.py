@@ -6,9 +6,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from mutator._common import kept_folders
-from mutator._common.below import inside
-from mutator._common.bounded import read_bounded
+from mutator._common import cached_folders
+from mutator._common.bounded_reading import read_bounded
+from mutator._common.confined_files import inside
 from mutator._common.files import json_bytes, raising_disk_full, read_json, write_atomic
 from mutator._common.hashing import digest
 from mutator.campaigns import run_environment
@@ -30,7 +30,7 @@ from mutator.store.check_results import FILE, SCHEMA, CheckResult
 from mutator.store.file_digests import FileDigest
 from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.kinds import always
+from mutator.triggers.trigger_kinds import always
 from mutator.workspace import Workspace
 
 
@@ -116,7 +116,7 @@ class _Checks:
         copy = self.kept
         try:
             with raising_disk_full(copy):
-                kept_folders.fetch(preflight_cache.entry(self.digest), copy)
+                cached_folders.fetch(preflight_cache.entry(self.digest), copy)
             found = read_json(copy / FILE, SCHEMA)
             results = self._passed(found, copy)
         except DiskFull:

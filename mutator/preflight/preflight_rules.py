@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from mutator._common.below import inside
-from mutator._common.bounded import read_bounded
+from mutator._common.bounded_reading import read_bounded
+from mutator._common.confined_files import inside
 from mutator._common.hashing import digest
 from mutator.engines.engine_jobs import Execution
 from mutator.errors import BadOutput

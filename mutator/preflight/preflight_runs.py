@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mutator._common import caches
-from mutator._common.below import inside
+from mutator._common import shared_cache
+from mutator._common.confined_files import inside
 from mutator._common.files import remove_folder
 from mutator.engines.engine_jobs import Job
 from mutator.engines.reference_engine import ReferenceEngine
@@ -19,7 +19,7 @@ from mutator.preflight.preflight_rules import CheckRun, look
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_progress import Pace, Progress
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.kinds import always
+from mutator.triggers.trigger_kinds import always
 from mutator.workspace import Workspace
 
 GOLDEN, AGAIN, NULL = "golden", "golden again", "null mutant"
@@ -100,7 +100,7 @@ class CheckDriver:
             execution = engine.execute(job, scratch)
             run = look(self.manifest, execution)
             if name[0] == GOLDEN and name[1].seed is not None:
-                caches.make_room(self.manifest.cache_name)
+                shared_cache.make_room(self.manifest.cache_name)
             if name[0] == NULL:
                 unreached_triggers.write_observed(self.kept, name[1].key, execution.watched.get("seen", ()))
             if name[0] == GOLDEN and not run.problem:

@@ -12,14 +12,14 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from mutator._common.below import inside
-from mutator._common.bounded import read_bounded
-from mutator._common.text import counted
+from mutator._common.bounded_reading import read_bounded
+from mutator._common.confined_files import inside
+from mutator._common.message_text import counted
 from mutator.engines.first_activation import active_at
 from mutator.model import Experiment, Trigger
 from mutator.mutants.mutant_building import build
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.kinds import time_of
+from mutator.triggers.trigger_kinds import time_of
 from mutator.workspace import Workspace
 
 FOLDER = "observed"

@@ -2,17 +2,17 @@
 
 from collections.abc import Iterable, Iterator
 
-from mutator._common.tables import Table
+from mutator._common.table_rendering import Table
 from mutator.reference.yaml_key_tables import generated
 from mutator.results.plan_columns import PLAN_COLUMNS
 from mutator.results.propagation_columns import COLUMNS as PROPAGATION
 from mutator.results.table_columns import TIMINGS, result_columns, severity_columns
 from mutator.results.table_files import ARROW_TYPES, Column
 from mutator.targets.channels import Channel
+from mutator.targets.contact_severity import DELTA_V
 from mutator.targets.criteria import Hazard, Metric
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.observation import variable_units
-from mutator.targets.severity import DELTA_V
+from mutator.targets.observed_values import variable_units
 from mutator.targets.target_facts import metric_facts
 from mutator.workspace import Workspace
 

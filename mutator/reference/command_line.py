@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from typer.main import get_command
 
-from mutator._common.tables import Table
+from mutator._common.table_rendering import Table
 from mutator.cli.app import EXIT_CODES, GROUPS, app
 from mutator.cli.options import Place
 from mutator.execution import pytest_plugin

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pkgutil import resolve_name
 
 from mutator._common.doors import DISTRIBUTORS, DOORS, EXPORTS, IMPORTERS, OPERATORS, STUDIES, Door
-from mutator._common.tables import Table
+from mutator._common.table_rendering import Table
 from mutator.reference.yaml_key_tables import generated
 from mutator.workspace import Workspace
 
@@ -84,7 +84,7 @@ _PLACES = (
         name="trigger kind",
         adds="when a fault is active",
         protocol="a function that makes a `Trigger` from a condition and a hold",
-        register="`mutator/triggers/kinds.py`; `READERS` and `TYPED` for the command line",
+        register="`mutator/triggers/trigger_kinds.py`; `READERS` and `TYPED` for the command line",
         example="`always` in that module",
     ),
     _Place(

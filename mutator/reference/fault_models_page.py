@@ -3,7 +3,7 @@
 import difflib
 from collections.abc import Iterator
 
-from mutator._common.tables import Table
+from mutator._common.table_rendering import Table
 from mutator.faults import fault_model_files
 from mutator.faults.fault_models import TARGET_UNIT, Example, FaultModel, ParamSchema, SnippetKind
 from mutator.reference.yaml_key_tables import generated, sections

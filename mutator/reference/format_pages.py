@@ -2,15 +2,15 @@
 
 from collections.abc import Iterator
 
-from mutator._common.tables import Table
+from mutator._common.table_rendering import Table
 from mutator.campaigns import campaign_files, campaign_model
 from mutator.config import units
 from mutator.execution.cluster import cluster_files
-from mutator.faults import specs
-from mutator.faults.readings import SCHEMA as READINGS_SCHEMA
-from mutator.faults.readings import UNDECLARED, ReadingsModel
+from mutator.faults import fault_specs
+from mutator.faults.library_readings import SCHEMA as READINGS_SCHEMA
+from mutator.faults.library_readings import UNDECLARED, ReadingsModel
 from mutator.reference.yaml_key_tables import generated, sections
-from mutator.stpa import analysis, context_tables, hazards
+from mutator.stpa import analysis_files, context_tables, hazard_list
 from mutator.targets import manifest_files, severity_model
 from mutator.workspace import Workspace
 
@@ -35,10 +35,10 @@ def render_fault_spec_page(workspace: Workspace) -> str:
         "library is\n`fault_library/faults/<module>/<fault_type>.yaml`. `mutator try FILE --scenario "
         "S1` accepts a file with any path.\n",
         STRICT,
-        f"The first key is `schema: {specs.SCHEMA}`. Files with a newer schema are rejected.\n"
+        f"The first key is `schema: {fault_specs.SCHEMA}`. Files with a newer schema are rejected.\n"
         "[Your editor can check the file](../how-to/edit-with-completion.md) while you write.\n",
         f"```yaml\n{example.rstrip()}\n```\n",
-        *sections("fault-spec.md", specs.spec_model(workspace.readings())),
+        *sections("fault-spec.md", fault_specs.spec_model(workspace.readings())),
         *_readings(),
         "## Units\n",
         *_units(),
@@ -88,15 +88,15 @@ def render_hazard_analysis_page(workspace: Workspace) -> str:
         "analysis](../how-to/change-the-hazard-analysis.md) shows how to write "
         "them. `mutator stpa` prints and checks them.\n",
         f"{_SAME} The first key of each file is `schema`: "
-        f"`{hazards.HAZARDS_SCHEMA}`, `{context_tables.CONTEXT_SCHEMA}`,\n`control_structure/1`, "
+        f"`{hazard_list.HAZARDS_SCHEMA}`, `{context_tables.CONTEXT_SCHEMA}`,\n`control_structure/1`, "
         "`unsafe_control_actions/1`, `causal_factors/1`.\n",
         *sections(
             "hazard-analysis.md",
-            hazards.HazardsModel,
+            hazard_list.HazardsModel,
             context_tables.TableModel,
-            analysis.StructureModel,
-            analysis.UnsafeActionsModel,
-            analysis.FactorsModel,
+            analysis_files.StructureModel,
+            analysis_files.UnsafeActionsModel,
+            analysis_files.FactorsModel,
         ),
     )
 

@@ -4,7 +4,7 @@ import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from mutator._common.shipped import refuse_shipped
+from mutator._common.shipped_files import refuse_shipped
 from mutator.reference import (
     columns_and_channels,
     command_line,

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from importlib import metadata
 from pathlib import Path
 
-from mutator._common.tables import Table
+from mutator._common.table_rendering import Table
 from mutator.errors import MutatorError
 
 PAGE = Path("docs", "reference", "licences.md")

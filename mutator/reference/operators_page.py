@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from mutator._common.doors import OPERATORS
-from mutator._common.tables import Table
+from mutator._common.table_rendering import Table
 from mutator.operators.operator_lookup import find_operator
 from mutator.reference.yaml_key_tables import generated
 from mutator.workspace import Workspace

@@ -13,7 +13,7 @@ from textwrap import dedent
 from typing import Any
 
 import mutator
-from mutator._common.tables import Table
+from mutator._common.table_rendering import Table
 from mutator.reference.yaml_key_tables import generated
 from mutator.workspace import Workspace
 

@@ -9,12 +9,12 @@ from mutator.campaigns import campaign_files, campaign_model
 from mutator.config import units
 from mutator.config.yaml_files import StrictModel
 from mutator.execution.cluster import cluster_files
-from mutator.faults import fault_model_files, readings
-from mutator.faults import specs as spec
+from mutator.faults import fault_model_files, library_readings
+from mutator.faults import fault_specs as spec
 from mutator.faults.fault_models import NAMES, TARGET_UNIT, FaultModel, FaultModels, ParamSchema
-from mutator.faults.injections import DIMENSIONLESS
-from mutator.faults.readings import Readings
-from mutator.stpa import analysis, context_tables, hazards
+from mutator.faults.injection_specs import DIMENSIONLESS
+from mutator.faults.library_readings import Readings
+from mutator.stpa import analysis_files, context_tables, hazard_list
 from mutator.targets import manifest_files, severity_model
 
 DRAFT = "http://json-schema.org/draft-07/schema#"  # best supported by editors
@@ -46,15 +46,15 @@ class Format:
 
 
 _FILES: tuple[tuple[type[StrictModel], str, str], ...] = (
-    (readings.ReadingsModel, readings.SCHEMA, "readings.yaml"),
+    (library_readings.ReadingsModel, library_readings.SCHEMA, "readings.yaml"),
     (campaign_model.CampaignModel, campaign_files.SCHEMA, "campaigns/*.yaml"),
     (manifest_files.ManifestModel, manifest_files.SCHEMA, "targets/*.yaml"),
     (severity_model.ScaleModel, severity_model.SCHEMA, "severity/*.yaml"),
-    (hazards.HazardsModel, hazards.HAZARDS_SCHEMA, "stpa/hazards.yaml"),
+    (hazard_list.HazardsModel, hazard_list.HAZARDS_SCHEMA, "stpa/hazards.yaml"),
     (context_tables.TableModel, context_tables.CONTEXT_SCHEMA, "stpa/contexts/*.yaml"),
-    (analysis.StructureModel, "control_structure/1", "stpa/control_structure.yaml"),
-    (analysis.UnsafeActionsModel, "unsafe_control_actions/1", "stpa/unsafe_control_actions.yaml"),
-    (analysis.FactorsModel, "causal_factors/1", "stpa/causal_factors.yaml"),
+    (analysis_files.StructureModel, "control_structure/1", "stpa/control_structure.yaml"),
+    (analysis_files.UnsafeActionsModel, "unsafe_control_actions/1", "stpa/unsafe_control_actions.yaml"),
+    (analysis_files.FactorsModel, "causal_factors/1", "stpa/causal_factors.yaml"),
 )
 
 

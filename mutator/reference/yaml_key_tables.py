@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
-from mutator._common.tables import Table
+from mutator._common.table_rendering import Table
 from mutator.config.yaml_files import StrictModel
 from mutator.reference.schemas import definitions
 

@@ -4,7 +4,7 @@ from typing import Any
 
 import pandas as pd
 
-from mutator._common.text import counted
+from mutator._common.message_text import counted
 from mutator.engines.engine_jobs import RunMode
 from mutator.execution.progress_text import duration
 from mutator.report.answer_parts import (

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from mutator._common.tables import Table
+from mutator._common.table_rendering import Table
 from mutator.engines.engine_choice import WORTH_IT
 from mutator.engines.engine_jobs import RunMode
 from mutator.errors import CheckFailed

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mutator._common.processes import processes_for, shared
+from mutator._common.helper_processes import processes_for, shared
 from mutator.model import Fault, Record
 from mutator.outcomes.fault_paths import FaultPaths, PathInputs, UntimedPath
 from mutator.results.ranking import places

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 import yaml
 from markupsafe import Markup
 
-from mutator._common.bounded import read_bounded
+from mutator._common.bounded_reading import read_bounded
 from mutator._common.hashing import plain
-from mutator.config.locations import as_written_at
+from mutator.config.location_syntax import as_written_at
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Fault
 from mutator.mutants.readable_patches import readable
@@ -33,8 +33,8 @@ from mutator.review.patch_shapes import Shape, shapes
 from mutator.statistics.mutation_score import PERMANENT, TRANSIENT
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.json_trees import Tree, tree
-from mutator.triggers.kinds import ALWAYS
+from mutator.triggers.formula_json import Tree, tree
+from mutator.triggers.trigger_kinds import ALWAYS
 from mutator.web import embedded
 
 if TYPE_CHECKING:

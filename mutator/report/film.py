@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from mutator._common.below import inside, open_below
+from mutator._common.confined_files import inside, open_below
 from mutator._common.files import ScratchFolder, half_written, make_folder
 from mutator.engines import bytecode
 from mutator.engines.sandbox import Sandbox

@@ -6,7 +6,7 @@ from mutator.config.yaml_files import load
 from mutator.errors import MutatorError
 from mutator.model import Method
 from mutator.report.reported_run import ReportedRun
-from mutator.targets.severity import Scale
+from mutator.targets.contact_severity import Scale
 
 Words = Mapping[str, Mapping[str, str]]  # heading -> term -> meaning
 

@@ -10,7 +10,7 @@ import pandas as pd
 
 from mutator.report.reported_run import ReportedRun
 from mutator.statistics.results_frame import hazard_names
-from mutator.targets.severity import CLASSES
+from mutator.targets.contact_severity import CLASSES
 
 Cells = list[list[Any]]  # by row; each cell has a count or value, and its base (the number of runs)
 

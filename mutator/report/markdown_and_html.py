@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from mutator._common.text import counted
+from mutator._common.message_text import counted
 from mutator.model import Outcome
 from mutator.mutants.injected_lines import tag_words
 from mutator.report.experiment_list import Browse

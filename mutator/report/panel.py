@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from mutator._common.tables import Table
+from mutator._common.table_rendering import Table
 
 if TYPE_CHECKING:
     from markupsafe import Markup

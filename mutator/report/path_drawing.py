@@ -8,10 +8,10 @@ from typing import Any
 from urllib.parse import quote
 
 from mutator.report.fault_path_data import PathCounts, link_text
-from mutator.stpa import shapes
-from mutator.stpa.analysis import LinkModel, StructureModel
-from mutator.stpa.layout import Arrow, Box, lay_out
-from mutator.stpa.shapes import course
+from mutator.stpa import svg_shapes
+from mutator.stpa.analysis_files import LinkModel, StructureModel
+from mutator.stpa.structure_layout import Arrow, Box, lay_out
+from mutator.stpa.svg_shapes import course
 
 _WIDEST = 7.0  # px, width of a link that passed all its faults
 _THIN = 1.8
@@ -28,7 +28,7 @@ def draw_path_counts(structure: StructureModel, counts: PathCounts, links: Colle
         'aria-label="Control structure with the share of faults that got through each link">',
         "<defs>",
         *(
-            shapes.tip(f"path-tip-{name}", 14, f'class="tip {name}" d="{shapes.TIP}"')
+            svg_shapes.tip(f"path-tip-{name}", 14, f'class="tip {name}" d="{svg_shapes.TIP}"')
             for name in ("quiet", "through", "stopped")
         ),
         "</defs>",
@@ -69,7 +69,7 @@ def _is_short(arrow: Arrow) -> bool:
 def _idle(arrow: Arrow, link: LinkModel) -> Iterator[str]:
     yield (
         f'<g class="idle"><path d="{course(arrow.points)}" stroke-dasharray="3 4" '
-        f'marker-end="url(#path-tip-quiet)"/>{shapes.label(arrow, escape(link.label))}</g>'
+        f'marker-end="url(#path-tip-quiet)"/>{svg_shapes.label(arrow, escape(link.label))}</g>'
     )
 
 
@@ -83,8 +83,8 @@ def _link(name: str, arrow: Arrow, link: LinkModel, counts: PathCounts) -> Itera
         f"<title>{escape(f'{link.label}: from {link.from_} to {link.to}')}</title>"
         f'<path class="hit" d="{course(arrow.points)}"/><path class="line" d="{course(arrow.points)}" '
         f'style="stroke-width: {width}" marker-end="url(#path-tip-{kind})"/>'
-        f"{shapes.label(arrow, escape(link.label))}"
-        f"{shapes.label(arrow, first, 1, 'count')}{shapes.label(arrow, last, 2, 'count')}</a>"
+        f"{svg_shapes.label(arrow, escape(link.label))}"
+        f"{svg_shapes.label(arrow, first, 1, 'count')}{svg_shapes.label(arrow, last, 2, 'count')}</a>"
     )
 
 
@@ -109,7 +109,7 @@ def _box(name: str, box: Box, label: str, about: str, counts: PathCounts) -> Ite
     yield (
         f'<a class="{classes}" data-component="{escape(name)}" href="#stopped_at={quote(name)}">'
         f"<title>{escape(about)}</title>"
-        f"{shapes.rectangle(box)}"
+        f"{svg_shapes.rectangle(box)}"
         f'<text class="name" x="{middle:.1f}" y="{top - 11:.1f}" text-anchor="middle">{escape(label)}</text>'
         f'<text class="count" x="{middle:.1f}" y="{top + 6:.1f}" text-anchor="middle">{first}</text>'
         f'<text class="count" x="{middle:.1f}" y="{top + 23:.1f}" text-anchor="middle">{last}</text></a>'

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from mutator._common.below import inside, read_below
+from mutator._common.confined_files import inside, read_below
 from mutator.errors import MutatorError
 from mutator.report.panel import FOLDER
 from mutator.report.report_builder import build_report

@@ -7,9 +7,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from mutator._common.processes import beside, processes_for
-from mutator._common.tables import Table
-from mutator._common.text import counted
+from mutator._common.helper_processes import beside, processes_for
+from mutator._common.message_text import counted
+from mutator._common.table_rendering import Table
 from mutator.report.experiment_list import Browse, browse_data
 from mutator.report.glossary import words_of
 from mutator.report.markdown_and_html import Content, markdown, page_html, study_html, study_markdown

@@ -5,7 +5,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from mutator._common.below import check_name, files_inside, read_below, unlink_below, write_below
+from mutator._common.confined_files import check_name, files_inside, read_below, unlink_below, write_below
 from mutator._common.files import json_bytes, json_object
 from mutator._common.hashing import digest
 from mutator._common.version import VERSION

@@ -8,10 +8,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 from urllib.parse import quote
 
-from mutator._common.below import inside
+from mutator._common.confined_files import inside
 from mutator._common.files import write_atomic
-from mutator._common.tables import Table
-from mutator._common.text import counted
+from mutator._common.message_text import counted
+from mutator._common.table_rendering import Table
 from mutator.errors import MutatorError
 from mutator.execution.progress_text import duration
 from mutator.model import Outcome

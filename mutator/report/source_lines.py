@@ -13,7 +13,7 @@ from mutator.results.outcome_counting import endings
 from mutator.statistics.mutation_score import PERMANENT, TRANSIENT
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.kinds import ALWAYS
+from mutator.triggers.trigger_kinds import ALWAYS
 from mutator.workspace import Workspace
 
 if TYPE_CHECKING:

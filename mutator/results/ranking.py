@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 from mutator.model import Outcome, Status
 from mutator.results.outcome_counting import endings, hazard_margins
-from mutator.targets.severity import CLASSES, DELTA_V
+from mutator.targets.contact_severity import CLASSES, DELTA_V
 
 if TYPE_CHECKING:
     import numpy as np

@@ -9,7 +9,7 @@ from mutator.model import Fault, Outcome, Status, Value, fault_label
 from mutator.results.outcome_counting import UNUSABLE, endings, hazard_margins, hazard_times, kinds
 from mutator.results.plan_columns import number_of
 from mutator.results.table_columns import alerts_of
-from mutator.targets.severity import DELTA_V
+from mutator.targets.contact_severity import DELTA_V
 
 if TYPE_CHECKING:
     import pandas as pd

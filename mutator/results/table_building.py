@@ -7,10 +7,10 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
-from mutator._common.below import inside
+from mutator._common.confined_files import inside
 from mutator._common.files import half_written, read_json, write_json
 from mutator._common.hashing import digest
-from mutator._common.processes import beside, processes_for, shared
+from mutator._common.helper_processes import beside, processes_for, shared
 from mutator._common.version import VERSION
 from mutator.errors import MutatorError, MutatorWarning
 from mutator.outcomes.fault_paths import fault_paths_of

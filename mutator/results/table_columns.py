@@ -14,8 +14,8 @@ from mutator.model import Experiment, Record, Status
 from mutator.outcomes.verdict_rules import reaction_time, severity_of, since_activation, since_manifestation
 from mutator.results.plan_columns import FIRST_PLANNED, LAST_PLANNED, PlanColumn
 from mutator.results.table_files import Column
+from mutator.targets.contact_severity import Scale
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.severity import Scale
 from mutator.targets.target_facts import T_END, MetricFacts
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from itertools import islice, zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mutator._common.bounded import MOST_DATA, read_bounded
+from mutator._common.bounded_reading import MOST_DATA, read_bounded
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Outcome, Status
 from mutator.results import table_building

@@ -3,9 +3,9 @@
 import shlex
 from typing import Any
 
-from mutator._common.bounded import read_bounded
+from mutator._common.bounded_reading import read_bounded
 from mutator._common.hashing import plain
-from mutator._common.text import counted
+from mutator._common.message_text import counted
 from mutator.campaigns.plan import Plan
 from mutator.errors import CheckFailed
 from mutator.review.decisions import Review, State, load_review

@@ -11,7 +11,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from mutator.config.locations import PROBE_NAME
+from mutator.config.location_syntax import PROBE_NAME
 from mutator.mutants.injected_lines import changed_parts, tag_of
 from mutator.review import source_names
 from mutator.review.source_names import SUPER, Import, Module, Use, uses_in

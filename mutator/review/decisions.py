@@ -11,10 +11,10 @@ from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
 
-from mutator._common.below import inside, open_below, write_below
+from mutator._common.confined_files import inside, open_below, write_below
 from mutator._common.files import make_folder
-from mutator._common.locks import alone_in
-from mutator._common.shipped import refuse_shipped
+from mutator._common.folder_locks import alone_in
+from mutator._common.shipped_files import refuse_shipped
 from mutator._common.version import VERSION
 from mutator.errors import MutatorError, ReviewConflict
 from mutator.review import review_file, seen_texts

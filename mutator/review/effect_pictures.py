@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from mutator._common import caches
-from mutator._common.bounded import read_bounded
+from mutator._common import shared_cache
+from mutator._common.bounded_reading import read_bounded
 from mutator._common.files import ScratchFolder, json_bytes, write_atomic
 from mutator._common.hashing import content_id, digest
 from mutator.engines.engine_jobs import Job
@@ -35,8 +35,8 @@ from mutator.mutants.template_rendering import snippet
 from mutator.review.mutant_groups import Group
 from mutator.review.patch_shapes import parameter_values
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.requirements import check_requirements
-from mutator.triggers.kinds import always
+from mutator.targets.required_packages import check_requirements
+from mutator.triggers.trigger_kinds import always
 from mutator.workspace import Workspace
 
 MODEL = "image_effect"
@@ -264,7 +264,7 @@ def _jpeg(picture: np.ndarray) -> bytes:
 
 
 def _recalled(key: str) -> Pictures | None:
-    path = caches.of_pictures() / f"{key}.json"
+    path = shared_cache.of_pictures() / f"{key}.json"
     try:
         data: dict[str, Any] = json.loads(read_bounded(path))
         before, levels = data["before"], data["levels"]
@@ -283,7 +283,7 @@ def _recalled(key: str) -> Pictures | None:
 
 
 def _remember(key: str, pictures: Pictures) -> None:
-    path = caches.of_pictures() / f"{key}.json"
+    path = shared_cache.of_pictures() / f"{key}.json"
     before = base64.b64encode(pictures.before).decode()
     levels = [[one.name, one.label, base64.b64encode(one.after).decode()] for one in pictures.levels]
     data = {"sum": digest([key, before, levels]), "before": before, "levels": levels}

@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 
 from mutator._common.hashing import content_id
-from mutator._common.yaml_records import mapping, written
+from mutator._common.yaml_dataclasses import mapping, written
 
 # for each parameter: least and greatest number, then values that are not finite (`nan`), as text
 Values = Mapping[str, tuple[float | str, ...]]

@@ -13,11 +13,11 @@ from pathlib import Path
 
 from mutator._common.hashing import content_id
 from mutator.campaigns.plan import Plan
-from mutator.config.locations import PROBE_NAME
+from mutator.config.location_syntax import PROBE_NAME
 from mutator.faults import probe_templates
-from mutator.faults.expansion import expand
 from mutator.faults.fault_models import FaultModels
-from mutator.faults.specs import FaultSpec
+from mutator.faults.fault_specs import FaultSpec
+from mutator.faults.spec_expansion import expand
 from mutator.model import Fault, Injection, Trigger
 from mutator.mutants.anchors import parsed
 from mutator.mutants.mutant_building import build
@@ -32,7 +32,7 @@ from mutator.review.patch_shapes import Shape
 from mutator.review.seen_texts import text_of
 from mutator.review.value_ranges import ranges_of
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.kinds import always, at_time
+from mutator.triggers.trigger_kinds import always, at_time
 from mutator.workspace import Workspace
 
 

@@ -8,8 +8,8 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from mutator.config.sources import Source
 from mutator.config.yaml_files import StrictModel, Written, read
+from mutator.config.yaml_sources import Source
 from mutator.review.entries import TIME, Bound, Decision, Entry, Flag, Remark, Verdict
 
 SCHEMA = "review/2"

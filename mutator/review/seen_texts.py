@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from difflib import unified_diff
 from pathlib import Path
 
-from mutator._common.below import read_below, write_below
+from mutator._common.confined_files import read_below, write_below
 from mutator.errors import MutatorError
 from mutator.review.entries import Bound, Values, values_in_words
 

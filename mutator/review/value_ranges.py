@@ -6,8 +6,8 @@ from math import isfinite
 
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
-from mutator.faults.parameters import resolve
-from mutator.faults.specs import FaultSpec, Variant
+from mutator.faults.fault_specs import FaultSpec, Variant
+from mutator.faults.injection_parameters import resolve
 from mutator.model import Fault, Injection
 from mutator.review.entries import Values
 

@@ -11,9 +11,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, TypeAdapter
 
-from mutator._common.below import check_plain
-from mutator._common.cores import usable_cores
-from mutator._common.text import one_of, suggestion
+from mutator._common.confined_files import check_plain
+from mutator._common.cpu_cores import usable_cores
+from mutator._common.message_text import one_of, suggestion
 from mutator.campaigns.filters import compile_filter
 from mutator.config.yaml_files import StrictModel
 from mutator.errors import MutatorError

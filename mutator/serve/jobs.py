@@ -15,7 +15,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import IO, Any
 
-from mutator._common.events import EVENTS_FD
+from mutator._common.progress_events import EVENTS_FD
 from mutator.errors import Absent, JobEnded, MutatorError
 from mutator.execution.progress_text import endings
 from mutator.serve.job_events import Event, EventReader, Link, Phase

@@ -7,8 +7,8 @@ written it.
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 
-from mutator._common import caches
-from mutator._common.below import read_below, write_below
+from mutator._common import shared_cache
+from mutator._common.confined_files import read_below, write_below
 from mutator._common.files import json_bytes, json_object
 from mutator._common.hashing import digest
 from mutator.errors import MutatorError
@@ -41,7 +41,7 @@ class ReportCache:
 
 def _stored(key: str) -> Mapping[str, bytes] | None:
     """Read a report from the cache; None if it is missing or damaged."""
-    place = caches.of_pages() / key
+    place = shared_cache.of_pages() / key
     try:
         digests = json_object(read_below(place, FILE), place / FILE, SCHEMA)["files"]
         files = {name: read_below(place, name) for name in digests}
@@ -51,10 +51,10 @@ def _stored(key: str) -> Mapping[str, bytes] | None:
 
 
 def _store(key: str, files: Mapping[str, bytes]) -> None:
-    place = caches.of_pages() / key
+    place = shared_cache.of_pages() / key
     place.mkdir(parents=True, exist_ok=True)
     for name, data in files.items():
         write_below(place, name, data)
     digests = {name: digest(data) for name, data in files.items()}
     write_below(place, FILE, json_bytes({"schema": SCHEMA, "files": digests}))  # last: marks it as complete
-    caches.prune_pages()
+    shared_cache.prune_pages()

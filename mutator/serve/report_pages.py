@@ -6,8 +6,8 @@ from pathlib import Path
 
 from starlette.responses import HTMLResponse, Response
 
-from mutator._common.below import check_plain
-from mutator._common.bounded import read_open
+from mutator._common.bounded_reading import read_open
+from mutator._common.confined_files import check_plain
 from mutator._common.hashing import digest
 from mutator.audit.table_audit import tables
 from mutator.comparison import comparison_files

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 from urllib.parse import quote
 
-from mutator._common.below import open_below
+from mutator._common.confined_files import open_below
 from mutator._common.folder_search import RUN_HEAD
 from mutator.errors import Absent, MutatorError, Outside
 from mutator.results.outcome_counting import outcome_counts

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from mutator._common.tables import Table
+from mutator._common.table_rendering import Table
 from mutator.model import OPERATORS, Fault, Status
 from mutator.results.table_columns import alerts_of
 from mutator.statistics.paired_statistics import resampled_interval
 from mutator.statistics.shares import Share, share
 from mutator.statistics.statistics_sheet import Sheet, SheetCell, cell_text
-from mutator.triggers.kinds import ALWAYS
+from mutator.triggers.trigger_kinds import ALWAYS
 
 AlertsByGoldenRun = Mapping[tuple[str, str], frozenset[str]]  # (scenario, seed or "") -> names of alerts
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from mutator._common.tables import Table
+from mutator._common.table_rendering import Table
 from mutator.statistics.shares import Share
 
 if TYPE_CHECKING:

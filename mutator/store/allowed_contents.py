@@ -6,13 +6,13 @@ Run folders travel: evidence comes from strangers. Two rules keep every command 
   of fixed names below a checked folder therefore stays in it. This is enough for a folder that somebody
   sends. It cannot stop a process that changes the folder at the same time, but such a process has the user's
   permissions, and needs no links.
-* `mutator._common.below`, wherever a name comes from a file: the name is checked when it is joined.
+* `mutator._common.confined_files`, wherever a name comes from a file: the name is checked when it is joined.
 """
 
 from fnmatch import fnmatchcase
 from pathlib import Path
 
-from mutator._common.below import entries_below, is_deep, is_plain, not_plain
+from mutator._common.confined_files import entries_below, is_deep, is_plain, not_plain
 from mutator.errors import Outside
 from mutator.store import file_digests
 from mutator.store.run_head import CAMPAIGN, HEAD

@@ -6,7 +6,7 @@ from typing import Any
 
 from mutator._common.files import json_bytes, read_json
 from mutator._common.hashing import digest
-from mutator._common.text import counted
+from mutator._common.message_text import counted
 from mutator.errors import MutatorError
 from mutator.store import file_digests
 from mutator.store.run_head import REMEDY

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
-from mutator._common.bounded import MOST_DATA, read_bounded
+from mutator._common.bounded_reading import MOST_DATA, read_bounded
 from mutator._common.files import raising_disk_full
 
 _BLOCK_MARK = b"FIB1"

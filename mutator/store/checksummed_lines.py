@@ -14,7 +14,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from mutator._common.bounded import MOST_DATA, bounded_lines, open_regular, read_open
+from mutator._common.bounded_reading import MOST_DATA, bounded_lines, open_regular, read_open
 from mutator._common.files import check_schema, raising_disk_full, writing_atomic
 from mutator._common.hashing import canonical
 from mutator.errors import MutatorError

@@ -7,10 +7,10 @@ from contextlib import suppress
 from fnmatch import fnmatchcase
 from pathlib import Path
 
-from mutator._common.below import unlink_below
+from mutator._common.confined_files import unlink_below
 from mutator._common.doors import EXPORTS
 from mutator._common.files import complete, is_half_written, read_json, remove_folder
-from mutator._common.locks import owned
+from mutator._common.folder_locks import owned
 from mutator.errors import MutatorError
 from mutator.store.allowed_contents import (
     ALLOWED_FILE_GLOBS,

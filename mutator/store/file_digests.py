@@ -16,9 +16,16 @@ from io import BufferedReader
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from mutator._common.below import check_name, inside, open_below, write_below
-from mutator._common.bounded import MOST_DATA, MOST_JSON, check_open, open_regular, read_bounded, read_open
-from mutator._common.cores import usable_cores
+from mutator._common.bounded_reading import (
+    MOST_DATA,
+    MOST_JSON,
+    check_open,
+    open_regular,
+    read_bounded,
+    read_open,
+)
+from mutator._common.confined_files import check_name, inside, open_below, write_below
+from mutator._common.cpu_cores import usable_cores
 from mutator._common.files import is_no_file, json_bytes, read_json, write_json
 from mutator._common.hashing import digest
 from mutator.errors import MutatorError, Outside

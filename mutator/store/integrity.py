@@ -8,10 +8,10 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
-from mutator._common.below import inside
+from mutator._common.confined_files import inside
 from mutator._common.files import is_half_written
 from mutator._common.hashing import digest
-from mutator._common.text import counted
+from mutator._common.message_text import counted
 from mutator.errors import MutatorError
 from mutator.store import file_digests, plan_file, verified_runs_cache
 from mutator.store.checksummed_lines import Segment, bare_segment, intact_lines, read_segment

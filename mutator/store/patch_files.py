@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from mutator._common.below import inside
-from mutator._common.bounded import unpacked
+from mutator._common.bounded_reading import unpacked
+from mutator._common.confined_files import inside
 from mutator._common.files import write_atomic
 from mutator._common.hashing import digest
 from mutator.store.checksummed_blocks import Block, BlockWriter, block_bytes, intact_blocks, read_blocks

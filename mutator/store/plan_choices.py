@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from mutator._common.arguments import check_type, check_whole
+from mutator._common.argument_checks import check_type, check_whole
 from mutator.store.shards import Shard
 
 

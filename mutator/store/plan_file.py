@@ -8,10 +8,10 @@ from itertools import accumulate, islice
 from pathlib import Path
 from typing import Any, Protocol, TypeVar, overload
 
-from mutator._common.bounded import bounded_lines, check_open, open_regular
+from mutator._common.bounded_reading import bounded_lines, check_open, open_regular
 from mutator._common.files import raising_disk_full, writing_atomic
 from mutator._common.hashing import added_values, canonical, plain
-from mutator._common.text import counted
+from mutator._common.message_text import counted
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Fault
 from mutator.store.plan_lines import (

@@ -11,7 +11,7 @@ from functools import lru_cache
 from hashlib import sha256
 from typing import Any, TypeVar
 
-from mutator._common.below import check_library_name
+from mutator._common.confined_files import check_library_name
 from mutator._common.hashing import canonical
 from mutator.errors import MutatorError
 from mutator.model import (

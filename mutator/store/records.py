@@ -7,7 +7,7 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from mutator._common.below import inside
+from mutator._common.confined_files import inside
 from mutator.errors import CheckFailed, MutatorError
 from mutator.model import Activation, Outcome, Record, RunError, Status
 from mutator.store.indexed_lines import IndexedLine, IndexedLines

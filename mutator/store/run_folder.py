@@ -10,8 +10,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from mutator._common.below import inside
-from mutator._common.bounded import MOST_DATA, read_bounded
+from mutator._common.bounded_reading import MOST_DATA, read_bounded
+from mutator._common.confined_files import inside
 from mutator._common.files import check_is_text
 from mutator._common.hashing import plain
 from mutator.errors import MutatorError
@@ -24,7 +24,7 @@ from mutator.store.run_head import HEAD, RunHead, StoredGolden, read_head
 from mutator.store.shards import Shard
 from mutator.store.timings import read_timings
 from mutator.store.work_stretches import Stretch
-from mutator.targets.severity import Scale
+from mutator.targets.contact_severity import Scale
 
 STOP_NOTE = "Runs end at their first terminal hazard: later hazards and alerts are not recorded."
 SERIES_MB = 500  # budget of a run's series, unless the plan sets another

@@ -5,11 +5,11 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from mutator._common.below import check_library_name, check_name
+from mutator._common.confined_files import check_library_name, check_name
 from mutator._common.files import json_bytes, read_json
 from mutator._common.folder_search import RUN_HEAD
 from mutator._common.hashing import added, plain
-from mutator._common.plain_reader import from_plain
+from mutator._common.typed_json import from_plain
 from mutator.errors import Misfit, MutatorError
 from mutator.model import Limits
 from mutator.store.plan_choices import Choices

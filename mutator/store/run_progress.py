@@ -6,7 +6,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from mutator._common.bounded import MOST_DATA, open_regular, read_open
+from mutator._common.bounded_reading import MOST_DATA, open_regular, read_open
 from mutator.model import Status
 
 

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from mutator._common.below import inside
+from mutator._common.confined_files import inside
 from mutator.model import Record
 from mutator.store.checksummed_lines import LineWriter, verified_lines, write_with_new_head
 from mutator.store.patch_files import PatchWriter

@@ -12,8 +12,8 @@ from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
-from mutator._common.below import check_name, inside
-from mutator._common.bounded import unpacked
+from mutator._common.bounded_reading import unpacked
+from mutator._common.confined_files import check_name, inside
 from mutator._common.hashing import canonical
 from mutator.errors import MutatorError
 from mutator.model import Record

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from mutator._common.bounded import unpacked
+from mutator._common.bounded_reading import unpacked
 from mutator._common.hashing import canonical
 from mutator.errors import MutatorError
 

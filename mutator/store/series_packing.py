@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mutator._common.below import inside
+from mutator._common.confined_files import inside
 from mutator._common.files import raising_disk_full
 from mutator.errors import MutatorError
 from mutator.store.checksummed_blocks import BlockWriter, read_blocks

@@ -7,7 +7,7 @@ character per byte. The page loads it as `x-user-defined`, an encoding in which 
 import re
 from pathlib import Path
 
-from mutator._common.bounded import read_bounded
+from mutator._common.bounded_reading import read_bounded
 from mutator._common.files import write_atomic
 from mutator._common.hashing import digest
 from mutator.errors import MutatorError

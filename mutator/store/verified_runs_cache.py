@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from mutator._common import caches
-from mutator._common.below import inside
-from mutator._common.bounded import read_bounded
+from mutator._common import shared_cache
+from mutator._common.bounded_reading import read_bounded
+from mutator._common.confined_files import inside
 from mutator._common.files import json_bytes, write_atomic
 from mutator._common.hashing import digest
 from mutator._common.version import VERSION
@@ -56,4 +56,4 @@ def remember(key: str, **facts: Any) -> None:
 
 
 def _path(key: str) -> Path:
-    return inside(caches.of_runs(), f"{key}.json")
+    return inside(shared_cache.of_runs(), f"{key}.json")

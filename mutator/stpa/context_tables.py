@@ -7,12 +7,12 @@ from pathlib import Path
 
 from pydantic import Field
 
-from mutator._common.yaml_records import mapping, written
-from mutator.config.sources import Source
+from mutator._common.yaml_dataclasses import mapping, written
 from mutator.config.yaml_files import StrictModel, Written, read
+from mutator.config.yaml_sources import Source
 from mutator.errors import MutatorError
 from mutator.model import Hold, Trigger
-from mutator.stpa.coverage import Coverage, measure_coverage
+from mutator.stpa.context_coverage import Coverage, measure_coverage
 from mutator.triggers.conditions import TIME, check_condition, names_in
 
 CONTEXT_SCHEMA = "context_table/1"

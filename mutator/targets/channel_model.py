@@ -5,8 +5,8 @@ from pathlib import Path
 from pydantic import Field
 
 from mutator._common.doors import IMPORTERS
-from mutator.config.sources import Source
 from mutator.config.yaml_files import StrictModel
+from mutator.config.yaml_sources import Source
 from mutator.targets.channels import ROUNDING, Channel, Role
 from mutator.triggers.conditions import RESERVED
 

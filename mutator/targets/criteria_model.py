@@ -6,11 +6,11 @@ from typing import get_args
 
 from pydantic import Field
 
-from mutator.config.sources import Keys, Source
 from mutator.config.yaml_files import StrictModel
+from mutator.config.yaml_sources import Keys, Source
 from mutator.targets.criteria import Aggregate, Hazard, Metric, Worse
-from mutator.targets.formulas import condition, formula
-from mutator.triggers import stl
+from mutator.targets.manifest_formulas import condition, formula
+from mutator.triggers import temporal_logic
 from mutator.triggers.conditions import GOLDEN, TIME, parse
 
 _AGGREGATES = get_args(Aggregate)
@@ -119,7 +119,7 @@ def _hazard(name: str, model: HazardModel, known: Collection[str], source: Sourc
     when = condition(model.when, known, source, (*keys, "when"))
     if model.stl:
         with source.placing((*keys, "stl")):
-            stl.check(model.stl, known, step_s)
+            temporal_logic.check(model.stl, known, step_s)
     terminal = model.terminal
     return Hazard(
         name=name,

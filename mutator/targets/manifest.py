@@ -7,20 +7,20 @@ from pathlib import Path
 
 from packaging.requirements import Requirement
 
-from mutator._common import caches
-from mutator._common.bounded import read_bounded
+from mutator._common import shared_cache
+from mutator._common.bounded_reading import read_bounded
 from mutator._common.hashing import digest
-from mutator._common.yaml_records import mapping, written
-from mutator.config.sources import Source
+from mutator._common.yaml_dataclasses import mapping, written
+from mutator.config.yaml_sources import Source
 from mutator.errors import MutatorError
 from mutator.targets.channels import Channel, Role
+from mutator.targets.contact_severity import DELTA_V, Contact
 from mutator.targets.criteria import Hazard, Metric
-from mutator.targets.observation import Observation
+from mutator.targets.observed_values import Observation
 from mutator.targets.placeholders import filled
 from mutator.targets.scene import Scene
-from mutator.targets.severity import DELTA_V, Contact
 from mutator.targets.source_tree import SourceTree, matches, read_tree
-from mutator.triggers import stl
+from mutator.triggers import temporal_logic
 from mutator.triggers.conditions import GOLDEN, names_in
 
 _DELTA_V = Metric(
@@ -203,7 +203,7 @@ class TargetManifest:
     @property
     def cache(self) -> Path:
         """The folder `{cache}`, which need not exist."""
-        return caches.of_target(self.cache_name)
+        return shared_cache.of_target(self.cache_name)
 
     def read_by_runs(self) -> tuple[Path, ...]:
         """Return what runs read besides their tree, scenario and cache: the target's root, if an argument
@@ -231,5 +231,5 @@ class TargetManifest:
 def _names_of(rules: Iterable[Hazard], metrics: Iterable[Metric], known: Collection[str]) -> set[str]:
     texts = [text for rule in rules for text in (rule.when, rule.margin, rule.terminal)]
     texts += [text for metric in metrics for text in (metric.formula, metric.where)]
-    in_stl = (name for rule in rules for name in stl.names_in(rule.stl, known))
+    in_stl = (name for rule in rules for name in temporal_logic.names_in(rule.stl, known))
     return {name.removeprefix(GOLDEN) for text in texts if text for name in names_in(text)}.union(in_stl)

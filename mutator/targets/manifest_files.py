@@ -5,23 +5,23 @@ from pathlib import Path
 
 from pydantic import Field
 
-from mutator._common.below import check_name
-from mutator._common.shipped import SHIPPED_TARGET
-from mutator.config.sources import Source
+from mutator._common.confined_files import check_name
+from mutator._common.shipped_files import SHIPPED_TARGET
 from mutator.config.yaml_files import StrictModel, Written, read
+from mutator.config.yaml_sources import Source
 from mutator.targets.channel_model import ChannelModel, TraceModel, read_channels
-from mutator.targets.commands import ChangeModel, EntryModel, check_commands
+from mutator.targets.contact_severity import Contact
 from mutator.targets.criteria_model import HazardModel, MetricModel, read_hazards, read_metrics
-from mutator.targets.environment import check_environment
+from mutator.targets.entry_model import ChangeModel, EntryModel, check_commands
 from mutator.targets.manifest import Film, TargetManifest
 from mutator.targets.observation_model import ObservationModel, read_observation
-from mutator.targets.paths import inside
-from mutator.targets.requirements import read_requirements
+from mutator.targets.process_environment import check_environment
+from mutator.targets.relative_paths import inside
+from mutator.targets.required_packages import read_requirements
 from mutator.targets.roots import INSTALLED, check_installed, find_overlay, find_root, read_packages
 from mutator.targets.scene_model import SceneModel, read_scene
-from mutator.targets.severity import Contact
 from mutator.targets.severity_model import check_contact
-from mutator.triggers import stl
+from mutator.triggers import temporal_logic
 
 SCHEMA = "target/2"
 
@@ -212,7 +212,7 @@ def _check_recorded(source: Source, hidden: Collection[str]) -> None:
         entries = source.data.get(key)
         for name, entry in entries.items() if isinstance(entries, dict) else ():
             for field, text in entry.items() if isinstance(entry, dict) else ():
-                found = stl.names_in(text, hidden) if isinstance(text, str) else ()
+                found = temporal_logic.names_in(text, hidden) if isinstance(text, str) else ()
                 if found and field not in ("about", "unit", "source"):
                     raise source.error(
                         (key, name, field),

@@ -5,14 +5,14 @@ import keyword
 
 from pydantic import Field
 
-from mutator._common.text import shown
-from mutator.config.locations import PROBE_NAME, dotted_name
-from mutator.config.place_model import AtModel
-from mutator.config.sources import Source
+from mutator._common.message_text import shown
+from mutator.config.location_model import AtModel
+from mutator.config.location_syntax import PROBE_NAME, dotted_name
 from mutator.config.yaml_files import StrictModel
+from mutator.config.yaml_sources import Source
 from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS
-from mutator.targets.observation import Observation, Value
-from mutator.targets.paths import inside
+from mutator.targets.observed_values import Observation, Value
+from mutator.targets.relative_paths import inside
 from mutator.triggers.conditions import RESERVED, TIME, check_formula
 
 _LONGEST = 1000  # characters in an expression, at most

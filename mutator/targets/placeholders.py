@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterable, Mapping, Sequence
 
-from mutator.config.sources import Keys, Source
+from mutator.config.yaml_sources import Keys, Source
 
 OF_RUNS = ("scenario", "seed", "out", "cache", "root")
 OF_FILMED_RUNS = (*OF_RUNS, "film")

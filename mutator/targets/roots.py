@@ -6,11 +6,11 @@ from pathlib import Path
 
 from packaging.requirements import Requirement
 
-from mutator._common.below import is_inside
-from mutator._common.shipped import SHIPPED_TARGET, shipped_folder
-from mutator.config.locations import PROBE_NAME
-from mutator.config.sources import Source
-from mutator.targets.requirements import pip_install
+from mutator._common.confined_files import is_inside
+from mutator._common.shipped_files import SHIPPED_TARGET, shipped_folder
+from mutator.config.location_syntax import PROBE_NAME
+from mutator.config.yaml_sources import Source
+from mutator.targets.required_packages import pip_install
 
 INSTALLED = "installed:"  # prefix of an import package's name, as `root` of a manifest
 

@@ -5,9 +5,9 @@ from collections.abc import Collection
 
 from pydantic import Field
 
-from mutator.config.sources import Keys, Source
 from mutator.config.yaml_files import StrictModel
-from mutator.targets.formulas import condition, formula
+from mutator.config.yaml_sources import Keys, Source
+from mutator.targets.manifest_formulas import condition, formula
 from mutator.targets.scene import Actor, Line, Scene, Shape
 
 

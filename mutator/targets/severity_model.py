@@ -5,11 +5,11 @@ from pathlib import Path
 
 from pydantic import Field
 
-from mutator.config.sources import Source
 from mutator.config.units import UNITS
 from mutator.config.yaml_files import StrictModel, read
+from mutator.config.yaml_sources import Source
+from mutator.targets.contact_severity import CLASSES, Contact, Scale
 from mutator.targets.criteria import Hazard, Metric
-from mutator.targets.severity import CLASSES, Contact, Scale
 
 SCHEMA = "severity/1"
 _KPH = UNITS["kph"].factor

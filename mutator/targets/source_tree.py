@@ -9,8 +9,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from mutator._common.below import check_inside, check_name, inside, is_inside
-from mutator._common.bounded import read_bounded
+from mutator._common.bounded_reading import read_bounded
+from mutator._common.confined_files import check_inside, check_name, inside, is_inside
 from mutator._common.files import check_is_text
 from mutator._common.hashing import canonical, digest
 from mutator.errors import MutatorError

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from mutator.targets.channels import Role
+from mutator.targets.contact_severity import Scale
 from mutator.targets.manifest import TargetManifest
-from mutator.targets.severity import Scale
 
 T_END = "t_end"  # the metric column with the end of the drive
 

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Collection, Mapping
 from functools import lru_cache
 
-from mutator._common.text import counted, operator_hint
+from mutator._common.message_text import counted, operator_hint
 from mutator.errors import MutatorError
 
 TIME = "t"  # s; every target has it

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from mutator.triggers.conditions import check_condition, check_formula
-from mutator.triggers.json_trees import tree
-from mutator.triggers.over_time import holds, numbers
+from mutator.triggers.formula_json import tree
+from mutator.triggers.trace_formulas import holds, numbers
 from mutator.web import asset
 
 NAMES = ("t", "gap", "speed", "closing")

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from mutator._common.text import folded
+from mutator._common.message_text import folded
 from mutator.cli.console import Terminal
 from mutator.cli.progress_display import campaign_progress
 from mutator.execution.progress_text import duration

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common.locks import living_workers, wait_for_workers
+from mutator._common.folder_locks import living_workers, wait_for_workers
 from mutator.execution.campaign_running import run_campaign
 from mutator.preflight.equivalence_check import Proof
 from mutator.store.records import read_records

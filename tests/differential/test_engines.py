@@ -26,7 +26,7 @@ from mutator.model import (
 )
 from mutator.mutants.anchors import parsed
 from mutator.mutants.mutant_building import build
-from mutator.triggers.kinds import always, at_time
+from mutator.triggers.trigger_kinds import always, at_time
 from mutator.workspace import Workspace
 
 LIMITS = Limits(cpu_s=2, wall_s=60, memory_mb=1024, steps=500)

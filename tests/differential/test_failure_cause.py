@@ -26,7 +26,7 @@ from mutator.model import (
     Value,
 )
 from mutator.mutants.mutant_building import build
-from mutator.triggers.kinds import at_time
+from mutator.triggers.trigger_kinds import at_time
 from mutator.workspace import Workspace
 
 SEED = 7

@@ -9,7 +9,7 @@ import pytest
 from mutator.execution.campaign_running import run_campaign
 from mutator.outcomes.golden_comparison import load_trace
 from mutator.outcomes.hazards_and_metrics import values_of
-from mutator.triggers.over_time import holds
+from mutator.triggers.trace_formulas import holds
 from mutator.workspace import Workspace
 
 pytestmark = pytest.mark.slow

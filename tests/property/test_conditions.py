@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from mutator.errors import MutatorError
 from mutator.triggers.conditions import check_condition, check_formula, evaluate, to_code
-from mutator.triggers.over_time import holds, numbers
+from mutator.triggers.trace_formulas import holds, numbers
 
 VARIABLES = ("t", "gap", "speed", "closing")
 NUMBERS = st.integers(-100, 100).map(str) | st.floats(0, 1e300).map(repr) | st.sampled_from(VARIABLES)

@@ -5,8 +5,8 @@ from pathlib import Path
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mutator.faults.expansion import draw_values, expand
-from mutator.faults.specs import Draw
+from mutator.faults.fault_specs import Draw
+from mutator.faults.spec_expansion import draw_values, expand
 from mutator.model import Fault
 from mutator.workspace import Workspace
 

@@ -16,7 +16,7 @@ from mutator.mutants.constants_and_defaults import FixedValue
 from mutator.mutants.injection_edits import injection_edit
 from mutator.mutants.probe import probe_of, settings_of
 from mutator.mutants.splicing import apply_edits, in_lines, joined, probe_import, unsplice
-from mutator.targets.observation import Observation
+from mutator.targets.observed_values import Observation
 
 from .test_value_anchors import MANY, models, module
 

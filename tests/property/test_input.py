@@ -15,8 +15,8 @@ from mutator._common.files import read_json
 from mutator.campaigns.filters import compile_filter
 from mutator.config import yaml_files
 from mutator.errors import MutatorError
-from mutator.faults.readings import UNDECLARED
-from mutator.faults.specs import load_spec
+from mutator.faults.fault_specs import load_spec
+from mutator.faults.library_readings import UNDECLARED
 from mutator.mutants.anchors import parse_file
 from mutator.mutants.template_rendering import literal, signed
 from mutator.triggers.conditions import check_condition, evaluate

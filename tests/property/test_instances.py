@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from mutator.config.instances import instance_condition
+from mutator.config.instance_conditions import instance_condition
 from mutator.errors import MutatorError
 from mutator.model import Anchor, AnchorKind, FaultLocation, Injection
 from mutator.mutants.anchors import ParsedFile

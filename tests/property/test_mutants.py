@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from mutator.campaigns.plan import make_plan
 from mutator.errors import MutatorError
-from mutator.faults.expansion import expand
 from mutator.faults.fault_models import FaultModels, ParamSchema, SnippetKind
+from mutator.faults.spec_expansion import expand
 from mutator.model import AnchorKind, Fault, Hold, Injection, Trigger, Value
 from mutator.mutants.anchors import parsed
 from mutator.mutants.mutant_building import Mutant, build, build_directly

@@ -8,7 +8,7 @@ from pathlib import Path
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mutator.faults.expansion import expand
+from mutator.faults.spec_expansion import expand
 from mutator.model import Fault, Hold, Trigger
 from mutator.mutants.mutant_building import build
 from mutator.review.patch_shapes import group_label, parameter_values, shapes

@@ -1,4 +1,4 @@
-"""Every reader of a whole file has a limit (`mutator/_common/bounded.py`)."""
+"""Every reader of a whole file has a limit (`mutator/_common/bounded_reading.py`)."""
 
 import ast
 from collections.abc import Iterator
@@ -7,9 +7,9 @@ from pathlib import Path
 MUTATOR = Path(__file__).parents[2] / "mutator"
 UNBOUNDED = ("read_bytes", "read_text", "readlines")
 ALLOWED = {
-    "_common/cores.py: read_text": "the kernel's file",
-    "_common/shipped.py: read_bytes": "installed with the harness, or unpacked from that",
-    "_common/shipped.py: read_text": "installed with the harness",
+    "_common/cpu_cores.py: read_text": "the kernel's file",
+    "_common/shipped_files.py: read_bytes": "installed with the harness, or unpacked from that",
+    "_common/shipped_files.py: read_text": "installed with the harness",
     "campaigns/run_environment.py: read_text": "the kernel's file",
     "execution/stopped_workers.py: read_text": "the kernel's file",
     "execution/cluster/piece_process.py: read": "a file of its parent",

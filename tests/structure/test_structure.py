@@ -139,9 +139,9 @@ def test_every_package_has_a_long_docstring() -> None:
 
 
 VIOLATIONS = {
-    "direction": ("mutator/faults/specs.py", "from mutator.campaigns import plan"),
+    "direction": ("mutator/faults/fault_specs.py", "from mutator.campaigns import plan"),
     "direction, in a function": (
-        "mutator/faults/specs.py",
+        "mutator/faults/fault_specs.py",
         "def f():\n    from mutator.campaigns import plan",
     ),
     "cycle": ("mutator/mutants/patch_rendering.py", "from mutator.mutants import mutant_building"),

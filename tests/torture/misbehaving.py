@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from mutator._common.files import is_half_written, remove_folder
-from mutator._common.tables import Table
+from mutator._common.table_rendering import Table
 from mutator.engines.engine_kinds import OFFERED, REFERENCE
 from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK
 from mutator.model import Status

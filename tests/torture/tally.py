@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, fields
 from enum import StrEnum
 
-from mutator._common.tables import Table
+from mutator._common.table_rendering import Table
 
 
 class End(StrEnum):

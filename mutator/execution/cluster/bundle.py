@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 
-from mutator._common.below import check_inside, check_name, files_inside, inside
-from mutator._common.bounded import read_bounded
+from mutator._common.bounded_reading import read_bounded
+from mutator._common.confined_files import check_inside, check_name, files_inside, inside
 from mutator._common.files import raising_disk_full, read_json
 from mutator._common.hashing import plain
 from mutator._common.version import VERSION

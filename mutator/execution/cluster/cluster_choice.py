@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from mutator._common.bounded import MOST_JSON, read_bounded
+from mutator._common.bounded_reading import MOST_JSON, read_bounded
 from mutator.errors import MutatorError
 from mutator.execution.cluster.cluster_files import load_cluster
 from mutator.execution.cluster.dask_connections import (

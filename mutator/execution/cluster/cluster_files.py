@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field
 
-from mutator.config.sources import Source
 from mutator.config.yaml_files import StrictModel, read
+from mutator.config.yaml_sources import Source
 from mutator.errors import MutatorError
 from mutator.execution.cluster.dask_connections import (
     certificates,

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from mutator._common.text import counted
+from mutator._common.message_text import counted
 from mutator._common.version import VERSION
 from mutator.store.work_stretches import Stretch, differences
 

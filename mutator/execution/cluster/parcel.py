@@ -4,7 +4,7 @@ import json
 from collections.abc import Mapping
 from hashlib import sha256
 
-from mutator._common.bounded import MOST_JSON
+from mutator._common.bounded_reading import MOST_JSON
 from mutator.errors import MutatorError
 
 _MARK, _DIGEST, _LENGTH = b"FIP1", 32, 4

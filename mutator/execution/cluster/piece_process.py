@@ -17,11 +17,11 @@ from dataclasses import replace
 from multiprocessing.connection import Connection
 from pathlib import Path
 
-from mutator._common import caches
-from mutator._common.below import inside
+from mutator._common import shared_cache
+from mutator._common.confined_files import inside
 from mutator._common.files import raising_disk_full
 from mutator._common.hashing import canonical
-from mutator._common.shortages import shortage
+from mutator._common.resource_shortages import shortage
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.shared_runs import runs
 from mutator.engines import sandbox
@@ -41,7 +41,7 @@ from mutator.store.patch_files import packed_patches
 from mutator.store.records import line_of
 from mutator.store.run_folder import GoldenRun
 from mutator.store.series_packing import series_block
-from mutator.targets.requirements import check_requirements
+from mutator.targets.required_packages import check_requirements
 
 
 class PieceRunner:
@@ -138,7 +138,7 @@ class PieceRunner:
                 raise GoldenRunsDiffer(f"golden run {golden.key} {came}")
             execution.out.rename(place)
             if golden.seed is not None:  # the images of a hundred seeds would fill the disk
-                caches.make_room(self._manifest.cache_name)
+                shared_cache.make_room(self._manifest.cache_name)
 
     def _golden_of(self, experiment: Experiment) -> GoldenRun:
         return GoldenRun.of(experiment, several_seeds=self._site.meta["several_seeds"])

@@ -5,7 +5,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from mutator._common.below import check_name, inside
+from mutator._common.confined_files import check_name, inside
 from mutator._common.files import read_json
 from mutator.errors import MutatorError
 from mutator.model import Limits

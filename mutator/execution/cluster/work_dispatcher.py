@@ -14,7 +14,7 @@ from typing import Any
 
 from distributed import Client, Future
 
-from mutator._common.plain_reader import from_plain
+from mutator._common.typed_json import from_plain
 from mutator.errors import DiskFull, MutatorError, SchedulerGone, WorkerCutOff, WorkerRefused
 from mutator.execution.cluster import worker_tasks
 from mutator.execution.cluster.bundle import Bundle

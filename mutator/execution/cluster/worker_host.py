@@ -20,7 +20,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 from mutator._common.files import raising_disk_full, remove_folder
-from mutator._common.shortages import shortage
+from mutator._common.resource_shortages import shortage
 from mutator.errors import MutatorError, PieceNotWanted
 from mutator.execution.cluster import bundle
 from mutator.execution.cluster.pieces import Ending, Piece, Result

@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from mutator._common.below import inside
+from mutator._common.confined_files import inside
 from mutator._common.files import make_folder, write_atomic
-from mutator._common.text import counted
+from mutator._common.message_text import counted
 from mutator.campaigns.filters import compile_filter
 from mutator.errors import MutatorError, MutatorWarning
 from mutator.execution.run_traces import Traces

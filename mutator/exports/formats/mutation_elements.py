@@ -9,7 +9,7 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from mutator._common.text import counted
+from mutator._common.message_text import counted
 from mutator._common.version import VERSION
 from mutator.execution import single_run
 from mutator.exports import Export, ExportRequest

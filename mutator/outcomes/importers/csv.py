@@ -2,7 +2,7 @@
 
 import io
 
-from mutator._common.bounded import read_bounded
+from mutator._common.bounded_reading import read_bounded
 from mutator.errors import BadTrace
 from mutator.outcomes.trace_files import (
     MOST_COLUMNS,

@@ -4,7 +4,7 @@ import io
 
 import numpy as np
 
-from mutator._common.bounded import read_bounded
+from mutator._common.bounded_reading import read_bounded
 from mutator.errors import BadTrace
 from mutator.outcomes import npz_reader
 from mutator.outcomes.trace_files import (

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 from markupsafe import Markup
 
-from mutator._common.tables import Table
+from mutator._common.table_rendering import Table
 from mutator.report.answer_parts import Cell, Codes, Link, Listing, Part
 from mutator.report.answers import answers_of
 from mutator.report.glossary import Words, meanings_of

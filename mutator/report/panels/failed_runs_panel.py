@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from pandas import DataFrame
 
-from mutator._common.tables import Table
+from mutator._common.table_rendering import Table
 from mutator.model import Status
 from mutator.report.panel import Panel, rendered
 from mutator.report.reported_run import ReportedRun

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from mutator._common.tables import Table
+from mutator._common.table_rendering import Table
 from mutator.report.fault_path_data import ALL, PathCounts, RunPaths, counts_by_fault_type
 from mutator.report.panel import Panel, rendered
 from mutator.report.path_drawing import draw_path_counts, drawn_counts, share_text

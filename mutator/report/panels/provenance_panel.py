@@ -1,6 +1,6 @@
 """The provenance panel: how the experiments were executed, and what is needed to reproduce them."""
 
-from mutator._common.tables import Table
+from mutator._common.table_rendering import Table
 from mutator.audit.seal import OUTSIDE, seal_or_why_not, unsealed_facts, without
 from mutator.campaigns.installed_studies import study_problems
 from mutator.report.panel import Panel, rendered

@@ -1,6 +1,6 @@
 """The panel that shows how much results vary between seeds. Runs with one seed have no such panel."""
 
-from mutator._common.tables import Table
+from mutator._common.table_rendering import Table
 from mutator.report.panel import Panel, rendered
 from mutator.report.panels.tables_panel import sheet_files
 from mutator.report.reported_run import ReportedRun

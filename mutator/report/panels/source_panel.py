@@ -10,8 +10,8 @@ from urllib.parse import quote
 
 from markupsafe import Markup, escape
 
-from mutator._common.tables import Table
-from mutator._common.text import counted
+from mutator._common.message_text import counted
+from mutator._common.table_rendering import Table
 from mutator.report.panel import Panel, rendered
 from mutator.report.reported_run import ReportedRun
 from mutator.report.source_lines import ENDINGS, LASTING, Mark, MarkedFile

@@ -4,7 +4,7 @@ from collections.abc import Collection
 from dataclasses import replace
 from operator import itemgetter
 
-from mutator._common.tables import Table
+from mutator._common.table_rendering import Table
 from mutator.outcomes.fault_free_runs import fault_free_table, own_alerts
 from mutator.report.panel import Panel, rendered
 from mutator.report.reported_run import ReportedRun

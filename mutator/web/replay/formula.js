@@ -1,7 +1,7 @@
 // @ts-check
 "use strict";
-// Evaluates a manifest's formulas and conditions over the steps of a run, as triggers/over_time.py does. The input is
-// trees (triggers/json_trees.py): numbers, names, and lists of an operator and its operands.
+// Evaluates a manifest's formulas and conditions over the steps of a run, as triggers/trace_formulas.py does. The input
+// is trees (triggers/formula_json.py): numbers, names, and lists of an operator and its operands.
 
 const Formula = (() => {
   const OF_NUMBERS = {

@@ -10,7 +10,7 @@ from mutator.engines.fork_server_client import Pool
 from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection, Limits, Trigger
 from mutator.mutants.mutant_building import build
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.kinds import always
+from mutator.triggers.trigger_kinds import always
 from mutator.workspace import Workspace
 
 Edit = Callable[[str, str, str], None]

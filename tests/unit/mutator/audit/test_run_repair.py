@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common.locks import owned
+from mutator._common.folder_locks import owned
 from mutator.audit.run_repair import _put_aside, repair
 from mutator.errors import MutatorError, Outside
 from mutator.store import file_digests, plan_file

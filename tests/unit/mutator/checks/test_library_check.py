@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 
 from mutator.checks.library_check import check_library
-from mutator.faults.expansion import expand
+from mutator.faults.spec_expansion import expand
 from mutator.model import Fault, Hold
 from mutator.mutants.mutant_building import build
 from mutator.mutants.probe import probe_path
 from mutator.mutants.splicing import unsplice
 from mutator.targets.source_tree import matches
-from mutator.triggers.kinds import always
+from mutator.triggers.trigger_kinds import always
 from mutator.workspace import Workspace
 
 # Values per trigger of the published fault types.

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from pydantic import Field
 
-from mutator._common.yaml_records import mapping, written
+from mutator._common.yaml_dataclasses import mapping, written
 from mutator.config import yaml_files
 from mutator.errors import MutatorError
 

@@ -10,7 +10,7 @@ from mutator.engines.first_activation import Observed, Start, first_active
 from mutator.model import Hold, Trigger
 from mutator.mutants.mutant_building import build
 from mutator.mutants.probe import Probe, state_after
-from mutator.triggers.kinds import always, at_time
+from mutator.triggers.trigger_kinds import always, at_time
 from mutator.workspace import Workspace
 
 

@@ -16,7 +16,7 @@ from mutator.engines import fork_server_client
 from mutator.engines.engine_jobs import RunMode
 from mutator.engines.first_activation import Observed
 from mutator.model import Status, Trigger
-from mutator.triggers.kinds import at_time
+from mutator.triggers.trigger_kinds import at_time
 from mutator.workspace import Workspace
 
 from ..fork_on_toy import LIMITS, Edit, Fork
@@ -114,7 +114,7 @@ from pathlib import Path
 from mutator.workspace import Workspace
 sys.path.insert(0, sys.argv[4])
 from fork_on_toy import Fork
-from mutator.triggers.kinds import at_time
+from mutator.triggers.trigger_kinds import at_time
 toy = Workspace(library=Path(sys.argv[1]), templates=Path(sys.argv[2]))
 fork = Fork(toy, Path(sys.argv[3]))
 print(fork.run(fork.job(at_time(2.0))).mode, flush=True)

@@ -6,7 +6,7 @@ import pytest
 
 from mutator.engines.engine_jobs import RunMode
 from mutator.model import Status
-from mutator.triggers.kinds import always, at_time
+from mutator.triggers.trigger_kinds import always, at_time
 
 from ..fork_on_toy import LIMITS, Edit, Fork
 

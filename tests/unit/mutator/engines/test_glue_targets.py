@@ -8,7 +8,7 @@ import mutator
 from mutator.engines.engine_jobs import RunMode
 from mutator.engines.in_target.run_once import Harness
 from mutator.model import Status
-from mutator.triggers.kinds import at_time
+from mutator.triggers.trigger_kinds import at_time
 
 from ..fork_on_toy import Edit, Fork
 

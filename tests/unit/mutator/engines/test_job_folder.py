@@ -7,7 +7,7 @@ import pytest
 
 from mutator.engines.engine_jobs import Execution
 from mutator.model import Status
-from mutator.triggers.kinds import at_time
+from mutator.triggers.trigger_kinds import at_time
 
 from ..fork_on_toy import Edit, Fork
 

@@ -16,7 +16,7 @@ from mutator.engines.reference_engine import ReferenceEngine
 from mutator.engines.sandbox import Sandbox
 from mutator.errors import EXIT_WRONG_INPUT, MutatorError
 from mutator.model import Limits, Status
-from mutator.triggers.kinds import at_time
+from mutator.triggers.trigger_kinds import at_time
 from mutator.workspace import Workspace
 
 from ..fork_on_toy import Edit, Fork

@@ -19,9 +19,9 @@ from mutator.execution.experiment_runner import Finished, Goldens, Runner
 from mutator.model import AfterHazard, Experiment, Method, Outcome, Record, Status
 from mutator.mutants.mutant_building import build
 from mutator.outcomes.golden_comparison import until
-from mutator.targets.stopping import stop_source
-from mutator.triggers import over_time
-from mutator.triggers.kinds import always, at_time
+from mutator.targets.stop_code import stop_source
+from mutator.triggers import trace_formulas
+from mutator.triggers.trigger_kinds import always, at_time
 
 from ..fork_on_toy import Edit, Fork
 
@@ -183,7 +183,7 @@ def test_stopping_agrees_with_the_verdict_on_the_trace(stopping: Fork, edit: Edi
         values = {"t": t, "d_rel": gap, "near": gap, "speed": speed}
         trace = {name: np.array(value) for name, value in values.items()}
         judged = [r.when if r.terminal == "True" else r.terminal for r in manifest.rules if r.terminal]
-        expected = any(over_time.holds(text, trace)[0] for text in judged)
+        expected = any(trace_formulas.holds(text, trace)[0] for text in judged)
         assert over({"time": t[0], "gap": gap[0], "speed": speed[0]}) is expected, numbers
 
 

@@ -19,7 +19,7 @@ from mutator.mutants.changed_file_reuse import (
 )
 from mutator.mutants.mutant_building import build, build_directly
 from mutator.mutants.patch_rendering import changed_file
-from mutator.triggers.kinds import always
+from mutator.triggers.trigger_kinds import always
 from mutator.workspace import Workspace
 
 TEXTS = [

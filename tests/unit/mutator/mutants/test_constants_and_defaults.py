@@ -15,7 +15,7 @@ from mutator.mutants.anchors import parse_file
 from mutator.mutants.constant_imports import importers
 from mutator.mutants.injection_edits import injection_edit
 from mutator.mutants.splicing import apply_edits, in_lines, joined, probe_import, unsplice
-from mutator.targets.observation import Observation
+from mutator.targets.observed_values import Observation
 from mutator.targets.source_tree import read_tree
 from mutator.workspace import Workspace
 

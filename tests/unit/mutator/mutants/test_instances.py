@@ -6,18 +6,18 @@ from typing import Any
 
 import pytest
 
-from mutator.config.instances import instance_condition
-from mutator.config.sources import Source
+from mutator.config.instance_conditions import instance_condition
+from mutator.config.yaml_sources import Source
 from mutator.errors import MutatorError
 from mutator.faults.injection_model import InjectionModel
-from mutator.faults.injections import InjectionSpec
+from mutator.faults.injection_specs import InjectionSpec
 from mutator.model import Anchor, AnchorKind, FaultLocation, Hold, Injection, Trigger
 from mutator.mutants import injected_lines
 from mutator.mutants import probe as contract
 from mutator.mutants.anchors import parse_file
 from mutator.mutants.injection_edits import injection_edit
 from mutator.mutants.splicing import apply_edits, in_lines, joined, probe_import, unsplice
-from mutator.targets.observation import Observation
+from mutator.targets.observed_values import Observation
 from mutator.workspace import Workspace
 
 SOURCE = """def drive(lanes, seen):

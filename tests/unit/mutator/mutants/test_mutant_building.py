@@ -10,14 +10,14 @@ from pathlib import Path
 import pytest
 
 from mutator.errors import InvalidMutant, MutatorError
-from mutator.faults.expansion import expand
+from mutator.faults.spec_expansion import expand
 from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Hold, Injection, Trigger
 from mutator.mutants import mutant_building
 from mutator.mutants.mutant_building import Mutant, write_tree
 from mutator.mutants.probe import probe_path
 from mutator.mutants.splicing import unsplice
 from mutator.targets.source_tree import read_tree
-from mutator.triggers.kinds import always, at_time
+from mutator.triggers.trigger_kinds import always, at_time
 from mutator.workspace import Workspace
 
 GOLDEN = Path(__file__).parents[1] / "toy" / "golden"

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from mutator.config.place_model import AtModel
-from mutator.config.sources import Source
+from mutator.config.location_model import AtModel
+from mutator.config.yaml_sources import Source
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import ParamSchema
 from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS, Injection, Value

@@ -13,7 +13,7 @@ import pytest
 
 from mutator.model import Hold, Trigger
 from mutator.mutants import probe as contract
-from mutator.targets.observation import Observation, Value
+from mutator.targets.observed_values import Observation, Value
 from mutator.triggers.conditions import check_condition, evaluate
 from mutator.workspace import Workspace
 

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mutator.config.sources import Source
+from mutator.config.yaml_sources import Source
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel, ParamSchema, SnippetKind
 from mutator.model import Hold, Value
 from mutator.mutants.probe import probe_of, settings_of
 from mutator.mutants.template_rendering import changed_value, snippet
-from mutator.triggers.kinds import always
+from mutator.triggers.trigger_kinds import always
 from mutator.workspace import Workspace
 
 SOURCE = Source(path=Path("t.yaml"), data={}, lines={})

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common import caches
+from mutator._common import shared_cache
 from mutator.engines.engine_jobs import Job
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import MutatorError
@@ -50,7 +50,7 @@ def test_executed_lines_are_cached(
     monkeypatch.setattr(executed_lines, "_measured", lambda *given: (runs.append("run"), measured(*given))[1])
     [first] = lines_of(manifest, [drive], LIMITS)
     assert [first] == lines_of(manifest, [drive], LIMITS) and len(runs) == 1
-    [entry] = caches.of_lines().iterdir()
+    [entry] = shared_cache.of_lines().iterdir()
     entry.write_text(entry.read_text().replace("[", "[1,", 1))
     assert [first] == lines_of(manifest, [drive], LIMITS) and len(runs) == 2
     broken = tmp_path / "broken.yaml"

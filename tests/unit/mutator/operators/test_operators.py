@@ -17,7 +17,7 @@ from mutator.operators.mutations import Mutation
 from mutator.operators.operator_lookup import find_operator, operators_named
 from mutator.operators.statement_facts import facts_of
 from mutator.targets.source_tree import read_tree
-from mutator.triggers.kinds import always
+from mutator.triggers.trigger_kinds import always
 from mutator.workspace import Workspace
 
 Make = Callable[..., list[Mutation]]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mutator._common.plain_reader import from_plain
+from mutator._common.typed_json import from_plain
 from mutator.model import Activation, Outcome, Record, Status
 from mutator.outcomes.channel_departures import departures
 from mutator.outcomes.golden_comparison import compare

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from mutator._common.plain_reader import from_plain
+from mutator._common.typed_json import from_plain
 from mutator.errors import MutatorError
 from mutator.model import (
     Activation,
@@ -25,7 +25,7 @@ from mutator.model import (
 )
 from mutator.outcomes.fault_paths import ComponentState, FaultPath, FaultPaths, LinkState, fault_paths_of
 from mutator.store.run_folder import RunFolder
-from mutator.stpa.analysis import StructureModel
+from mutator.stpa.analysis_files import StructureModel
 from mutator.targets.target_facts import ChannelFacts
 from tests.made_head import made_head
 

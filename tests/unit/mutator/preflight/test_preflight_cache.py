@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common import kept_folders
+from mutator._common import cached_folders
 from mutator._common.files import json_bytes
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import make_plan
@@ -141,7 +141,7 @@ def test_a_forged_golden_run_is_ignored(
     told["goldens"]["A"] = digest_of(manifest, place)
     (cache / "checks.json").write_bytes(json_bytes(told))
     (cache / "sum").unlink()
-    (cache / "sum").write_bytes(kept_folders._sum(cache))
+    (cache / "sum").write_bytes(cached_folders._sum(cache))
     folder = freeze(make_plan(toy, "small"), tmp_path / "run", toy)
     with pytest.raises(RunStarted):
         run_checks(toy, folder)

@@ -12,7 +12,7 @@ from mutator.campaigns.plan import make_plan
 from mutator.model import Experiment, Trigger
 from mutator.preflight.preflight_checks import describe_unreached_triggers, run_checks
 from mutator.preflight.unreached_triggers import read_observed, remarks, write_observed
-from mutator.triggers.kinds import at_time
+from mutator.triggers.trigger_kinds import at_time
 from mutator.workspace import Workspace
 
 MakeExperiment = Callable[..., Experiment]

@@ -4,7 +4,7 @@ import importlib.util
 import re
 from pathlib import Path
 
-from mutator._common import caches
+from mutator._common import shared_cache
 
 CLONE = Path(__file__).parents[4]
 PAGE = (CLONE / "docs" / "reference" / "formats.md").read_text(encoding="utf-8")
@@ -37,8 +37,15 @@ def test_every_module_in_the_page_exists() -> None:
 def test_the_page_lists_every_cache() -> None:
     table = PAGE.split("\n## Caches\n")[1].split("\n## ")[0]
     folders = set(re.findall(r"^\| `([^/`]+)/", table, re.MULTILINE))
-    parts = {caches.CHECKS, caches.GOLDENS, caches.LINES, caches.PAGES, caches.PICTURES, caches.RUNS}
-    assert folders == {*parts, caches.TARGETS}
+    parts = {
+        shared_cache.CHECKS,
+        shared_cache.GOLDENS,
+        shared_cache.LINES,
+        shared_cache.PAGES,
+        shared_cache.PICTURES,
+        shared_cache.RUNS,
+    }
+    assert folders == {*parts, shared_cache.TARGETS}
 
 
 def test_the_page_lists_the_schema_of_every_library_file() -> None:

@@ -9,11 +9,11 @@ import jsonschema
 import pytest
 from typer.main import get_command
 
-from mutator._common import shipped
+from mutator._common import shipped_files
 from mutator.cli.app import GROUPS, app
 from mutator.config import yaml_files
 from mutator.errors import MutatorError
-from mutator.faults.specs import spec_model
+from mutator.faults.fault_specs import spec_model
 from mutator.reference.generated_files import FOLDER, PAGES, SCHEMAS, STUB, render_files, write_files
 from mutator.reference.schemas import Format, definitions, file_formats
 from mutator.reference.yaml_key_tables import reading_order
@@ -124,7 +124,7 @@ def test_a_schema_accepts_a_users_fault_model() -> None:
 
 def test_pages_are_written_only_in_a_clone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """An installed wheel has no clone to write to."""
-    monkeypatch.setattr(shipped, "ARCHIVE", tmp_path)
+    monkeypatch.setattr(shipped_files, "ARCHIVE", tmp_path)
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
     library = tmp_path / "mutator" / "shipped" / "0" / "fault_library"
     with pytest.raises(MutatorError, match="ships with mutator"):

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from math import inf
 
-from mutator._common.plain_reader import from_plain
+from mutator._common.typed_json import from_plain
 from mutator.model import Record
 from mutator.outcomes.fault_paths import (
     ComponentState,
@@ -16,7 +16,7 @@ from mutator.outcomes.fault_paths import (
 )
 from mutator.report.fault_path_data import PathCounts, RunPaths
 from mutator.report.path_drawing import draw_path_counts, drawn_counts
-from mutator.stpa.analysis import load_analysis
+from mutator.stpa.analysis_files import load_analysis
 from mutator.targets.target_facts import ChannelFacts
 from mutator.workspace import Workspace
 

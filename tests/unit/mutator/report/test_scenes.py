@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from mutator.report.experiment_list import scene_facts
-from mutator.triggers.json_trees import Tree
+from mutator.triggers.formula_json import Tree
 from mutator.workspace import Workspace
 
 

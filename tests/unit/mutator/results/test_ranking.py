@@ -13,7 +13,7 @@ from mutator.results.ranking import places, worth
 from mutator.results.result_rows import Row, rows_of
 from mutator.results.table_columns import SEVERITY, SINCE, result_columns
 from mutator.results.table_reader import Results
-from mutator.targets.severity import CLASSES
+from mutator.targets.contact_severity import CLASSES
 from mutator.targets.target_facts import MetricFacts
 from tests.made_head import made_head
 from tests.made_up_results import write_results

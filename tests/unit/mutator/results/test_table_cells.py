@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from mutator._common.hashing import plain
-from mutator._common.plain_reader import from_plain
+from mutator._common.typed_json import from_plain
 from mutator.model import Experiment, Method, Outcome, Record, Status
 from mutator.results.table_columns import (
     SEVERITY,
@@ -16,7 +16,7 @@ from mutator.results.table_columns import (
     result_columns,
     severity_columns,
 )
-from mutator.targets.severity import Scale
+from mutator.targets.contact_severity import Scale
 
 HAZARDS = ("H1", "H2", "H3")
 COLUMNS = result_columns(HAZARDS, ("gas", "brake", "steer_torque"), (), (SEVERITY, *SINCE))

@@ -38,7 +38,7 @@ from mutator.statistics.results_frame import hazard_names, load_usable_results, 
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import read_head
-from mutator.targets.environment import THREADS
+from mutator.targets.process_environment import THREADS
 from mutator.targets.target_facts import metric_facts
 from mutator.workspace import Workspace
 from tests.costs import is_cheap, is_refused

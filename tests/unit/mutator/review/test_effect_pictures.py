@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from mutator._common import caches
+from mutator._common import shared_cache
 from mutator.engines.engine_jobs import Execution, Job
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import MutatorError
@@ -85,7 +85,7 @@ def test_images_are_cached_until_an_effect_changes(lit: Lit, runs: list[str]) ->
     runs.clear()
     assert drawn(workspace, group) == first
     assert not runs
-    [entry] = caches.of_pictures().iterdir()
+    [entry] = shared_cache.of_pictures().iterdir()
     entry.write_bytes(entry.read_bytes().replace(b"least", b"lost!"))
     assert drawn(workspace, group) == first
     lens = workspace.library.parent / "tree/toycar/lens.py"

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import pytest
 
-from mutator.faults.expansion import expand
+from mutator.faults.spec_expansion import expand
 from mutator.model import Fault, Hold, Trigger
 from mutator.mutants.mutant_building import build
 from mutator.review.patch_shapes import Shape, group_label, parameter_values, shapes, without_values
-from mutator.triggers.kinds import always, at_time
+from mutator.triggers.trigger_kinds import always, at_time
 from mutator.workspace import Workspace
 
 NEAR = Trigger(name="near", condition="hwt <= 2.0")

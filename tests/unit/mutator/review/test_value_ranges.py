@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from mutator.faults.expansion import expand
+from mutator.faults.spec_expansion import expand
 from mutator.model import Fault, Value
 from mutator.review.value_ranges import ranges_of
 from mutator.workspace import Workspace

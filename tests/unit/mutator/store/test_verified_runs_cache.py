@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common import caches
+from mutator._common import shared_cache
 from mutator.errors import MutatorError
 from mutator.execution.campaign_running import run_campaign
 from mutator.execution.finished_run_cache import ended_before
@@ -114,7 +114,7 @@ def test_space_is_freed_for_the_images_of_the_next_seed(
     made: tuple[Workspace, Path], cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked = []
-    monkeypatch.setattr(caches, "make_room", asked.append)
+    monkeypatch.setattr(shared_cache, "make_room", asked.append)
     run_campaign(made[0], "small", tmp_path / "run", choices=Choices(limit=4), engine="reference")
     goldens = len(RunFolder.open(tmp_path / "run").goldens)
     assert asked == ["toycar"] * (goldens + 2)

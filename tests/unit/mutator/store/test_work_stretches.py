@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from mutator._common.hashing import plain
-from mutator._common.plain_reader import from_plain
+from mutator._common.typed_json import from_plain
 from mutator.errors import Misfit
 from mutator.store.work_stretches import (
     Blas,

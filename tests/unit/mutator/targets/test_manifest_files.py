@@ -4,14 +4,14 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common import caches
+from mutator._common import shared_cache
 from mutator.errors import MutatorError, Outside
-from mutator.faults.expansion import expand
+from mutator.faults.spec_expansion import expand
 from mutator.model import AnchorKind
 from mutator.mutants.mutant_building import build
 from mutator.targets.manifest_files import load_manifest
 from mutator.targets.source_tree import matches, read_tree
-from mutator.triggers.kinds import always
+from mutator.triggers.trigger_kinds import always
 from mutator.workspace import Workspace
 
 FILM = 'film: {run: ["x={film}"], module: show, args: ["{out}"], still: ["{film}"]}'
@@ -88,7 +88,7 @@ def test_every_run_has_the_same_cache_folder(toy: Workspace) -> None:
     manifest = toy.manifest("toy")
     for independent in (False, True):
         given = manifest.arguments(scenario=Path("s"), seed=0, out=Path("o"), independent=independent)
-        assert given[given.index("--cache") + 1] == str(caches.of_target("toy"))
+        assert given[given.index("--cache") + 1] == str(shared_cache.of_target("toy"))
 
 
 def test_a_film_adds_arguments(toy: Workspace) -> None:

@@ -8,11 +8,11 @@ import pytest
 from mutator.api.trials import try_fault
 from mutator.checks.doctor import examine
 from mutator.errors import MutatorError
-from mutator.faults.expansion import expand
+from mutator.faults.spec_expansion import expand
 from mutator.model import Outcome
 from mutator.mutants.mutant_building import build
 from mutator.report.film import Shot, _show
-from mutator.triggers.kinds import always
+from mutator.triggers.trigger_kinds import always
 from mutator.workspace import Workspace
 
 MANIFEST = "targets/pole.yaml"

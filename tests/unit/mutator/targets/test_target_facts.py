@@ -3,7 +3,7 @@
 import pytest
 
 from mutator._common.hashing import plain
-from mutator._common.plain_reader import from_plain
+from mutator._common.typed_json import from_plain
 from mutator.errors import Misfit
 from mutator.targets.channels import Role
 from mutator.targets.target_facts import ChannelFacts, MetricFacts

@@ -8,8 +8,8 @@ import pytest
 
 from mutator.campaigns.filters import compile_filter
 from mutator.errors import MutatorError
-from mutator.stpa.coverage import measure_coverage
-from mutator.triggers import stl
+from mutator.stpa.context_coverage import measure_coverage
+from mutator.triggers import temporal_logic
 from mutator.triggers.conditions import check_condition, check_formula
 from tests.costs import is_cheap, is_refused
 
@@ -50,14 +50,14 @@ EXPRESSIONS = {
 @pytest.mark.parametrize("formula", TEMPORAL.values(), ids=TEMPORAL)
 def test_a_hostile_temporal_formula_ends_soon(formula: str) -> None:
     pytest.importorskip("rtamt")
-    is_cheap(lambda: stl.check(formula, ("x",), 0.01))
+    is_cheap(lambda: temporal_logic.check(formula, ("x",), 0.01))
     steps = np.arange(3000) * 0.01
-    is_cheap(lambda: stl.robustness(formula, {"x": steps, "t": steps}, 0.01))
+    is_cheap(lambda: temporal_logic.robustness(formula, {"x": steps, "t": steps}, 0.01))
 
 
 def test_a_long_interval_is_refused_with_the_longest() -> None:
     pytest.importorskip("rtamt")
-    refused = is_refused(lambda: stl.check(TEMPORAL["a long past"], ("x",), 0.01))
+    refused = is_refused(lambda: temporal_logic.check(TEMPORAL["a long past"], ("x",), 0.01))
     assert "intervals of 99999999900 steps" in refused or "intervals of 999999999 steps" in refused
     assert "at most 3000 steps together, 30 s here" in refused
 

@@ -16,14 +16,14 @@ from selfdrive.sim.image_library import SPACING
 from selfdrive.sim.remembering_detector import SEEING
 from selfdrive.sim.road_renderer import RoadRenderer
 
-from mutator._common import caches
+from mutator._common import shared_cache
 from mutator.engines.engine_jobs import Job
 from mutator.engines.job_tree_pool import BaseTree
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection, Limits, Status
 from mutator.mutants.mutant_building import build
 from mutator.targets.source_tree import matches
-from mutator.triggers.kinds import at_time
+from mutator.triggers.trigger_kinds import at_time
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[4]
@@ -75,7 +75,7 @@ def drive(tmp_path: Path) -> Drive:
 
 def memory() -> Path:
     """The folder where the harness lets the target store detections."""
-    return caches.of_target("openpilot") / FILE
+    return shared_cache.of_target("openpilot") / FILE
 
 
 def test_the_manifest_lists_every_file_that_affects_detection() -> None:

@@ -1,0 +1,283 @@
+"""Open, write and delete files below a folder that somebody else may have filled.
+
+A run folder, a library, a bundle or a shard can come from anybody. A name in one of its files can point out
+of it (`../../setup.py`), and a link in it can point anywhere. So names are checked, and each folder on the
+way is opened relative to the one before, without following links: nothing can be exchanged between check and
+use. Only `root` itself may be reached through links, because the user named it.
+
+What is only read, and only at the user's side, may use links that stay inside: a library, its templates, a
+target's tree (`check_inside`, `files_inside`).
+"""
+
+import errno
+import os
+import stat
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from io import BufferedReader
+from pathlib import Path
+from typing import BinaryIO
+
+from mutator._common.bounded_reading import read_open
+from mutator._common.files import clear_place, let_in, raising_disk_full
+from mutator.errors import MutatorError, Outside
+
+_FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
+_CAREFULLY = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
+_NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
+_DEEPEST, _DEEPEST_OUTPUT = 30, 20  # folders in each other; an output lies in a few others
+_LONGEST_NAME = 220  # bytes; Linux allows 255, and a half-written file has a longer name
+
+
+def check_name(name: object, where: str | Path, *, folders: bool = True) -> str:
+    """Return `name` if it is a relative path in its shortest form, such as `golden/S1/trace.npz`.
+
+    Outside for anything else, and without `folders` also for several parts. `where` is the file or folder
+    that the name comes from.
+    """
+    text = name if isinstance(name, str) else ""
+    parts = text.split("/")
+    if (folders or len(parts) == 1) and all(
+        part not in ("", ".", "..") and part.isprintable() and _fits(part) for part in parts
+    ):
+        return text
+    raise Outside(
+        f"the name {name!a}",
+        where=where,
+        expected="the name of a file inside its folder, without `..`, links or unprintable characters",
+        remedy="do not use this folder: whoever made it could reach your other files",
+    )
+
+
+def check_library_name(name: str, where: str | Path) -> str:
+    """Return the name of a target or scenario of the library; Outside for the path of a YAML file."""
+    if not name.endswith((".yaml", ".yml")):
+        return name
+    raise Outside(
+        f"the path {name!a}",
+        where=where,
+        expected="the name of a file in the library",
+        remedy="add the file to the library, and name it without its folder and `.yaml`",
+    )
+
+
+def inside(root: Path, name: object) -> Path:
+    """Join a name that is not a constant of the code to `root`; Outside as in `check_name`."""
+    return root / check_name(name, root)
+
+
+def open_below(root: Path, name: str) -> BufferedReader:
+    """Open a regular file below `root` for reading.
+
+    FileNotFoundError if it is missing; Outside if it is a link or no regular file, or if a folder on the way
+    is a link.
+    """
+    file = open_descriptor(root, name, os.O_RDONLY)
+    if not stat.S_ISREG(os.fstat(file).st_mode):
+        os.close(file)
+        raise not_plain(root / name)
+    return os.fdopen(file, "rb")
+
+
+def open_descriptor(root: Path, name: str, flags: int) -> int:
+    """Return a descriptor of anything but a link, for the caller to check and close. Opening never blocks."""
+    with _parent(root, name) as (parent, last):
+        return os.open(last, flags | _CAREFULLY, 0o644, dir_fd=parent)
+
+
+def read_below(root: Path, name: str) -> bytes:
+    """Return the content of a file; errors as in `open_below` and `read_open`."""
+    with open_below(root, name) as file:
+        return read_open(file, root / name)
+
+
+def write_below(root: Path, name: str, data: bytes) -> None:
+    """Write a file as `writing_below` does."""
+    with writing_below(root, name) as writer:
+        writer.write(data)
+
+
+@contextmanager
+def writing_below(root: Path, name: str) -> Iterator[BinaryIO]:
+    """Yield a file to write. It takes its name at the end of the block, and its folders are made.
+
+    What stands in its place is replaced, never written to. Outside if a folder on the way is a link;
+    MutatorError if a folder stands in its place.
+    """
+    with raising_disk_full(root / name), _parent(root, name, make=True) as (parent, last):
+        temporary = f".{last}.{threading.get_native_id()}"  # `is_half_written`
+        with suppress(FileNotFoundError):
+            os.unlink(temporary, dir_fd=parent)
+        file = os.open(temporary, _NEW, 0o644, dir_fd=parent)
+        try:
+            with os.fdopen(file, "wb") as writer:
+                yield writer
+                writer.flush()
+                os.fsync(file)
+            os.replace(temporary, last, src_dir_fd=parent, dst_dir_fd=parent)
+        except BaseException as err:
+            with suppress(OSError):
+                os.unlink(temporary, dir_fd=parent)
+            if isinstance(err, IsADirectoryError):
+                what = "a file to write"
+                raise MutatorError("a folder", where=root / name, expected=what, remedy="move it") from None
+            raise
+
+
+def unlink_below(root: Path, name: str) -> None:
+    """Delete a file or a link, which is not followed; a missing one is ignored."""
+    with suppress(FileNotFoundError), _parent(root, name) as (parent, last):
+        os.unlink(last, dir_fd=parent)
+
+
+def move_below(root: Path, name: str, to: str) -> None:
+    """Rename a file, folder or link, which is not followed; make the folders of `to`."""
+    with _parent(root, name) as (parent, last), _parent(root, to, make=True) as (there, final):
+        os.rename(last, final, src_dir_fd=parent, dst_dir_fd=there)
+
+
+def check_plain(root: Path) -> None:
+    """Raise Outside if anything below `root` is neither a regular file nor a folder."""
+    for _, entry in entries_below(root):
+        if not is_plain(entry):
+            raise not_plain(Path(entry.path))
+
+
+def check_inside(root: Path, path: Path) -> Path:
+    """Return `path`, a place below `root`; Outside if a link on the way leads out of `root`."""
+    if not is_inside(root, path):
+        raise Outside(
+            "a link that leads out of its folder",
+            where=path,
+            expected=f"only files and folders of {root}, and links to them",
+            remedy="put a copy in its place, or delete it; it would show somebody else's library your files",
+        )
+    return path
+
+
+def is_inside(root: Path, path: Path) -> bool:
+    """Whether `path`, with all links followed, is `root` or below it. The path need not exist."""
+    return Path(os.path.realpath(path)).is_relative_to(os.path.realpath(root))
+
+
+def files_inside(root: Path, folder: str, pattern: str) -> list[Path]:
+    """Return the files below `root`/`folder` whose names match a glob, sorted; linked folders are skipped.
+
+    Outside for a name that `check_name` refuses, and for a link that leads out of `root`.
+    """
+    base = check_inside(root, root / folder)
+    files = sorted(path for path in base.rglob(pattern) if not path.is_dir())
+    for path in files:
+        check_name(path.relative_to(root).as_posix(), base)
+        if path.is_symlink():
+            check_inside(root, path)
+    return files
+
+
+def entries_below(
+    root: Path, closed: Callable[[str], bool] = lambda name: False
+) -> Iterator[tuple[str, os.DirEntry[str]]]:
+    """Yield everything below `root` with its path from there, but nothing in links and `closed` folders.
+
+    What disappears meanwhile is left out.
+    """
+    folders = [""]
+    while folders:
+        folder = folders.pop()
+        with suppress(FileNotFoundError, NotADirectoryError), os.scandir(f"{root}/{folder}") as entries:
+            for entry in entries:
+                name = f"{folder}{entry.name}"
+                yield name, entry
+                if entry.is_dir(follow_symlinks=False) and not closed(name):
+                    folders.append(f"{name}/")
+
+
+def move_plain(source: int, target: int, depth: int = 0) -> None:
+    """Move regular files between open folders, whoever can change the first one meanwhile.
+
+    Folders are made anew. Links, pipes and the like, unprintable names and deep folders stay behind.
+    """
+    if depth >= _DEEPEST_OUTPUT:
+        return
+    with suppress(OSError):
+        os.fchmod(source, stat.S_IRWXU)
+    with os.scandir(source) as entries:
+        found = [entry.name for entry in entries if entry.name.isprintable()]
+    for name in sorted(found):
+        with suppress(FileNotFoundError, NotADirectoryError):
+            kind = _kind(source, name)
+            if kind == stat.S_IFREG:
+                os.rename(name, name, src_dir_fd=source, dst_dir_fd=target)
+                if _kind(target, name) != stat.S_IFREG:  # exchanged between look and move
+                    clear_place(Path(f"/proc/self/fd/{target}", name))
+            elif kind == stat.S_IFDIR:
+                os.mkdir(name, dir_fd=target)
+                with open_folder(name, source) as below, open_folder(name, target) as there:
+                    move_plain(below, there, depth + 1)
+
+
+@contextmanager
+def open_folder(name: str | Path, parent: int | None = None) -> Iterator[int]:
+    """Yield a descriptor of a folder; NotADirectoryError for anything else, also for a link."""
+    with suppress(OSError):
+        let_in(name, parent)
+    handle = os.open(name, _FOLDER, dir_fd=parent)
+    try:
+        yield handle
+    finally:
+        os.close(handle)
+
+
+def _kind(folder: int, name: str) -> int:
+    return stat.S_IFMT(os.stat(name, dir_fd=folder, follow_symlinks=False).st_mode)
+
+
+def is_deep(name: str) -> bool:
+    """Whether a path has more folders than anything that belongs there; readers would recurse too deeply."""
+    return name.count("/") >= _DEEPEST
+
+
+def is_plain(entry: os.DirEntry[str]) -> bool:
+    """Whether an entry is a regular file or a folder, or has disappeared."""
+    kinds = entry.is_file(follow_symlinks=False), entry.is_dir(follow_symlinks=False)
+    return any(kinds) or not os.path.lexists(entry.path)
+
+
+@contextmanager
+def _parent(root: Path, name: str, *, make: bool = False) -> Iterator[tuple[int, str]]:
+    """Open the folder that contains `name`; yield its descriptor and the last part of the name."""
+    *folders, last = check_name(name, root).split("/")
+    handle = os.open(root, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        for part in folders:
+            if make:
+                with suppress(FileExistsError):
+                    os.mkdir(part, dir_fd=handle)
+            inner = os.open(part, _FOLDER, dir_fd=handle)
+            os.close(handle)
+            handle = inner
+        yield handle, last
+    except OSError as err:
+        if err.errno in (errno.ELOOP, errno.ENOTDIR, errno.ENXIO):
+            raise not_plain(root / name) from None
+        raise
+    finally:
+        os.close(handle)
+
+
+def not_plain(path: Path) -> Outside:
+    """Return the error about a link, a pipe and the like, for the caller to raise."""
+    return Outside(
+        "a link, a pipe or something else that is not a plain file",
+        where=path,
+        expected="only files and folders",
+        remedy="delete it, or use a copy of the folder without it",
+    )
+
+
+def _fits(part: str) -> bool:
+    try:
+        return len(part.encode()) <= _LONGEST_NAME
+    except UnicodeEncodeError:
+        return False

@@ -1,0 +1,129 @@
+"""Locks that let only one command at a time use a run folder. They use `flock`, so the kernel releases them
+when the process ends.
+"""
+
+import fcntl
+import os
+import stat
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from mutator._common.confined_files import open_descriptor, unlink_below
+from mutator._common.files import raising_disk_full
+from mutator.errors import MutatorError, Outside
+
+OWNER = "owner.lock"
+WORKERS = "workers"
+_PATIENCE_S = 15.0  # workers of a dead command exit well within this time
+
+
+@contextmanager
+def owned(run: Path, patience_s: float = _PATIENCE_S) -> Iterator[None]:
+    """Lock the existing folder `run`; MutatorError while another command or its workers use it."""
+    with raising_disk_full(run):
+        fd = _opened(run, OWNER, os.O_CREAT)
+    try:
+        if not _try_lock(fd):
+            raise MutatorError(
+                f"in use by process {os.read(fd, 32).decode(errors='replace').strip() or '(unknown)'}",
+                where=run,
+                expected="one command at a time in a run folder",
+                remedy="wait until that process ends, or use another folder",
+            )
+        with raising_disk_full(run):
+            os.ftruncate(fd, 0)
+            os.write(fd, f"{os.getpid()}\n".encode())
+        if living := wait_for_workers(run, patience_s):
+            raise MutatorError(
+                f"workers of an earlier run are still running (process id: {', '.join(map(str, living))})",
+                where=run,
+                expected="no workers in this folder",
+                remedy="wait for them or end them, then run the same command again",
+            )
+        try:
+            yield
+        finally:
+            living_workers(run)
+            with suppress(OSError):  # some workers are still ending, or there were none
+                (run / WORKERS).rmdir()  # never follows a link
+    finally:
+        os.close(fd)
+
+
+@contextmanager
+def alone_in(folder: Path) -> Iterator[None]:
+    """Wait for an exclusive lock on an existing folder. Nothing is written."""
+    fd = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        fcntl.flock(fd, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(fd)
+
+
+def register_worker(run: Path) -> int:
+    """Register this process as a worker in `run` until the returned descriptor is closed."""
+    with raising_disk_full(run):
+        (run / WORKERS).mkdir(exist_ok=True)
+        fd = _opened(run, f"{WORKERS}/{os.getpid()}", os.O_CREAT)
+    fcntl.flock(fd, fcntl.LOCK_EX)
+    return fd
+
+
+def living_workers(run: Path) -> list[int]:
+    """Return the process ids of the workers in `run`, and remove the entries of dead workers."""
+    living = []
+    names = (path.name for path in (run / WORKERS).glob("[0-9]*"))
+    for name in sorted(filter(str.isdecimal, names)):
+        try:
+            fd = _opened(run, f"{WORKERS}/{name}")
+        except FileNotFoundError:  # another process removed it
+            continue
+        try:
+            if _try_lock(fd):
+                unlink_below(run, f"{WORKERS}/{name}")
+            else:
+                living.append(int(name))
+        finally:
+            os.close(fd)
+    return living
+
+
+def wait_for_workers(run: Path, patience_s: float = _PATIENCE_S) -> list[int]:
+    """Wait until no worker is left in `run`; return the process ids of workers that outlive `patience_s`."""
+    deadline = time.monotonic() + patience_s
+    while (living := living_workers(run)) and time.monotonic() <= deadline:
+        time.sleep(0.1)
+    return living
+
+
+def _opened(run: Path, name: str, more: int = 0) -> int:
+    """Open a lock; MutatorError unless it is a file with no other name, because it is written in place."""
+    try:
+        fd = open_descriptor(run, name, os.O_RDWR | more)
+    except (Outside, IsADirectoryError):
+        raise _no_lock(run / name) from None
+    found = os.fstat(fd)
+    if not stat.S_ISREG(found.st_mode) or found.st_nlink > 1:
+        os.close(fd)
+        raise _no_lock(run / name)
+    return fd
+
+
+def _no_lock(path: Path) -> MutatorError:
+    return MutatorError(
+        "not a regular file with a single name",
+        where=path,
+        expected="a file of the run folder",
+        remedy="delete it: it holds no results",
+    )
+
+
+def _try_lock(fd: int) -> bool:
+    try:
+        fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True

@@ -1,0 +1,111 @@
+"""Share work among forked processes. Results are in the order of the items."""
+
+import gc
+import os
+import pickle
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from typing import Any, TypeVar
+
+from mutator._common.cpu_cores import usable_cores
+from mutator.errors import MutatorError
+
+_MOST = 2  # the maximum number of processes, because each needs memory
+_WORTH = 20_000  # the smallest number of experiments for which a second process is worth starting
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+
+def processes_for(experiments: int) -> int:
+    return min(_MOST, usable_cores()) if experiments >= _WORTH else 1
+
+
+def shared(made: Callable[[T], R], items: Sequence[T], processes: int) -> Iterator[R]:
+    """Yield `made(item)` for each item, in order, computed by `processes` processes (with fewer than two: by
+    this process).
+
+    Each process is at most one result ahead, which saves memory. Exceptions that `made` raises are raised
+    again; MutatorError if a process dies.
+    """
+    if processes < 2:
+        yield from map(made, items)
+        return
+    with _workers(made, items, processes) as receivers:
+        for number in range(len(items)):
+            yield _received(receivers[number % processes])
+
+
+@contextmanager
+def beside(work: Callable[[], R], processes: int) -> Iterator[Callable[[], R]]:
+    """Run `work` in another process during the block. Yield a function that waits for its result.
+
+    The function raises what `work` raised. With fewer than two processes, `work` itself is yielded.
+    """
+    if processes < 2:
+        yield work
+        return
+    with _workers(lambda _: work(), [None], 1) as [receiver]:
+        yield lambda: _received(receiver)
+
+
+@contextmanager
+def _workers(made: Callable[[T], R], items: Sequence[T], processes: int) -> Iterator[list[Connection]]:
+    """Start worker processes, which end with the block, and yield the connections to their results."""
+    context = get_context("fork")
+    pipes = [context.Pipe(duplex=False) for _ in range(processes)]
+    workers = [
+        context.Process(target=_work, args=(made, items[number::processes], pipes, number), daemon=True)
+        for number in range(processes)
+    ]
+    try:
+        for worker in workers:
+            worker.start()
+        for _, sender in pipes:
+            sender.close()
+        yield [receiver for receiver, _ in pipes]
+    finally:
+        for receiver, _ in pipes:
+            receiver.close()
+        for worker in workers:
+            if worker.pid is not None:
+                worker.terminate()
+                worker.join()
+
+
+def _work(
+    made: Callable[[T], Any],
+    items: Sequence[T],
+    pipes: Sequence[tuple[Connection, Connection]],
+    number: int,
+) -> None:
+    gc.disable()  # results have no cycles, and a collection would copy shared memory
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all processes; the parent ends its workers
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    for receiver, _ in pipes:  # otherwise no worker would notice that the parent died
+        receiver.close()
+    sender = pipes[number][1]
+    try:
+        for item in items:
+            sender.send_bytes(pickle.dumps((made(item), None), pickle.HIGHEST_PROTOCOL))
+    except BrokenPipeError:
+        os._exit(1)
+    except BaseException as err:
+        sender.send_bytes(pickle.dumps((None, err)))
+
+
+def _received(receiver: Connection) -> Any:
+    try:
+        result, error = pickle.loads(receiver.recv_bytes())
+    except EOFError:
+        raise MutatorError(
+            "a helper process was killed",
+            expected="enough memory for it",
+            remedy="free some memory, then run the same command again",
+        ) from None
+    if error is not None:
+        raise error
+    return result

@@ -1,0 +1,31 @@
+"""The `where` of an injection: a condition that selects one instance among several."""
+
+import ast
+
+from mutator.config.location_syntax import PROBE_NAME
+
+_LONGEST = 1000
+_PLAIN = (
+    *(ast.Expression, ast.BoolOp, ast.And, ast.Or, ast.UnaryOp, ast.Not, ast.USub, ast.Compare, ast.cmpop),
+    *(ast.Name, ast.Load, ast.Attribute, ast.Subscript, ast.Constant, ast.Tuple),
+)
+
+
+def instance_condition(text: str) -> str:
+    """Return the condition in the form that mutants contain.
+
+    ValueError unless it consists of names, attributes, items, constants, comparisons, `and`, `or` and `not`.
+    """
+    try:
+        tree = ast.parse(text.strip(), mode="eval") if len(text) <= _LONGEST else None
+    except (SyntaxError, RecursionError, MemoryError):
+        tree = None
+    plain = tree is not None and all(isinstance(node, _PLAIN) for node in ast.walk(tree))
+    if tree is None or not plain or PROBE_NAME in names_of(text) or "#" in text:
+        raise ValueError(text)
+    return ast.unparse(tree)
+
+
+def names_of(text: str) -> frozenset[str]:
+    tree = ast.parse(text.strip(), mode="eval")
+    return frozenset(node.id for node in ast.walk(tree) if isinstance(node, ast.Name))

@@ -1,0 +1,314 @@
+"""Fault specs: YAML files that each describe one fault type of a module, before values are drawn."""
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, create_model, model_validator
+
+from mutator.config import units
+from mutator.config.yaml_files import StrictModel, read
+from mutator.config.yaml_sources import Keys, Source
+from mutator.faults.injection_model import InjectionModel
+from mutator.faults.injection_specs import InjectionSpec
+from mutator.faults.library_readings import Readings
+from mutator.model import Hold
+
+SCHEMA = "fault_spec/1"
+_NAME = re.compile(r"[a-z][a-z0-9_]*\Z")
+_MOST_RANGES = 1000
+_LARGEST = 1e15  # limit of a drawn number: whole numbers up to it are exact
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Draw:
+    """How a variant's values are made: one draw from each range, or a list.
+
+    Values are in `unit`, the suffix of the YAML key (None for plain numbers). `key` and the campaign's seed
+    determine the draw: equal keys and ranges give equal values.
+    """
+
+    key: str
+    name: str
+    unit: str | None
+    kind: Literal["integers", "reals", "list"]
+    ranges: tuple[tuple[float, float], ...] = ()
+    values: tuple[float | int, ...] = ()
+    decimals: int | None = None
+    cap: float | None = None
+    keys: Keys = ()
+
+    @property
+    def count(self) -> int:
+        return len(self.values) if self.kind == "list" else len(self.ranges)
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """The least and the greatest possible value."""
+        ends = self.values or [end for ends in self.ranges for end in ends]
+        return min(ends), max(ends) if self.cap is None else min(max(ends), self.cap)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Variant:
+    """One row of the library: for each reading, injections that share a trigger and a draw.
+
+    `readings` starts with the default reading. `holds` overrides, by reading, how long the fault stays
+    active.
+    """
+
+    name: str
+    aim: str
+    about: str
+    draw: Draw | None
+    changes: tuple[str, ...]
+    readings: Mapping[str, tuple[InjectionSpec, ...]]
+    holds: Mapping[str, Hold | None]
+    keys: Keys
+
+    def injections(self, reading: str) -> tuple[InjectionSpec, ...]:
+        return self.readings[self._written(reading)]
+
+    def hold(self, reading: str) -> Hold | None:
+        """Return how long the fault stays active; None: the trigger decides."""
+        return self.holds[self._written(reading)]
+
+    def _written(self, reading: str) -> str:
+        return reading if reading in self.readings else next(iter(self.readings))
+
+    @property
+    def count(self) -> int:
+        return self.draw.count if self.draw else 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class FaultSpec:
+    """One file of `fault_library/faults/<module>/`: a fault type of a module with its variants."""
+
+    module: str
+    fault_type: str
+    about: str
+    variants: tuple[Variant, ...]
+    readings: Readings  # the library's
+    source: Source
+
+    @property
+    def name(self) -> str:
+        """`<module>/<fault_type>`. The `Fault.spec` of its faults is `<module>/<fault_type>/<variant>`."""
+        return f"{self.module}/{self.fault_type}"
+
+    @property
+    def path(self) -> Path:
+        return self.source.path
+
+    @property
+    def count(self) -> int:
+        return sum(v.count for v in self.variants)
+
+    def __iter__(self) -> Iterator[Variant]:
+        return iter(self.variants)
+
+
+_Number = Annotated[float, Field(ge=-_LARGEST, le=_LARGEST, allow_inf_nan=False)]
+
+
+class SweepModel(StrictModel, title="A sweep"):
+    """Ranges of equal width at equal distances. `{first: [15, 24], step: 10, last: [245, 254]}` gives the
+    24 ranges [15, 24], [25, 34] ... [245, 254]. One value is drawn from each range, both ends included.
+    """
+
+    first: list[_Number] = Field(description="The first range, [low, high].")
+    step: float = Field(gt=0.0, allow_inf_nan=False, description="The distance from one range to the next.")
+    last: list[_Number] = Field(description="The last range, a whole number of steps above the first.")
+
+    @model_validator(mode="after")
+    def _even(self) -> "SweepModel":
+        self.ranges()
+        return self
+
+    def ranges(self) -> tuple[tuple[float, float], ...]:
+        """Return all ranges as (low, high); ValueError if the sweep is not valid."""
+        if len(self.first) != 2 or len(self.last) != 2 or not self.first[0] <= self.first[1]:
+            raise ValueError("first and last as [low, high]")
+        low, high = self.first
+        steps = (self.last[0] - low) / self.step
+        if steps >= _MOST_RANGES:
+            raise ValueError(f"at most {_MOST_RANGES} ranges")
+        ranges = tuple((low + i * self.step, high + i * self.step) for i in range(round(steps) + 1))
+        if not ranges or any(abs(a - b) > 1e-9 for a, b in zip(ranges[-1], self.last, strict=True)):
+            raise ValueError("a last range that is a whole number of steps above the first")
+        return ranges
+
+
+class _DrawModel(StrictModel, title="A draw"):
+    """The key of a draw is a name of your choice and a unit: `distance_m`. Parameters refer to the drawn
+    value by that name without the unit, optionally with a minus sign: `by_m: -distance`. Give exactly one of
+    `integers_from`, `reals_from` and `values`. The same seed and key give the same values.
+    """
+
+    integers_from: SweepModel | None = Field(None, description="One whole number from each range of a sweep.")
+    reals_from: SweepModel | None = Field(None, description="One number from each range of a sweep.")
+    decimals: int | None = Field(
+        None, ge=0, le=12, description="The number of decimals to which values of `reals_from` are rounded."
+    )
+    values: list[float | int] | None = Field(None, description="A list of values, used unchanged.")
+    cap: float | None = Field(
+        None, allow_inf_nan=False, description="The maximum: larger drawn values are reduced to it."
+    )
+    key: str | None = Field(
+        None,
+        description="A name that seeds the draw together with the campaign's seed. Variants can share it. "
+        "Default: the variant's full name.",
+    )
+
+
+_LATCHES = (
+    "How long the fault stays active, if the trigger does not determine it: `to_end` for a fault that latches"
+)
+
+
+class _ReadingModel(StrictModel, title="A reading"):
+    hold: Literal["while", "to_end"] | None = Field(
+        None, description=f"{_LATCHES} in this reading; default: the variant's `hold`."
+    )
+    injections: list[InjectionModel] = Field(
+        description="At least one. The fault is activated if any of them runs while the fault is active."
+    )
+
+
+class _VariantBase(StrictModel, title="A variant"):
+    """A variant is one row of the library: its injections share one trigger, one draw and one aim."""
+
+    aim: str = Field(description="The hazard that the fault is meant to cause, one of the target's hazards.")
+    about: str = Field(description="What this variant does.")
+    changes: list[str] = Field(
+        default_factory=list,
+        description="Changes of the scenario that belong to the fault, by their names in the target's "
+        "manifest.",
+    )
+    hold: Literal["while", "to_end"] | None = Field(None, description=f"{_LATCHES}.")
+    draw: dict[str, _DrawModel] | None = Field(
+        None,
+        description="Exactly one draw: name and unit -> draw. Without a draw, the variant is a single fault.",
+    )
+
+
+class SpecModel(StrictModel, title="The file"):
+    """A fault type of a module, in one or more variants."""
+
+    # `spec_model` adds `variants`
+
+    module: str = Field(description="The module of the controller that the fault is in.")
+    fault_type: str = Field(
+        description="The name of the fault type. The spec is named `<module>/<fault_type>`."
+    )
+    about: str = Field(description="What goes wrong, in one sentence.")
+
+
+@cache
+def spec_model(readings: Readings) -> type[SpecModel]:
+    """Make the schema of a library's spec files. A variant has one key for each reading."""
+    keys: dict[str, Any] = {}
+    for name, about in zip(readings.names, readings.about, strict=True):
+        required = name == readings.default
+        kind = _ReadingModel if required else _ReadingModel | None
+        keys[name] = (kind, Field(... if required else None, description=about))
+    variant = create_model("_VariantModel", __base__=_VariantBase, __doc__=_VariantBase.__doc__, **keys)
+    variants = Field(description="Name of the variant -> variant; at least one.")
+    return create_model(
+        "SpecModel",
+        __base__=SpecModel,
+        __doc__=SpecModel.__doc__,
+        variants=(dict[str, variant], variants),  # type: ignore[valid-type]
+    )
+
+
+def load_spec(path: Path, readings: Readings) -> FaultSpec:
+    """Read one spec of a library; errors have file and line. `expand` does the remaining checks."""
+    model, source = read(path, spec_model(readings), SCHEMA)
+    models: dict[str, _VariantBase] = model.variants  # type: ignore[attr-defined]
+    for key in ("module", "fault_type"):
+        _check_name(getattr(model, key), source, (key,))
+    if not models:
+        raise source.error(("variants",), "no variant", expected="at least one", remedy="describe a fault")
+    name = f"{model.module}/{model.fault_type}"
+    variants = tuple(_variant(name, key, variant, readings, source) for key, variant in models.items())
+    return FaultSpec(
+        module=model.module,
+        fault_type=model.fault_type,
+        about=model.about,
+        variants=variants,
+        readings=readings,
+        source=source,
+    )
+
+
+def _check_name(name: str, source: Source, keys: Keys) -> None:
+    if not _NAME.match(name):
+        raise source.error(keys, f"'{name}'", expected="lowercase letters, digits and _", remedy="rename it")
+
+
+def _variant(spec: str, name: str, model: _VariantBase, readings: Readings, source: Source) -> Variant:
+    keys: Keys = ("variants", name)
+    _check_name(name, source, keys)
+    written: dict[str, _ReadingModel | None] = {name: getattr(model, name) for name in readings.names}
+    holds = {reading: one.hold or model.hold for reading, one in written.items() if one}
+    return Variant(
+        name=name,
+        aim=model.aim,
+        about=model.about,
+        draw=_draw(f"{spec}/{name}", model.draw, source, (*keys, "draw")) if model.draw is not None else None,
+        changes=tuple(model.changes),
+        readings={
+            reading: _injections(one, source, (*keys, reading)) for reading, one in written.items() if one
+        },
+        holds={reading: hold and Hold(hold) for reading, hold in holds.items()},
+        keys=keys,
+    )
+
+
+def _injections(model: _ReadingModel, source: Source, keys: Keys) -> tuple[InjectionSpec, ...]:
+    if not model.injections:
+        raise source.error((*keys, "injections"), "no injection", expected="at least one")
+    return tuple(
+        injection.injection(source, (*keys, "injections", i)) for i, injection in enumerate(model.injections)
+    )
+
+
+def _draw(default_key: str, models: dict[str, _DrawModel], source: Source, keys: Keys) -> Draw:
+    if len(models) != 1:
+        raise source.error(
+            keys, f"{len(models)} draws", expected="one", remedy="use one draw for all injections"
+        )
+    key, model = next(iter(models.items()))
+    name, unit = units.split(key)
+    _check_name(name, source, (*keys, key))
+    ways = {"integers": model.integers_from, "reals": model.reals_from, "list": model.values}
+    given = [kind for kind, way in ways.items() if way is not None]
+    place = (*keys, key)
+    if len(given) != 1:
+        raise source.error(
+            place, f"{len(given)} ways to draw", expected="integers_from, reals_from or values"
+        )
+    kind: Literal["integers", "reals", "list"] = given[0]  # type: ignore[assignment]
+    ranges = model.integers_from or model.reals_from
+    if model.integers_from and any(x != int(x) for pair in model.integers_from.ranges() for x in pair):
+        raise source.error((*place, "integers_from"), "a range with fractions", expected="whole numbers")
+    if model.decimals is not None and kind != "reals":
+        raise source.error(
+            (*place, "decimals"), f"decimals: {model.decimals}", expected="`decimals` only with reals_from"
+        )
+    return Draw(
+        key=model.key or default_key,
+        name=name,
+        unit=unit.suffix if unit else None,
+        kind=kind,
+        ranges=ranges.ranges() if ranges else (),
+        values=tuple(model.values or ()),
+        decimals=model.decimals,
+        cap=model.cap,
+        keys=place,
+    )

@@ -1,0 +1,212 @@
+"""Check an injection's parameters and convert them from the spec's form to the template's."""
+
+from mutator._common.message_text import one_of, shown, suggestion
+from mutator._common.random_streams import generator
+from mutator.config import units
+from mutator.config.location_syntax import assignable, dotted_name
+from mutator.config.yaml_sources import Source
+from mutator.errors import MutatorError
+from mutator.faults.fault_models import NAMES, TARGET_UNIT, FaultModel, ParamSchema
+from mutator.faults.fault_specs import Draw
+from mutator.faults.injection_specs import DIMENSIONLESS, Drawn, InjectionSpec, ParamSpec, quantity, reference
+from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS, AnchorKind, Injection, Value
+
+_NAMED = {"variable": "a name as in the source", "import": "a module of the target and a name in it"}
+_WITHOUT_TARGET = VALUE_ANCHORS | FIXED_ANCHORS
+_WITH_DEFAULT_TARGET = (AnchorKind.AFTER_ASSIGN, AnchorKind.BEFORE_ASSIGN)
+
+
+def resolve(
+    spec: InjectionSpec,
+    model: FaultModel,
+    source: Source,
+    *,
+    draw: Draw | None = None,
+    value: float | int | None = None,
+    seed: int = 0,
+    key: str = "",
+) -> Injection:
+    """Insert `value`, which was drawn from `draw`, and return the injection.
+
+    Parameters are sorted by name, and numbers are in the unit that the template expects. A missing `target`
+    defaults to the name that the anchor assigns. A `seed` parameter is drawn from (seed, key). MutatorError
+    with file and line for anything that does not fit the model.
+    """
+    resolver = _Resolver(spec, model, source, draw, value)
+    params: dict[str, Value] = {}
+    for param in spec.params:
+        schema = resolver.schema(param)
+        params[schema.name] = resolver.value(param, schema)
+        if schema.name == "target" and spec.location.anchor.kind in _WITHOUT_TARGET:
+            raise source.error(
+                param.keys,
+                f"'{param.value}' for '{param.key}' at `{spec.location.anchor.kind.value}`",
+                expected="no target, because the anchored expression is changed",
+                remedy="leave it out, or anchor at a statement",
+            )
+    for schema in model.params:
+        if schema.type == "seed":
+            params[schema.name] = int(generator(seed, f"{key}/{schema.name}").random() * 2**53)
+        elif schema.name == "target" and spec.location.anchor.kind in _WITH_DEFAULT_TARGET:
+            params.setdefault("target", spec.location.anchor.name)
+        at_value = schema.name == "target" and spec.location.anchor.kind in _WITHOUT_TARGET
+        if schema.name not in params and not (schema.optional or at_value):
+            raise source.error(
+                (*spec.keys, "params"),
+                f"parameter '{schema.name}' of model {model.name} is missing",
+                expected=schema.about,
+                remedy=f"add {resolver.key(schema)}",
+            )
+    return Injection(
+        location=spec.location,
+        model=model.name,
+        params=tuple(sorted(params.items())),
+        where=spec.where,
+        call=spec.call,
+        every=spec.every,
+    )
+
+
+class _Resolver:
+    def __init__(
+        self,
+        spec: InjectionSpec,
+        model: FaultModel,
+        source: Source,
+        draw: Draw | None,
+        value: float | int | None,
+    ) -> None:
+        self.spec = spec
+        self.model = model
+        self.source = source
+        self.draw = draw
+        self.drawn = value
+
+    def schema(self, param: ParamSpec) -> ParamSchema:
+        """Return the schema of a parameter, after checking the dimension of its unit suffix.
+
+        A constant that is not a number must have no unit suffix.
+        """
+        schema = self.model.param(param.name)
+        if schema is None or schema.type == "seed":
+            known = [p for p in self.model.params if p.type != "seed"]
+            names = [key for p in known for key in self.keys(p)]
+            raise self.source.error(
+                param.keys,
+                f"unknown parameter '{param.key}' of model {self.model.name}",
+                expected=one_of(map(self.key, known)),
+                remedy="correct or remove it" + suggestion(param.key, names),
+            )
+        unit = None if self.is_plain(param, schema) else self.unit(schema)
+        given = units.UNITS[param.unit] if param.unit else None
+        if (unit is None) != (given is None) or (unit and given and unit.dimension != given.dimension):
+            raise self.source.error(
+                param.keys,
+                f"'{param.key}'" + (f" (a unit of {given.dimension})" if given else " (no unit)"),
+                expected=self.key(schema),
+                remedy="end the key with the number's unit",
+            )
+        return schema
+
+    def is_plain(self, param: ParamSpec, schema: ParamSchema) -> bool:
+        """Return whether a constant is a truth value, None, or a text other than the draw's name."""
+        if schema.type != "constant" or param.unit:
+            return False
+        if not isinstance(param.value, str):
+            return param.value is None or isinstance(param.value, bool)
+        drawn = reference(param.value)
+        return drawn is None or self.draw is None or drawn.name != self.draw.name
+
+    def keys(self, schema: ParamSchema) -> list[str]:
+        """Return the keys that a spec can use: one for each unit of the right dimension."""
+        unit = self.unit(schema)
+        if unit is None:
+            return [schema.name]
+        fitting = [u.suffix for u in units.UNITS.values() if u.dimension == unit.dimension]
+        return [f"{schema.name}_{suffix}" for suffix in dict.fromkeys((unit.suffix, *fitting))]
+
+    def key(self, schema: ParamSchema) -> str:
+        return f"`{self.keys(schema)[0]}`"
+
+    def unit(self, schema: ParamSchema) -> units.Unit | None:
+        if schema.unit != TARGET_UNIT:
+            return units.UNITS[schema.unit] if schema.unit else None
+        if self.spec.unit is None:
+            raise self.source.error(
+                self.spec.keys,
+                f"model {self.model.name} without `unit`",
+                expected=f"the changed variable's unit, one of {units.KNOWN}, or '1'",
+                remedy="add `unit: m` (the variable's unit in the source) next to `model`",
+            )
+        return None if self.spec.unit == DIMENSIONLESS else units.UNITS[self.spec.unit]
+
+    def value(self, param: ParamSpec, schema: ParamSchema) -> Value:
+        """Return the value in the template's unit, after checking its type and range."""
+        if schema.type in NAMES:
+            fits = dotted_name if schema.type == "import" else assignable
+            if not isinstance(param.value, str) or not fits(param.value):
+                raise self._wrong(param, _NAMED[schema.type])
+            return param.value
+        if schema.type == "boolean":
+            if not isinstance(param.value, bool):
+                raise self._wrong(param, "true or false")
+            return param.value
+        if schema.type in ("choice", "unit"):
+            words = schema.choices if schema.type == "choice" else tuple(units.UNITS)
+            if param.value not in words:
+                raise self._wrong(param, f"one of {', '.join(words)}")
+            return str(param.value)
+        if self.is_plain(param, schema):
+            return self._constant(param)
+        number = self._number(param, schema)
+        if schema.type == "integer":
+            if not number.is_integer():
+                raise self._wrong(param, "a whole number", f"{number}")
+            number = int(number)
+        low = "" if schema.min is None else f"at least {schema.min:g}"
+        high = "" if schema.max is None else f"at most {schema.max:g}"
+        below = schema.min is not None and not number >= schema.min
+        above = schema.max is not None and not number <= schema.max
+        if below or above:
+            unit = self.unit(schema)
+            written = param.value if isinstance(param.value, int | float) else number
+            expected = " and ".join(filter(None, (low, high))) + (f" {unit.symbol}" if unit else "")
+            raise self._wrong(param, expected, f"{written:g}")
+        return number
+
+    def _constant(self, param: ParamSpec) -> Value:
+        """Return the value; MutatorError for a text that resembles the draw's name, a likely typo."""
+        assert not isinstance(param.value, Drawn)
+        if isinstance(param.value, str) and self.draw and suggestion(param.value, [self.draw.name]):
+            raise self._wrong(param, f"'{self.draw.name}', the draw, or a text that is less similar")
+        return param.value
+
+    def _number(self, param: ParamSpec, schema: ParamSchema) -> float:
+        value = param.value
+        unit = self.unit(schema)
+        if isinstance(value, bool):
+            raise self._wrong(param, "a number")
+        if isinstance(value, int | float):
+            return (
+                units.convert(value, units.UNITS[param.unit], unit) if unit and param.unit else float(value)
+            )
+        drawn = value if isinstance(value, Drawn) else reference(str(value))
+        if drawn is None or self.draw is None or self.drawn is None or drawn.name != self.draw.name:
+            expected = f"a number, or '{self.draw.name}', the draw" if self.draw else "a number"
+            raise self._wrong(param, expected)
+        source = units.UNITS[self.draw.unit] if self.draw.unit else None
+        if unit is None or source is None:
+            if unit is not source:
+                raise self._wrong(param, "a draw with a unit" if unit else "a draw without a unit")
+            return float(drawn.sign * self.drawn)
+        try:
+            return quantity(drawn, self.drawn, source, unit)
+        except ValueError as error:
+            raise self._wrong(param, f"the same dimension: {error}") from None
+
+    def _wrong(self, param: ParamSpec, expected: str, got: str | None = None) -> MutatorError:
+        value = param.value.name if isinstance(param.value, Drawn) else param.value
+        text = got or shown(value)
+        return self.source.error(
+            param.keys, f"{text} for '{param.key}'", expected=expected, remedy="correct the value"
+        )

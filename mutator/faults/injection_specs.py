@@ -1,0 +1,71 @@
+"""Injections as written in YAML."""
+
+import math
+import re
+from dataclasses import dataclass
+
+from mutator.config import units
+from mutator.config.yaml_sources import Keys
+from mutator.model import FaultLocation
+
+DIMENSIONLESS = "1"
+_REFERENCE = re.compile(r"(-?)([a-z][a-z0-9_]*)\Z")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drawn:
+    """A parameter with the drawn value `name`, multiplied by `sign`.
+
+    With `written_in` and `read_as`, the value is converted to the first unit and then misread as the second.
+    """
+
+    name: str
+    sign: int = 1
+    written_in: str | None = None
+    read_as: str | None = None
+
+
+ParamValue = int | float | str | bool | None | Drawn
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ParamSpec:
+    """A parameter as written: `name` without its unit suffix, `unit` the suffix or None."""
+
+    name: str
+    unit: str | None
+    value: ParamValue
+    keys: Keys  # its position in the file
+
+    @property
+    def key(self) -> str:
+        return f"{self.name}_{self.unit}" if self.unit else self.name
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InjectionSpec:
+    """One injection as written. `unit` is the unit of the changed variable, if the model needs it."""
+
+    location: FaultLocation
+    model: str
+    params: tuple[ParamSpec, ...]
+    unit: str | None
+    keys: Keys
+    where: str | None = None
+    call: int | None = None
+    every: int | None = None
+
+
+def reference(text: str) -> Drawn | None:
+    """Parse `distance` or `-distance` as a reference to the draw of that name."""
+    match = _REFERENCE.match(text)
+    return Drawn(name=match[2], sign=-1 if match[1] else 1) if match else None
+
+
+def quantity(drawn: Drawn, number: float, unit: units.Unit, target: units.Unit) -> float:
+    """Convert the drawn `number` from `unit` to `target`; ValueError if the units are incompatible."""
+    number = math.copysign(1.0, drawn.sign) * number
+    if drawn.written_in and drawn.read_as:
+        number = units.convert(number, unit, units.UNITS[drawn.written_in])
+        unit = units.UNITS[drawn.read_as]
+    return units.convert(number, unit, target)

@@ -1,0 +1,77 @@
+"""Readings: a library's interpretations of the same faults, such as `as_described` and `as_coded`."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from pydantic import Field
+
+from mutator._common.confined_files import check_inside
+from mutator.config.yaml_files import StrictModel, read
+from mutator.errors import MutatorError
+
+SCHEMA = "readings/1"
+FILE = "readings.yaml"  # in a library
+_NAME = re.compile(r"[a-z][a-z0-9_]*\Z")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Readings:
+    """The readings of a library, in order. The first is the default, which every variant must define."""
+
+    names: tuple[str, ...]
+    about: tuple[str, ...]
+
+    @property
+    def default(self) -> str:
+        return self.names[0]
+
+    def check(self, name: str) -> None:
+        """Raise MutatorError for an unknown name."""
+        if name not in self.names:
+            raise MutatorError(
+                f"reading '{name}'",
+                expected=f"one of {', '.join(self.names)}",
+                remedy=f"correct the name, or declare the reading in the library's {FILE}",
+            )
+
+
+UNDECLARED = Readings(
+    names=("as_described", "as_coded"),
+    about=(
+        "The injections according to the text that describes the fault.",
+        "The injections according to the code that was published with that text.",
+    ),
+)
+"""The readings of a library without a file `readings.yaml`."""
+
+
+class _DeclaredReadingModel(StrictModel, title="A declared reading"):
+    about: str = Field(description="What the reading means.")
+
+
+class ReadingsModel(StrictModel, title="readings.yaml"):
+    """The readings of a library."""
+
+    readings: dict[str, _DeclaredReadingModel] = Field(
+        min_length=1,
+        description="Name -> reading. A name consists of lowercase letters, digits and `_`. "
+        "The first reading is the default.",
+    )
+
+
+def load_readings(library: Path) -> Readings:
+    path = check_inside(library, library / FILE)
+    if not path.is_file():
+        return UNDECLARED
+    model, source = read(path, ReadingsModel, SCHEMA)
+    for name in model.readings:
+        if not _NAME.match(name):
+            raise source.error(
+                ("readings", name),
+                f"'{name}'",
+                expected="lowercase letters, digits and _",
+                remedy="rename it",
+            )
+    about = tuple(reading.about.strip() for reading in model.readings.values())
+    return Readings(names=tuple(model.readings), about=about)

@@ -1,0 +1,152 @@
+"""Expand specs into faults."""
+
+import math
+from collections.abc import Iterator
+
+from mutator._common.message_text import one_of
+from mutator._common.random_streams import generator
+from mutator.config import units
+from mutator.config.yaml_sources import Keys
+from mutator.errors import MutatorError
+from mutator.faults.fault_models import FaultModels
+from mutator.faults.fault_specs import Draw, FaultSpec, Variant
+from mutator.faults.injected_imports import check_import
+from mutator.faults.injection_parameters import resolve
+from mutator.faults.injection_specs import InjectionSpec
+from mutator.model import Fault, Injection
+from mutator.targets.allowed_locations import check_location
+from mutator.targets.manifest import TargetManifest
+
+_REDRAWS = 100  # of one value
+_ALL_REDRAWS = 20_000  # of all values; more mean that the ranges have too few different values
+
+
+def expand(
+    spec: FaultSpec,
+    seed: int,
+    reading: str | None = None,
+    *,
+    models: FaultModels,
+    manifest: TargetManifest,
+) -> tuple[Fault, ...]:
+    """Return the faults of `spec` in `reading` (None: the library's default), ordered by variant and range.
+
+    The same seed draws the same values for every reading, trigger, scenario and method. MutatorError
+    (file:line) for an unknown model, parameter or change, a wrong unit, a value out of range, and a location
+    outside the target or in a forbidden place. Anchors are resolved later, when a mutant is built.
+    """
+    reading = reading or spec.readings.default
+    spec.readings.check(reading)
+    expander = _Expander(spec, seed, reading, models, manifest)
+    return tuple(fault for variant in spec for fault in expander.faults(variant))
+
+
+def draw_values(draw: Draw, seed: int) -> tuple[int | float, ...]:
+    """Return the values of `draw` for `seed`, in the draw's unit: one from each range, or the list unchanged.
+
+    The value from a range depends only on seed, key, position and earlier values. Duplicates are drawn again,
+    because equal faults have the same id. A 0 among `reals` is drawn again, because it changes nothing.
+    """
+    if draw.kind == "list":
+        return draw.values
+    stream = generator(seed, draw.key).random(len(draw.ranges))
+    values: list[int | float] = []
+    left = _ALL_REDRAWS
+    for i, u in enumerate(map(float, stream)):
+        value = _value(draw, i, u)
+        for attempt in range(min(_REDRAWS, left)):
+            if value not in values and not (value == 0 and draw.kind == "reals"):
+                break
+            left -= 1
+            value = _value(draw, i, float(generator(seed, f"{draw.key}/{i}/{attempt}").random()))
+        values.append(value)
+    return tuple(values)
+
+
+def _value(draw: Draw, index: int, u: float) -> int | float:
+    low, high = draw.ranges[index]
+    if draw.kind == "integers":
+        whole = int(low) + math.floor(u * (int(high) - int(low) + 1))
+        return whole if draw.cap is None else min(whole, int(draw.cap))
+    value = low + u * (high - low)
+    value = value if draw.decimals is None else round(value, draw.decimals)
+    return value if draw.cap is None else float(min(value, draw.cap))
+
+
+class _Expander:
+    def __init__(
+        self, spec: FaultSpec, seed: int, reading: str, models: FaultModels, manifest: TargetManifest
+    ) -> None:
+        self.spec = spec
+        self.seed = seed
+        self.reading = reading
+        self.models = models
+        self.manifest = manifest
+
+    def faults(self, variant: Variant) -> Iterator[Fault]:
+        """Yield a fault for each drawn value of the variant, or one fault for a variant without a draw."""
+        self._check(variant)
+        draw = variant.draw
+        unit = units.UNITS[draw.unit].symbol if draw and draw.unit else "-"
+        values: tuple[int | float | None, ...] = draw_values(draw, self.seed) if draw else (None,)
+        for number, value in enumerate(values):
+            yield Fault(
+                spec=f"{self.spec.name}/{variant.name}",
+                module=self.spec.module,
+                fault_type=self.spec.fault_type,
+                reading=self.reading,
+                value=value,
+                unit=unit,
+                aim=variant.aim,
+                injections=self._injections(variant, value, number),
+                hold=variant.hold(self.reading),
+                changes=variant.changes,
+            )
+
+    def _injections(self, variant: Variant, value: int | float | None, number: int) -> tuple[Injection, ...]:
+        return tuple(
+            resolve(
+                injection,
+                self.models.get(injection.model),
+                self.spec.source,
+                draw=variant.draw,
+                value=value,
+                seed=self.seed,
+                key=f"{self.spec.name}/{variant.name}/{number}/{i}",
+            )
+            for i, injection in enumerate(variant.injections(self.reading))
+        )
+
+    def _check(self, variant: Variant) -> None:
+        if variant.aim not in self.manifest.hazards:
+            raise self._wrong((*variant.keys, "aim"), f"aim '{variant.aim}'", self.manifest.hazards)
+        for i, change in enumerate(variant.changes):
+            if change not in self.manifest.changes:
+                keys = (*variant.keys, "changes", i)
+                raise self._wrong(keys, f"change '{change}'", tuple(self.manifest.changes))
+        for injection in variant.injections(self.reading):
+            self._check_injection(injection)
+
+    def _check_injection(self, injection: InjectionSpec) -> None:
+        keys: Keys = (*injection.keys, "model")
+        try:
+            model = self.models.get(injection.model)
+            keys = (*injection.keys, "at", "file")
+            check_location(self.manifest, injection.location)
+            for param in injection.params:
+                schema = model.param(param.name)
+                if schema and schema.type == "import":
+                    keys = param.keys
+                    check_import(self.manifest, str(param.value))
+        except MutatorError as error:
+            raise self.spec.source.error(
+                keys, error.got, expected=error.expected, remedy=error.remedy
+            ) from None
+
+    def _wrong(self, keys: Keys, got: str, known: tuple[str, ...]) -> MutatorError:
+        return self.spec.source.error(
+            keys,
+            got,
+            expected=f"{one_of(known)}, as in {self.manifest.path.name}",
+            remedy="correct it",
+        )

@@ -1,0 +1,278 @@
+"""The hazard analysis as data: control structure, unsafe control actions, causal factors.
+
+Loading checks all references between the files. `mutator.stpa.analysis_checks` compares the analysis with the
+fault specs and the target.
+"""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+
+from pydantic import Field
+
+from mutator._common.confined_files import inside
+from mutator._common.message_text import one_of, suggestion
+from mutator.config.yaml_files import StrictModel, read
+from mutator.config.yaml_sources import Keys, Source
+from mutator.stpa.context_tables import ContextTable, load_context_table
+from mutator.stpa.hazard_list import HazardList, load_hazards
+
+_WIDEST = 100  # most rows and columns of the drawing
+
+
+class Kind(StrEnum):
+    HUMAN = "human"
+    CONTROLLER = "controller"
+    ESTIMATOR = "estimator"
+    ACTUATOR = "actuator"
+    SENSOR = "sensor"
+    PROCESS = "process"
+
+
+class Category(StrEnum):
+    """The four ways in which a control action can be unsafe (Leveson, Engineering a Safer World, 2011)."""
+
+    NOT_PROVIDED = "not_provided"
+    PROVIDED = "provided"
+    WRONG_TIMING = "wrong_timing"
+    WRONG_DURATION = "wrong_duration"
+
+
+class VariableModel(StrictModel, title="A variable"):
+    """What a controller assumes about the process."""
+
+    about: str = Field(description="What the variable means.")
+    observed: str | None = Field(
+        description="The observed variable that represents this one in triggers; `null` if there is none."
+    )
+
+
+class ComponentModel(StrictModel, title="A component"):
+    """A component, drawn as a box."""
+
+    kind: Kind = Field(strict=False, description="The kind of component.")
+    label: str = Field(description="The name in the drawing.")
+    about: str = Field(description="What the component does.")
+    modules: list[str] = Field(
+        default_factory=list,
+        description="The component's source files in the target. The path of a fault in one of them begins "
+        "at this component.",
+    )
+    process_model: dict[str, VariableModel] = Field(
+        default_factory=dict, description="Name -> variable in a controller's process model."
+    )
+    drawn: list[int] = Field(
+        min_length=3,
+        max_length=3,
+        description="The place in the drawing: row from the top, column from the left, width in columns.",
+    )
+
+
+class LinkModel(StrictModel, title="A link"):
+    """A link, drawn as an arrow."""
+
+    from_: str = Field(alias="from", description="The component at which the link begins.")
+    to: str = Field(description="The component at which the link ends.")
+    label: str = Field(description="What the link carries.")
+    studied: bool = Field(
+        True, description="`false`: the link is drawn dashed and does not belong to fault paths."
+    )
+
+
+class ActionModel(StrictModel, title="A control action"):
+    """An action by which a controller influences the process that it controls."""
+
+    link: str = Field(description="The link that carries the action.")
+    channel: str = Field(description="The recorded channel that shows the action.")
+    about: str = Field(description="What the action does.")
+
+
+class StructureModel(StrictModel, title="control_structure.yaml"):
+    """The controllers, their control actions, what these control, and the feedback they get."""
+
+    about: str = Field(description="What the control structure shows.")
+    components: dict[str, ComponentModel] = Field(description="Name -> component.")
+    control_actions: dict[str, ActionModel] = Field(description="Name -> control action.")
+    links: dict[str, LinkModel] = Field(description="Name -> link.")
+
+
+class UnsafeActionModel(StrictModel, title="An unsafe control action"):
+    """One way in which a control action causes a hazard."""
+
+    action: str = Field(description="The control action.")
+    category: Category = Field(strict=False, description="In which of the four ways the action is unsafe.")
+    about: str = Field(description="What happens.")
+    hazards: list[str] = Field(min_length=1, description="The hazards that it causes.")
+    contexts: list[str] = Field(
+        min_length=1, description="The contexts in which it causes them, as `table/row`."
+    )
+
+
+class UnsafeActionsModel(StrictModel, title="unsafe_control_actions.yaml"):
+    """How each control action can be unsafe, and in which contexts."""
+
+    about: str = Field(description="What the file lists.")
+    tables: list[str] = Field(
+        description="The context tables from which the unsafe control actions are taken."
+    )
+    unsafe_control_actions: dict[str, UnsafeActionModel] = Field(description="Id -> unsafe control action.")
+
+
+class FactorModel(StrictModel, title="A causal factor"):
+    """A cause of unsafe control actions. Give either `faults` or `no_fault`."""
+
+    about: str = Field(description="What goes wrong.")
+    where: list[str] = Field(
+        min_length=1, description="The links or components of the control structure where it goes wrong."
+    )
+    at: list[str] = Field(default_factory=list, description="The places in the target, as `file::function`.")
+    leads_to: list[str] = Field(min_length=1, description="The unsafe control actions that it can cause.")
+    faults: list[str] = Field(default_factory=list, description="The fault specs that represent it.")
+    no_fault: str | None = Field(None, description="The reason why no fault spec represents it.")
+
+
+class FactorsModel(StrictModel, title="causal_factors.yaml"):
+    """What can make a controller act unsafely, and the faults that represent it."""
+
+    about: str = Field(description="What the file lists.")
+    causal_factors: dict[str, FactorModel] = Field(description="Id -> causal factor.")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Analysis:
+    """The whole analysis, in which all names are consistent; `*_source` refer to the files."""
+
+    hazards: HazardList
+    structure: StructureModel
+    structure_source: Source
+    tables: Mapping[str, ContextTable]
+    unsafe: Mapping[str, UnsafeActionModel]
+    unsafe_source: Source
+    factors: Mapping[str, FactorModel]
+    factors_source: Source
+
+
+def load_structure(path: Path) -> StructureModel:
+    """Read a control structure; MutatorError with file and line for a mistake."""
+    structure, source = read(path, StructureModel, "control_structure/1")
+    _check_structure(structure, source)
+    return structure
+
+
+def load_analysis(folder: Path) -> Analysis:
+    """Read hazards, control structure, unsafe control actions, context tables and causal factors from
+    `folder`.
+
+    MutatorError with file and line for the first unknown name, uncovered context or other mistake.
+    """
+    hazards = load_hazards(folder / "hazards.yaml")
+    structure, s_source = read(folder / "control_structure.yaml", StructureModel, "control_structure/1")
+    _check_structure(structure, s_source)
+    unsafe, u_source = read(
+        folder / "unsafe_control_actions.yaml", UnsafeActionsModel, "unsafe_control_actions/1"
+    )
+    tables = _tables(folder / "contexts", unsafe, u_source, structure)
+    _check_unsafe(unsafe, u_source, structure, hazards, tables)
+    factors, f_source = read(folder / "causal_factors.yaml", FactorsModel, "causal_factors/1")
+    _check_factors(factors, f_source, structure, unsafe)
+    return Analysis(
+        hazards=hazards,
+        structure=structure,
+        structure_source=s_source,
+        tables=tables,
+        unsafe=unsafe.unsafe_control_actions,
+        unsafe_source=u_source,
+        factors=factors.causal_factors,
+        factors_source=f_source,
+    )
+
+
+def _known(source: Source, keys: Keys, what: str, name: str, known: Collection[str]) -> None:
+    if name not in known:
+        raise source.error(
+            keys,
+            f"{what} '{name}'",
+            expected=one_of(known),
+            remedy="correct the name" + suggestion(name, list(known)),
+        )
+
+
+def _check_structure(structure: StructureModel, source: Source) -> None:
+    _check_grid(structure, source)
+    for name, link in structure.links.items():
+        if name in structure.components:
+            raise source.error(("links", name), f"link '{name}'", expected="a name that no component has")
+        _known(source, ("links", name, "from"), "component", link.from_, structure.components)
+        _known(source, ("links", name, "to"), "component", link.to, structure.components)
+    for name, action in structure.control_actions.items():
+        keys = ("control_actions", name, "link")
+        _known(source, keys, "link", action.link, structure.links)
+        if structure.components[structure.links[action.link].from_].kind is not Kind.CONTROLLER:
+            raise source.error(keys, f"link '{action.link}'", expected="a link that comes from a controller")
+
+
+def _check_grid(structure: StructureModel, source: Source) -> None:
+    taken: dict[tuple[int, int], str] = {}
+    for name, component in structure.components.items():
+        row, column, width = component.drawn
+        fields = [(row, column + i) for i in range(min(width, _WIDEST))]
+        other = next((taken[field] for field in fields if field in taken), None)
+        if other or not fields or min(row, column) < 0 or max(row, column, width) > _WIDEST:
+            raise source.error(
+                ("components", name, "drawn"),
+                f"'{name}' drawn at {component.drawn}" + (f", where '{other}' is" if other else ""),
+                expected=f"row, column and width of at most {_WIDEST}, a width of at least 1, no overlap",
+            )
+        taken.update(dict.fromkeys(fields, name))
+
+
+def _tables(
+    folder: Path, unsafe: UnsafeActionsModel, source: Source, structure: StructureModel
+) -> dict[str, ContextTable]:
+    """Load the context tables of the unsafe actions. They can judge only the structure's control actions."""
+    known = sorted(path.stem for path in folder.glob("*.yaml"))
+    tables = {}
+    for i, name in enumerate(unsafe.tables):
+        _known(source, ("tables", i), "context table", name, known)
+        tables[name] = table = load_context_table(inside(folder, f"{name}.yaml"))
+        for row in table.rows:
+            for action in row.actions:
+                keys = ("contexts", row.id, "actions", action)
+                _known(table.source, keys, "control action", action, structure.control_actions)
+    return tables
+
+
+def _check_unsafe(
+    unsafe: UnsafeActionsModel,
+    source: Source,
+    structure: StructureModel,
+    hazards: HazardList,
+    tables: Mapping[str, ContextTable],
+) -> None:
+    rows = [f"{table.name}/{row.id}" for table in tables.values() for row in table.rows]
+    for name, action in unsafe.unsafe_control_actions.items():
+        keys: Keys = ("unsafe_control_actions", name)
+        _known(source, (*keys, "action"), "control action", action.action, structure.control_actions)
+        for i, hazard in enumerate(action.hazards):
+            _known(source, (*keys, "hazards", i), "hazard", hazard, hazards.hazards)
+        for i, context in enumerate(action.contexts):
+            _known(source, (*keys, "contexts", i), "context", context, rows)
+
+
+def _check_factors(
+    factors: FactorsModel, source: Source, structure: StructureModel, unsafe: UnsafeActionsModel
+) -> None:
+    places = (*structure.components, *structure.links)
+    for name, factor in factors.causal_factors.items():
+        keys: Keys = ("causal_factors", name)
+        for i, place in enumerate(factor.where):
+            _known(source, (*keys, "where", i), "link or component", place, places)
+        for i, action in enumerate(factor.leads_to):
+            known = unsafe.unsafe_control_actions
+            _known(source, (*keys, "leads_to", i), "unsafe control action", action, known)
+        if bool(factor.faults) == (factor.no_fault is not None):
+            got = "both faults and no_fault" if factor.faults else "neither faults nor no_fault"
+            raise source.error(
+                keys, f"{got} in '{name}'", expected="fault specs, or the reason why there are none"
+            )

@@ -1,0 +1,96 @@
+"""Prove that the conditions of a context table cover every situation exactly once.
+
+The constants in the conditions divide each variable's axis into points and open intervals. Conditions are
+constant within such a cell, so a test of one value per cell is a proof. Variables are treated as independent:
+a table that is complete only because one variable depends on another fails.
+"""
+
+import ast
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from itertools import pairwise, product
+
+from mutator._common.message_text import counted
+from mutator.errors import NotTestable
+from mutator.triggers.conditions import evaluate
+
+MAX_TESTS = 400_000  # most tests: contexts times cells
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cell:
+    """A part of a variable's axis: `value` lies in it, and `text` describes it (`gap > 2.0`)."""
+
+    value: float
+    text: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Coverage:
+    """The number of tested cells, and the first place that the contexts do not cover exactly once.
+
+    `beyond` says why no proof was possible; `rows` are the contexts that hold at `place`.
+    """
+
+    cells: int = 0
+    beyond: str | None = None
+    place: str | None = None
+    rows: tuple[str, ...] = ()
+
+
+def measure_coverage(conditions: Mapping[str, str]) -> Coverage:
+    """Test the conditions of a table, row id -> condition, in every cell."""
+    try:
+        cuts = _cuts(conditions.values())
+    except NotTestable as error:
+        return Coverage(beyond=f"{error}; only comparisons of one variable with a constant can be tested")
+    lines = [_cells(name, sorted(values)) for name, values in cuts.items()]
+    total = math.prod(len(line) for line in lines)
+    if total * len(conditions) > MAX_TESTS:
+        found = f"{counted(total, 'cell')} for {counted(len(conditions), 'context')}"
+        return Coverage(beyond=f"its constants yield {found}, too many to test")
+    for place in product(*lines):
+        values = {name: cell.value for name, cell in zip(cuts, place, strict=True)}
+        rows = tuple(row for row, condition in conditions.items() if evaluate(condition, values))
+        if len(rows) != 1:
+            text = " and ".join(cell.text for cell in place) or "any observation"
+            return Coverage(cells=total, place=text, rows=rows)
+    return Coverage(cells=total)
+
+
+def _cuts(conditions: Iterable[str]) -> dict[str, set[float]]:
+    found: dict[str, set[float]] = {}
+    for condition in conditions:
+        for node in ast.walk(ast.parse(condition, mode="eval")):
+            if isinstance(node, ast.Compare):
+                for left, right in pairwise((node.left, *node.comparators)):
+                    name, value = _cut(left, right)
+                    found.setdefault(name, set()).add(value)
+    return found
+
+
+def _cut(left: ast.expr, right: ast.expr) -> tuple[str, float]:
+    for variable, constant in ((left, right), (right, left)):
+        value = _constant(constant)
+        if isinstance(variable, ast.Name) and value is not None:
+            return variable.id, value
+    raise NotTestable(f"a condition compares '{ast.unparse(left)}' with '{ast.unparse(right)}'")
+
+
+def _constant(node: ast.expr) -> float | None:
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+        value = _constant(node.operand)
+        return None if value is None else -value
+    return float(node.value) if isinstance(node, ast.Constant) and isinstance(node.value, float) else None
+
+
+def _cells(name: str, cuts: list[float]) -> list[Cell]:
+    cells = [Cell(value=-math.inf, text=f"{name} < {cuts[0]}")]
+    for low, high in pairwise(cuts):
+        cells.append(Cell(value=low, text=f"{name} = {low}"))
+        middle = low + (high - low) / 2.0
+        if low < middle < high:  # otherwise no number lies between them
+            cells.append(Cell(value=middle, text=f"{low} < {name} < {high}"))
+    cells.append(Cell(value=cuts[-1], text=f"{name} = {cuts[-1]}"))
+    return [*cells, Cell(value=math.inf, text=f"{name} > {cuts[-1]}")]

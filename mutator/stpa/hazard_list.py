@@ -1,0 +1,54 @@
+"""The accidents and hazards of the hazard analysis."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from pydantic import Field
+
+from mutator.config.yaml_files import StrictModel, read
+from mutator.config.yaml_sources import Source
+
+HAZARDS_SCHEMA = "hazards/1"
+
+
+@dataclass(frozen=True, kw_only=True)
+class HazardList:
+    """Accidents and hazards (id -> description), and the accidents that each hazard can cause."""
+
+    source: Source
+    accidents: Mapping[str, str]
+    hazards: Mapping[str, str]
+    leads_to: Mapping[str, tuple[str, ...]]
+
+
+class _HazardModel(StrictModel, title="A hazard"):
+    about: str = Field(description="What the hazard is.")
+    leads_to: list[str] = Field(description="The accidents that it can cause.")
+
+
+class HazardsModel(StrictModel, title="hazards.yaml"):
+    """Accidents, and the hazards that can lead to them."""
+
+    accidents: dict[str, str] = Field(description="Id -> description.")
+    hazards: dict[str, _HazardModel] = Field(description="Id -> hazard.")
+
+
+def load_hazards(path: Path) -> HazardList:
+    """Read accidents and hazards; MutatorError if a hazard names an unknown accident."""
+    model, source = read(path, HazardsModel, HAZARDS_SCHEMA)
+    for name, hazard in model.hazards.items():
+        for i, accident in enumerate(hazard.leads_to):
+            if accident not in model.accidents:
+                raise source.error(
+                    ("hazards", name, "leads_to", i),
+                    f"accident '{accident}'",
+                    expected=f"one of {', '.join(model.accidents)}",
+                    remedy="correct the name, or add the accident to `accidents`",
+                )
+    return HazardList(
+        source=source,
+        accidents=dict(model.accidents),
+        hazards={name: hazard.about for name, hazard in model.hazards.items()},
+        leads_to={name: tuple(hazard.leads_to) for name, hazard in model.hazards.items()},
+    )

@@ -1,0 +1,34 @@
+"""Check whether a fault may be injected at a place in a target."""
+
+from mutator.errors import MutatorError
+from mutator.model import FaultLocation
+from mutator.targets.manifest import TargetManifest
+from mutator.targets.relative_paths import inside
+from mutator.targets.source_tree import matches
+
+
+def check_location(manifest: TargetManifest, location: FaultLocation) -> None:
+    check_file(manifest, location.path)
+
+
+def check_file(manifest: TargetManifest, named: str) -> None:
+    """Raise MutatorError, without a file position, unless faults may be injected into the file."""
+    path = inside(named)
+    if path != named or not path.endswith(".py") or path not in manifest.tree.files:
+        raise MutatorError(
+            f"no Python file '{named}' in target {manifest.name}",
+            expected="a path relative to the target's root, among the manifest's files",
+            remedy=f"correct the path, or the `files` of {manifest.path.name}",
+        )
+    if path in manifest.tree.overlaid:
+        raise MutatorError(
+            f"file '{path}' is in the overlay of target {manifest.name}",
+            expected="a file of the controller, because no fault may be injected into the overlay",
+            remedy="inject somewhere else",
+        )
+    if matches(path, manifest.forbid):
+        raise MutatorError(
+            f"no fault may be injected into file '{path}'",
+            expected=f"a file that `forbid` of {manifest.path.name} does not match",
+            remedy="inject somewhere else",
+        )

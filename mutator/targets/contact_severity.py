@@ -1,0 +1,66 @@
+"""The severity of a contact: delta-v of the ego car, and its class on a scale."""
+
+from dataclasses import dataclass, field
+
+from mutator._common.yaml_dataclasses import mapping, written
+
+CLASSES = ("S0", "S1", "S2", "S3")  # from ISO 26262-3, the mildest first
+DELTA_V = "delta_v"  # name of the metric
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Contact:
+    """How severe a contact is. The metric `delta_v` is the delta-v of the ego car, `contact_speed *
+    other_mass_kg / (mass_kg + other_mass_kg)`; the scale assigns its class.
+    """
+
+    __pydantic_config__ = mapping("Severity")
+
+    hazard: str = field(
+        metadata=written("The terminal hazard that is a contact with another vehicle.", alias="contact")
+    )
+    speed: str = field(
+        metadata=written(
+            "The metric that holds the closing speed at the contact: one with `at_end`, in m/s. If it is "
+            "negative, the cars separate, and delta-v is 0.",
+            alias="contact_speed",
+        )
+    )
+    mass: float = field(
+        metadata=written("The mass of the ego car.", alias="mass_kg", gt=0.0, allow_inf_nan=False)
+    )
+    other_mass: float = field(
+        metadata=written("The mass of the other vehicle.", alias="other_mass_kg", gt=0.0, allow_inf_nan=False)
+    )
+    scale: str = field(
+        metadata=written(
+            "The name of a file in the library's `severity/`, without `.yaml`; or `collision`, which ships "
+            "with mutator."
+        )
+    )
+
+    def delta_v(self, closing: float) -> float:
+        """Return the change of the ego car's speed in m/s, in an inelastic collision along the line of
+        travel; 0 if the closing speed is not positive.
+        """
+        return max(closing, 0.0) * self.other_mass / (self.mass + self.other_mass)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scale:
+    """The classes of delta-v: (name, least delta-v in m/s, meaning), the mildest first, beginning at 0.
+    `source` cites the bounds.
+    """
+
+    name: str
+    about: str
+    source: str
+    classes: tuple[tuple[str, float, str], ...]
+
+    def __post_init__(self) -> None:
+        if not any(least <= 0.0 for _, least, _ in self.classes):
+            raise ValueError("no class of severity begins at 0")
+
+    def class_of(self, delta_v: float) -> str:
+        """Return the class of a delta-v in m/s, 0 or more; a value on a bound is in the upper class."""
+        return [name for name, least, _ in self.classes if delta_v >= least][-1]

@@ -1,0 +1,95 @@
+"""How a manifest runs and films a target."""
+
+from collections.abc import Collection
+
+from pydantic import Field
+
+from mutator._common.message_text import one_of
+from mutator.config.yaml_files import StrictModel
+from mutator.config.yaml_sources import Source
+from mutator.targets.manifest import Film
+from mutator.targets.placeholders import OF_FILMED_RUNS, OF_FILMS, OF_RUNS, check_placeholders
+
+
+class ChangeModel(StrictModel, title="A change"):
+    """Further arguments, and the scenarios that they make identical."""
+
+    args: list[str] = Field(description="Further arguments.")
+    same_in: list[str] = Field(
+        min_length=2, description="The scenarios that the change makes identical. They share one run."
+    )
+
+
+class EntryModel(StrictModel, title="The entry"):
+    """Arguments can contain placeholders: `{scenario}` is the scenario's file, `{seed}` the seed, `{out}` the
+    folder for trace and record. `{cache}` is a folder that all runs of the target share. It can be missing,
+    unwritable or damaged, and `mutator cache` deletes from it, so results must not depend on it. `{root}` is
+    the target's root, to which a run must never write.
+    """
+
+    module: str = Field(description="The module, which is run as `python -m` from the root.")
+    args: list[str] = Field(
+        default_factory=lambda: ["--scenario", "{scenario}", "--seed", "{seed}", "--out", "{out}"],
+        description="The module's arguments. Default: `--scenario {scenario} --seed {seed} --out {out}`.",
+    )
+    stepwise: str | None = Field(
+        None,
+        description="A function of the module (or `Class.method`) that takes these arguments and returns a "
+        "steppable run, for [faster engines](../explanation/performance.md#which-engine-runs).",
+    )
+    independent: list[str] = Field(
+        default_factory=list,
+        description="Extra arguments for runs that must not use data left by other runs. These are the runs "
+        "of the equivalence check and of mutants of files in `reads_itself`.",
+    )
+    changes: dict[str, list[str] | ChangeModel] = Field(
+        default_factory=dict, description="Name of a scenario change -> its arguments."
+    )
+
+
+def check_commands(entry: EntryModel, film: Film | None, source: Source) -> None:
+    for key, command in (("entry", entry), ("film", film)):
+        if command and not all(part.isidentifier() for part in command.module.split(".")):
+            raise source.error(
+                (key, "module"),
+                f"'{command.module}'",
+                expected="a dotted module name",
+                remedy="write it as after `python -m`: package.module",
+            )
+    stepwise = entry.stepwise
+    if stepwise is not None and not all(part.isidentifier() for part in stepwise.split(".")):
+        raise source.error(
+            ("entry", "stepwise"),
+            f"'{stepwise}'",
+            expected="a function of the entry module",
+            remedy="write only its name, such as `open_run` or `Drive.open`",
+        )
+    _check_runs(entry, source)
+    if film is not None:
+        _check_films(film, entry.changes, source)
+
+
+def _check_runs(entry: EntryModel, source: Source) -> None:
+    keys = ("entry",)
+    check_placeholders(entry.args, OF_RUNS, source, (*keys, "args"))
+    check_placeholders(entry.independent, OF_RUNS, source, (*keys, "independent"))
+    for name, change in entry.changes.items():
+        place = (*keys, "changes", name)
+        if isinstance(change, list):
+            check_placeholders(change, OF_RUNS, source, place)
+        else:
+            check_placeholders(change.args, OF_RUNS, source, (*place, "args"))
+
+
+def _check_films(film: Film, changes: Collection[str], source: Source) -> None:
+    for i, name in enumerate(film.pictures):
+        if name not in changes:
+            raise source.error(
+                ("film", "pictures", i),
+                f"'{name}'",
+                expected=f"{one_of(changes)}, the entry's changes",
+                remedy="correct the name",
+            )
+    check_placeholders(film.run_args, OF_FILMED_RUNS, source, ("film", "run"))
+    check_placeholders(film.args, OF_FILMS, source, ("film", "args"))
+    check_placeholders(film.still_args, OF_FILMS, source, ("film", "still"))

@@ -1,0 +1,65 @@
+"""Generate code that ends a run at its first terminal hazard, from the manifest's conditions."""
+
+import ast
+from inspect import getsource
+
+from mutator.config.yaml_sources import Keys
+from mutator.errors import MutatorError
+from mutator.targets.criteria import Hazard
+from mutator.targets.manifest import TargetManifest
+from mutator.triggers.conditions import TIME, divide, names_in, parse, to_code
+
+_REMEDY = "leave `after_hazard` out of the campaign, so that runs continue"
+
+
+def stop_source(manifest: TargetManifest) -> str:
+    """Return the source of a function `over(recorded)`, which says whether a terminal hazard holds in a step.
+
+    `recorded` has the step's values, by their names in the trace. The code needs `math`, and `min` and `max`
+    that propagate NaN. MutatorError if the target has no terminal hazard or no `entry.stepwise`, and for a
+    hazard that cannot be decided from one step, because it has `for_s`, looks at earlier steps, is judged by
+    the record or by temporal logic, or uses a channel that is not recorded in each step.
+    """
+    if manifest.stepwise is None:
+        raise _refused(manifest, ("entry",), "no `stepwise`", "a run that can be ended between two steps")
+    conditions = [_condition(manifest, hazard) for hazard in manifest.rules if hazard.terminal]
+    if not conditions:
+        raise _refused(manifest, ("hazards",), "no terminal hazard", "one with `terminal`")
+    channels = {channel.name: channel for channel in manifest.channels}
+    derived = [value for value in manifest.observation.derived if value.name not in channels]
+    needed = {name for text in conditions for name in names_in(text)}
+    for value in reversed(derived):
+        needed |= {*names_in(value.text)} if value.name in needed else set()
+    lines = [f"    {TIME} = float(recorded[{manifest.time_channel!r}])"]
+    for channel in manifest.channels:
+        if channel.name in needed and channel.time:
+            keys = ("channels", channel.name, "time")
+            raise _refused(manifest, keys, f"{channel.name} has separate times", "a number in each step")
+        if channel.name in needed:
+            lines.append(f"    {channel.name} = float(recorded[{channel.in_trace!r}])")
+    lines += [f"    {v.name} = {to_code(v.text, number=True)}" for v in derived if v.name in needed]
+    holds = " or ".join(f"({to_code(text)})" for text in conditions)
+    return "\n".join(
+        [getsource(divide), "_div = divide", "def over(recorded):", *lines, f"    return {holds}", ""]
+    )
+
+
+def _condition(manifest: TargetManifest, hazard: Hazard) -> str:
+    own = hazard.terminal != "True"
+    text = hazard.terminal if own else hazard.when
+    keys = ("hazards", hazard.name)
+    if not text:
+        judge = "temporal logic" if hazard.stl else "the target itself"
+        raise _refused(manifest, keys, f"{hazard.name}, which is judged by {judge}", "a condition, `when`")
+    if hazard.for_s and not own:
+        raise _refused(manifest, (*keys, "for_s"), f"{hazard.name} has `for_s`", "a condition of one step")
+    calls = {ast.unparse(node.func) for node in ast.walk(parse(text)) if isinstance(node, ast.Call)}
+    if earlier := calls & {"ever", "rate"}:
+        got = f"{hazard.name} uses `{min(earlier)}`"
+        raise _refused(manifest, keys, got, "a condition of a single step")
+    return text
+
+
+def _refused(manifest: TargetManifest, keys: Keys, got: str, expected: str) -> MutatorError:
+    got = f"runs cannot stop at a terminal hazard: {got}"
+    return manifest.source.error(keys, got, expected=expected, remedy=_REMEDY)

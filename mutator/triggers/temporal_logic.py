@@ -1,0 +1,156 @@
+"""Signal temporal logic, evaluated by the optional package rtamt (`pip install rtamt`)."""
+
+import logging
+import re
+from collections.abc import Collection, Mapping
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from mutator._common.message_text import suggestion
+from mutator.errors import MutatorError
+from mutator.triggers.conditions import TIME
+
+_NAME = re.compile(r"\b[A-Za-z_]\w*\b")
+_OUT = "robustness_of_it"
+_PLACE = re.compile(r"1:(\d+): Syntax")
+_BOUNDED = ("TimedAlways", "TimedEventually", "TimedUntil")
+_UNBOUNDED = ("Always", "Eventually", "Until")
+_NEXT = ("Next", "StrongNext")
+_LONGEST = 1000  # characters of a formula
+MOST_STEPS = 3000  # of all intervals of a formula together; rtamt's time grows with the square of some
+_SAME_LENGTH = 0.01  # tolerance in steps; times are sums of steps, or rounded
+
+
+def check(formula: str, variables: Collection[str], step_s: float) -> None:
+    """Raise MutatorError if rtamt is missing, or cannot evaluate the formula in steps of `step_s`."""
+    # NaN suffices: no arithmetic fails on it
+    _evaluated(formula, {name: np.full(1, np.nan) for name in (*variables, TIME)}, step_s)
+
+
+def names_in(formula: str, variables: Collection[str]) -> tuple[str, ...]:
+    known = set(variables)
+    return tuple(dict.fromkeys(name for name in _NAME.findall(formula) if name in known))
+
+
+def robustness(formula: str, values: Mapping[str, np.ndarray], step_s: float) -> np.ndarray:
+    """Return how far each step is from violating the formula (below 0: violated).
+
+    `values` has an array for each variable, and the time of each step. If the formula looks n steps ahead,
+    its value for step i is known at step i + n and stored there; the first n entries are `inf`. MutatorError
+    if steps are not `step_s` long, because the logic counts steps, not times.
+    """
+    time = values[TIME]
+    lengths = np.diff(time)
+    uneven = np.flatnonzero(~(np.abs(lengths - step_s) <= _SAME_LENGTH * step_s))
+    if uneven.size:
+        raise MutatorError(
+            f"a step of {lengths[uneven[0]]:g} s at {time[uneven[0]]:g} s, but {formula!r} counts steps",
+            expected=f"steps of {step_s:g} s, the manifest's `step_s`",
+            remedy="record steps of equal length, or write the hazard with `when`",
+        )
+    return _evaluated(formula, values, step_s)
+
+
+def _evaluated(formula: str, values: Mapping[str, np.ndarray], step_s: float) -> np.ndarray:
+    if len(formula) > _LONGEST:
+        raise MutatorError(f"a formula of {len(formula)} characters", expected=f"at most {_LONGEST}")
+    specification = _specification(step_s)
+    formula = " ".join(formula.split())
+    names, steps = names_in(formula, values), len(values[TIME])
+    # rtamt needs at least two steps, so the last one is repeated, and its second value is dropped
+    rows = {name: [*values[name].tolist(), *values[name][-1:].tolist()] for name in names}
+    try:
+        _parse(specification, formula, names)
+        _check_intervals(specification.ast.specs[-1], specification.offline_interpreter)
+        ahead = _ahead(specification.ast.specs[-1], specification.offline_interpreter)
+        told = specification.evaluate({**rows, "time": [*range(steps + 1)]}) if steps else []
+    except Exception as error:  # rtamt raises KeyError, ValueError, errors of its own, and arithmetic errors
+        raise _refusal(error, formula, values, step_s) from None
+    judged = [number for _, number in told[: max(0, steps - ahead)]]
+    return np.array([np.inf] * min(ahead, steps) + judged, dtype=float)
+
+
+def _specification(step_s: float) -> Any:
+    try:
+        import rtamt  # type: ignore[import-untyped]
+    except ImportError:
+        raise MutatorError(
+            "a formula of signal temporal logic, but rtamt is not installed",
+            expected="the package rtamt",
+            remedy="pip install rtamt, or write the condition with `when`",
+        ) from None
+    specification = rtamt.StlDiscreteTimeSpecification()
+    specification.set_sampling_period(Fraction(step_s).limit_denominator(10**9), "s", 0.1)
+    return specification
+
+
+def _parse(specification: Any, formula: str, names: Collection[str]) -> None:
+    declared = {*names, _OUT}
+    for name in declared:
+        specification.declare_var(name, "float")
+    specification.spec = f"{_OUT} = {formula}"
+    before = logging.root.manager.disable
+    logging.disable(logging.WARNING)  # rtamt warns about an unknown name, which is rejected below
+    try:
+        specification.parse()
+    finally:
+        logging.disable(before)
+    specification.offline_interpreter.set_ast(specification.ast)
+    if unknown := sorted(specification.ast.vars - declared):
+        raise KeyError(unknown[0])
+
+
+def _check_intervals(node: Any, interpreter: Any) -> None:
+    """Raise ValueError if the intervals of a formula have too many steps together."""
+    total, waiting = 0, [node]
+    while waiting:
+        node = waiting.pop()
+        waiting += _children(node)
+        total += int(interpreter.time_unit_transformer(node)[1]) if hasattr(node, "begin") else 0
+    if total > MOST_STEPS:
+        raise ValueError(f"intervals of {total} steps")
+
+
+def _children(node: Any) -> list[Any]:
+    """Return a node's children; rtamt lists those of some operators twice."""
+    return list({id(child): child for child in node.children}.values())
+
+
+def _ahead(node: Any, interpreter: Any) -> int:
+    """Return how many steps a formula looks ahead; ValueError if unbounded."""
+    kind = type(node).__name__
+    if kind in _UNBOUNDED:
+        raise ValueError(f"unbounded {kind.lower()}")
+    below: int = max((_ahead(child, interpreter) for child in _children(node)), default=0)
+    if not hasattr(node, "begin"):
+        return below + (kind in _NEXT)
+    begin, end = interpreter.time_unit_transformer(node)
+    if begin > end:
+        raise ValueError("an interval that ends before it begins")
+    return below + (int(end) if kind in _BOUNDED else 0)
+
+
+def _refusal(error: Exception, formula: str, variables: Collection[str], step_s: float) -> MutatorError:
+    """Turn rtamt's message into one for the formula's author."""
+    said = str(error).removeprefix("RTAMT Exception: ").strip()
+    remedy = "correct the formula"
+    if place := _PLACE.match(said):
+        rest = formula[int(place[1]) - len(f"{_OUT} = ") :]
+        said = f"unexpected {rest!r}" if rest else "an unexpected end"
+    elif isinstance(error, KeyError):
+        name = str(error.args[0])
+        said, remedy = f"unknown name '{name}'", f"correct it{suggestion(name, [*variables])}"
+    elif "unbounded" in said:
+        remedy = "bound the look-ahead, `always[0:2](x < 3)`, or look back: `historically(x < 3)`"
+    elif said.startswith("intervals of"):
+        remedy = f"shorten them: at most {MOST_STEPS} steps together, {MOST_STEPS * step_s:g} s here"
+    elif "sampling period" in said:
+        said, remedy = f"a time that is not a multiple of the step, {step_s:g} s,", "use a multiple"
+    return MutatorError(
+        f"{said} in {formula!r}",
+        expected="a formula of signal temporal logic that looks back, or ahead for a bounded time, over "
+        + ", ".join(variables),
+        remedy=remedy,
+    )

@@ -1,0 +1,31 @@
+"""Hints for operators of other languages."""
+
+import pytest
+
+from mutator._common.message_text import operator_hint
+from mutator.campaigns.filters import compile_filter
+from mutator.errors import MutatorError
+from mutator.triggers.conditions import check_condition
+
+
+@pytest.mark.parametrize(
+    ("text", "hint"),
+    [
+        ("a && b", "write 'and' for '&&'"),
+        ("a || !b", "write 'or' for '||', write 'not' for '!'"),
+        ("a = 3", "write '==' for '='"),
+        ("a != 3 and b <= 2 and c >= 1 and d == 0", ""),
+        ("match(name, 'a=!b&&') and", ""),
+    ],
+)
+def test_operators_of_other_languages_get_a_hint(text: str, hint: str) -> None:
+    assert operator_hint(text) == hint
+
+
+@pytest.mark.parametrize("text", ["t > 2 && v > 3", "t > 2 || v > 3", "!(t > 2)", "t = 2"])
+def test_errors_in_conditions_and_filters_contain_the_hint(text: str) -> None:
+    for refused in (check_condition, lambda text: compile_filter(text, ("t", "v"))):
+        with pytest.raises(MutatorError) as caught:
+            refused(text)
+        assert operator_hint(text) in str(caught.value)
+        assert caught.value.remedy == operator_hint(text)

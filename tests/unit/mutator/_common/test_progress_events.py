@@ -1,0 +1,75 @@
+"""Events that a command sends to the program that started it."""
+
+import json
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from mutator._common import progress_events
+from mutator.errors import MutatorError
+from mutator.serve.job_events import EventReader, Link, Phase, Remark
+
+
+@pytest.fixture
+def pipe(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    reading, writing = os.pipe()
+    os.set_inheritable(writing, True)
+    monkeypatch.setenv(progress_events.EVENTS_FD, str(writing))
+    monkeypatch.setattr(progress_events, "_pipe", None)
+    yield reading
+    os.close(writing)
+    os.close(reading)
+
+
+def test_the_reader_understands_every_event(pipe: int) -> None:
+    progress_events.open_events()
+    progress_events.phase("golden runs", 1, 4, {"sdc": 2})
+    progress_events.warning("old")
+    progress_events.link("plot", Path("plots/a.svg"))
+    progress_events.result("verdict: sdc \udcff")
+    progress_events.error("x" * 9_999)
+    data = os.read(pipe, 65_536)
+    assert [*EventReader().read(data)] == [
+        Phase(event="phase", phase="golden runs", done=1, total=4, outcomes={"sdc": 2}),
+        Remark(event="warning", text="old"),
+        Link(event="link", kind="plot", path=str(Path.cwd() / "plots/a.svg")),
+        Remark(event="result", text="verdict: sdc ?"),
+        Remark(event="error", text="x" * progress_events.LONGEST_TEXT),
+    ]
+    assert all(len(line) < 4_096 and json.loads(line)["event"] for line in data.splitlines())
+
+
+def test_child_processes_do_not_get_the_pipe(pipe: int) -> None:
+    """A mutant could otherwise send events."""
+    fd = int(os.environ[progress_events.EVENTS_FD])
+    assert os.get_inheritable(fd)
+    progress_events.open_events()
+    assert progress_events.EVENTS_FD not in os.environ
+    assert not os.get_inheritable(fd)
+
+
+@pytest.mark.parametrize("text", ["", "x", "-1", "99999", "9" * 99])
+def test_anything_but_an_open_pipe_is_refused(monkeypatch: pytest.MonkeyPatch, text: str) -> None:
+    monkeypatch.setenv(progress_events.EVENTS_FD, text)
+    with pytest.raises(MutatorError, match=f"'{text}'"):
+        progress_events.open_events()
+
+
+def test_a_file_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Others could write to it."""
+    with (tmp_path / "events").open("w") as file:
+        monkeypatch.setenv(progress_events.EVENTS_FD, str(file.fileno()))
+        with pytest.raises(MutatorError, match="open pipe"):
+            progress_events.open_events()
+
+
+def test_a_command_goes_on_when_nobody_reads_its_events(monkeypatch: pytest.MonkeyPatch) -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    monkeypatch.setattr(progress_events, "_pipe", writing)
+    progress_events.result("done")
+    progress_events.result("again")
+    assert progress_events._pipe is None
+    os.close(writing)

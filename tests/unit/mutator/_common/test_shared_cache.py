@@ -1,0 +1,98 @@
+"""The location, the content and the deletion order of caches."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from mutator._common import shared_cache
+
+
+@pytest.fixture
+def filled() -> Path:
+    """A cache with three files of a target, used one after another, and checks that were used last."""
+    checks = shared_cache.of_checks() / "ab12" / "golden" / "A"
+    checks.mkdir(parents=True)
+    (checks / "trace.npz").write_bytes(b"1" * 5000)
+    (checks.parents[1] / "checks.json").write_bytes(b"2")
+    compiled = shared_cache.of_target("car") / "compiled"
+    compiled.mkdir(parents=True)
+    for used, path in enumerate((compiled / "hog.so", compiled.parent / "b.npy", compiled.parent / "a.npy")):
+        path.write_bytes(b"3" * 9000)
+        os.utime(path, (1000 + used, 1000 + used))
+    return shared_cache.folder()
+
+
+@pytest.mark.parametrize("named", ["", "relative/folder"])
+def test_the_cache_is_in_the_home_folder_unless_xdg_cache_home_is_absolute(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, named: str
+) -> None:
+    """The XDG specification requires an absolute path."""
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert shared_cache.folder() == tmp_path / "mutator"
+    monkeypatch.setenv("XDG_CACHE_HOME", named)
+    assert shared_cache.folder() == tmp_path / "home" / ".cache" / "mutator"
+
+
+def test_without_a_home_folder_the_cache_is_empty(monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_home() -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    monkeypatch.setattr(Path, "home", no_home)
+    with pytest.raises(OSError):
+        shared_cache.of_target("car").mkdir(parents=True)
+    assert (shared_cache.entries(), shared_cache.prune(0), shared_cache.clear()) == ([], [], [])
+
+
+@pytest.mark.parametrize("name", ["..", "a/b", "/", ".hidden", "plain", "ä" * 100])
+def test_any_target_name_gives_a_folder_directly_below_targets(name: str) -> None:
+    place = shared_cache.of_target(name)
+    assert place.resolve().parent == (shared_cache.folder() / "targets").resolve()
+    place.mkdir(parents=True)
+    assert shared_cache.make_room(name) == []
+
+
+def test_checks_form_one_entry_and_each_target_file_has_its_own(filled: Path) -> None:
+    found = [(entry.what, entry.path.relative_to(filled).as_posix()) for entry in shared_cache.entries()]
+    files = ["targets/car/a.npy", "targets/car/b.npy", "targets/car/compiled/hog.so"]
+    assert found == [("checks", "checks/ab12"), *(("target car", file) for file in files)]
+    assert all(entry.size >= 5000 for entry in shared_cache.entries())
+
+
+def test_the_size_of_a_sparse_file_is_its_size_on_disk() -> None:
+    place = shared_cache.of_target("car")
+    place.mkdir(parents=True)
+    with (place / "table").open("wb") as file:
+        file.truncate(800_000_000)
+    [entry] = shared_cache.entries()
+    assert entry.size < 1_000_000
+
+
+def test_pruning_deletes_the_least_recently_used_entries_first(filled: Path) -> None:
+    sizes = {entry.path.name: entry.size for entry in shared_cache.entries()}
+    kept = sizes["ab12"] + sizes["a.npy"]
+    assert [entry.path.name for entry in shared_cache.prune(kept)] == ["hog.so", "b.npy"]
+    assert [entry.path.name for entry in shared_cache.entries()] == ["ab12", "a.npy"]
+    assert shared_cache.prune(kept) == []
+
+
+def test_clearing_deletes_links_but_not_their_targets(filled: Path) -> None:
+    outside = filled.parent / "outside"
+    outside.mkdir()
+    (outside / "kept").write_text("kept")
+    (filled / "targets" / "car" / "link").symlink_to(outside)
+    assert len(shared_cache.clear()) == 5
+    assert [path for path in filled.rglob("*") if path.is_file()] == []
+    assert (outside / "kept").exists()
+
+
+def test_making_room_deletes_the_least_recently_used_files_of_a_target(
+    filled: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert shared_cache.make_room("car") == []
+    monkeypatch.setattr(shared_cache, "TARGET_BYTES", 2 * 12_288)
+    assert [entry.path.name for entry in shared_cache.make_room("car")] == ["hog.so"]
+    assert shared_cache.make_room("truck") == []
+    assert len(shared_cache.entries()) == 3

@@ -1,0 +1,104 @@
+"""The diagram of the control structure."""
+
+from itertools import combinations, pairwise
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+import mutator
+from mutator.stpa.analysis_files import Analysis, load_analysis
+from mutator.stpa.structure_drawing import FAULT, draw, faulty_places, short
+from mutator.stpa.structure_layout import APART, Box, Layout, Point, lay_out
+from mutator.workspace import Workspace
+
+CLONE = Path(__file__).parents[4]
+
+
+@pytest.fixture(scope="module")
+def analysis(clone: Workspace) -> Analysis:
+    return load_analysis(clone.library / "stpa")
+
+
+@pytest.fixture(scope="module")
+def layout(analysis: Analysis) -> Layout:
+    return lay_out(analysis.structure)
+
+
+def meets(box: Box, start: Point, end: Point) -> bool:
+    """Whether a horizontal or vertical segment has a point inside the box."""
+    (x1, x2), (y1, y2) = sorted((start[0], end[0])), sorted((start[1], end[1]))
+    return x1 < box.x + box.width and x2 > box.x and y1 < box.bottom and y2 > box.y
+
+
+def test_boxes_do_not_overlap_and_are_inside(layout: Layout) -> None:
+    for one, other in combinations(layout.boxes.values(), 2):
+        assert not meets(one, (other.x, other.y), (other.x + other.width, other.bottom))
+    for box in layout.boxes.values():
+        assert box.x >= 0 and box.x + box.width < layout.width and box.bottom < layout.height
+
+
+def test_arrows_join_their_boxes_and_cross_no_other_box(analysis: Analysis, layout: Layout) -> None:
+    for name, link in analysis.structure.links.items():
+        points = layout.arrows[name].points
+        for place, point in ((link.from_, points[0]), (link.to, points[-1])):
+            box = layout.boxes[place]
+            assert point[1] in (box.y, box.bottom) or point[0] in (box.x, box.x + box.width), name
+        for box in layout.boxes.values():
+            assert not any(meets(box, start, end) for start, end in pairwise(points)), name
+
+
+def test_arrows_do_not_overlap(layout: Layout) -> None:
+    for (one, first), (other, second) in combinations(layout.arrows.items(), 2):
+        for a, b in pairwise(first.points):
+            for c, d in pairwise(second.points):
+                for i in (0, 1):  # along x, along y
+                    if a[1 - i] == b[1 - i] and c[1 - i] == d[1 - i]:
+                        together = min(max(a[i], b[i]), max(c[i], d[i])) > max(
+                            min(a[i], b[i]), min(c[i], d[i])
+                        )
+                        assert not together or abs(a[1 - i] - c[1 - i]) >= APART - 8, (one, other)
+
+
+def test_labels_overlap_nothing(analysis: Analysis, layout: Layout) -> None:
+    areas = {}
+    for name, link in analysis.structure.links.items():
+        arrow, width = layout.arrows[name], 7.0 * len(link.label)
+        (x, y), apart = arrow.label.at, arrow.label.apart
+        left = x - {"start": 0.0, "middle": width / 2, "end": width}[arrow.label.anchor]
+        areas[name] = Box(x=left, y=y - 12, width=width, height=apart + 15, row=0, lines=())
+    for (name, area), (other, beside) in combinations(areas.items(), 2):
+        assert not meets(area, (beside.x, beside.y), (beside.x + beside.width, beside.bottom)), (name, other)
+    for name, area in areas.items():
+        for box in layout.boxes.values():
+            assert not meets(area, (box.x, box.y), (box.x + box.width, box.bottom)), name
+        for other, arrow in layout.arrows.items():
+            if other != name:
+                assert not any(meets(area, a, b) for a, b in pairwise(arrow.points)), (name, other)
+
+
+def test_only_places_with_faults_have_the_colour_of_faults(analysis: Analysis) -> None:
+    text = draw(analysis)
+    assert text == draw(analysis)
+    root = ElementTree.fromstring(text)
+    lines = [e for e in root.iter("{http://www.w3.org/2000/svg}path") if e.get("stroke") == FAULT]
+    links = faulty_places(analysis).keys() & analysis.structure.links.keys()
+    assert len(lines) == len(links) + 1  # the links and the legend's line
+    words = [e.text for e in root.iter("{http://www.w3.org/2000/svg}text")]
+    assert {"ACC", "LKAS", "steer torque", "CF13, 14"} <= set(words)
+
+
+def test_the_diagram_in_the_docs_is_current(analysis: Analysis) -> None:
+    """After a change, run `mutator stpa --svg docs/explanation/hazard-analysis.svg`."""
+    assert (CLONE / "docs" / "explanation" / "hazard-analysis.svg").read_text() == draw(analysis)
+
+
+def test_a_common_prefix_is_written_once() -> None:
+    assert short(["CF9"]) == "CF9"
+    assert short(["CF9", "CF10"]) == "CF9, 10"
+
+
+@pytest.mark.parametrize("mark", ["<marker", '" L".join', "arrow.label.anchor"])
+def test_one_module_draws_the_arrows_of_all_drawings(mark: str) -> None:
+    sources = Path(mutator.__file__).parent
+    assert [path.name for path in sources.rglob("*.py") if mark in path.read_text()] == ["shapes.py"]
