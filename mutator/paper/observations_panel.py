@@ -10,7 +10,7 @@ from mutator.config.yaml_files import MAX_BYTES
 from mutator.outcomes.fault_free_runs import own_alerts
 from mutator.paper import observations, observations_by_seed, observations_page
 from mutator.paper.observations import Verdict
-from mutator.paper.published_counts import has_paper, load_paper
+from mutator.paper.published_numbers import has_paper, load_paper
 from mutator.report.panel import Panel, rendered
 from mutator.report.panels.tables_panel import csv_files
 from mutator.report.reported_run import ReportedRun

@@ -3,8 +3,8 @@
 from mutator.figures.drawings import Drawing
 from mutator.paper.example_figures import example_drawings
 from mutator.paper.observations_panel import build_observations_panel
-from mutator.paper.published_counts import has_paper, load_paper
-from mutator.paper.published_counts_check import check_paper
+from mutator.paper.published_numbers import has_paper, load_paper
+from mutator.paper.published_numbers_check import check_paper
 from mutator.report.reported_run import PublishedWork, ReportedRun
 from mutator.statistics.published_counts import PublishedCounts
 

@@ -14,7 +14,7 @@ from mutator.reference import (
     operators_page,
     python_api,
 )
-from mutator.reference.schemas import editor_schema, file_formats
+from mutator.reference.json_schemas import editor_schema, file_formats
 from mutator.workspace import Workspace
 
 FOLDER = Path("docs") / "reference"

@@ -6,7 +6,7 @@ from typing import Any
 
 from mutator._common.table_rendering import Table
 from mutator.config.yaml_files import StrictModel
-from mutator.reference.schemas import definitions
+from mutator.reference.json_schemas import definitions
 
 # models used in several kinds of files, and the page with their section
 _PAGES = {"Injection": "fault-spec.md", "At": "fault-spec.md"}

@@ -19,7 +19,7 @@ from typing import Any
 import pytest
 
 from mutator.reference.generated_files import SCHEMAS
-from mutator.reference.schemas import file_formats
+from mutator.reference.json_schemas import file_formats
 from mutator.workspace import Workspace
 
 CLONE = Path(__file__).parents[2]

@@ -13,7 +13,7 @@ from mutator.errors import MutatorError
 from mutator.paper import observations, observations_page
 from mutator.paper.measures import Estimate, median_time, of_difference, of_share
 from mutator.paper.observations import JudgedClaim, JudgedObservation, Rule, Verdict, judge, together
-from mutator.paper.published_counts import load_paper
+from mutator.paper.published_numbers import load_paper
 from mutator.statistics.shares import share
 from mutator.statistics.tallies import Tally
 

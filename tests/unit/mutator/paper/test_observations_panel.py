@@ -10,7 +10,7 @@ import pytest
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import make_plan
 from mutator.paper.observations_panel import build_observations_panel
-from mutator.paper.published_counts import load_paper
+from mutator.paper.published_numbers import load_paper
 from mutator.report.reported_run import ReportedRun
 from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder

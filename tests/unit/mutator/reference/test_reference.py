@@ -15,7 +15,7 @@ from mutator.config import yaml_files
 from mutator.errors import MutatorError
 from mutator.faults.fault_specs import spec_model
 from mutator.reference.generated_files import FOLDER, PAGES, SCHEMAS, STUB, render_files, write_files
-from mutator.reference.schemas import Format, definitions, file_formats
+from mutator.reference.json_schemas import Format, definitions, file_formats
 from mutator.reference.yaml_key_tables import reading_order
 from mutator.workspace import Workspace
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from mutator.checks.library_check import check_library
-from mutator.paper.published_counts import FILES
-from mutator.paper.published_counts_check import check_paper
+from mutator.paper.published_numbers import FILES
+from mutator.paper.published_numbers_check import check_paper
 from mutator.workspace import Workspace
 
 CLONE = Path(__file__).parents[4]

@@ -8,7 +8,7 @@ from typing import Any
 from mutator.config.yaml_files import load
 from mutator.config.yaml_sources import Source
 from mutator.errors import MutatorError
-from mutator.paper.published_counts import FILES, Paper, load_paper
+from mutator.paper.published_numbers import FILES, Paper, load_paper
 from mutator.statistics.tallies import Tally, sum_tallies
 from mutator.workspace import Workspace
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.paper.published_counts import Paper, load_paper
+from mutator.paper.published_numbers import Paper, load_paper
 from mutator.statistics import guided_against_random
 from mutator.statistics.guided_against_random_tables import hazard_odds_sheet, hazards_by_fault_type_sheet
 from mutator.statistics.shares import share
