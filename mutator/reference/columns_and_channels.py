@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator
 
 from mutator._common.table_rendering import Table
-from mutator.reference.yaml_key_tables import generated
+from mutator.reference.yaml_key_tables import generated_page_head
 from mutator.results.plan_columns import PLAN_COLUMNS
 from mutator.results.propagation_columns import COLUMNS as PROPAGATION
 from mutator.results.table_columns import TIMINGS, result_columns, severity_columns
@@ -22,7 +22,7 @@ def render_results_page(workspace: Workspace) -> str:
     manifests = [workspace.manifest(name) for name in workspace.targets]
     return "\n".join(
         [
-            generated("Result columns"),
+            generated_page_head("Result columns"),
             "`results.csv` and `results.parquet` of a [run folder](run-folder.md) have one row for "
             "each experiment "
             "with a record,\nsorted by id. An empty cell means that there is no value. A *flag* is 0 or "
@@ -33,31 +33,31 @@ def render_results_page(workspace: Workspace) -> str:
             "has two columns:\nits name in lower case, and `t_` with that name. A channel has one column: "
             "`max_dev_` with the first word of its\nname, or with its whole name if two channels start with "
             "the same word. Margins of hazards and metrics have the\nnames that the manifest gives them.\n",
-            *(line for manifest in manifests for line in _table_of(manifest)),
+            *(line for manifest in manifests for line in _result_columns_section(manifest)),
             "## plan.csv\n",
             f"`plan.csv` has the columns that are known before a run: {left_out}.\n",
             "## propagation.parquet\n",
             "One row for each channel of an experiment that differed from the golden run by more than its "
             "tolerance, in the order of\nexperiments and of the manifest's channels. [Fault "
             "paths](../explanation/fault-paths.md) explains how a path follows from\nthese rows.\n",
-            *_columns(PROPAGATION),
+            *_columns_table(PROPAGATION),
             "## timings.parquet\n",
             "The cost of each experiment in its newest run. It is a separate table because it varies from "
             "run to run.\n",
-            *_columns(TIMINGS),
+            *_columns_table(TIMINGS),
         ]
     )
 
 
-def _table_of(manifest: TargetManifest) -> Iterator[str]:
+def _result_columns_section(manifest: TargetManifest) -> Iterator[str]:
     yield f"## Target {manifest.name}\n"
     compared = [channel.name for channel in manifest.compared]
     severity = severity_columns(has_classes=manifest.contact is not None)
     columns = (manifest.hazards, compared, metric_facts(manifest), severity)
-    yield from _columns(result_columns(*columns, paths=True))
+    yield from _columns_table(result_columns(*columns, paths=True))
 
 
-def _columns(columns: Iterable[Column]) -> Iterator[str]:
+def _columns_table(columns: Iterable[Column]) -> Iterator[str]:
     heads = ("column", "type", "Parquet", "unit", "meaning")
     rows = [(f"`{c.name}`", c.type, ARROW_TYPES[c.type], c.unit or "-", c.about) for c in columns]
     yield Table(heads=heads, rows=rows).as_markdown(escape=False)
@@ -67,39 +67,39 @@ def _columns(columns: Iterable[Column]) -> Iterator[str]:
 def render_channels_page(workspace: Workspace) -> str:
     manifests = [workspace.manifest(name) for name in workspace.targets]
     parts = [
-        generated("Channels and units"),
+        generated_page_head("Channels and units"),
         "This page lists the variables, channels, hazards and metrics that the "
         "[manifest](target-manifest.md) of each target declares.\nInternally, all values are in SI units "
         "and radians. Files and tables can use other units, which the names of\nkeys and columns "
         "contain ([units](fault-spec.md#units)).\n",
     ]
     for manifest in manifests:
-        parts += _target(manifest)
+        parts += _target_section(manifest)
     return "\n".join(parts).rstrip() + "\n"
 
 
-def _target(manifest: TargetManifest) -> Iterator[str]:
+def _target_section(manifest: TargetManifest) -> Iterator[str]:
     yield f"## {manifest.name}\n"
     yield "Triggers and contexts can use these variables:\n"
-    observed = variable_units(manifest.observation)
-    variables = [(f"`{name}`", *told) for name, told in observed.items()]
+    observed_variables = variable_units(manifest.observation)
+    variables = [(f"`{name}`", *unit_and_meaning) for name, unit_and_meaning in observed_variables.items()]
     yield Table(heads=("variable", "unit", "meaning"), rows=variables).as_markdown(escape=False)
     yield ""
     yield (
         f"A trace in `{manifest.trace_file}` has one array for each channel, with one value for each step of "
         f"{manifest.step_s:g} s. `{manifest.time_channel}` is the time in s.\n"
     )
-    rows = [_channel(channel) for channel in manifest.channels]
+    rows = [_channel_row(channel) for channel in manifest.channels]
     yield Table(heads=("channel", "unit", "role", "component", "meaning"), rows=rows).as_markdown(
         escape=False
     )
     yield ""
-    hazards = [_hazard(hazard) for hazard in manifest.rules]
+    hazards = [_hazard_row(hazard) for hazard in manifest.rules]
     yield Table(heads=("hazard", "condition", "ends the drive", "meaning"), rows=hazards).as_markdown(
         escape=False
     )
     yield ""
-    metrics = [_metric(metric) for metric in manifest.measures]
+    metrics = [_metric_row(metric) for metric in manifest.measures]
     if metrics:
         yield Table(heads=("metric", "unit", "is", "worse", "meaning"), rows=metrics).as_markdown(
             escape=False
@@ -111,13 +111,13 @@ def _target(manifest: TargetManifest) -> Iterator[str]:
     yield ""
 
 
-def _channel(channel: Channel) -> tuple[str, ...]:
-    own = channel.tolerance != channel.role.tolerance
-    role = f"{channel.role}, to {channel.tolerance:g}" if own else str(channel.role)
+def _channel_row(channel: Channel) -> tuple[str, ...]:
+    has_special_tolerance = channel.tolerance != channel.role.tolerance
+    role = f"{channel.role}, to {channel.tolerance:g}" if has_special_tolerance else str(channel.role)
     return f"`{channel.name}`", channel.unit, role, channel.component or "-", channel.about or "-"
 
 
-def _hazard(hazard: Hazard) -> tuple[str, ...]:
+def _hazard_row(hazard: Hazard) -> tuple[str, ...]:
     when = f"`{hazard.when or hazard.stl}`" if not hazard.recorded else "as recorded"
     if hazard.for_s:
         when += f" for {hazard.for_s:g} s"
@@ -125,14 +125,14 @@ def _hazard(hazard: Hazard) -> tuple[str, ...]:
     return hazard.name, when, ends, hazard.about or "-"
 
 
-def _metric(metric: Metric) -> tuple[str, ...]:
+def _metric_row(metric: Metric) -> tuple[str, ...]:
     if metric.name == DELTA_V:
-        what = "as in `severity`"
+        definition = "as in `severity`"
     elif metric.formula:
-        what = f"{metric.aggregate} of `{metric.formula}`"
+        definition = f"{metric.aggregate} of `{metric.formula}`"
     else:
-        what = "min of the hazard's robustness"
+        definition = "min of the hazard's robustness"
     if metric.where:
-        what += f" where `{metric.where}`"
+        definition += f" where `{metric.where}`"
     about = f"{metric.about} ({metric.source})" if metric.source else metric.about
-    return f"`{metric.name}`", metric.unit, what, metric.worse, about
+    return f"`{metric.name}`", metric.unit, definition, metric.worse, about

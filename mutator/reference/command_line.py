@@ -12,11 +12,11 @@ from mutator._common.table_rendering import Table
 from mutator.cli.app import EXIT_CODES, GROUPS, app
 from mutator.cli.options import Place
 from mutator.execution import pytest_plugin
-from mutator.reference.yaml_key_tables import generated
+from mutator.reference.yaml_key_tables import generated_page_head
 from mutator.workspace import Workspace
 
-_PLACE = {field.name for field in fields(Place)}
-_PLACES = (
+_PLACE_OPTIONS = {field.name for field in fields(Place)}
+_PLACE_OPTIONS_NOTE = (
     "These options say where the library, templates and target are. Write them before or after the "
     "subcommand.\n"
 )
@@ -25,11 +25,11 @@ _PLACES = (
 def render_command_line_page(workspace: Workspace) -> str:
     command: Any = get_command(app)
     parts = [
-        generated("Command line"),
+        generated_page_head("Command line"),
         "`mutator --help` and `mutator SUBCOMMAND --help` print the same information.\n",
         *(f"* {title}: {', '.join(f'[{name}](#{name})' for name in names)}" for title, names in GROUPS),
         "\n## Exit codes\n",
-        _markdown(("code", "meaning"), [(str(code), meaning) for code, meaning in EXIT_CODES.items()]),
+        _table_markdown(("code", "meaning"), [(str(code), meaning) for code, meaning in EXIT_CODES.items()]),
         "\nCode 1 also means that a command found a difference that you asked it to look for. Code 3 also "
         "means a bug in\nmutator itself, reported with a traceback.\n",
         "Errors go to standard error: file and line, what was found, what was expected, and what to do. "
@@ -39,16 +39,16 @@ def render_command_line_page(workspace: Workspace) -> str:
         "campaigns,\nspecs, scenarios, targets, run folders in `runs/`, and experiments of the run that "
         "`--run` names or of the newest\nrun. `mutator --show-completion` prints its script.\n",
         "## Library, templates and target\n",
-        _PLACES,
-        *_options(command, [p for p in command.params if p.name in _PLACE]),
+        _PLACE_OPTIONS_NOTE,
+        *_options_table(command, [p for p in command.params if p.name in _PLACE_OPTIONS]),
     ]
     for _, names in GROUPS:
         for name in names:
-            parts += _verb(command, name)
-    return "\n".join([*parts, *_plugin()]).rstrip() + "\n"
+            parts += _subcommand_section(command, name)
+    return "\n".join([*parts, *_pytest_section()]).rstrip() + "\n"
 
 
-def _verb(group: Any, name: str) -> Iterator[str]:
+def _subcommand_section(group: Any, name: str) -> Iterator[str]:
     command = group.commands[name]
     yield f"## {name}\n"
     with command.make_context(
@@ -56,23 +56,23 @@ def _verb(group: Any, name: str) -> Iterator[str]:
     ) as ctx:
         usage = " ".join(command.get_usage(ctx).removeprefix("Usage: ").split())
     yield f"```text\n{usage}\n```\n"
-    yield f"{_paragraphs(command.help)}\n"
-    own = [param for param in command.params if param.name not in (*_PLACE, "help")]
-    yield from _options(command, own)
+    yield f"{_unwrap_paragraphs(command.help)}\n"
+    params = [param for param in command.params if param.name not in (*_PLACE_OPTIONS, "help")]
+    yield from _options_table(command, params)
     if command.epilog:
         title, _, lines = command.epilog.replace("\b", "").strip().partition("\n")
         examples, _, rest = lines.partition("\n\n")
-        yield f"{title}\n\n```sh\n" + "\n".join(map(_example, examples.splitlines())) + "\n```\n"
+        yield f"{title}\n\n```sh\n" + "\n".join(map(_example_line, examples.splitlines())) + "\n```\n"
         if rest:
             yield f"{rest.strip()}\n"
 
 
-def _example(line: str) -> str:
+def _example_line(line: str) -> str:
     command, gap, comment = re.match(r"  (.*?)(?:( {2,})(\S.*))?$", line).groups()  # type: ignore[union-attr]
     return f"{command}{gap}# {comment}" if gap else command
 
 
-def _options(command: Any, params: Iterable[Any]) -> Iterator[str]:
+def _options_table(command: Any, params: Iterable[Any]) -> Iterator[str]:
     rows = []
     with command.make_context("mutator", [], resilient_parsing=True) as ctx:
         for param in params:
@@ -80,14 +80,14 @@ def _options(command: Any, params: Iterable[Any]) -> Iterator[str]:
                 left, right = (" ".join(text.replace("|", r"\|").split()) for text in record)
                 rows.append((f"`{left}`", right))
     if rows:
-        yield from (_markdown(("argument or option", "meaning"), rows), "")
+        yield from (_table_markdown(("argument or option", "meaning"), rows), "")
 
 
-def _paragraphs(text: str) -> str:
+def _unwrap_paragraphs(text: str) -> str:
     return "\n\n".join(" ".join(part.split()) for part in text.split("\n\n"))
 
 
-def _plugin() -> Iterator[str]:
+def _pytest_section() -> Iterator[str]:
     parser = pytest.Parser(_ispytest=True)
     pytest_plugin.pytest_addoption(parser)
     yield "## pytest\n"
@@ -99,9 +99,9 @@ def _plugin() -> Iterator[str]:
         (f"`{' '.join(option.names())} {option.attrs()['metavar']}`", str(option.attrs()["help"]))
         for option in parser.getgroup("mutator").options
     ]
-    yield _markdown(("option", "meaning"), rows)
+    yield _table_markdown(("option", "meaning"), rows)
     yield ""
 
 
-def _markdown(heads: tuple[str, str], rows: list[tuple[str, str]]) -> str:
+def _table_markdown(heads: tuple[str, str], rows: list[tuple[str, str]]) -> str:
     return Table(heads=heads, rows=rows).as_markdown(escape=False)

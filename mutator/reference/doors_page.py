@@ -7,14 +7,14 @@ from pkgutil import resolve_name
 
 from mutator._common.doors import DISTRIBUTORS, DOORS, EXPORTS, IMPORTERS, OPERATORS, STUDIES, Door
 from mutator._common.table_rendering import Table
-from mutator.reference.yaml_key_tables import generated
+from mutator.reference.yaml_key_tables import generated_page_head
 from mutator.workspace import Workspace
 
 _INTRO = """\
 A door is a place where you add something to mutator. Most take one file.
 [CONTRIBUTING](../../CONTRIBUTING.md#add-something) says more about those inside the project.
 """
-_PACKAGES = """\
+_ENTRY_POINTS_NOTE = """\
 Another package adds these by an entry point. It is loaded only when somebody uses its name. If it cannot be
 loaded, is no object of the stated class, has the name of another, or fails while it is used, the error names
 the package. Its code runs with your rights, so install only packages that you trust. Inside the project, the
@@ -26,7 +26,7 @@ Once a package is uninstalled, the files that its exports wrote in run folders a
 
 The package in `tests/fixtures/doors/` has an example of each but the study.
 """
-_EXAMPLES = {
+_EXAMPLE_BY_DOOR = {
     EXPORTS.thing: ("a format of `mutator export`", "counts", "door_examples.counts:EXPORT"),
     IMPORTERS.thing: ("a format of traces; its name is the suffix", "jsonl", "door_examples.jsonl:IMPORTER"),
     DISTRIBUTORS.thing: (
@@ -48,57 +48,57 @@ _EXAMPLES = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Place:
+class _InternalDoor:
     """A door that is no entry point, or has a page of its own."""
 
     name: str
-    adds: str
+    purpose: str
     protocol: str
-    register: str
+    how_to_register: str
     example: str
 
 
-_PLACES = (
-    _Place(
+_INTERNAL_DOORS = (
+    _InternalDoor(
         name="fault model",
-        adds="what can go wrong in a statement",
+        purpose="what can go wrong in a statement",
         protocol="a Jinja2 template and its YAML, with examples that are its tests",
-        register="put both into the library's `templates/`",
+        how_to_register="put both into the library's `templates/`",
         example="[Add a fault model](../how-to/add-a-fault-model.md)",
     ),
-    _Place(
+    _InternalDoor(
         name="hazard, metric",
-        adds="what is judged and measured in a run, and its result columns",
+        purpose="what is judged and measured in a run, and its result columns",
         protocol="a formula over channels; of a metric, also over those of the golden run",
-        register="write it into the target's manifest",
+        how_to_register="write it into the target's manifest",
         example="[Add a hazard](../how-to/add-a-hazard.md)",
     ),
-    _Place(
+    _InternalDoor(
         name="target",
-        adds="another controller",
+        purpose="another controller",
         protocol="a manifest, and a class with `step()`",
-        register="put the manifest into the library's `targets/`",
+        how_to_register="put the manifest into the library's `targets/`",
         example="[Add a target](../how-to/add-a-target.md)",
     ),
-    _Place(
+    _InternalDoor(
         name="trigger kind",
-        adds="when a fault is active",
+        purpose="when a fault is active",
         protocol="a function that makes a `Trigger` from a condition and a hold",
-        register="`mutator/triggers/trigger_kinds.py`; `READERS` and `TYPED` for the command line",
+        how_to_register="`mutator/triggers/trigger_kinds.py`; `READERS` and `TYPED` for the command line",
         example="`always` in that module",
     ),
-    _Place(
+    _InternalDoor(
         name="engine",
-        adds="how a run is executed",
+        purpose="how a run is executed",
         protocol="`mutator.engines.engine_kinds.EngineKind`",
-        register="`ENGINES` in `mutator/engines/engine_kinds.py`",
+        how_to_register="`ENGINES` in `mutator/engines/engine_kinds.py`",
         example="`mutator/engines/reference_engine.py`",
     ),
-    _Place(
+    _InternalDoor(
         name="panel",
-        adds="a part of the report",
+        purpose="a part of the report",
         protocol="a function from a `ReportedRun` to a `Panel` or None",
-        register="`PANELS` in `mutator/report/panels/`",
+        how_to_register="`PANELS` in `mutator/report/panels/`",
         example="`mutator/report/panels/provenance_panel.py`",
     ),
 )
@@ -106,16 +106,16 @@ _PLACES = (
 
 def render_doors_page(workspace: Workspace) -> str:
     heads = ("door", "what it adds", "protocol", "how to register", "example")
-    rows = [(f"**{p.name}**", p.adds, p.protocol, p.register, p.example) for p in _PLACES]
+    rows = [(f"**{p.name}**", p.purpose, p.protocol, p.how_to_register, p.example) for p in _INTERNAL_DOORS]
     inside = Table(heads=heads, rows=rows).as_markdown(escape=False)
-    parts = [generated("Doors"), _INTRO, "## Entry points of other packages\n", _PACKAGES]
+    parts = [generated_page_head("Doors"), _INTRO, "## Entry points of other packages\n", _ENTRY_POINTS_NOTE]
     for door in DOORS:
-        parts += _section(door)
+        parts += _door_section(door)
     return "\n".join([*parts, "## Data and tables\n", inside]).rstrip() + "\n"
 
 
-def _section(door: Door) -> Iterator[str]:
-    adds, name, value = _EXAMPLES[door.thing]
+def _door_section(door: Door) -> Iterator[str]:
+    adds, example_name, example_value = _EXAMPLE_BY_DOOR[door.thing]
     kind = resolve_name(door.kind)
     yield f"### {door.thing.capitalize()}\n"
     yield f"It adds {adds}. The object is a `{door.kind.replace(':', '.')}`."
@@ -123,7 +123,7 @@ def _section(door: Door) -> Iterator[str]:
         folder = door.folder.replace(".", "/")
         yield f"Inside the project, it is the attribute `{door.attribute}` of a module in `{folder}/`."
     yield f"\n{inspect.cleandoc(kind.__doc__)}\n"
-    yield f'```toml\n[project.entry-points."{door.group}"]\n{name} = "{value}"\n```\n'
-    shipped = [(f"`{one}`", door.find(one).about) for one in door.shipped()]
-    if shipped:
-        yield Table(heads=(door.thing, "what it is"), rows=shipped).as_markdown(escape=False) + "\n"
+    yield f'```toml\n[project.entry-points."{door.group}"]\n{example_name} = "{example_value}"\n```\n'
+    shipped_rows = [(f"`{name}`", door.find(name).about) for name in door.shipped()]
+    if shipped_rows:
+        yield Table(heads=(door.thing, "what it is"), rows=shipped_rows).as_markdown(escape=False) + "\n"

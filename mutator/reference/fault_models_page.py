@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from mutator._common.table_rendering import Table
 from mutator.faults import fault_model_files
 from mutator.faults.fault_models import TARGET_UNIT, Example, FaultModel, ParamSchema, SnippetKind
-from mutator.reference.yaml_key_tables import generated, sections
+from mutator.reference.yaml_key_tables import generated_page_head, model_sections
 from mutator.workspace import Workspace
 
 INTRODUCTION = """\
@@ -36,7 +36,7 @@ holds, and `like` converts a number to the variable's type. [Failure modes](../e
 shows what each model represents in standards and in the literature.
 """
 
-_DOES = {
+_SENTENCE_BY_KIND = {
     SnippetKind.INSERT: "Inserts.",
     SnippetKind.GUARD: "Guards.",
     SnippetKind.VALUE: "Changes a value.",
@@ -45,47 +45,49 @@ _DOES = {
 
 def render_fault_models_page(workspace: Workspace) -> str:
     models = list(workspace.fault_models())
-    parts = [generated("Fault models"), INTRODUCTION]
-    rows = [(f"[{model.name}](#{model.name})", _sentence(model.about)) for model in models]
+    parts = [generated_page_head("Fault models"), INTRODUCTION]
+    rows = [(f"[{model.name}](#{model.name})", _first_sentence(model.about)) for model in models]
     parts += [Table(heads=("model", "what it does"), rows=rows).as_markdown(escape=False), ""]
     for model in models:
-        parts += _model(model)
+        parts += _model_section(model)
     parts += [
         "## The YAML of a model\n",
         f"The first key is `schema: {fault_model_files.SCHEMA}`.\n",
-        *sections("fault-models.md", fault_model_files.FaultModelModel, below=2),
+        *model_sections("fault-models.md", fault_model_files.FaultModelModel, below=2),
     ]
     return "\n".join(parts).rstrip() + "\n"
 
 
-def _model(model: FaultModel) -> Iterator[str]:
+def _model_section(model: FaultModel) -> Iterator[str]:
     yield f"## {model.name}\n"
-    does = _DOES[model.kind] + (" Its exceptions are attributed to the target." if model.raises else "")
+    does = _SENTENCE_BY_KIND[model.kind] + (
+        " Its exceptions are attributed to the target." if model.raises else ""
+    )
     yield f"{' '.join(model.about.split())} {does}\n"
     params = [param for param in model.params if param.type != "seed"]
     if params:
         heads = ("parameter", "type", "unit", "meaning")
-        yield Table(heads=heads, rows=list(map(_param, params))).as_markdown(escape=False)
+        yield Table(heads=heads, rows=list(map(_parameter_row, params))).as_markdown(escape=False)
         yield ""
     for example in model.examples:
         yield f"For example, {example.about}:\n"
-        yield f"```diff\n{_change(example)}\n```\n"
+        yield f"```diff\n{_example_diff(example)}\n```\n"
 
 
-def _param(param: ParamSchema) -> tuple[str, str, str, str]:
+def _parameter_row(param: ParamSchema) -> tuple[str, str, str, str]:
     unit = "the variable's" if param.unit == TARGET_UNIT else param.unit or "-"
     low = [] if param.min is None else [f"at least {param.min:g}"]
     high = [] if param.max is None else [f"at most {param.max:g}"]
-    more = low + high + [f"`{word}`".replace("|", "\\|") for word in param.choices]
-    kind = param.type + (f" ({', '.join(more)})" if more else "")
+    limits = low + high + [f"`{word}`".replace("|", "\\|") for word in param.choices]
+    kind = param.type + (f" ({', '.join(limits)})" if limits else "")
     about = param.about + (" (optional)" if param.optional else "")
     return f"`{param.name}`", kind, unit, about
 
 
-def _change(example: Example) -> str:
+def _example_diff(example: Example) -> str:
     lines = difflib.ndiff(example.before.splitlines(), example.after.splitlines())
     return "\n".join((line[0] + line[2:]).rstrip() for line in lines if not line.startswith("?"))
 
 
-def _sentence(text: str) -> str:
+def _first_sentence(text: str) -> str:
     return " ".join(text.split()).partition(". ")[0].rstrip(".")

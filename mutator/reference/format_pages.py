@@ -9,18 +9,18 @@ from mutator.execution.cluster import cluster_files
 from mutator.faults import fault_specs
 from mutator.faults.library_readings import SCHEMA as READINGS_SCHEMA
 from mutator.faults.library_readings import UNDECLARED, ReadingsModel
-from mutator.reference.yaml_key_tables import generated, sections
+from mutator.reference.yaml_key_tables import generated_page_head, model_sections
 from mutator.stpa import analysis_files, context_tables, hazard_list
 from mutator.targets import manifest_files, severity_model
 from mutator.workspace import Workspace
 
-STRICT = """\
+STRICT_YAML_NOTE = """\
 Use plain YAML: no tags, anchors or aliases, no duplicate keys, only `true` and `false` as booleans. Unknown
 keys, wrong types, units of the wrong dimension and values out of range are errors with file and line. The
 last part of a number's key is its unit (`distance_m`, `by_kph`). A number without a unit has a key without
 one.
 """
-_SAME = (
+_STRICT_YAML_LINKS = (
     "The YAML is as strict as in [fault specs](fault-spec.md), and "
     "[your editor can check it](../how-to/edit-with-completion.md)."
 )
@@ -28,20 +28,20 @@ _SAME = (
 
 def render_fault_spec_page(workspace: Workspace) -> str:
     example = min((workspace.library / "faults").rglob("*.yaml")).read_text(encoding="utf-8")
-    return _page(
-        generated("Fault specs"),
+    return _join_page(
+        generated_page_head("Fault specs"),
         "A fault spec is one YAML file with a fault type of a module, in one or more variants. Its "
         "place in the "
         "library is\n`fault_library/faults/<module>/<fault_type>.yaml`. `mutator try FILE --scenario "
         "S1` accepts a file with any path.\n",
-        STRICT,
+        STRICT_YAML_NOTE,
         f"The first key is `schema: {fault_specs.SCHEMA}`. Files with a newer schema are rejected.\n"
         "[Your editor can check the file](../how-to/edit-with-completion.md) while you write.\n",
         f"```yaml\n{example.rstrip()}\n```\n",
-        *sections("fault-spec.md", fault_specs.spec_model(workspace.readings())),
-        *_readings(),
+        *model_sections("fault-spec.md", fault_specs.spec_model(workspace.readings())),
+        *_readings_section(),
         "## Units\n",
-        *_units(),
+        *_units_table(),
         "## Fault models\n",
         "[Fault models](fault-models.md) lists all models (offset, scale, stuck, ...) with their "
         "parameters and examples.\n",
@@ -50,47 +50,47 @@ def render_fault_spec_page(workspace: Workspace) -> str:
 
 def render_campaigns_page(workspace: Workspace) -> str:
     example = (workspace.library / "campaigns" / "quickstart.yaml").read_text(encoding="utf-8")
-    return _page(
-        generated("Campaigns"),
+    return _join_page(
+        generated_page_head("Campaigns"),
         "A campaign file chooses faults, scenarios, triggers and limits. Its place in the library is\n"
         "`fault_library/campaigns/<name>.yaml`. `mutator run FILE --out DIR` accepts a file with any path.\n",
-        f"The first key is `schema: {campaign_files.SCHEMA}`. {_SAME}\n",
+        f"The first key is `schema: {campaign_files.SCHEMA}`. {_STRICT_YAML_LINKS}\n",
         f"```yaml\n{example.rstrip()}\n```\n",
         "The experiments are all combinations of the selected faults, scenarios, methods and "
         "contexts; `sample` "
         "draws some of them.\nThe same file and options produce the same plan everywhere.\n",
-        *sections("campaign.md", campaign_model.CampaignModel),
+        *model_sections("campaign.md", campaign_model.CampaignModel),
     )
 
 
 def render_manifests_page(workspace: Workspace) -> str:
-    return _page(
-        generated("Target manifests"),
+    return _join_page(
+        generated_page_head("Target manifests"),
         "A manifest at `fault_library/targets/<name>.yaml` holds everything that the harness knows "
         "about a controller.\nTo write one, see [Add a target](../how-to/add-a-target.md). "
         "[Channels](channels.md) lists "
         "what the manifests of this library\nrecord.\n",
-        f"The first key is `schema: {manifest_files.SCHEMA}`. {_SAME}\n",
-        *sections("target-manifest.md", manifest_files.ManifestModel),
+        f"The first key is `schema: {manifest_files.SCHEMA}`. {_STRICT_YAML_LINKS}\n",
+        *model_sections("target-manifest.md", manifest_files.ManifestModel),
         "## Scales of severity\n",
         "The files in `fault_library/severity/` map a delta-v to a class; see [Verdicts](../explanation/"
         "verdicts.md#severity).\nA manifest names one of them in `severity.scale`. The first key is `schema: "
         f"{severity_model.SCHEMA}`.\n",
-        *sections("target-manifest.md", severity_model.ScaleModel, below=2),
+        *model_sections("target-manifest.md", severity_model.ScaleModel, below=2),
     )
 
 
 def render_hazard_analysis_page(workspace: Workspace) -> str:
-    return _page(
-        generated("Files of the hazard analysis"),
+    return _join_page(
+        generated_page_head("Files of the hazard analysis"),
         "These are the files in `fault_library/stpa/`. [The hazard "
         "analysis](../explanation/hazard-analysis.md) explains them.\n[Change the hazard "
         "analysis](../how-to/change-the-hazard-analysis.md) shows how to write "
         "them. `mutator stpa` prints and checks them.\n",
-        f"{_SAME} The first key of each file is `schema`: "
+        f"{_STRICT_YAML_LINKS} The first key of each file is `schema`: "
         f"`{hazard_list.HAZARDS_SCHEMA}`, `{context_tables.CONTEXT_SCHEMA}`,\n`control_structure/1`, "
         "`unsafe_control_actions/1`, `causal_factors/1`.\n",
-        *sections(
+        *model_sections(
             "hazard-analysis.md",
             hazard_list.HazardsModel,
             context_tables.TableModel,
@@ -102,21 +102,21 @@ def render_hazard_analysis_page(workspace: Workspace) -> str:
 
 
 def render_clusters_page(workspace: Workspace) -> str:
-    return _page(
-        generated("Cluster files"),
+    return _join_page(
+        generated_page_head("Cluster files"),
         "A cluster file describes the cluster that `mutator run --cluster FILE.yaml` starts, and stops after "
         "the run. See\n[Run on many machines](../how-to/run-on-many-machines.md), with examples "
         "[for Slurm](../how-to/clusters/slurm.yaml) and\n"
         "[for Kubernetes](../how-to/clusters/kubernetes.yaml).\n",
-        f"The first key is `schema: {cluster_files.SCHEMA}`. {_SAME}\n",
-        *sections("cluster-file.md", cluster_files.ClusterModel),
+        f"The first key is `schema: {cluster_files.SCHEMA}`. {_STRICT_YAML_LINKS}\n",
+        *model_sections("cluster-file.md", cluster_files.ClusterModel),
         "The run sets these options itself and rejects them in a file: "
         f"{', '.join(f'`{name}`' for name in cluster_files.RESERVED)}.\n`security` must be `true` or left "
         "out. `processes` must equal `cores`, because each worker has one thread.\n",
     )
 
 
-def _readings() -> Iterator[str]:
+def _readings_section() -> Iterator[str]:
     yield "## Readings\n"
     yield (
         "The [readings](../explanation/concepts.md#readings) of a library are the keys under which its "
@@ -126,10 +126,10 @@ def _readings() -> Iterator[str]:
         "replaces readings that a variant does not have. The first key of the file is\n"
         f"`schema: {READINGS_SCHEMA}`.\n"
     )
-    yield from sections("fault-spec.md", ReadingsModel, below=2)
+    yield from model_sections("fault-spec.md", ReadingsModel, below=2)
 
 
-def _units() -> Iterator[str]:
+def _units_table() -> Iterator[str]:
     rows = [(f"`_{unit.suffix}`", unit.symbol, unit.dimension) for unit in units.UNITS.values()]
     yield Table(heads=("suffix", "unit", "quantity"), rows=rows).as_markdown(escape=False)
     yield ""
@@ -140,5 +140,5 @@ def _units() -> Iterator[str]:
     )
 
 
-def _page(*parts: str) -> str:
+def _join_page(*parts: str) -> str:
     return "\n".join(parts).rstrip() + "\n"

@@ -14,13 +14,13 @@ from mutator.reference import (
     operators_page,
     python_api,
 )
-from mutator.reference.json_schemas import editor_schema, file_formats
+from mutator.reference.json_schemas import build_editor_schema, file_formats
 from mutator.workspace import Workspace
 
-FOLDER = Path("docs") / "reference"
-SCHEMAS = FOLDER / "schemas"
-STUB = Path("mutator") / "__init__.pyi"
-PAGES: dict[str, Callable[[Workspace], str]] = {
+PAGES_FOLDER = Path("docs") / "reference"
+SCHEMAS_FOLDER = PAGES_FOLDER / "schemas"
+STUB_PATH = Path("mutator") / "__init__.pyi"
+RENDER_BY_PAGE: dict[str, Callable[[Workspace], str]] = {
     "api.md": python_api.render_api_page,
     "campaign.md": format_pages.render_campaigns_page,
     "channels.md": columns_and_channels.render_channels_page,
@@ -37,13 +37,13 @@ PAGES: dict[str, Callable[[Workspace], str]] = {
 
 
 def render_files(workspace: Workspace) -> dict[Path, str]:
-    files = {FOLDER / name: make(workspace) for name, make in PAGES.items()} | {
-        STUB: python_api.render_stub()
+    files = {PAGES_FOLDER / name: render(workspace) for name, render in RENDER_BY_PAGE.items()} | {
+        STUB_PATH: python_api.render_stub()
     }
-    known = workspace.fault_models()
-    for kind in file_formats(workspace.readings()):
-        text = json.dumps(editor_schema(kind, known), indent=1, ensure_ascii=False)
-        files[SCHEMAS / f"{kind.name}.json"] = text + "\n"
+    fault_models = workspace.fault_models()
+    for file_format in file_formats(workspace.readings()):
+        text = json.dumps(build_editor_schema(file_format, fault_models), indent=1, ensure_ascii=False)
+        files[SCHEMAS_FOLDER / f"{file_format.name}.json"] = text + "\n"
     return files
 
 

@@ -17,10 +17,10 @@ from mutator.faults.library_readings import Readings
 from mutator.stpa import analysis_files, context_tables, hazard_list
 from mutator.targets import manifest_files, severity_model
 
-DRAFT = "http://json-schema.org/draft-07/schema#"  # best supported by editors
-_MODEL = re.compile(r"^_?(\w+?)Model$")
-_LINK = re.compile(r"\[([^]]+)\]\([^)]+\)")
-_DRAWN = {
+SCHEMA_DRAFT = "http://json-schema.org/draft-07/schema#"  # best supported by editors
+_MODEL_NAME_PATTERN = re.compile(r"^_?(\w+?)Model$")
+_MARKDOWN_LINK_PATTERN = re.compile(r"\[([^]]+)\]\([^)]+\)")
+_DRAWN_VALUE_SCHEMA = {
     "type": "object",
     "required": ["draw", "written_in", "read_as"],
     "properties": {
@@ -33,19 +33,19 @@ _DRAWN = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Format:
+class YamlFormat:
     """A kind of YAML file: its model, the value of its `schema` key, and the glob of its files in a clone."""
 
     model: type[StrictModel]
     schema: str
-    files: str
+    files_glob: str
 
     @property
     def name(self) -> str:
         return self.schema.partition("/")[0]
 
 
-_FILES: tuple[tuple[type[StrictModel], str, str], ...] = (
+_FIXED_FORMATS: tuple[tuple[type[StrictModel], str, str], ...] = (
     (library_readings.ReadingsModel, library_readings.SCHEMA, "readings.yaml"),
     (campaign_model.CampaignModel, campaign_files.SCHEMA, "campaigns/*.yaml"),
     (manifest_files.ManifestModel, manifest_files.SCHEMA, "targets/*.yaml"),
@@ -58,20 +58,27 @@ _FILES: tuple[tuple[type[StrictModel], str, str], ...] = (
 )
 
 
-def file_formats(declared: Readings) -> tuple[Format, ...]:
+def file_formats(declared: Readings) -> tuple[YamlFormat, ...]:
     specs = (spec.spec_model(declared), spec.SCHEMA, "faults/*/*.yaml")
     return (
-        *(Format(model=m, schema=s, files=f"fault_library/{files}") for m, s, files in (specs, *_FILES)),
-        Format(
-            model=fault_model_files.FaultModelModel, schema=fault_model_files.SCHEMA, files="templates/*.yaml"
+        *(
+            YamlFormat(model=m, schema=s, files_glob=f"fault_library/{files_glob}")
+            for m, s, files_glob in (specs, *_FIXED_FORMATS)
         ),
-        Format(
-            model=cluster_files.ClusterModel, schema=cluster_files.SCHEMA, files="docs/how-to/clusters/*.yaml"
+        YamlFormat(
+            model=fault_model_files.FaultModelModel,
+            schema=fault_model_files.SCHEMA,
+            files_glob="templates/*.yaml",
+        ),
+        YamlFormat(
+            model=cluster_files.ClusterModel,
+            schema=cluster_files.SCHEMA,
+            files_glob="docs/how-to/clusters/*.yaml",
         ),
     )
 
 
-def definitions(model: type[StrictModel]) -> dict[str, dict[str, Any]]:
+def schema_by_model(model: type[StrictModel]) -> dict[str, dict[str, Any]]:
     """Return the JSON Schema of every model in a file of `model`, by short name (`Variant`), that of `model`
     first.
 
@@ -79,97 +86,99 @@ def definitions(model: type[StrictModel]) -> dict[str, dict[str, Any]]:
     """
     whole = model.model_json_schema(by_alias=True)
     parts = {model.__name__: whole} | whole.pop("$defs", {})
-    return {short_name(name): _described(part) for name, part in parts.items()}
+    return {short_name(name): _with_descriptions(part) for name, part in parts.items()}
 
 
 def short_name(name: str) -> str:
     """Return `Variant` for `_VariantModel`; other names stay unchanged."""
-    match = _MODEL.match(name)
+    match = _MODEL_NAME_PATTERN.match(name)
     return match[1] if match else name
 
 
-def _described(part: dict[str, Any]) -> dict[str, Any]:
-    kept: dict[str, Any] = _clean(part)
+def _with_descriptions(part: dict[str, Any]) -> dict[str, Any]:
+    schema: dict[str, Any] = _without_generated_texts(part)
     if "properties" in part:
-        kept["title"] = part["title"]
-        kept["description"] = " ".join(part.get("description", "").split())
+        schema["title"] = part["title"]
+        schema["description"] = " ".join(part.get("description", "").split())
         for key, value in part["properties"].items():
-            kept["properties"][key]["description"] = value["description"]
-    return kept
+            schema["properties"][key]["description"] = value["description"]
+    return schema
 
 
-def _clean(value: Any) -> Any:
+def _without_generated_texts(value: Any) -> Any:
     """Drop the titles and descriptions that pydantic generates, and shorten references."""
     if isinstance(value, list):
-        return [_clean(item) for item in value]
+        return [_without_generated_texts(item) for item in value]
     if not isinstance(value, dict):
         return value
-    kept = {
-        key: _clean(inner)
+    cleaned = {
+        key: _without_generated_texts(inner)
         for key, inner in value.items()
         if key not in ("title", "description", "properties")
     }
     if "properties" in value:  # the keys of `properties` are names, not JSON Schema keywords
-        kept["properties"] = {key: _clean(inner) for key, inner in value["properties"].items()}
-    if "$ref" in kept:
-        kept["$ref"] = f"#/definitions/{short_name(kept['$ref'].rpartition('/')[2])}"
-    return kept
+        cleaned["properties"] = {
+            key: _without_generated_texts(inner) for key, inner in value["properties"].items()
+        }
+    if "$ref" in cleaned:
+        cleaned["$ref"] = f"#/definitions/{short_name(cleaned['$ref'].rpartition('/')[2])}"
+    return cleaned
 
 
-def editor_schema(kind: Format, models: FaultModels) -> dict[str, Any]:
-    parts = definitions(kind.model)
+def build_editor_schema(file_format: YamlFormat, models: FaultModels) -> dict[str, Any]:
+    parts = schema_by_model(file_format.model)
     if "Injection" in parts:
-        _with_models(parts["Injection"], models)
+        _add_fault_models(parts["Injection"], models)
     if "Variant" in parts:  # another library can declare other readings
         parts["Variant"]["additionalProperties"] = {"$ref": "#/definitions/Reading"}
     for part in parts.values():
         part.pop("title", None)
         part.pop("description", None)
         for value in part.get("properties", {}).values():
-            value["description"] = _LINK.sub(r"\1", value["description"])
-    whole = parts.pop(short_name(kind.model.__name__))
-    key = {"const": kind.schema, "description": "The format of this file and its version."}
+            value["description"] = _MARKDOWN_LINK_PATTERN.sub(r"\1", value["description"])
+    whole = parts.pop(short_name(file_format.model.__name__))
+    key = {"const": file_format.schema, "description": "The format of this file and its version."}
     whole["properties"] = {"schema": key} | whole["properties"]
     whole["required"] = ["schema", *whole["required"]]
-    head = {"$schema": DRAFT, "title": kind.schema}
+    head = {"$schema": SCHEMA_DRAFT, "title": file_format.schema}
     return head | whole | ({"definitions": parts} if parts else {})
 
 
-def _with_models(injection: dict[str, Any], models: FaultModels) -> None:
+def _add_fault_models(injection: dict[str, Any], models: FaultModels) -> None:
     properties = injection["properties"]
     properties["model"]["anyOf"] = [{"enum": [model.name for model in models]}, {"type": "string"}]
     properties["unit"]["anyOf"] = [{"enum": [*units.UNITS, DIMENSIONLESS]}, {"type": "null"}]
-    injection["allOf"] = [_parameters(model) for model in models]
+    injection["allOf"] = [_parameters_rule(model) for model in models]
 
 
-def _parameters(model: FaultModel) -> dict[str, Any]:
-    known = {"required": ["model"], "properties": {"model": {"const": model.name}}}
+def _parameters_rule(model: FaultModel) -> dict[str, Any]:
+    condition = {"required": ["model"], "properties": {"model": {"const": model.name}}}
     patterns = {
-        f"^({'|'.join(keys(param))})$": _value(param) | {"description": param.about}
+        f"^({'|'.join(parameter_keys(param))})$": _value_schema(param) | {"description": param.about}
         for param in model.params
         if param.type != "seed"
     }
     params = {"patternProperties": patterns, "additionalProperties": False}
-    return {"if": known, "then": {"properties": {"params": params}}}
+    return {"if": condition, "then": {"properties": {"params": params}}}
 
 
-def keys(param: ParamSchema) -> Iterator[str]:
+def parameter_keys(param: ParamSchema) -> Iterator[str]:
     """Yield the keys of a parameter in a spec, one for each possible unit."""
     if param.unit in (None, TARGET_UNIT):
         yield param.name
     if param.unit is not None:
-        own = units.UNITS.get(param.unit)
+        default_unit = units.UNITS.get(param.unit)
         for unit in units.UNITS.values():
-            if own is None or unit.dimension == own.dimension:
+            if default_unit is None or unit.dimension == default_unit.dimension:
                 yield f"{param.name}_{unit.suffix}"
 
 
-def _value(param: ParamSchema) -> dict[str, Any]:
+def _value_schema(param: ParamSchema) -> dict[str, Any]:
     if param.type in NAMES:
         return {"type": "string"}
     if param.type == "boolean":
         return {"type": "boolean"}
     if param.type in ("choice", "unit"):
         return {"enum": list(param.choices or units.UNITS)}
-    more = [{"type": "boolean"}, {"type": "null"}] if param.type == "constant" else []
-    return {"anyOf": [{"type": "number"}, {"type": "string"}, _DRAWN, *more]}
+    other_types = [{"type": "boolean"}, {"type": "null"}] if param.type == "constant" else []
+    return {"anyOf": [{"type": "number"}, {"type": "string"}, _DRAWN_VALUE_SCHEMA, *other_types]}

@@ -13,8 +13,8 @@ from pathlib import Path
 from mutator._common.table_rendering import Table
 from mutator.errors import MutatorError
 
-PAGE = Path("docs", "reference", "licences.md")
-_HEAD = """\
+PAGE_PATH = Path("docs", "reference", "licences.md")
+_PAGE_HEAD = """\
 # Licences of the dependencies
 
 <!-- Written by `python -m mutator.reference.licences`. -->
@@ -27,26 +27,29 @@ as the package states it. Binary wheels can include libraries under other licenc
 `examples`), or only other packages in this table.
 
 """
-_ROW = re.compile(r"^\| ([\w.-]+) \| [^|]* \| ([^|]+) \|$", re.MULTILINE)
+_TABLE_ROW_PATTERN = re.compile(r"^\| ([\w.-]+) \| [^|]* \| ([^|]+) \|$", re.MULTILINE)
 
 
 def write_licences(clone: Path) -> None:
     """Write the page. A package that is not installed keeps its listed licence; MutatorError if none is
     listed.
     """
-    page = clone / PAGE
-    known = table_of(page.read_text(encoding="utf-8")) if page.exists() else {}
-    direct = _needed_by(clone)
-    rows = [(name, direct.get(name, "others"), _licence(name, known)) for name in constrained(clone)]
+    page_path = clone / PAGE_PATH
+    licence_by_package = licences_in(page_path.read_text(encoding="utf-8")) if page_path.exists() else {}
+    group_by_package = _first_group_by_package(clone)
+    rows = [
+        (name, group_by_package.get(name, "others"), _licence_of(name, licence_by_package))
+        for name in constrained_packages(clone)
+    ]
     table = Table(heads=("package", "needed by", "licence"), rows=rows).as_markdown(escape=False)
-    page.write_text(f"{_HEAD}{table}\n", encoding="utf-8")
+    page_path.write_text(f"{_PAGE_HEAD}{table}\n", encoding="utf-8")
 
 
-def table_of(page: str) -> dict[str, str]:
-    return {name: licence for name, licence in _ROW.findall(page) if name != "package"}
+def licences_in(page: str) -> dict[str, str]:
+    return {name: licence for name, licence in _TABLE_ROW_PATTERN.findall(page) if name != "package"}
 
 
-def constrained(clone: Path) -> tuple[str, ...]:
+def constrained_packages(clone: Path) -> tuple[str, ...]:
     text = (clone / "constraints.txt").read_text(encoding="utf-8")
     return tuple(sorted(set(re.findall(r"^([\w.-]+)==", text, re.MULTILINE))))
 
@@ -69,28 +72,28 @@ def stated_licence(name: str) -> str | None:
     return ", ".join(expressions or named or texts or ["none stated"])
 
 
-def _licence(name: str, known: Mapping[str, str]) -> str:
-    licence = stated_licence(name) or known.get(name)
+def _licence_of(name: str, listed: Mapping[str, str]) -> str:
+    licence = stated_licence(name) or listed.get(name)
     if licence is None:
-        raise MutatorError(f"no known licence for {name}", where=PAGE, remedy=f"install {name}")
+        raise MutatorError(f"no known licence for {name}", where=PAGE_PATH, remedy=f"install {name}")
     return licence
 
 
-def _needed_by(clone: Path) -> dict[str, str]:
+def _first_group_by_package(clone: Path) -> dict[str, str]:
     project = tomllib.loads((clone / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     groups = {"mutator": project["dependencies"]}
     groups |= {f"`{extra}`": lines for extra, lines in project["optional-dependencies"].items()}
-    needed: dict[str, str] = {}
+    group_by_package: dict[str, str] = {}
     for group, lines in groups.items():
-        for name in map(_name, lines):
-            needed.setdefault(name, group)
-    return needed
+        for name in map(_package_name, lines):
+            group_by_package.setdefault(name, group)
+    return group_by_package
 
 
-def _name(requirement: str) -> str:
+def _package_name(requirement: str) -> str:
     return re.split(r"[^\w.-]", requirement, maxsplit=1)[0].lower()
 
 
 if __name__ == "__main__":
     write_licences(Path.cwd())
-    print(PAGE)
+    print(PAGE_PATH)

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from mutator._common.doors import OPERATORS
 from mutator._common.table_rendering import Table
 from mutator.operators.operator_lookup import find_operator
-from mutator.reference.yaml_key_tables import generated
+from mutator.reference.yaml_key_tables import generated_page_head
 from mutator.workspace import Workspace
 
 _INTRO = """\
@@ -15,7 +15,7 @@ controller, imitating typical mistakes of programmers.
 [Doors](doors.md#operator) how to add one. Each change is an ordinary fault, active while its trigger holds;
 under the trigger `always`, from the start.
 """
-_REST = """\
+_AFTER_REPLACEMENTS = """\
 Operators do not change strings and containers in arithmetic, the comparisons in a chain such as `a < b < c`,
 expressions with a `yield`, or code outside functions. They do not leave out the assignment that gives a local
 name its first value.
@@ -33,7 +33,7 @@ function in proportion to its number of mutants, so each mutant has the same cha
 
 ## The faults
 """
-_FIELDS = (
+_FAULT_FIELDS = (
     ("spec", "`operators/<operator>/<path>::<function>`"),
     ("module, fault type", "`operators`, the operator"),
     (
@@ -50,13 +50,18 @@ _FIELDS = (
 
 
 def render_operators_page(workspace: Workspace) -> str:
-    replacements = Table(heads=("operator", "where", "replacement"), rows=list(_replacements()))
-    fields = Table(heads=("field", "what it is"), rows=_FIELDS)
+    replacements = Table(heads=("operator", "where", "replacement"), rows=list(_replacement_rows()))
+    fields = Table(heads=("field", "what it is"), rows=_FAULT_FIELDS)
     tables = [table.as_markdown(escape=False) for table in (replacements, fields)]
-    return "\n".join([generated("Mutation operators"), _INTRO, tables[0], "", _REST, tables[1]]) + "\n"
+    return (
+        "\n".join(
+            [generated_page_head("Mutation operators"), _INTRO, tables[0], "", _AFTER_REPLACEMENTS, tables[1]]
+        )
+        + "\n"
+    )
 
 
-def _replacements() -> Iterator[tuple[str, str, str]]:
+def _replacement_rows() -> Iterator[tuple[str, str, str]]:
     for name in OPERATORS.shipped():
         heads = [f"`{name}`"]
         for where, replacement in find_operator(name).replacements:

@@ -6,17 +6,17 @@ from typing import Any
 
 from mutator._common.table_rendering import Table
 from mutator.config.yaml_files import StrictModel
-from mutator.reference.json_schemas import definitions
+from mutator.reference.json_schemas import schema_by_model
 
 # models used in several kinds of files, and the page with their section
-_PAGES = {"Injection": "fault-spec.md", "At": "fault-spec.md"}
-_SIGNS = {
+_PAGE_BY_SHARED_MODEL = {"Injection": "fault-spec.md", "At": "fault-spec.md"}
+_BOUND_WORDS = {
     "minimum": "at least",
     "maximum": "at most",
     "exclusiveMinimum": "above",
     "exclusiveMaximum": "below",
 }
-_WORDS = {
+_TYPE_WORDS = {
     "string": "text",
     "number": "number",
     "integer": "whole number",
@@ -25,11 +25,11 @@ _WORDS = {
 }
 
 
-def generated(title: str) -> str:
+def generated_page_head(title: str) -> str:
     return f"# {title}\n\n<!-- Written by `python -m mutator.reference`; do not edit by hand. -->\n"
 
 
-def sections(page: str, *models: type[StrictModel], below: int = 1) -> Iterator[str]:
+def model_sections(page: str, *models: type[StrictModel], below: int = 1) -> Iterator[str]:
     """Yield a section for each model in files of `models`, each once, in the order of their keys.
 
     Headings are one level below `below`; with several `models`, those of their parts are two levels below it.
@@ -37,56 +37,56 @@ def sections(page: str, *models: type[StrictModel], below: int = 1) -> Iterator[
     """
     parts: dict[str, dict[str, Any]] = {}
     for model in models:
-        known = definitions(model)
-        parts |= {name: known[name] for name in reading_order(known)}
-    files = {next(iter(definitions(model))) for model in models}
-    tables = _Tables(page, parts)
+        schemas = schema_by_model(model)
+        parts |= {name: schemas[name] for name in order_models(schemas)}
+    file_models = {next(iter(schema_by_model(model))) for model in models}
+    tables = _KeyTables(page, parts)
     for name, part in parts.items():
-        if "enum" in part or _PAGES.get(name, page) != page:
+        if "enum" in part or _PAGE_BY_SHARED_MODEL.get(name, page) != page:
             continue
-        deeper = len(models) > 1 and name not in files
-        yield f"{'#' * (below + 1 + deeper)} {part['title']}\n"
+        is_deeper = len(models) > 1 and name not in file_models
+        yield f"{'#' * (below + 1 + is_deeper)} {part['title']}\n"
         if part["description"]:
             yield f"{part['description']}\n"
-        yield from tables.keys(part)
+        yield from tables.key_table(part)
 
 
-def reading_order(parts: dict[str, dict[str, Any]]) -> list[str]:
+def order_models(parts: dict[str, dict[str, Any]]) -> list[str]:
     """Return the names of models in reading order: the first, then those that its keys refer to."""
-    met: dict[str, None] = {}
+    ordered: dict[str, None] = {}
     waiting = [next(iter(parts))]
     while waiting:
         name = waiting.pop()
-        if name not in met:
-            met[name] = None
-            waiting += reversed(list(_references(parts[name])))
-    return list(met)
+        if name not in ordered:
+            ordered[name] = None
+            waiting += reversed(list(_referenced_models(parts[name])))
+    return list(ordered)
 
 
-def _references(value: Any) -> Iterator[str]:
+def _referenced_models(value: Any) -> Iterator[str]:
     if isinstance(value, list):
         for item in value:
-            yield from _references(item)
+            yield from _referenced_models(item)
     elif isinstance(value, dict):
         for key, inner in value.items():
             if key == "$ref":
                 yield inner.rpartition("/")[2]
             else:
-                yield from _references(inner)
+                yield from _referenced_models(inner)
 
 
-class _Tables:
+class _KeyTables:
     def __init__(self, page: str, parts: dict[str, dict[str, Any]]) -> None:
         self._page = page
         self._parts = parts
 
-    def keys(self, part: dict[str, Any]) -> Iterator[str]:
+    def key_table(self, part: dict[str, Any]) -> Iterator[str]:
         required = part.get("required", [])
         rows = [
             (
                 f"`{key}`",
-                self._type(value),
-                "required" if key in required else _default(value),
+                self._type_text(value),
+                "required" if key in required else _default_text(value),
                 value["description"],
             )
             for key, value in part["properties"].items()
@@ -94,7 +94,7 @@ class _Tables:
         yield Table(heads=("key", "type", "default", "meaning"), rows=rows).as_markdown(escape=False)
         yield ""
 
-    def _type(self, value: dict[str, Any]) -> str:
+    def _type_text(self, value: dict[str, Any]) -> str:
         """Return a JSON Schema type as text; for optional keys, null is left out."""
         if "anyOf" in value:
             types = [v.get("type") for v in value["anyOf"]]
@@ -102,36 +102,36 @@ class _Tables:
             skipped = {"integer"} if "number" in types else set()
             if value.get("default", "") is None:
                 skipped.add("null")
-            return " or ".join(self._type(v) for v in value["anyOf"] if v.get("type") not in skipped)
+            return " or ".join(self._type_text(v) for v in value["anyOf"] if v.get("type") not in skipped)
         if "$ref" in value:
-            return self._reference(value["$ref"].rpartition("/")[2])
+            return self._reference_text(value["$ref"].rpartition("/")[2])
         if "enum" in value:
-            return _one_of(value["enum"])
+            return _alternatives_text(value["enum"])
         if value["type"] == "array":
-            return f"list of {self._type(value['items'])}"
+            return f"list of {self._type_text(value['items'])}"
         if value["type"] == "object":
             inner = value.get("additionalProperties")
-            return f"mapping to {self._type(inner)}" if isinstance(inner, dict) else "mapping"
-        return _WORDS[value["type"]] + _bounds(value)
+            return f"mapping to {self._type_text(inner)}" if isinstance(inner, dict) else "mapping"
+        return _TYPE_WORDS[value["type"]] + _bounds_text(value)
 
-    def _reference(self, name: str) -> str:
+    def _reference_text(self, name: str) -> str:
         part = self._parts[name]
         if "enum" in part:
-            return _one_of(part["enum"])
+            return _alternatives_text(part["enum"])
         title = part["title"].lower()
-        page = _PAGES.get(name, self._page)
+        page = _PAGE_BY_SHARED_MODEL.get(name, self._page)
         return f"[{title}]({'' if page == self._page else page}#{title.replace(' ', '-')})"
 
 
-def _default(value: dict[str, Any]) -> str:
-    given = value.get("default")
-    return "-" if given is None or isinstance(given, dict) else f"`{json.dumps(given)}`"
+def _default_text(value: dict[str, Any]) -> str:
+    default = value.get("default")
+    return "-" if default is None or isinstance(default, dict) else f"`{json.dumps(default)}`"
 
 
-def _one_of(values: list[str]) -> str:
+def _alternatives_text(values: list[str]) -> str:
     return " or ".join(f"`{value}`" for value in values)
 
 
-def _bounds(value: dict[str, Any]) -> str:
-    bounds = [f"{word} {value[key]:g}" for key, word in _SIGNS.items() if key in value]
+def _bounds_text(value: dict[str, Any]) -> str:
+    bounds = [f"{word} {value[key]:g}" for key, word in _BOUND_WORDS.items() if key in value]
     return f" ({', '.join(bounds)})" if bounds else ""

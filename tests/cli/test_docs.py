@@ -18,7 +18,7 @@ from typing import Any
 
 import pytest
 
-from mutator.reference.generated_files import SCHEMAS
+from mutator.reference.generated_files import SCHEMAS_FOLDER
 from mutator.reference.json_schemas import file_formats
 from mutator.workspace import Workspace
 
@@ -250,7 +250,7 @@ def test_the_index_names_every_page() -> None:
     rest = {
         file
         for file in INDEX.parent.rglob("*.*")
-        if file not in PAGES and file.parent != CLONE / SCHEMAS and not site & {file, *file.parents}
+        if file not in PAGES and file.parent != CLONE / SCHEMAS_FOLDER and not site & {file, *file.parents}
     }
     assert rest - shown == set(), "no page shows or links to these files"
 
@@ -265,10 +265,10 @@ def test_the_guide_has_editor_settings_for_every_schema() -> None:
     page = (HOW_TO / "edit-with-completion.md").read_text(encoding="utf-8")
     [settings] = [json.loads(text) for _, kind, text in FENCE.findall(page) if kind == "json"]
     expected = {
-        f"./{SCHEMAS.as_posix()}/{kind.name}.json": kind.files
+        f"./{SCHEMAS_FOLDER.as_posix()}/{kind.name}.json": kind.files_glob
         for kind in file_formats(Workspace.find(root=CLONE).readings())
     }
-    expected[f"./{SCHEMAS.as_posix()}/scenario.json"] = "fault_library/scenarios/*.yaml"
+    expected[f"./{SCHEMAS_FOLDER.as_posix()}/scenario.json"] = "fault_library/scenarios/*.yaml"
     assert settings["yaml.schemas"] == expected
 
 

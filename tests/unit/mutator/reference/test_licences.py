@@ -7,14 +7,20 @@ from pathlib import Path
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.reference.licences import PAGE, constrained, stated_licence, table_of, write_licences
+from mutator.reference.licences import (
+    PAGE_PATH,
+    constrained_packages,
+    licences_in,
+    stated_licence,
+    write_licences,
+)
 
 CLONE = Path(__file__).parents[4]
-TABLE = table_of((CLONE / PAGE).read_text(encoding="utf-8"))
+TABLE = licences_in((CLONE / PAGE_PATH).read_text(encoding="utf-8"))
 
 
 def test_every_constrained_package_has_a_licence() -> None:
-    assert tuple(TABLE) == constrained(CLONE)
+    assert tuple(TABLE) == constrained_packages(CLONE)
     assert all(licence.strip() for licence in TABLE.values())
 
 
@@ -44,10 +50,10 @@ def clone(folder: Path, *packages: str) -> Path:
 
 
 def test_a_package_that_is_not_installed_keeps_its_licence(tmp_path: Path) -> None:
-    page = clone(tmp_path, "pytest", "no_such") / PAGE
+    page = clone(tmp_path, "pytest", "no_such") / PAGE_PATH
     page.write_text("| gone | others | MIT |\n| no_such | others | BSD |\n")
     write_licences(tmp_path)
-    assert table_of(page.read_text()) == {"no_such": "BSD", "pytest": "MIT"}
+    assert licences_in(page.read_text()) == {"no_such": "BSD", "pytest": "MIT"}
     assert "| no_such | `test` | BSD |" in page.read_text()
     assert "| pytest | mutator | MIT |" in page.read_text()
     with pytest.raises(MutatorError, match="no known licence for another; install another"):

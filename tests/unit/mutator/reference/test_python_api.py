@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import mutator
-from mutator.reference.python_api import members, render_api_page, undocumented
+from mutator.reference.python_api import list_undocumented, members_of, render_api_page
 from mutator.workspace import Workspace
 
 CLONE = Path(__file__).parents[4]
@@ -16,7 +16,7 @@ CLONE = Path(__file__).parents[4]
 
 def test_every_public_name_is_documented() -> None:
     """An attribute is described by a `#:` comment."""
-    assert undocumented() == []
+    assert list_undocumented() == []
 
 
 def test_the_page_describes_every_public_name() -> None:
@@ -50,7 +50,7 @@ def test_a_missing_docstring_is_noticed(tmp_path: Path, monkeypatch: pytest.Monk
     monkeypatch.setattr(mutator, "__all__", ["Silent", "silent"])
     for name in mutator.__all__:
         monkeypatch.setattr(mutator, name, getattr(module, name), raising=False)
-    assert undocumented() == [
+    assert list_undocumented() == [
         "silent",
         "Silent",
         "Silent.unsaid",
@@ -58,6 +58,8 @@ def test_a_missing_docstring_is_noticed(tmp_path: Path, monkeypatch: pytest.Monk
         "Silent.method",
         "Silent.of_it",
     ]
-    found = {member.name: (member.written, member.type, member.meaning) for member in members(module.Silent)}
+    found = {
+        member.name: (member.signature, member.type, member.meaning) for member in members_of(module.Silent)
+    }
     assert found["above"] == ("above", "int", "Said on two lines.")
     assert found["method"] == ("method(n=3)", "Silent", "")

@@ -14,9 +14,16 @@ from mutator.cli.app import GROUPS, app
 from mutator.config import yaml_files
 from mutator.errors import MutatorError
 from mutator.faults.fault_specs import spec_model
-from mutator.reference.generated_files import FOLDER, PAGES, SCHEMAS, STUB, render_files, write_files
-from mutator.reference.json_schemas import Format, definitions, file_formats
-from mutator.reference.yaml_key_tables import reading_order
+from mutator.reference.generated_files import (
+    PAGES_FOLDER,
+    RENDER_BY_PAGE,
+    SCHEMAS_FOLDER,
+    STUB_PATH,
+    render_files,
+    write_files,
+)
+from mutator.reference.json_schemas import YamlFormat, file_formats, schema_by_model
+from mutator.reference.yaml_key_tables import order_models
 from mutator.workspace import Workspace
 
 CLONE = Path(__file__).parents[4]
@@ -25,15 +32,20 @@ CHAFF = CLONE / "fault_library" / "faults" / "radar" / "chaff.yaml"
 
 
 def validator(kind: str) -> jsonschema.Draft7Validator:
-    return jsonschema.Draft7Validator(json.loads((CLONE / SCHEMAS / f"{kind}.json").read_text()))
+    return jsonschema.Draft7Validator(json.loads((CLONE / SCHEMAS_FOLDER / f"{kind}.json").read_text()))
 
 
-def described(kind: Format) -> dict[str, dict[str, Any]]:
-    return {name: part for name, part in definitions(kind.model).items() if "properties" in part}
+def described(kind: YamlFormat) -> dict[str, dict[str, Any]]:
+    return {name: part for name, part in schema_by_model(kind.model).items() if "properties" in part}
 
 
 @pytest.mark.parametrize(
-    "path", [*(FOLDER / page for page in PAGES), *(SCHEMAS / f"{f.name}.json" for f in FORMATS), STUB]
+    "path",
+    [
+        *(PAGES_FOLDER / page for page in RENDER_BY_PAGE),
+        *(SCHEMAS_FOLDER / f"{f.name}.json" for f in FORMATS),
+        STUB_PATH,
+    ],
 )
 def test_generated_files_are_up_to_date(path: Path) -> None:
     generated = _generated()[path]
@@ -56,12 +68,12 @@ def test_no_generated_file_lacks_a_source() -> None:
         for path in (CLONE / "docs").rglob("*.md")
         if "python -m mutator.reference`; do" in path.read_text()
     ]
-    found = {path.relative_to(CLONE) for path in (*pages, *(CLONE / SCHEMAS).glob("*"))}
-    assert found - {SCHEMAS / "scenario.json"} == {*_generated()} - {STUB}
+    found = {path.relative_to(CLONE) for path in (*pages, *(CLONE / SCHEMAS_FOLDER).glob("*"))}
+    assert found - {SCHEMAS_FOLDER / "scenario.json"} == {*_generated()} - {STUB_PATH}
 
 
 @pytest.mark.parametrize("kind", FORMATS, ids=lambda kind: kind.name)
-def test_every_model_and_key_is_described(kind: Format) -> None:
+def test_every_model_and_key_is_described(kind: YamlFormat) -> None:
     parts = described(kind)
     assert parts
     for name, part in parts.items():
@@ -71,7 +83,7 @@ def test_every_model_and_key_is_described(kind: Format) -> None:
 
 
 def test_models_are_in_reading_order() -> None:
-    names = reading_order(definitions(spec_model(Workspace.find(CLONE).readings())))
+    names = order_models(schema_by_model(spec_model(Workspace.find(CLONE).readings())))
     assert names == ["Spec", "Variant", "Draw", "Sweep", "Reading", "Injection", "At"]
 
 
@@ -81,8 +93,8 @@ def test_every_command_is_in_a_group() -> None:
 
 
 @pytest.mark.parametrize("kind", FORMATS, ids=lambda kind: kind.name)
-def test_library_files_follow_their_schema(kind: Format) -> None:
-    files = sorted(CLONE.glob(kind.files))
+def test_library_files_follow_their_schema(kind: YamlFormat) -> None:
+    files = sorted(CLONE.glob(kind.files_glob))
     assert files
     check = validator(kind.name)
     for file in files:
