@@ -14,15 +14,15 @@ from pydantic import Field, model_validator
 
 from mutator.config.yaml_files import StrictModel, read
 from mutator.config.yaml_sources import Source
-from mutator.paper.measures import MEASURES, Estimate, of_difference, of_share
+from mutator.paper.measures import MEASURES, Estimate, estimate_of_difference, estimate_of_share
 from mutator.statistics.shares import share
 
-FILE = "paper_observations.yaml"
+FILE_NAME = "paper_observations.yaml"
 SCHEMA = "paper_observations/1"
-FEWEST = 10  # minimum number of runs for a verdict from an interval
+MIN_RUNS_FOR_VERDICT = 10  # minimum number of runs for a verdict from an interval
 
 
-class Verdict(StrEnum):
+class ClaimVerdict(StrEnum):
     """The verdict on a claim."""
 
     HOLDS = "holds"
@@ -30,7 +30,7 @@ class Verdict(StrEnum):
     UNDECIDED = "not enough data"
 
 
-class Rule(StrictModel):
+class ClaimRule(StrictModel):
     """The condition under which a claim holds. Exactly one field is set.
 
     Shares and differences are fractions; times are in s. `above`, `below` and `within` (plus or minus) are
@@ -45,17 +45,17 @@ class Rule(StrictModel):
     never: float | None = Field(None, gt=0, lt=1)
 
     @model_validator(mode="after")
-    def _check(self) -> "Rule":
+    def _check(self) -> "ClaimRule":
         if len(self.model_dump(exclude_none=True)) != 1:
             raise ValueError("exactly one of above, below, within, some, never")
         return self
 
-    def verdict(self, found: Estimate) -> Verdict:
+    def verdict_on(self, estimate: Estimate) -> ClaimVerdict:
         if self.some is not None or self.never is not None:
-            return self._seen(found)
-        if found.n < FEWEST:
-            return Verdict.UNDECIDED
-        low, high = found.low, found.high  # comparisons with NaN are false
+            return self._verdict_on_occurrence(estimate)
+        if estimate.n < MIN_RUNS_FOR_VERDICT:
+            return ClaimVerdict.UNDECIDED
+        low, high = estimate.low, estimate.high  # comparisons with NaN are false
         if self.within is not None:
             holds, fails = -self.within < low and high < self.within, low > self.within or high < -self.within
         elif self.above is not None:
@@ -63,22 +63,22 @@ class Rule(StrictModel):
         else:
             assert self.below is not None
             holds, fails = high < self.below, low > self.below
-        return Verdict.HOLDS if holds else Verdict.FAILS if fails else Verdict.UNDECIDED
+        return ClaimVerdict.HOLDS if holds else ClaimVerdict.FAILS if fails else ClaimVerdict.UNDECIDED
 
-    def _seen(self, found: Estimate) -> Verdict:
-        wanted = self.some is not None
-        if found.count:
-            return Verdict.HOLDS if wanted else Verdict.FAILS
-        if found.n and found.high <= (self.some or self.never or 0.0):
-            return Verdict.FAILS if wanted else Verdict.HOLDS
-        return Verdict.UNDECIDED
+    def _verdict_on_occurrence(self, estimate: Estimate) -> ClaimVerdict:
+        must_occur = self.some is not None
+        if estimate.count:
+            return ClaimVerdict.HOLDS if must_occur else ClaimVerdict.FAILS
+        if estimate.n and estimate.high <= (self.some or self.never or 0.0):
+            return ClaimVerdict.FAILS if must_occur else ClaimVerdict.HOLDS
+        return ClaimVerdict.UNDECIDED
 
     def __str__(self) -> str:
         [(name, value)] = self.model_dump(exclude_none=True).items()
         return f"{name} {value:g}"
 
 
-class _Each(StrictModel):
+class _Groups(StrictModel):
     column: str
     values: list[str] = Field(min_length=1)
 
@@ -89,18 +89,18 @@ class Claim(StrictModel):
     If the results cannot decide the claim, it has no measure, and `see` says where to look instead.
     """
 
-    says: str
+    claim_text: str = Field(alias="says")
     measure: str | None = None
     of: str = ""
     against: str | None = None
     part: str | None = None
     start: str | None = None
     end: str | None = None
-    each: _Each | None = None
-    holds: Rule | None = None
+    each: _Groups | None = None
+    claim_rule: ClaimRule | None = Field(None, alias="holds")
     see: str = ""
     paper: list[list[int]] = Field(default_factory=list, max_length=2)
-    told: str = ""
+    published_words: str = Field("", alias="told")
     mixture: bool = False
     needed: bool = False
 
@@ -108,66 +108,66 @@ class Claim(StrictModel):
     def _check(self) -> "Claim":
         if self.measure is not None and self.measure not in MEASURES:
             raise ValueError(f"a `measure` that is one of {', '.join(MEASURES)}")
-        if (self.measure is None) != (self.holds is None) or (self.measure is None) != bool(self.see):
+        if (self.measure is None) != (self.claim_rule is None) or (self.measure is None) != bool(self.see):
             raise ValueError("either `measure` and `holds`, or `see`")
         if any(len(pair) != 2 for pair in self.paper):
             raise ValueError("pairs of a count and a total")
         return self
 
-    def calls(self) -> Iterator[tuple[str, dict[str, str]]]:
+    def measure_calls(self) -> Iterator[tuple[str, dict[str, str]]]:
         """Yield each group with the arguments of the measure. A claim without groups has one group, ''."""
-        named = {name: getattr(self, name) for name in ("of", "against", "part", "start", "end")}
+        text_by_argument = {name: getattr(self, name) for name in ("of", "against", "part", "start", "end")}
         # an empty `of` means all runs
-        arguments = {name: text for name, text in named.items() if text is not None}
+        arguments = {name: text for name, text in text_by_argument.items() if text is not None}
         if self.each is None:
             yield "", arguments
             return
         for value in self.each.values:
-            chosen = f'({self.of}) and {self.each.column} == "{value}"'
-            yield value, arguments | {"of": chosen}
+            group_query = f'({self.of}) and {self.each.column} == "{value}"'
+            yield value, arguments | {"of": group_query}
 
-    def published(self) -> Estimate | None:
+    def published_estimate(self) -> Estimate | None:
         """Return the paper's counts as an estimate."""
         shares = [share(count, of) for count, of in self.paper]
         if len(shares) == 2:
-            return of_difference(*shares)
-        return of_share(shares[0]) if shares else None
+            return estimate_of_difference(*shares)
+        return estimate_of_share(shares[0]) if shares else None
 
 
-class Observation(StrictModel):
+class PublishedObservation(StrictModel):
     """One observation, divided into claims."""
 
     title: str
     claims: list[Claim] = Field(min_length=1)
 
 
-class Observations(StrictModel):
+class ObservationsFile(StrictModel):
     """The file of observations."""
 
     source: str
-    observations: list[Observation] = Field(min_length=1)
+    observations: list[PublishedObservation] = Field(min_length=1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Answer:
+class ClaimAnswer:
     """A query and its result. `group` is '' if the claim has no groups."""
 
     group: str
     query: str
-    found: Estimate
-    verdict: Verdict
+    result: Estimate
+    verdict: ClaimVerdict
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JudgedClaim:
-    """A claim with its results and verdict. `why` gives reasons beyond the rule."""
+    """A claim with its results and verdict. `reason` gives reasons beyond the rule."""
 
     number: str  # "1.2" is the second claim of the first observation
     claim: Claim
-    answers: tuple[Answer, ...]
-    verdict: Verdict
-    paper: Verdict | None  # verdict of the same rule on the published counts
-    why: str
+    answers: tuple[ClaimAnswer, ...]
+    verdict: ClaimVerdict
+    verdict_on_paper: ClaimVerdict | None  # verdict of the same rule on the published counts
+    reason: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -177,88 +177,93 @@ class JudgedObservation:
     number: int
     title: str
     claims: tuple[JudgedClaim, ...]
-    verdict: Verdict
+    verdict: ClaimVerdict
 
 
-def judge(
-    path: Path, runs: pd.DataFrame, lacks: Sequence[str], *, only_needed: bool = False
+def judge_observations(
+    path: Path, runs: pd.DataFrame, mixture_gaps: Sequence[str], *, only_needed: bool = False
 ) -> tuple[JudgedObservation, ...]:
     """Judge the observations in a file against a frame of results.
 
-    With `only_needed`, judge only the claims on which observations depend. `lacks` says how the runs differ
-    from the paper's mixture of faults. MutatorError with file and line if the file or a query is invalid.
+    With `only_needed`, judge only the claims on which observations depend. `mixture_gaps` says how the runs
+    differ from the paper's mixture of faults. MutatorError with file and line if the file or a query is
+    invalid.
     """
-    model, source = read(path, Observations, SCHEMA)
-    made = []
+    model, source = read(path, ObservationsFile, SCHEMA)
+    judged = []
     for i, observation in enumerate(model.observations):
         claims = tuple(
-            _judged(f"{i + 1}.{k + 1}", claim, runs, lacks, source, ("observations", i, "claims", k))
+            _judge_claim(
+                f"{i + 1}.{k + 1}", claim, runs, mixture_gaps, source, ("observations", i, "claims", k)
+            )
             for k, claim in enumerate(observation.claims)
             if claim.needed or not only_needed
         )
-        needed = [one.verdict for one in claims if one.claim.needed]
-        made.append(
-            JudgedObservation(number=i + 1, title=observation.title, claims=claims, verdict=together(needed))
+        needed = [judged_claim.verdict for judged_claim in claims if judged_claim.claim.needed]
+        judged.append(
+            JudgedObservation(
+                number=i + 1, title=observation.title, claims=claims, verdict=combined_verdict(needed)
+            )
         )
-    return tuple(made)
+    return tuple(judged)
 
 
-def together(verdicts: Sequence[Verdict]) -> Verdict:
+def combined_verdict(verdicts: Sequence[ClaimVerdict]) -> ClaimVerdict:
     """Return FAILS if any verdict is FAILS, else HOLDS if all (at least one) are HOLDS, else UNDECIDED."""
-    for verdict in (Verdict.FAILS, Verdict.UNDECIDED):
+    for verdict in (ClaimVerdict.FAILS, ClaimVerdict.UNDECIDED):
         if verdict in verdicts:
             return verdict
-    return Verdict.HOLDS if verdicts else Verdict.UNDECIDED
+    return ClaimVerdict.HOLDS if verdicts else ClaimVerdict.UNDECIDED
 
 
-def _judged(
+def _judge_claim(
     number: str,
     claim: Claim,
     runs: pd.DataFrame,
-    lacks: Sequence[str],
+    mixture_gaps: Sequence[str],
     source: Source,
     keys: tuple[str | int, ...],
 ) -> JudgedClaim:
-    if claim.measure is None or claim.holds is None:
+    if claim.measure is None or claim.claim_rule is None:
         return JudgedClaim(
             number=number,
             claim=claim,
             answers=(),
-            verdict=Verdict.UNDECIDED,
-            paper=None,
-            why=claim.see.strip(),
+            verdict=ClaimVerdict.UNDECIDED,
+            verdict_on_paper=None,
+            reason=claim.see.strip(),
         )
     answers = tuple(
-        _answer(group, claim.measure, claim.holds, arguments, runs, source, keys)
-        for group, arguments in claim.calls()
+        _answer_claim(group, claim.measure, claim.claim_rule, arguments, runs, source, keys)
+        for group, arguments in claim.measure_calls()
     )
-    verdict, why = together([one.verdict for one in answers]), ""
-    if claim.mixture and lacks:
-        verdict, why = Verdict.UNDECIDED, "; ".join(lacks)
-    published = claim.published()
+    verdict, reason = combined_verdict([answer.verdict for answer in answers]), ""
+    if claim.mixture and mixture_gaps:
+        verdict, reason = ClaimVerdict.UNDECIDED, "; ".join(mixture_gaps)
+    published = claim.published_estimate()
     return JudgedClaim(
         number=number,
         claim=claim,
         answers=answers,
         verdict=verdict,
-        paper=claim.holds.verdict(published) if published else None,
-        why=why,
+        verdict_on_paper=claim.claim_rule.verdict_on(published) if published else None,
+        reason=reason,
     )
 
 
-def _answer(
+def _answer_claim(
     group: str,
     measure: str,
-    rule: Rule,
+    rule: ClaimRule,
     arguments: dict[str, str],
     runs: pd.DataFrame,
     source: Source,
     keys: tuple[str | int, ...],
-) -> Answer:
+) -> ClaimAnswer:
     query = f"{measure}(runs, {', '.join(f'{name}={text!r}' for name, text in arguments.items())})"
     call: Any = MEASURES[measure]
     try:
-        found: Estimate = call(runs, **arguments)
+        estimate: Estimate = call(runs, **arguments)
     except (NameError, SyntaxError, TypeError, ValueError, KeyError, AttributeError) as err:
         raise source.error(
             keys,
@@ -266,4 +271,4 @@ def _answer(
             expected=f"arguments that {measure} accepts, with names of columns of the results",
             remedy="see mutator/paper/measures.py",
         ) from err
-    return Answer(group=group, query=query, found=found, verdict=rule.verdict(found))
+    return ClaimAnswer(group=group, query=query, result=estimate, verdict=rule.verdict_on(estimate))

@@ -9,8 +9,8 @@ from mutator._common.message_text import counted
 from mutator.config.yaml_files import MAX_BYTES
 from mutator.outcomes.fault_free_runs import own_alerts
 from mutator.paper import observations, observations_by_seed, observations_page
-from mutator.paper.observations import Verdict
-from mutator.paper.published_numbers import has_paper, load_paper
+from mutator.paper.observations import ClaimVerdict
+from mutator.paper.published_numbers import has_published_numbers, load_published_numbers
 from mutator.report.panel import Panel, rendered
 from mutator.report.panels.tables_panel import csv_files
 from mutator.report.reported_run import ReportedRun
@@ -19,24 +19,24 @@ from mutator.statistics.results_frame import select_columns
 if TYPE_CHECKING:
     import pandas as pd
 
-FILE = "observations.md"
-_HTML = """\
+MARKDOWN_FILE = "observations.md"
+_HTML_TEMPLATE = """\
 <h2>The paper's observations</h2>
 <p>{{ coverage }}</p>
-{% for one in observations %}
-<details class="table"{{ " open" if one.verdict.value != undecided }}>
-<summary><h3>{{ one.number }}. {{ one.title }}
-<span class="verdict">{{ one.verdict.value }}</span></h3></summary>
-{{ table(one).as_html() }}
+{% for observation in observations %}
+<details class="table"{{ " open" if observation.verdict.value != undecided }}>
+<summary><h3>{{ observation.number }}. {{ observation.title }}
+<span class="verdict">{{ observation.verdict.value }}</span></h3></summary>
+{{ table(observation).as_html() }}
 <details><summary>Queries</summary>
 <pre>{{ session }}
 
-{% for claim in one.claims %}
-# {{ claim.number }} {{ claim.claim.says }}
+{% for claim in observation.claims %}
+# {{ claim.number }} {{ claim.claim.claim_text }}
 {% for answer in claim.answers %}
 {{ answer.query }}
 {% else %}
-# {{ claim.why }}
+# {{ claim.reason }}
 {% endfor %}
 {% endfor %}
 </pre></details>
@@ -60,61 +60,70 @@ def build_observations_panel(run: ReportedRun) -> Panel | None:
     if run.workspace is None:
         return None
     references = run.workspace.references
-    file = references / observations.FILE
-    if not (file.is_file() and has_paper(references)):
+    file = references / observations.FILE_NAME
+    if not (file.is_file() and has_published_numbers(references)):
         return None
-    kinds = list(dict.fromkeys(kind for _, kind in load_paper(references).coverage))
-    missing = _missing(kinds, run.frame)
-    if len(missing) == len(kinds):
+    fault_types = list(
+        dict.fromkeys(kind for _, kind in load_published_numbers(references).tally_by_fault_type)
+    )
+    missing = _missing_fault_types(fault_types, run.frame)
+    if len(missing) == len(fault_types):
         return None
     ends = run.ends() or {}
     words = re.findall(r"\w+", read_bounded(file, MAX_BYTES).decode())
     frame = select_columns(run.frame, *words)  # the queries use only columns that the file names
     frame = frame.assign(t_end=frame["scenario"].map(ends))
-    judged = observations.judge(file, frame, list(_lacks(run, missing)))
-    coverage = _coverage(run, len(kinds), missing)
-    if all(one.verdict is Verdict.UNDECIDED for one in judged):
+    judged = observations.judge_observations(file, frame, list(_mixture_gaps(run, missing)))
+    coverage = _describe_coverage(run, len(fault_types), missing)
+    if all(observation.verdict is ClaimVerdict.UNDECIDED for observation in judged):
         return None
-    shown_ends = tuple(sorted(ends.items()))
+    ends_by_scenario = tuple(sorted(ends.items()))
     by_seed = observations_by_seed.judge_by_seed(
-        file, frame, lambda runs: list(_lacks(run, _missing(kinds, runs)))
+        file, frame, lambda runs: list(_mixture_gaps(run, _missing_fault_types(fault_types, runs)))
     )
-    of_seeds = observations_by_seed.table(judged, by_seed) if by_seed else None
-    sheets = [observations_page.sheet(judged), *([observations_by_seed.sheet(by_seed)] if by_seed else ())]
-    text = observations_page.markdown(judged, shown_ends, coverage)
+    seeds_table = observations_by_seed.verdicts_by_seed_table(judged, by_seed) if by_seed else None
+    sheets = [
+        observations_page.observations_sheet(judged),
+        *([observations_by_seed.observations_by_seed_sheet(by_seed)] if by_seed else ()),
+    ]
+    text = observations_page.render_markdown(judged, ends_by_scenario, coverage)
     parts = [
         "## The paper's observations",
         coverage,
-        observations_page.verdicts(judged),
-        *(("### Seed by seed", observations_by_seed.ABOUT, of_seeds.as_markdown()) if of_seeds else ()),
-        f"The claims, rules, numbers and queries are in [{FILE}]({FILE}).",
+        observations_page.verdicts_markdown(judged),
+        *(
+            ("### Seed by seed", observations_by_seed.SEEDS_NOTE, seeds_table.as_markdown())
+            if seeds_table
+            else ()
+        ),
+        f"The claims, rules, numbers and queries are in [{MARKDOWN_FILE}]({MARKDOWN_FILE}).",
     ]
     html = rendered(
-        _HTML,
+        _HTML_TEMPLATE,
         coverage=coverage,
-        observations=sorted(judged, key=lambda one: one.verdict is Verdict.UNDECIDED),
-        undecided=Verdict.UNDECIDED.value,
-        table=observations_page.table,
-        session=observations_page.session(shown_ends),
-        rules=observations_page.rules(),
-        of_seeds=of_seeds,
-        about_seeds=observations_by_seed.ABOUT,
+        observations=sorted(judged, key=lambda observation: observation.verdict is ClaimVerdict.UNDECIDED),
+        undecided=ClaimVerdict.UNDECIDED.value,
+        table=observations_page.claims_table,
+        session=observations_page.session_code(ends_by_scenario),
+        rules=observations_page.rules_text(),
+        of_seeds=seeds_table,
+        about_seeds=observations_by_seed.SEEDS_NOTE,
     )
     return Panel(
         anchor="observations",
         link="Observations",
         markdown="\n\n".join(parts),
         html=html,
-        summary=of_seeds,
-        files={FILE: text.encode(), **csv_files(sheets)},
+        summary=seeds_table,
+        files={MARKDOWN_FILE: text.encode(), **csv_files(sheets)},
     )
 
 
-def _missing(kinds: Sequence[str], runs: "pd.DataFrame") -> list[str]:
-    return sorted(set(kinds) - set(runs["kind"].unique()))
+def _missing_fault_types(fault_types: Sequence[str], runs: "pd.DataFrame") -> list[str]:
+    return sorted(set(fault_types) - set(runs["kind"].unique()))
 
 
-def _lacks(run: ReportedRun, missing: list[str]) -> Iterator[str]:
+def _mixture_gaps(run: ReportedRun, missing: list[str]) -> Iterator[str]:
     """Yield how the run differs from the paper's mixture of faults. A shard is always incomplete."""
     if missing:
         yield f"no runs of {counted(len(missing), 'fault type')} of the paper"
@@ -122,8 +131,8 @@ def _lacks(run: ReportedRun, missing: list[str]) -> Iterator[str]:
         yield f"only {run.done} of {planned} planned experiments were run"
 
 
-def _coverage(run: ReportedRun, kinds: int, missing: list[str]) -> str:
+def _describe_coverage(run: ReportedRun, fault_type_count: int, missing: list[str]) -> str:
     text = f"Based on {len(run.frame)} of {run.folder.planned} experiments, which cover "
-    text += f"{kinds - len(missing)} of the paper's {kinds} fault types."
+    text += f"{fault_type_count - len(missing)} of the paper's {fault_type_count} fault types."
     text += f" Missing: {', '.join(missing)}." if missing else ""
     return " ".join(filter(None, (text, own_alerts(run.fault_free()))))

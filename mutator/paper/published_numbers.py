@@ -10,25 +10,25 @@ from mutator.config.yaml_sources import Source
 from mutator.statistics.published_counts import PublishedCounts
 from mutator.statistics.tallies import Tally
 
-FILES = ("paper_summary.yaml", "paper_coverage.yaml", "paper_times.yaml")
+FILE_NAMES = ("paper_summary.yaml", "paper_coverage.yaml", "paper_times.yaml")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Paper:
-    """The published counts. `coverage` has only injected, activated and hazards."""
+class PublishedNumbers:
+    """The published counts. `tally_by_fault_type` has only injected, activated and hazards."""
 
-    summary: dict[tuple[str, str], Tally]  # by method and scenario
-    coverage: dict[tuple[str, str], Tally]  # by method and module/fault type
+    tally_by_scenario: dict[tuple[str, str], Tally]  # by method and scenario
+    tally_by_fault_type: dict[tuple[str, str], Tally]  # by method and module/fault type
     driver_reaction_s: float
     least_alert_to_hazard_s: float  # the scenarios' smallest and largest mean
     most_alert_to_hazard_s: float
 
-    def published(self) -> PublishedCounts:
+    def as_published(self) -> PublishedCounts:
         least, most = self.least_alert_to_hazard_s, self.most_alert_to_hazard_s
         return PublishedCounts(
             source="paper",
-            by_scenario=self.summary,
-            by_fault_type=self.coverage,
+            by_scenario=self.tally_by_scenario,
+            by_fault_type=self.tally_by_fault_type,
             scenario_title="the paper's table II",
             fault_type_title="the paper's table III",
             counts_note="The paper gives the counts; their intervals are computed here.",
@@ -50,7 +50,7 @@ class _SummaryRow(StrictModel):
     alerts_no_hazards: int = Field(ge=0)
 
 
-class _Summary(StrictModel):
+class _SummaryFile(StrictModel):
     source: str
     rows: list[_SummaryRow]
 
@@ -65,63 +65,63 @@ class _CoverageRow(StrictModel):
     random_hazards: int = Field(ge=0)
 
 
-class _Coverage(StrictModel):
+class _CoverageFile(StrictModel):
     source: str
     rows: list[_CoverageRow]
 
 
-class _Range(StrictModel):
+class _TimeRange(StrictModel):
     least: float
     most: float
 
 
-class _Times(StrictModel):
+class _TimesFile(StrictModel):
     source: str
     driver_reaction_s: float = Field(gt=0)
-    mean_alert_to_hazard_s: _Range
+    mean_alert_to_hazard_s: _TimeRange
 
 
-def load_paper(references: Path) -> Paper:
+def load_published_numbers(references: Path) -> PublishedNumbers:
     """Load the numbers cited in a folder. MutatorError with file and line if counts are impossible."""
-    summary, summary_source = read(references / FILES[0], _Summary, "paper_summary/1")
-    coverage, coverage_source = read(references / FILES[1], _Coverage, "paper_coverage/1")
-    times, _ = read(references / FILES[2], _Times, "paper_times/1")
-    by_scenario = {}
+    summary, summary_source = read(references / FILE_NAMES[0], _SummaryFile, "paper_summary/1")
+    coverage, coverage_source = read(references / FILE_NAMES[1], _CoverageFile, "paper_coverage/1")
+    times, _ = read(references / FILE_NAMES[2], _TimesFile, "paper_times/1")
+    tally_by_scenario = {}
     for i, row in enumerate(summary.rows):
         tally = Tally(**row.model_dump(exclude={"method", "scenario"}))
-        _check(tally, summary_source, i)
-        by_scenario[row.method, row.scenario] = tally
-    by_kind = {}
-    for i, line in enumerate(coverage.rows):
-        kind = f"{line.module}/{line.fault_type}"
+        _check_tally(tally, summary_source, i)
+        tally_by_scenario[row.method, row.scenario] = tally
+    tally_by_fault_type = {}
+    for i, coverage_row in enumerate(coverage.rows):
+        fault_type = f"{coverage_row.module}/{coverage_row.fault_type}"
         for method, activated, hazards in (
-            ("guided", line.guided_activated, line.guided_hazards),
-            ("random", line.random_activated, line.random_hazards),
+            ("guided", coverage_row.guided_activated, coverage_row.guided_hazards),
+            ("random", coverage_row.random_activated, coverage_row.random_hazards),
         ):
-            tally = Tally(injected=line.injected, activated=activated, hazards=hazards)
-            _check(tally, coverage_source, i)
-            by_kind[method, kind] = tally
-    return Paper(
-        summary=by_scenario,
-        coverage=by_kind,
+            tally = Tally(injected=coverage_row.injected, activated=activated, hazards=hazards)
+            _check_tally(tally, coverage_source, i)
+            tally_by_fault_type[method, fault_type] = tally
+    return PublishedNumbers(
+        tally_by_scenario=tally_by_scenario,
+        tally_by_fault_type=tally_by_fault_type,
         driver_reaction_s=times.driver_reaction_s,
         least_alert_to_hazard_s=times.mean_alert_to_hazard_s.least,
         most_alert_to_hazard_s=times.mean_alert_to_hazard_s.most,
     )
 
 
-def has_paper(references: Path) -> bool:
-    return all((references / name).is_file() for name in FILES)
+def has_published_numbers(references: Path) -> bool:
+    return all((references / name).is_file() for name in FILE_NAMES)
 
 
-def _check(tally: Tally, source: Source, row: int) -> None:
+def _check_tally(tally: Tally, source: Source, row: int) -> None:
     """Raise MutatorError if a part exceeds its whole, or if counts of hazards and alerts are inconsistent."""
     parts = (tally.manifested or 0, tally.hazards, tally.alerts or 0)
-    fits = tally.activated <= tally.injected and max(parts) <= tally.activated
+    is_consistent = tally.activated <= tally.injected and max(parts) <= tally.activated
     if tally.alerts is not None:
-        warned = tally.hazards - (tally.hazards_no_alerts or 0)
-        fits = fits and warned == tally.alerts - (tally.alerts_no_hazards or 0)
-    if not fits:
+        hazards_with_alert = tally.hazards - (tally.hazards_no_alerts or 0)
+        is_consistent = is_consistent and hazards_with_alert == tally.alerts - (tally.alerts_no_hazards or 0)
+    if not is_consistent:
         raise source.error(
             ("rows", row),
             f"counts that contradict each other: {tally}",

@@ -15,76 +15,87 @@ from mutator.figures.run_plot import (
     MarkKind,
     finite,
 )
-from mutator.paper.unsafe_actions import Pair, Steps, Wanted
+from mutator.paper.unsafe_actions import ActionFigure, RunPair, StepFlags
 from mutator.targets.manifest import TargetManifest
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-BEFORE_S, AFTER_S = 4.0, 1.0  # time that is shown before activation and after the hazard
-SHADE = "#bbbbbb"
-LEAST_RANGE = 0.1  # minimum range of a vertical axis; less would magnify noise
-LABEL_SHARE = 0.12  # width of a mark's label as a share of the time axis
+SHOWN_BEFORE_S, SHOWN_AFTER_S = 4.0, 1.0  # time that is shown before activation and after the hazard
+SHADE_COLOUR = "#bbbbbb"
+MIN_AXIS_RANGE = 0.1  # minimum range of a vertical axis; less would magnify noise
+LABEL_WIDTH_SHARE = 0.12  # width of a mark's label as a share of the time axis
 
 
 @style.shipped_style()
-def draw(
-    pair: Pair, steps: Steps, wanted: Wanted, marks: Iterable[Mark], manifest: TargetManifest
+def plot_run_pair(
+    pair: RunPair,
+    steps: StepFlags,
+    figure_spec: ActionFigure,
+    marks: Iterable[Mark],
+    manifest: TargetManifest,
 ) -> "Figure":
-    """Draw the `wanted.panels` that both runs have. In those of `wanted.actions`, shade `steps`."""
+    """Draw the panels of `figure_spec` that both runs have. In its action channels, shade `steps`."""
     units = {channel.name: channel.unit for channel in (*manifest.compared, *manifest.plotted)}
-    panels = [(c, what) for c, what in wanted.panels if c in pair.golden and c in pair.faulty]
-    first = max(float(pair.t[0]), pair.start - BEFORE_S)
-    last = min(float(pair.t[-1]), pair.end + AFTER_S)
+    panels = [(c, meaning) for c, meaning in figure_spec.panels if c in pair.golden and c in pair.faulty]
+    first = max(float(pair.times_s[0]), pair.start_s - SHOWN_BEFORE_S)
+    last = min(float(pair.times_s[-1]), pair.end_s + SHOWN_AFTER_S)
     figure, axes = style.blank(1.1 + 1.35 * len(panels), len(panels), 1)
-    shown = (pair.t >= first) & (pair.t <= last)
+    is_visible = (pair.times_s >= first) & (pair.times_s <= last)
     for axis, (channel, what) in zip(axes, panels, strict=True):
-        _lines(axis, pair, channel, shown)
+        _plot_channel(axis, pair, channel, is_visible)
         axis.set_ylabel(f"{what} [{units.get(channel) or '-'}]", fontsize=style.TEXT)
         axis.set_xlim(first, last)
-        if channel in wanted.actions:
-            _shade(axis, pair.t, steps)
+        if channel in figure_spec.action_channels:
+            _shade_steps(axis, pair.times_s, steps)
         low, high = axis.get_ylim()
-        axis.set_ylim(low, max(high, low + LEAST_RANGE))
+        axis.set_ylim(low, max(high, low + MIN_AXIS_RANGE))
         axis.tick_params(labelbottom=axis is axes[-1])
     axes[-1].set_xlabel("time [s]", fontsize=style.TEXT)
-    _mark(axes, [mark for mark in first_ones(marks) if first <= mark.t <= last], last - first)
+    _draw_marks(axes, [mark for mark in without_later_alerts(marks) if first <= mark.t <= last], last - first)
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower left", ncols=2, fontsize=style.SMALL, frameon=False)
     figure.align_ylabels(axes)
     return figure
 
 
-def first_ones(marks: Iterable[Mark]) -> list[Mark]:
-    kept: list[Mark] = []
+def without_later_alerts(marks: Iterable[Mark]) -> list[Mark]:
+    shown_marks: list[Mark] = []
     for mark in marks:
-        if mark.kind is not MarkKind.ALERT or all(m.kind is not MarkKind.ALERT for m in kept):
-            kept.append(mark)
-    return kept
+        if mark.kind is not MarkKind.ALERT or all(m.kind is not MarkKind.ALERT for m in shown_marks):
+            shown_marks.append(mark)
+    return shown_marks
 
 
-def _lines(axis: "Axes", pair: Pair, channel: str, shown: np.ndarray) -> None:
+def _plot_channel(axis: "Axes", pair: RunPair, channel: str, is_visible: np.ndarray) -> None:
     """Draw the golden line dashed above the solid faulty line, so that both are visible if they coincide."""
-    t = pair.t[shown]
-    axis.plot(t, finite(pair.faulty[channel][shown]), "-", color=FAULTY_COLOUR, linewidth=1.6, label="faulty")
+    t = pair.times_s[is_visible]
     axis.plot(
-        t, finite(pair.golden[channel][shown]), "--", color=GOLDEN_COLOUR, linewidth=1.6, label="fault-free"
+        t, finite(pair.faulty[channel][is_visible]), "-", color=FAULTY_COLOUR, linewidth=1.6, label="faulty"
+    )
+    axis.plot(
+        t,
+        finite(pair.golden[channel][is_visible]),
+        "--",
+        color=GOLDEN_COLOUR,
+        linewidth=1.6,
+        label="fault-free",
     )
     axis.grid(visible=True, linewidth=0.4, alpha=0.5)
     axis.margins(y=0.08)
 
 
-def _shade(axis: "Axes", t: np.ndarray, steps: Steps) -> None:
+def _shade_steps(axis: "Axes", t: np.ndarray, steps: StepFlags) -> None:
     edges = np.flatnonzero(np.diff(np.concatenate(([0], steps.astype(int), [0]))))
     for begin, end in edges.reshape(-1, 2):
-        axis.axvspan(t[begin], t[end - 1], color=SHADE, alpha=0.45, linewidth=0)
+        axis.axvspan(t[begin], t[end - 1], color=SHADE_COLOUR, alpha=0.45, linewidth=0)
 
 
-def _mark(axes: Sequence["Axes"], marks: Sequence[Mark], width: float) -> None:
+def _draw_marks(axes: Sequence["Axes"], marks: Sequence[Mark], width: float) -> None:
     """Draw a line through all panels for each mark. Its name is above, on the lowest free level."""
-    free: list[float] = []  # the end of the last name on each level
-    end, room = axes[0].get_xlim()[1], LABEL_SHARE * width
+    level_ends: list[float] = []  # the end of the last name on each level
+    end, label_width = axes[0].get_xlim()[1], LABEL_WIDTH_SHARE * width
     for mark in marks:
         for axis in axes:
             axis.axvline(
@@ -93,13 +104,13 @@ def _mark(axes: Sequence["Axes"], marks: Sequence[Mark], width: float) -> None:
                 linestyle=MARK_LINES[mark.kind],
                 linewidth=1.8 if mark.kind is MarkKind.HAZARD else 1.1,
             )
-        fits = mark.t + room <= end  # else the name ends at its mark instead of beginning there
-        begin = mark.t if fits else mark.t - room
-        level = next((i for i, taken in enumerate(free) if taken <= begin), len(free))
-        free[level : level + 1] = [begin + room]
-        what = f"first alert, {mark.label}" if mark.kind is MarkKind.ALERT else mark.label
+        fits = mark.t + label_width <= end  # else the name ends at its mark instead of beginning there
+        begin = mark.t if fits else mark.t - label_width
+        level = next((i for i, name_end in enumerate(level_ends) if name_end <= begin), len(level_ends))
+        level_ends[level : level + 1] = [begin + label_width]
+        label = f"first alert, {mark.label}" if mark.kind is MarkKind.ALERT else mark.label
         axes[0].annotate(
-            f"{what} {mark.t:.2f} s",
+            f"{label} {mark.t:.2f} s",
             (mark.t, 1.0),
             xycoords=("data", "axes fraction"),
             xytext=(0, 3 + 11 * level),

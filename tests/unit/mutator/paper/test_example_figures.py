@@ -11,8 +11,8 @@ import pytest
 
 from mutator.execution.campaign_running import run_campaign
 from mutator.figures.drawings import Drawing, drawing_files
-from mutator.paper.example_figures import candidates, example_drawings
-from mutator.paper.unsafe_actions import WANTED, Pair, Wanted
+from mutator.paper.example_figures import build_example_drawings, candidate_rows
+from mutator.paper.unsafe_actions import ACTION_FIGURES, ActionFigure, RunPair
 from mutator.report import report_builder
 from mutator.statistics.results_frame import load_usable_results
 from mutator.store.plan_choices import Choices
@@ -21,14 +21,14 @@ from mutator.workspace import Workspace
 
 from ..statistics.results_frame import results
 
-BRAKE = Wanted(
+BRAKE = ActionFigure(
     name="brake",
     title="Brake",
     query='module == "sensor" and t_h3 > t_activation',
-    order="max_dev_wheel",
-    confirmed="it is so",
-    look=lambda pair: pair.t > pair.start,
-    actions=("brake",),
+    order_column="max_dev_wheel",
+    what_it_shows="it is so",
+    find_steps=lambda pair: pair.times_s > pair.start_s,
+    action_channels=("brake",),
     panels=(("brake", "brake"), ("gap", "distance"), ("d_rel", "not recorded here")),
     hazard="H3",
 )
@@ -49,11 +49,11 @@ def place(driven: Path, tmp_path: Path) -> Path:
     return tmp_path / "place"
 
 
-def drawn(place: Path, wanted: Wanted) -> Drawing:
+def drawn(place: Path, wanted: ActionFigure) -> Drawing:
     toy = place / "toy"
     workspace = Workspace(library=toy / "fault_library", templates=toy / "templates")
     run = place / "run"
-    [drawing] = example_drawings(
+    [drawing] = build_example_drawings(
         RunFolder.open(run), load_usable_results(run / "results.csv"), workspace, [wanted]
     )
     return drawing
@@ -112,26 +112,26 @@ def test_a_missing_input_is_reported_instead_of_a_figure(place: Path) -> None:
     shutil.rmtree(place / "toy" / "tree")
     assert drawn(place, BRAKE).note.startswith("No figure: ")
     run = place / "run"
-    [nowhere] = example_drawings(RunFolder.open(run), load_usable_results(run / "results.csv"), None, [BRAKE])
+    [nowhere] = build_example_drawings(RunFolder.open(run), load_usable_results(run / "results.csv"), None, [BRAKE])
     assert "no fault library" in nowhere.note
 
 
 def test_matching_experiments_are_tried_until_one_shows_the_action(place: Path) -> None:
     looked_at: list[float] = []
 
-    def second(pair: Pair) -> np.ndarray | None:
-        looked_at.append(pair.start)
-        return pair.t > pair.start if len(looked_at) == 2 else None
+    def second(pair: RunPair) -> np.ndarray | None:
+        looked_at.append(pair.start_s)
+        return pair.times_s > pair.start_s if len(looked_at) == 2 else None
 
-    assert "this is number 2," in drawn(place, replace(BRAKE, look=second)).note
-    none = drawn(place, replace(BRAKE, look=lambda pair: None))
+    assert "this is number 2," in drawn(place, replace(BRAKE, find_steps=second)).note
+    none = drawn(place, replace(BRAKE, find_steps=lambda pair: None))
     assert none.figure is None
     assert "none shows it" in none.note
 
 
 def test_a_query_without_a_match_is_reported(place: Path) -> None:
     assert "no experiment of this run matches" in drawn(place, replace(BRAKE, query='module == "radar"')).note
-    assert "records no sail" in drawn(place, replace(BRAKE, actions=("sail",))).note
+    assert "records no sail" in drawn(place, replace(BRAKE, action_channels=("sail",))).note
 
 
 def test_candidates_are_sorted_by_size_and_then_by_id() -> None:
@@ -144,10 +144,15 @@ def test_candidates_are_sorted_by_size_and_then_by_id() -> None:
         h1 | {"max_dev_brake": 99.0, "fault_type": "jamming"},
         {"t_activation": 2, "max_dev_brake": 99.0, "max_dev_gas": 0},
     )
-    assert list(candidates(frame, WANTED[0])["experiment_id"]) == ["a", "b", "0"]
+    assert list(candidate_rows(frame, ACTION_FIGURES[0])["experiment_id"]) == ["a", "b", "0"]
 
 
 def test_every_query_finds_its_experiment() -> None:
     had = {"t_activation": 2, "t_alert": 3, "t_h1": 5, "t_h2": 5, "max_dev_brake": 1, "max_dev_gas": 1}
     frame = results(had, had | {"fault_type": "jamming"})
-    assert [list(candidates(frame, one)["experiment_id"]) for one in WANTED] == [["0"], ["0"], ["0"], ["1"]]
+    assert [list(candidate_rows(frame, one)["experiment_id"]) for one in ACTION_FIGURES] == [
+        ["0"],
+        ["0"],
+        ["0"],
+        ["1"],
+    ]

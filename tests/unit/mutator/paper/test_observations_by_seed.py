@@ -5,8 +5,12 @@ from typing import Any
 
 import pandas as pd
 
-from mutator.paper.observations import Verdict, judge
-from mutator.paper.observations_by_seed import judge_by_seed, sheet, table
+from mutator.paper.observations import ClaimVerdict, judge_observations
+from mutator.paper.observations_by_seed import (
+    judge_by_seed,
+    observations_by_seed_sheet,
+    verdicts_by_seed_table,
+)
 
 from ..statistics.results_frame import results
 
@@ -48,12 +52,12 @@ def test_seeds_that_show_each_observation_are_counted(tmp_path: Path) -> None:
     file.write_text(OBSERVATIONS)
     found = judge_by_seed(file, frame(), lambda runs: [])
     assert list(found) == ["1", "3", "11", "12"]
-    rows = table(judge(file, frame(), []), found).rows
+    rows = verdicts_by_seed_table(judge_observations(file, frame(), []), found).rows
     assert [row[2:] for row in rows] == [
-        (Verdict.UNDECIDED, "1", "1", "2", "4"),
-        (Verdict.HOLDS, "3", "1", "0", "4"),
+        (ClaimVerdict.UNDECIDED, "1", "1", "2", "4"),
+        (ClaimVerdict.HOLDS, "3", "1", "0", "4"),
     ]
-    lines = sheet(found).lines
+    lines = observations_by_seed_sheet(found).lines
     assert len(lines) == 8 and lines[2][:4] == (3, 1, "holds", "1.1")
 
 
@@ -61,5 +65,5 @@ def test_a_claim_about_all_faults_is_undecided_for_a_seed_without_all_fault_type
     file = tmp_path / "observations.yaml"
     file.write_text(OBSERVATIONS)
     found = judge_by_seed(file, frame(), lambda runs: ["a type"] if set(runs["seed"]) == {3} else [])
-    assert [found[name][1].verdict for name in ("1", "3")] == [Verdict.HOLDS, Verdict.UNDECIDED]
+    assert [found[name][1].verdict for name in ("1", "3")] == [ClaimVerdict.HOLDS, ClaimVerdict.UNDECIDED]
     assert judge_by_seed(file, results(*seed(1, 5)), lambda runs: []) == {}

@@ -10,7 +10,7 @@ import pytest
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import make_plan
 from mutator.paper.observations_panel import build_observations_panel
-from mutator.paper.published_numbers import load_paper
+from mutator.paper.published_numbers import load_published_numbers
 from mutator.report.reported_run import ReportedRun
 from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
@@ -30,7 +30,7 @@ def test_claims_about_all_faults_need_the_whole_plan(
     shutil.copytree(REFERENCES, toycar.library / "references")
     freeze(make_plan(toycar, "small", Choices(shard=shard)), tmp_path / "run", toycar)
     folder = RunFolder.open(tmp_path / "run")
-    kinds = [kind.split("/") for _, kind in load_paper(REFERENCES).coverage]
+    kinds = [kind.split("/") for _, kind in load_published_numbers(REFERENCES).tally_by_fault_type]
     against = {
         "module": "vision_output",
         "fault_type": "relative_distance",

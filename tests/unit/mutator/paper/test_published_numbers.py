@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.paper.published_numbers import Paper, load_paper
+from mutator.paper.published_numbers import PublishedNumbers, load_published_numbers
 from mutator.statistics import guided_against_random
 from mutator.statistics.guided_against_random_tables import hazard_odds_sheet, hazards_by_fault_type_sheet
 from mutator.statistics.shares import share
@@ -21,16 +21,16 @@ HIT = {"t_activation": 7.0, "t_manifest": 7.1, "h1": 1, "t_h1": 18.0}
 
 
 @pytest.fixture(scope="module")
-def paper() -> Paper:
-    return load_paper(REFERENCES)
+def paper() -> PublishedNumbers:
+    return load_published_numbers(REFERENCES)
 
 
 def of(counts: dict[tuple[str, str], Tally], method: str) -> Tally:
     return sum_tallies(one for (how, _), one in counts.items() if how == method)
 
 
-def test_the_cited_tables_have_the_sums_that_the_paper_gives(paper: Paper) -> None:
-    assert of(paper.summary, "guided") == Tally(
+def test_the_cited_tables_have_the_sums_that_the_paper_gives(paper: PublishedNumbers) -> None:
+    assert of(paper.tally_by_scenario, "guided") == Tally(
         injected=5640,
         activated=3678,
         manifested=3656,
@@ -39,15 +39,15 @@ def test_the_cited_tables_have_the_sums_that_the_paper_gives(paper: Paper) -> No
         hazards_no_alerts=402,
         alerts_no_hazards=656,
     )
-    assert of(paper.summary, "random").hazards == 1634
+    assert of(paper.tally_by_scenario, "random").hazards == 1634
     for method in ("guided", "random"):
-        types, scenarios = of(paper.coverage, method), of(paper.summary, method)
+        types, scenarios = of(paper.tally_by_fault_type, method), of(paper.tally_by_scenario, method)
         assert (types.injected, types.hazards) == (scenarios.injected, scenarios.hazards)
         assert types.activated == scenarios.activated
 
 
-def test_the_guided_advantage_reverses_per_injected_fault(paper: Paper) -> None:
-    guided, random = of(paper.summary, "guided"), of(paper.summary, "random")
+def test_the_guided_advantage_reverses_per_injected_fault(paper: PublishedNumbers) -> None:
+    guided, random = of(paper.tally_by_scenario, "guided"), of(paper.tally_by_scenario, "random")
     rates = [
         round(100 * share(one.hazards, whole).rate, 1)
         for one, whole in (
@@ -60,9 +60,9 @@ def test_the_guided_advantage_reverses_per_injected_fault(paper: Paper) -> None:
     assert rates == [35.8, 29.0, 23.3, 29.0]
 
 
-def test_our_counts_are_in_the_row_below_the_papers(paper: Paper) -> None:
+def test_our_counts_are_in_the_row_below_the_papers(paper: PublishedNumbers) -> None:
     frame = results(HIT, HIT | {"alerts": "fcw", "t_alert": 9}, {}, {"scenario": "S9", "t_activation": 2})
-    lines = summary_sheet("guided", tally_by_scenario(frame), paper.published()).table().rows
+    lines = summary_sheet("guided", tally_by_scenario(frame), paper.as_published()).table().rows
     hazards = [line[2:] for line in lines if line[:2] == ["hazards", "activated"]]
     assert hazards[0][:3] == ["paper", "35.1 % (215/613; 31.4 to 38.9)", "-"]
     assert hazards[1][0] == "here"
@@ -75,17 +75,17 @@ def test_our_counts_are_in_the_row_below_the_papers(paper: Paper) -> None:
     assert unwarned[3].startswith("50.0 % (1/2;")
 
 
-def test_hazards_are_given_per_activated_and_per_injected_fault(paper: Paper) -> None:
+def test_hazards_are_given_per_activated_and_per_injected_fault(paper: PublishedNumbers) -> None:
     frame = results({"fault_type": "zeta"}, HIT, {}, {"fault_type": "jamming", "t_activation": 3})
-    sheet = coverage_sheet("guided", tally_by_fault_type(frame), paper.published())
+    sheet = coverage_sheet("guided", tally_by_fault_type(frame), paper.as_published())
     kinds = [line[0] for line in sheet.lines]
     assert kinds == [k for k in ("radar/chaff", "radar/jamming", "radar/zeta", "total") for _ in range(2)]
     chaff = sheet.table().rows[1]
     assert [cell.split(";")[0] for cell in chaff[2:]] == ["50.0 % (1/2", "100.0 % (1/1", "50.0 % (1/2"]
 
 
-def test_the_csv_has_a_column_for_each_number(paper: Paper) -> None:
-    sheet = coverage_sheet("guided", tally_by_fault_type(results(HIT)), paper.published())
+def test_the_csv_has_a_column_for_each_number(paper: PublishedNumbers) -> None:
+    sheet = coverage_sheet("guided", tally_by_fault_type(results(HIT)), paper.as_published())
     lines = list(csv.DictReader(io.StringIO(sheet.as_csv())))
     assert lines[0]["hazards/activated: count"] == "154"
     assert lines[0]["hazards/activated: of"] == "432"
@@ -99,13 +99,13 @@ def test_contradictory_counts_are_reported_with_their_line(tmp_path: Path) -> No
             file.read_text().replace("guided_hazards: 154", "guided_hazards: 433")
         )
     with pytest.raises(MutatorError, match=r"paper_coverage\.yaml:6: counts that contradict"):
-        load_paper(tmp_path)
+        load_published_numbers(tmp_path)
 
 
-def test_within_fault_types_guided_faults_are_ahead_only_per_activated_fault(paper: Paper) -> None:
+def test_within_fault_types_guided_faults_are_ahead_only_per_activated_fault(paper: PublishedNumbers) -> None:
     activated, injected = (
         guided_against_random.mantel_haenszel(
-            guided_against_random.strata_with_both_methods(paper.coverage, whole)
+            guided_against_random.strata_with_both_methods(paper.tally_by_fault_type, whole)
         )
         for whole in guided_against_random.RATE_BASES
     )
@@ -115,11 +115,11 @@ def test_within_fault_types_guided_faults_are_ahead_only_per_activated_fault(pap
     assert activated.low > 1
 
 
-def test_the_papers_counts_and_ours_get_the_same_statistical_tests(paper: Paper) -> None:
+def test_the_papers_counts_and_ours_get_the_same_statistical_tests(paper: PublishedNumbers) -> None:
     frame = results(HIT, HIT | {"method": "random", "trigger": "random/C2"})
     overall, kinds = (
-        hazard_odds_sheet(frame, paper.published()),
-        hazards_by_fault_type_sheet(frame, paper.published()),
+        hazard_odds_sheet(frame, paper.as_published()),
+        hazards_by_fault_type_sheet(frame, paper.as_published()),
     )
     assert [line[:2] for line in overall.lines] == [
         (whole, source) for whole in ("activated", "injected") for source in ("paper", "here")

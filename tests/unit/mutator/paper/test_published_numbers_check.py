@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from mutator.checks.library_check import check_library
-from mutator.paper.published_numbers import FILES
-from mutator.paper.published_numbers_check import check_paper
+from mutator.paper.published_numbers import FILE_NAMES
+from mutator.paper.published_numbers_check import check_published_numbers
 from mutator.workspace import Workspace
 
 CLONE = Path(__file__).parents[4]
@@ -22,15 +22,15 @@ def workspace(tmp_path: Path) -> Workspace:
 
 
 def test_the_shipped_numbers_are_valid(workspace: Workspace) -> None:
-    assert list(check_paper(workspace)) == []
+    assert list(check_published_numbers(workspace)) == []
 
 
 def test_missing_numbers_are_reported_with_a_remedy(workspace: Workspace) -> None:
     references = workspace.library / "references"
     shutil.rmtree(references)
-    [problem] = check_paper(workspace)
+    [problem] = check_published_numbers(workspace)
     assert problem.where == str(references)
-    for file in FILES:
+    for file in FILE_NAMES:
         assert file in problem.got
         assert file in str(problem.expected)
     assert "copy them" in str(problem.remedy)
@@ -76,7 +76,7 @@ def test_a_wrong_number_is_reported_with_its_line(
     path = workspace.library / "references" / f"paper_{file}.yaml"
     assert old in path.read_text()
     path.write_text(path.read_text().replace(old, new))
-    problems = "\n".join(str(problem).replace("\n", " ") for problem in check_paper(workspace))
+    problems = "\n".join(str(problem).replace("\n", " ") for problem in check_published_numbers(workspace))
     assert re.search(told, problems), problems
 
 

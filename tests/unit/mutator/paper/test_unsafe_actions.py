@@ -7,7 +7,13 @@ import numpy as np
 import pytest
 
 from mutator.model import Record
-from mutator.paper.unsafe_actions import Look, Pair, at_a_wrong_time, both_unavailable, brake_too_short
+from mutator.paper.unsafe_actions import (
+    FindSteps,
+    RunPair,
+    build_wrong_time_finder,
+    find_both_unavailable,
+    find_brake_too_short,
+)
 
 T = np.arange(0, 10, 0.1)
 NONE = np.zeros_like(T)
@@ -18,13 +24,15 @@ def during(begin: float, end: float) -> np.ndarray:
     return np.where((begin - 0.01 < T) & (end - 0.01 > T), 0.5, 0.0)
 
 
-def pair(golden: dict[str, np.ndarray], faulty: dict[str, np.ndarray]) -> Pair:
+def pair(golden: dict[str, np.ndarray], faulty: dict[str, np.ndarray]) -> RunPair:
     """Return two runs, with the activation at 2 s, an alert at 4 s and a hazard at 8 s."""
     none = {"gas": NONE, "brake": NONE}
-    return Pair(t=T, golden=none | golden, faulty=none | faulty, step_s=0.1, start=2.0, end=8.0, alert=4.0)
+    return RunPair(
+        times_s=T, golden=none | golden, faulty=none | faulty, step_s=0.1, start_s=2.0, end_s=8.0, alert_s=4.0
+    )
 
 
-def stretch(look: Look, given: Pair) -> tuple[float, float] | None:
+def stretch(look: FindSteps, given: RunPair) -> tuple[float, float] | None:
     """Return the times of the first and last step that show the action."""
     steps = look(given)
     return None if steps is None else (round(T[steps][0], 1), round(T[steps][-1], 1))
@@ -43,11 +51,11 @@ def test_braking_is_too_short_if_it_lasts_at_most_half_as_long(
     end: float, shown: tuple[float, float] | None
 ) -> None:
     given = pair({"brake": during(1, 6)}, {"brake": during(1, end)})
-    assert stretch(brake_too_short, given) == shown
+    assert stretch(find_brake_too_short, given) == shown
 
 
 def test_braking_is_not_too_short_if_the_golden_run_does_not_brake() -> None:
-    assert brake_too_short(pair({}, {})) is None
+    assert find_brake_too_short(pair({}, {})) is None
 
 
 @pytest.mark.parametrize(
@@ -64,8 +72,8 @@ def test_gas_that_the_golden_run_does_not_apply_is_at_a_wrong_time(
     begin: float, end: float, shown: tuple[float, float] | None
 ) -> None:
     given = pair({"gas": during(3, 4)}, {"gas": during(begin, end)})
-    assert stretch(at_a_wrong_time("gas"), given) == shown
-    assert at_a_wrong_time("brake")(given) is None
+    assert stretch(build_wrong_time_finder("gas"), given) == shown
+    assert build_wrong_time_finder("brake")(given) is None
 
 
 BOTH = {"gas": during(5, 7), "brake": during(1, 6)}
@@ -83,15 +91,15 @@ def test_gas_and_brake_are_unavailable_if_they_end_soon_after_the_alert(
     golden: dict[str, np.ndarray], last: float, shown: tuple[float, float] | None
 ) -> None:
     given = pair(golden, {"brake": during(1, last)})
-    assert stretch(both_unavailable, given) == shown
-    assert both_unavailable(replace(given, alert=None)) is None
+    assert stretch(find_both_unavailable, given) == shown
+    assert find_both_unavailable(replace(given, alert_s=None)) is None
 
 
 def test_runs_are_compared_up_to_the_end_of_the_shorter_one(record: Callable[..., Record]) -> None:
     found = record(hazards=(("H3", 4.0), ("H1", 5.0)), alerts=(("a", 3.5), ("b", 3.0)))
     long, short = {"t": T, "gas": NONE}, {"t": T[:70], "gas": NONE[:70]}
     for golden, faulty in ((long, short), (short, long)):
-        whole = Pair.of(golden, faulty, found, "t", 0.1, None)
-        assert {len(whole.t), len(whole.golden["gas"]), len(whole.faulty["gas"])} == {70}
-        assert (whole.start, whole.end, whole.alert) == (2.0, T[69], 3.5)
-        assert Pair.of(golden, faulty, found, "t", 0.1, "H1").end == 5.0
+        whole = RunPair.of(golden, faulty, found, "t", 0.1, None)
+        assert {len(whole.times_s), len(whole.golden["gas"]), len(whole.faulty["gas"])} == {70}
+        assert (whole.start_s, whole.end_s, whole.alert_s) == (2.0, T[69], 3.5)
+        assert RunPair.of(golden, faulty, found, "t", 0.1, "H1").end_s == 5.0

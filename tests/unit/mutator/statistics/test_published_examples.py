@@ -5,7 +5,7 @@ import math
 import pandas as pd
 import pytest
 
-from mutator.paper.measures import mean_time, of_difference, paired
+from mutator.paper.measures import estimate_of_difference, mean_time, paired
 from mutator.statistics import guided_against_random
 from mutator.statistics.guided_against_random import Stratum
 from mutator.statistics.paired_statistics import mcnemar, paired_times
@@ -90,8 +90,8 @@ def test_wilcoxon() -> None:
 
 def test_newcombe() -> None:
     """The example is in Newcombe, Statistics in Medicine 17 (1998) 873-890, table II, method 10."""
-    found = of_difference(share(56, 70), share(48, 80))
-    assert found.estimate == pytest.approx(0.2)
+    found = estimate_of_difference(share(56, 70), share(48, 80))
+    assert found.value == pytest.approx(0.2)
     assert (round(found.low, 4), round(found.high, 4)) == (0.0524, 0.3339)
 
 
@@ -112,7 +112,7 @@ def test_student() -> None:
     more = [1.2, 2.4, 1.3, 1.3, 0.0, 1.0, 1.8, 0.8, 4.6, 1.4]
     frame = results(*({"t_activation": 1.0, "t_manifest": 1.0 + hours} for hours in more))
     found = mean_time(frame, of="", start="t_activation", end="t_manifest")
-    assert found.estimate == pytest.approx(1.58)
+    assert found.value == pytest.approx(1.58)
     assert (found.low, found.high) == pytest.approx((0.7001142, 2.4598858), abs=1e-6)
 
 
