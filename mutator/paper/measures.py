@@ -92,7 +92,9 @@ def clustered_difference(runs: pd.DataFrame, *, of: str) -> Estimate:
 
 def stratified(runs: pd.DataFrame, *, of: str) -> Estimate:
     """Return the odds ratio of a hazard, guided against random, over all fault types (Mantel-Haenszel)."""
-    strata = guided_against_random.strata_with_both_methods(tally_by_fault_type(_select_runs(runs, of)), "injected")
+    strata = guided_against_random.strata_with_both_methods(
+        tally_by_fault_type(_select_runs(runs, of)), "injected"
+    )
     ratio = guided_against_random.mantel_haenszel(strata)
     types = counted(ratio.strata, "fault type")
     text = f"- ({types})"
@@ -118,7 +120,9 @@ def paired(runs: pd.DataFrame, *, of: str) -> Estimate:
     """
     from statsmodels.stats.proportion import proportion_confint  # type: ignore[import-untyped]
 
-    matched = guided_against_random.mcnemar_of_pairs(_select_runs(guided_against_random.matched_pairs(runs), of))
+    matched = guided_against_random.mcnemar_of_pairs(
+        _select_runs(guided_against_random.matched_pairs(runs), of)
+    )
     discordant = matched.first_only + matched.second_only
     low = high = estimate = math.nan
     if discordant:

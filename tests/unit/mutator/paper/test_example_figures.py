@@ -112,7 +112,9 @@ def test_a_missing_input_is_reported_instead_of_a_figure(place: Path) -> None:
     shutil.rmtree(place / "toy" / "tree")
     assert drawn(place, BRAKE).note.startswith("No figure: ")
     run = place / "run"
-    [nowhere] = build_example_drawings(RunFolder.open(run), load_usable_results(run / "results.csv"), None, [BRAKE])
+    [nowhere] = build_example_drawings(
+        RunFolder.open(run), load_usable_results(run / "results.csv"), None, [BRAKE]
+    )
     assert "no fault library" in nowhere.note
 
 
