@@ -37,9 +37,9 @@ from mutator.execution.cluster.cluster_choice import parse
 from mutator.execution.cluster.piece_queue import Board
 from mutator.execution.cluster.pieces import Ending, Piece, Result
 from mutator.store.checksummed_blocks import block_bytes
-from mutator.store.patch_files import packed_patches
+from mutator.store.patch_files import pack_patches
 from mutator.store.run_folder import RunFolder
-from mutator.store.series_packing import EXPERIMENT
+from mutator.store.series_packing import EXPERIMENT_BLOCK
 from mutator.store.work_stretches import Stretch
 from mutator.workspace import Workspace
 
@@ -144,8 +144,10 @@ def work(run: str, data: bytes) -> bytes:
         forked=True,
         records=tuple(line.replace(b"@", name.encode()) for name in piece.lines),
         timings=tuple(timing.replace(b"@", name.encode()) for name in piece.lines),
-        patches=packed_patches((name, patch) for name in piece.lines),
-        series=b"".join(block_bytes(EXPERIMENT, f"{name} {piece.golden}", series) for name in piece.lines),
+        patches=pack_patches((name, patch) for name in piece.lines),
+        series=b"".join(
+            block_bytes(EXPERIMENT_BLOCK, f"{name} {piece.golden}", series) for name in piece.lines
+        ),
     ).packed()
 
 

@@ -43,8 +43,8 @@ class Saved:
 def last_difference(golden: Series, faulty: Series) -> float:
     """Return the last time (s) at which a channel differs from the golden run, or -inf."""
     last = -math.inf
-    for number, (one, other) in enumerate(zip(golden.rows, faulty.rows, strict=True)):
-        times, known = faulty.times(number), golden.times(number)
+    for number, (one, other) in enumerate(zip(golden.channel_values, faulty.channel_values, strict=True)):
+        times, known = faulty.times_of(number), golden.times_of(number)
         rows = min(len(one), len(other))
         if len(one) != len(other) or not np.array_equal(times[:rows], known[:rows]):
             return math.inf  # a run of another length
@@ -62,11 +62,11 @@ def bound(folder: RunFolder, workspace: Workspace) -> tuple[Saved, float]:
     timings, records = folder.timings(), folder.records()
     digests: dict[Path, str] = {}
     saved, total = Saved(), 0.0
-    for experiment in plan_file.read_all(folder.path):
+    for experiment in plan_file.load_experiments(folder.path):
         record = records[experiment.id]
         cpu_s = timings[experiment.id]["cpu_s"]
         total += cpu_s
-        golden = folder.golden(experiment.scenario, experiment.changes)
+        golden = folder.golden_folder(experiment.scenario, experiment.changes)
         digests[golden] = digests.get(golden) or trace_digest(manifest, golden)
         if cpu_s and record.status is Status.OK and record.activation:
             kind, share = _saved(record, digests[golden], series)
@@ -76,10 +76,10 @@ def bound(folder: RunFolder, workspace: Workspace) -> tuple[Saved, float]:
 
 
 def _saved(record: Record, golden: str, series: SeriesFolder) -> tuple[str, float]:
-    found, active = series.read(record.experiment_id, record), record.activation
+    found, active = series.load_series(record.experiment_id, record), record.activation
     if found is None or active is None:
         return "without a series", 0.0
-    end = float(found[0].about["end"])
+    end = float(found[0].facts["end"])
     same = record.trace_digest == golden
     over = max(active.last, -math.inf if same else last_difference(*found))
     kind = "equal to the golden run throughout" if same else "equal to the golden run again"

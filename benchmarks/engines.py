@@ -65,7 +65,7 @@ class Bench:
         self._drive_goldens(ReferenceEngine(*arguments))
 
     def golden(self, experiment: Experiment) -> Path:
-        return self.folder / "golden" / GoldenRun.of(experiment, several_seeds=False).key
+        return self.folder / "golden" / GoldenRun.for_experiment(experiment, several_seeds=False).key
 
     def steps(self, experiment: Experiment) -> int:
         """Return the number of steps of every run that ends normally."""

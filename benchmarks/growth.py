@@ -110,10 +110,10 @@ def working(size: int, out: Path) -> dict[str, float]:
     manifest, models = workspace.manifest(folder.head.target), workspace.fault_models()
     lines = LineWriter(out / "records" / "0001-main.jsonl", {"schema": SCHEMA, "plan": folder.head.plan})
     began = process_time()
-    faults = plan_file.read_faults(out)
+    faults = plan_file.load_faults(out)
     number = 0
     for chunk in folder.head.chunks:
-        for experiment in plan_file.read_chunk(out, chunk, faults):
+        for experiment in plan_file.load_chunk(out, chunk, faults):
             build(manifest, models, experiment.fault, experiment.trigger)
             lines.append(asdict(record(experiment, number)))
             number += 1
@@ -144,7 +144,7 @@ def opening(size: int, out: Path) -> dict[str, float]:
     """Open and seal a finished run of that many experiments. Return the CPU times."""
     folder = written_run(size, out, bytes(PATCH_BYTES))
     head, data = folder.head, bytes(GOLDEN_BYTES)
-    goldens = [folder.golden(*golden) for golden in head.goldens]
+    goldens = [folder.golden_folder(*golden) for golden in head.goldens]
     paths = [golden / name for golden in goldens for name in head.golden_files]
     names = [path.relative_to(folder.path).as_posix() for path in paths]
     checks = b'{"schema": "checks/1", "results": []}'

@@ -39,12 +39,12 @@ from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.checksummed_blocks import block_bytes
 from mutator.store.file_digests import FileDigest
-from mutator.store.patch_files import _Packer
-from mutator.store.records import SCHEMA, line_of
+from mutator.store.patch_files import _PatchPacker
+from mutator.store.records import SCHEMA, record_as_json
 from mutator.store.run_folder import GoldenRun, RunFolder
-from mutator.store.series_folder import INDEX, Index, write_index
-from mutator.store.series_format import encode
-from mutator.store.series_script import name_of, write_script
+from mutator.store.series_folder import INDEX_NAME, SeriesIndex, save_index
+from mutator.store.series_format import encode_series
+from mutator.store.series_script import script_name_of, write_script
 from mutator.store.timings import TIMINGS_SCHEMA
 from mutator.store.work_stretches import Stretch
 from mutator.workspace import Workspace
@@ -55,7 +55,7 @@ KINDS = 480  # different records, used in turn
 PATCHES = 240  # different patches
 SERIES, SERIES_MOST = 48, 150_000  # different series; experiments with a series, limited to fit 500 MB
 WORKERS, PIECE = 2, 20  # number of files; consecutive experiments per file
-_WHOLE_EVERY = 256  # the first of this many patches is stored whole, as in mutator.store.patches
+_WHOLE_EVERY = 256  # the first of this many patches is stored whole, as in mutator.store.patch_files
 _NO_ID = "0" * 16
 
 
@@ -110,9 +110,9 @@ def planned(workspace: Workspace, size: int, out: Path) -> RunFolder:
 
 
 def _experiments(folder: RunFolder) -> Iterator[Experiment]:
-    faults = plan_file.read_faults(folder.path)
+    faults = plan_file.load_faults(folder.path)
     for chunk in folder.head.chunks:
-        yield from plan_file.read_chunk(folder.path, chunk, faults)
+        yield from plan_file.load_chunk(folder.path, chunk, faults)
 
 
 def goldens(workspace: Workspace, folder: RunFolder, experiments: Sequence[Experiment]) -> None:
@@ -121,14 +121,16 @@ def goldens(workspace: Workspace, folder: RunFolder, experiments: Sequence[Exper
     """
     manifest, run = workspace.manifest(folder.head.target), folder.path
     known, driven = {}, dict[GoldenRun, Path]()
-    for one in folder.goldens:
-        like, place = one._replace(seed=None), folder.golden(*one)
+    for one in folder.golden_runs:
+        like, place = one._replace(seed=None), folder.golden_folder(*one)
         place.parent.mkdir(exist_ok=True)
         if like in driven:
             shutil.copytree(driven[like], place)
         else:
             drives = (
-                e for e in (*experiments, folder.canary) if GoldenRun.of(e, several_seeds=False) == like
+                e
+                for e in (*experiments, folder.canary)
+                if GoldenRun.for_experiment(e, several_seeds=False) == like
             )
             with TemporaryDirectory(dir=run) as scratch:
                 limits = folder.limits
@@ -213,15 +215,15 @@ def _patch_of(count: int, patches: int) -> int:
 
 def _blocks(patches: Sequence[bytes]) -> list[tuple[int, bytes]]:
     """Return the first patch whole, and the others as differences from it."""
-    packer = _Packer()
-    return [packer.block(patch) for patch in patches]
+    packer = _PatchPacker()
+    return [packer.next_block(patch) for patch in patches]
 
 
 def _bodies(records: Sequence[Record], patches: Sequence[bytes]) -> list[Callable[[str, int], bytes]]:
     named = [digest(patch).encode() for patch in patches]
 
     def body(one: Record) -> Callable[[str, int], bytes]:
-        text = canonical(line_of(replace(one, patch="PATCH"))).encode()[1:]
+        text = canonical(record_as_json(replace(one, patch="PATCH"))).encode()[1:]
         before, after = text.split(_NO_ID.encode())
         between, end = after.split(b"PATCH")
         return lambda name, patch: b"".join((before, name.encode(), between, named[patch], end))
@@ -254,33 +256,33 @@ def write_series(
     """Write packed series: a few different ones, shared by the experiments that fit the budget."""
     manifest, place = workspace.manifest("openpilot"), folder.path / "series"
     place.mkdir()
-    first = folder.goldens[0]
-    golden = dict(load_trace(manifest, folder.golden(*first)))
+    first = folder.golden_runs[0]
+    golden = dict(load_trace(manifest, folder.golden_folder(*first)))
     sampler, draw = Sampler(manifest, golden), np.random.default_rng(1)
     names = [channel.name for channel in manifest.compared]
     made = [sampler.encoded]
     for number in range(SERIES):
         change = {name: golden[name] + draw.normal(size=len(golden[name])).cumsum() / 100 for name in names}
         made.append(
-            encode(
+            encode_series(
                 sampler.series(golden | change, record(experiments[number % len(experiments)], number)),
                 sampler.golden,
             )
         )
     data = b"".join(made)
-    write_script(place / f"{name_of(data)}.js", data)
+    write_script(place / f"{script_name_of(data)}.js", data)
     key, kept = first.key, ids[:SERIES_MOST]
-    index = Index(
+    index = SeriesIndex(
         plan=folder.head.plan,
-        chunks=((name_of(data), len(made)),),
-        sizes=tuple(map(len, made)),
-        goldens={key: 0},
-        entries={name: 1 + number % SERIES for number, name in enumerate(kept)},
-        golden_of=dict.fromkeys(kept, key),
-        left_out=len(ids) - len(kept),
+        chunks=((script_name_of(data), len(made)),),
+        entry_sizes=tuple(map(len, made)),
+        golden_entries={key: 0},
+        experiment_entries={name: 1 + number % SERIES for number, name in enumerate(kept)},
+        golden_by_experiment=dict.fromkeys(kept, key),
+        left_out_count=len(ids) - len(kept),
         budget_mb=500,
     )
-    write_index(place / f"{INDEX}.js", index)
+    save_index(place / f"{INDEX_NAME}.js", index)
 
 
 def main() -> int:

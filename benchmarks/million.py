@@ -157,7 +157,7 @@ def figures(sizes: list[int], rows: list[str], place: Path) -> dict[str, dict[in
     print(f"{'experiments':>12} {'':18}{'CPU s':>9}{'wall s':>9}{'MB':>8}{'us CPU each':>13}{'growth':>8}")
     for size in sizes:
         run = place / str(size)
-        if not (run / "run.json").exists() or not RunFolder.unverified(run).finished:
+        if not (run / "run.json").exists() or not RunFolder.open_unverified(run).is_finished:
             shutil.rmtree(run, ignore_errors=True)
             subprocess.run([sys.executable, made_up_run.__file__, str(size), str(run)], check=True)
         for row in rows:

@@ -34,7 +34,7 @@ from mutator.model import Experiment, Hold, Trigger  # noqa: E402
 from mutator.mutants.mutant_building import build  # noqa: E402
 from mutator.store.checksummed_lines import LineWriter  # noqa: E402
 from mutator.store.plan_choices import Choices  # noqa: E402
-from mutator.store.records import SCHEMA, line_of  # noqa: E402
+from mutator.store.records import SCHEMA, record_as_json  # noqa: E402
 from mutator.triggers.trigger_kinds import always  # noqa: E402
 from mutator.workspace import Workspace  # noqa: E402
 
@@ -98,7 +98,7 @@ class Bench:
             for finished in runner.run(some):
                 assert finished.mode == "fork" and finished.mutant, finished.record
                 (self.folder / "patch").write_bytes(finished.mutant.patch_bytes)
-                records.append(line_of(finished.record))
+                records.append(record_as_json(finished.record))
                 children += finished.cpu_s
             return children
 

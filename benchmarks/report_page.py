@@ -42,8 +42,8 @@ from mutator.review.patch_shapes import shapes
 from mutator.store.checksummed_lines import LineWriter
 from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
-from mutator.store.series_format import encode
-from mutator.store.series_packing import EncodedSeries, SeriesWriter, pack
+from mutator.store.series_format import encode_series
+from mutator.store.series_packing import EncodedSeries, SeriesWriter, pack_series
 from mutator.web import embedded
 from mutator.workspace import Workspace
 
@@ -123,13 +123,13 @@ def write_series(workspace: Workspace, records: Sequence[Record], out: Path) -> 
         faulty = golden | {
             name: golden[name] + np.concatenate((np.zeros(1000), change)) for name in names[:7]
         }
-        made.append(encode(sampler.series(faulty, one), sampler.golden))
+        made.append(encode_series(sampler.series(faulty, one), sampler.golden))
     writer = SeriesWriter(out, "0001-main")
     for number, one in enumerate(records):
-        data = EncodedSeries(key="S1", golden=sampler.encoded, faulty=made[number % len(made)])
+        data = EncodedSeries(golden_key="S1", golden=sampler.encoded, faulty=made[number % len(made)])
         writer.append(one.experiment_id, data)
     writer.close()
-    pack(out, "plan", {one.experiment_id: number for number, one in enumerate(records)}, 500)
+    pack_series(out, "plan", {one.experiment_id: number for number, one in enumerate(records)}, 500)
     return (out / "series" / "index.js").stat().st_size / 1000
 
 

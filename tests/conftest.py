@@ -34,7 +34,7 @@ from mutator.mutants.anchors import ParsedFile, parsed
 from mutator.store import file_digests
 from mutator.store.checksummed_lines import LineWriter, read_segment
 from mutator.store.file_digests import FileDigest
-from mutator.store.patch_files import Patches, PatchWriter, rewrite
+from mutator.store.patch_files import PatchFolder, PatchWriter, rewrite_patch_file
 from mutator.store.plan_choices import Choices
 from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
@@ -282,10 +282,10 @@ def put_patches() -> Callable[[Path, Mapping[str, bytes | None]], None]:
     """Replace or remove the patches of experiments in a run folder."""
 
     def put(run: Path, given: Mapping[str, bytes | None]) -> None:
-        found = Patches(run)
-        [path] = found.files()
+        found = PatchFolder(run)
+        [path] = found.block_files()
         patches = {name: found.read(name) for name in found} | given
-        rewrite(path, [(name, data) for name, data in patches.items() if data is not None])
+        rewrite_patch_file(path, [(name, data) for name, data in patches.items() if data is not None])
 
     return put
 
@@ -368,7 +368,7 @@ def write_finished(write_run: Callable[..., Path]) -> Callable[..., Path]:
     def write(workspace: Workspace, out: Path, **given: Any) -> Path:
         patch = b"diff --git a/a.py b/a.py\n"
         write_run(workspace, out, lambda experiment: {"patch": file_digests.digest(patch)}, **given)
-        folder = RunFolder.unverified(out)
+        folder = RunFolder.open_unverified(out)
         lines = [line for _, line in read_segment(out / "records" / "0001-a.jsonl").objects(SCHEMA)]
         patches = PatchWriter(out, "0001-a")
         for line in lines:
@@ -384,7 +384,7 @@ def write_finished(write_run: Callable[..., Path]) -> Callable[..., Path]:
             writer.close()
         new = {"checks.json": b'{"schema": "checks/1", "results": [], "goldens": {}}'}
         for scenario, changes in folder.head.goldens:
-            place = folder.golden(scenario, tuple(changes)).relative_to(folder.path)
+            place = folder.golden_folder(scenario, tuple(changes)).relative_to(folder.path)
             new |= {f"{place}/{name}": name.encode() for name in folder.head.golden_files}
         with file_digests.rewriting_files(
             out, {name: FileDigest.of_bytes(data) for name, data in new.items()}

@@ -41,4 +41,4 @@ HEAD = RunHead(
 
 def made_head(**changes: object) -> dict[str, Any]:
     """Return the content of run.json with some keys changed."""
-    return HEAD.content() | changes
+    return HEAD.as_json() | changes

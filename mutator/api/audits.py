@@ -20,7 +20,7 @@ from mutator.errors import CheckFailed, MutatorError
 from mutator.execution.spot_check import drawn, driven_again
 from mutator.report.report_audit import pages
 from mutator.store.run_folder import RunFolder
-from mutator.store.work_stretches import package_versions, told
+from mutator.store.work_stretches import describe_stretches, package_versions
 from mutator.workspace import Workspace
 
 SHOWN = 20  # differences listed in the text of an audit
@@ -113,7 +113,7 @@ def verify(
     check_whole("rerun", rerun)
     for name, value in (("expect", expect), ("expect_review", expect_review)):
         _check_digest(name, value)
-    folder = RunFolder.unverified(Path(run))
+    folder = RunFolder.open_unverified(Path(run))
     found = _workspace(workspace)
     checks = audit_checks(folder, found)
     facts = _facts(folder)
@@ -227,10 +227,10 @@ def _facts(folder: RunFolder) -> dict[str, str]:
     return {
         "run": folder.path.name,
         "campaign": f"{head.campaign} of {head.target}, {head.reading}, seed {head.seed}",
-        "experiments": f"{folder.planned}{f' of shard {folder.shard}' if folder.shard else ''}",
+        "experiments": f"{folder.planned_count}{f' of shard {folder.shard}' if folder.shard else ''}",
         "plan": head.plan,
         **{f"digest of {name}": value for name, value in head.sources.items()},
         "mutator": head.provenance.mutator,
-        "python": told(folder.stretches).get("python", "none"),
+        "python": describe_stretches(folder.stretches).get("python", "none"),
         **({"packages": f"{len(packages)}, with digest {digest(packages)}"} if packages else {}),
     }

@@ -71,7 +71,7 @@ class Run(RunContents):
 
     def __repr__(self) -> str:
         head = self.folder.head
-        done = f"{sum(self.endings.values())} of {self.folder.planned} experiments"
+        done = f"{sum(self.endings.values())} of {self.folder.planned_count} experiments"
         failed = len(self.harness_errors)
         errors = f", {failed} with a HARNESS ERROR" if failed else ""
         return f"<Run {self.path.name}: {done} of {head.campaign}, {head.reading}{errors}>"
@@ -149,7 +149,7 @@ class Run(RunContents):
             raise MutatorError(f"seed {seed}", argument="seed", expected=seeds_text(seeds))
         several = seeds[0] if seed is None else seed
         wanted = GoldenRun(scenario, changes or (), several if len(seeds) > 1 else None)
-        folder = self.folder.golden(*wanted)
+        folder = self.folder.golden_folder(*wanted)
         if not folder.is_dir():
             known = sorted(path.name for path in (self.path / "golden").glob("*"))
             raise MutatorError(

@@ -18,7 +18,7 @@ from mutator.outcomes.golden_comparison import Trace
 from mutator.outcomes.series_sampling import sampled_traces
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
-from mutator.store.series_folder import SeriesFolder, making_again
+from mutator.store.series_folder import SeriesFolder, rerun_command
 from mutator.store.work_stretches import Stretch
 from mutator.targets.contact_severity import Scale
 from mutator.targets.manifest import TargetManifest
@@ -67,12 +67,12 @@ class StoredRun:
     @cached_property
     def faults(self) -> dict[str, Fault]:
         """The planned faults by id: value, aim, and what is injected where."""
-        return plan_file.read_faults(self.path)
+        return plan_file.load_faults(self.path)
 
     @cached_property
     def experiments(self) -> dict[str, Experiment]:
         """The planned experiments by id, in plan order."""
-        return {e.id: e for e in plan_file.read_all(self.path)}
+        return {e.id: e for e in plan_file.load_experiments(self.path)}
 
     @cached_property
     def records(self) -> Mapping[str, Record]:
@@ -93,7 +93,7 @@ class StoredRun:
 
     def _find(self, id: str) -> str:
         check_type("id", id, str, "the id of an experiment, or the start of one")
-        return self.folder.find(id)
+        return self.folder.experiment_id_from(id)
 
 
 def stored_run(path: Path, workspace: Workspace | None = None) -> StoredRun:
@@ -118,7 +118,7 @@ class StoredExperiment(ExperimentResult):
     @property
     def scale(self) -> Scale | None:
         """The severity scale that the run was planned with."""
-        return self.run.folder.scale
+        return self.run.folder.severity_scale
 
     @property
     def stretch(self) -> Stretch | None:
@@ -166,8 +166,8 @@ class StoredExperiment(ExperimentResult):
     def _load_traces(self) -> tuple[Trace, Trace]:
         if self.record is None:
             raise self.not_run()
-        found = SeriesFolder(self.run.path).read(self.id, self.record)
+        found = SeriesFolder(self.run.path).load_series(self.id, self.record)
         if found is None:
-            remedy = f"rerun the experiment: {making_again(self.run.path, self.id)}"
+            remedy = f"rerun the experiment: {rerun_command(self.run.path, self.id)}"
             raise MutatorError(f"no series of {self.id}", where=self.run.path, remedy=remedy)
         return sampled_traces(*found, self._target().time_channel)

@@ -24,4 +24,4 @@ def worst_results(run: Path, only: str | None = None, limit: int | None = None) 
         rows = (row for first in batches for row in cells_by_row(frame.iloc[first : first + _BATCH]))
         fits = [accepts({name: None if cell == "" else cell for name, cell in row.items()}) for row in rows]
         order = [row for row in order if fits[row]]
-    return rows_of(frame.iloc[order[:limit]], plan_file.read_faults(run)), len(order)
+    return rows_of(frame.iloc[order[:limit]], plan_file.load_faults(run)), len(order)

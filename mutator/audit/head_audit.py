@@ -28,7 +28,7 @@ _REMEDY = "verify with the library of the run"
 
 def facts_of_target(folder: RunFolder, workspace: Workspace, manifest: TargetManifest) -> Problems:
     """Yield what run.json says about the target and its hazards, but the library does not."""
-    keys = {run_key(manifest, experiment) for experiment in plan_file.iterate(folder.path)}
+    keys = {run_key(manifest, experiment) for experiment in plan_file.iterate_experiments(folder.path)}
     follows = replace(folder.head, runs=len(keys), **vars(target_facts(workspace, manifest)))
     for key, found, value in folder.head.differences(follows):
         yield MutatorError(
@@ -42,7 +42,7 @@ def facts_of_target(folder: RunFolder, workspace: Workspace, manifest: TargetMan
 def seeds_and_sessions(folder: RunFolder) -> Problems:
     """Yield experiments of another seed or reading than run.json states, and records of no session."""
     path = folder.path / plan_file.EXPERIMENTS
-    for number, experiment in enumerate(plan_file.iterate(folder.path), start=1):
+    for number, experiment in enumerate(plan_file.iterate_experiments(folder.path), start=1):
         if experiment.seed not in folder.seeds:
             yield MutatorError(
                 f"seed {experiment.seed}", where=path, line=number, expected=_of(folder, "seed")
@@ -66,7 +66,7 @@ def seeds_and_sessions(folder: RunFolder) -> Problems:
 
 def chunks_of(folder: RunFolder) -> tuple[plan_file.Chunk, ...]:
     """Return the offset, length and number of experiments of each chunk, for the numbers in run.json."""
-    lines = plan_file.lines_of(folder.path / plan_file.EXPERIMENTS)
+    lines = plan_file.read_lines(folder.path / plan_file.EXPERIMENTS)
     found, offset = [], 0
     for *_, count in folder.head.chunks:
         length = sum(map(len, islice(lines, count)))
@@ -82,7 +82,7 @@ def checks(folder: RunFolder) -> Problems:
         return
     said = read_json(path, CHECKS_SCHEMA)
     known = {result["name"] for result in said["results"]}
-    keys = [one.key for one in folder.goldens]
+    keys = [one.key for one in folder.golden_runs]
     wanted = ["anchors", "canary", *(f"{kind} {key}" for key in keys for kind in ("golden", "null mutant"))]
     if missing := [name for name in wanted if name not in known]:
         yield MutatorError(f"no check `{missing[0]}`", where=path, expected="the checks of all golden runs")
@@ -104,15 +104,15 @@ def checks(folder: RunFolder) -> Problems:
 def idle_runs(folder: RunFolder, manifest: TargetManifest, records: Sequence[Recorded]) -> Problems:
     """Yield golden runs with other bytes than the runs in which no fault was active, which do the same."""
     idle: dict[str, list[Recorded]] = {}
-    experiments = {experiment.id: experiment for experiment in plan_file.iterate(folder.path)}
+    experiments = {experiment.id: experiment for experiment in plan_file.iterate_experiments(folder.path)}
     for one in records:
         planned = experiments.get(one.record.experiment_id)
         if planned is not None and one.record.outcome is Outcome.NOT_ACTIVATED:
-            idle.setdefault(folder.golden_of(planned).key, []).append(one)
-    for golden in folder.goldens:
+            idle.setdefault(folder.golden_run_of(planned).key, []).append(one)
+    for golden in folder.golden_runs:
         if golden.key not in idle:
             continue
-        found = trace_digest(manifest, folder.golden(*golden))
+        found = trace_digest(manifest, folder.golden_folder(*golden))
         others = [one for one in idle.get(golden.key, ()) if one.record.trace_digest != found]
         if others:
             yield others[0].difference(
@@ -123,7 +123,7 @@ def idle_runs(folder: RunFolder, manifest: TargetManifest, records: Sequence[Rec
 
 def engines(folder: RunFolder, records: Sequence[Recorded]) -> Problems:
     """Yield an experiment of which nothing says how it ran, if there is no proof."""
-    if not folder.finished or (folder.path / "proof").is_dir():
+    if not folder.is_finished or (folder.path / "proof").is_dir():
         return
     known = folder.timings()
     lost = [one for one in records if one.record.experiment_id not in known]

@@ -17,7 +17,7 @@ from mutator.outcomes.verdict_rules import Events, judge
 from mutator.preflight import equivalence_check
 from mutator.store import plan_file
 from mutator.store.checksummed_lines import read_segment
-from mutator.store.records import record_from
+from mutator.store.records import record_from_json
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import RunHead
 from mutator.targets.manifest import TargetManifest
@@ -44,7 +44,7 @@ def recorded(folder: RunFolder, kind: str) -> list[Recorded]:
         segment = read_segment(path)
         for number in segment.lines:
             try:
-                record = record_from(segment.content(number))
+                record = record_from_json(segment.content(number))
             except (
                 MutatorError,
                 KeyError,
@@ -63,7 +63,7 @@ def mutants(
     """Rebuild the mutants. Yield an error for each record with another tree or patch, and for each stored
     patch that differs, is missing, or belongs to no experiment.
     """
-    experiments = {experiment.id: experiment for experiment in plan_file.read_all(folder.path)}
+    experiments = {experiment.id: experiment for experiment in plan_file.load_experiments(folder.path)}
     built: dict[tuple[str, Trigger], tuple[str, str]] = {}
     for one in records:
         if (experiment := experiments.get(one.record.experiment_id)) is None:
@@ -81,16 +81,16 @@ def mutants(
         if found != patch:
             name = one.record.experiment_id
             got = f"a patch of {name} with SHA-256 {found[:16]}" if found else f"no patch of {name}"
-            where = folder.patches.file(one.record.experiment_id)
+            where = folder.patches.file_of(one.record.experiment_id)
             none = "no patch, because the mutant cannot be built"
             expected = f"the mutant's patch, {patch[:16]}" if patch else none
             yield MutatorError(got, where=where, expected=expected)
     known = {one.record.experiment_id for one in records}
-    for name in folder.patches if folder.finished else ():
+    for name in folder.patches if folder.is_finished else ():
         if name not in known:
             got, where = (
                 f"a patch of {name}, which is not an experiment of this run",
-                folder.patches.file(name),
+                folder.patches.file_of(name),
             )
             yield MutatorError(got, where=where, expected="patches only of experiments that ran")
 
@@ -222,7 +222,7 @@ def proof(
         if one.record.experiment_id not in sampled:
             yield one.difference("in the proof", "only experiments of the sample that the plan determines")
     missing = sorted(sampled - {one.record.experiment_id for one in proven})
-    if folder.finished and missing:
+    if folder.is_finished and missing:
         yield MutatorError(
             f"no record of {missing[0]}", where=place, expected="a record of each sampled experiment"
         )

@@ -120,8 +120,8 @@ def _files(folder: RunFolder) -> int:
 
 
 def _content(folder: RunFolder) -> Problems:
-    yield from folder.problems(anew=True)
-    for path in filter(Path.is_file, folder.patches.files()):
+    yield from folder.problems(ignore_cache=True)
+    for path in filter(Path.is_file, folder.patches.block_files()):
         if read_blocks(path).is_damaged:
             yield MutatorError(
                 "damaged blocks",
@@ -136,7 +136,7 @@ def _plan(folder: RunFolder) -> Problems:
     both.
     """
     run, head = folder.path, folder.head
-    yield from plan_file.problems(run)
+    yield from plan_file.plan_problems(run)
     plan = load_plan(folder)
     campaign = plan.campaign
     follows = replace(
@@ -149,7 +149,7 @@ def _plan(folder: RunFolder) -> Problems:
         target=campaign.target,
         chunks=chunks_of(folder),
         limits=campaign.limits,
-        goldens=tuple(one.stored() for one in plan.goldens()),
+        goldens=tuple(one.to_stored() for one in plan.goldens()),
         canary_hazard=campaign.canary.hazard,
     )
     for key, found, value in head.differences(follows):

@@ -34,8 +34,8 @@ from mutator.store.allowed_contents import DAMAGED_FOLDER
 from mutator.store.checksummed_blocks import read_blocks
 from mutator.store.checksummed_lines import Segment, line_file_bytes, read_segment
 from mutator.store.file_digests import DigestLedger, FileDigest
-from mutator.store.patch_files import rewrite
-from mutator.store.records import LINE_SCHEMAS
+from mutator.store.patch_files import rewrite_patch_file
+from mutator.store.records import LINE_SCHEMA_BY_FOLDER
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -104,7 +104,7 @@ def _files(folder: RunFolder, ledger: DigestLedger) -> Iterator[_Change]:
 
 def _lost_patches(folder: RunFolder) -> list[str]:
     """Planned experiments whose stored patch does not match their record."""
-    lost, planned = [], folder.share()
+    lost, planned = [], folder.planned_positions()
     for one in recorded(folder, "records"):
         if one.record.experiment_id not in planned:
             continue
@@ -120,7 +120,7 @@ def _drop_patches(folder: RunFolder, lost: Collection[str]) -> list[str]:
     file with damaged blocks. Other patches in these files are kept.
     """
     run, patches, said = folder.path, folder.patches, []
-    for path in patches.files():
+    for path in patches.block_files():
         name = path.relative_to(run).as_posix()
         if not path.is_file():
             _put_aside(run, name)
@@ -133,15 +133,15 @@ def _drop_patches(folder: RunFolder, lost: Collection[str]) -> list[str]:
         if found.is_damaged:
             said.append(f"{name}: damaged blocks set aside")
         kept = ((one, patches.read(one)) for one in names if one not in lost)
-        rewrite(path, [(one, data) for one, data in kept if data is not None])
+        rewrite_patch_file(path, [(one, data) for one, data in kept if data is not None])
     return said
 
 
 def _segments(folder: RunFolder, ledger: DigestLedger, lost: Collection[str]) -> Iterator[_Change]:
     """Segments with invalid lines, and their remaining content."""
-    run, planned = folder.path, folder.share()
+    run, planned = folder.path, folder.planned_positions()
     strangers = set(integrity.unexpected_files(run, ledger)) if ledger.finished else set()
-    for kind, schema in LINE_SCHEMAS.items():
+    for kind, schema in LINE_SCHEMA_BY_FOLDER.items():
         done: set[str] = set()
         for path in sorted({*(run / kind).glob("*.jsonl")} - strangers):
             name = path.relative_to(run).as_posix()

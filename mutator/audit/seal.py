@@ -26,10 +26,10 @@ from mutator.store.approvals import review_digest
 from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.checksummed_lines import bare_segment, intact_lines
-from mutator.store.records import ending_on
+from mutator.store.records import parse_ending
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN, HEAD
-from mutator.store.work_stretches import told
+from mutator.store.work_stretches import describe_stretches
 
 SCHEMA, RESULTS_SCHEMA = "seal/2", "results-digest/2"
 _RUNS_SCHEMA = "results-digest/1"  # of the plan and its runs, as the seal includes them
@@ -67,9 +67,9 @@ class Seals:
 def seals_of(folder: RunFolder) -> Seals:
     """Compute the digests of a run folder from its content."""
     review = review_digest(folder.path)
-    if not folder.finished:
+    if not folder.is_finished:
         return Seals(review_digest=review)
-    head, goldens = folder.head.content(), golden_files(folder)
+    head, goldens = folder.head.as_json(), golden_files(folder)
     runs = digest([_RUNS_SCHEMA, folder.head.plan, goldens, _records(folder, "records")])
     results = digest(
         [
@@ -112,7 +112,9 @@ def unsealed_facts(folder: RunFolder) -> dict[str, str]:
     """
     choices = folder.head.choices
     chosen = {"chosen: shard": choices.shard, "chosen: series_mb": choices.series_mb}
-    environment = {name: text for name, text in told(folder.stretches).items() if name != "python"}
+    environment = {
+        name: text for name, text in describe_stretches(folder.stretches).items() if name != "python"
+    }
     approvals = {"approvals": _APPROVALS} if review_digest(folder.path) else {}
     made = {name: str(value) for name, value in chosen.items() if value}
     return {**environment, **made, **approvals, "other files": _UNSEALED_FILES}
@@ -121,8 +123,8 @@ def unsealed_facts(folder: RunFolder) -> dict[str, str]:
 def golden_digests(folder: RunFolder, names: Sequence[str]) -> dict[str, str]:
     """Digest of each golden run's files `names` (trace and record)."""
     found = {}
-    for one in folder.goldens:
-        place = folder.golden(*one)
+    for one in folder.golden_runs:
+        place = folder.golden_folder(*one)
         files = [digest(read_bounded(inside(place, name))) for name in names]
         found[one.key] = digest(files)
     return found
@@ -152,7 +154,7 @@ def _records(
     for path in sorted(inside(folder.path, kind).glob("*.jsonl")):
         segment = bare_segment(path)
         for number, line in intact_lines(path):
-            if number > 1 and (ending := ending_on(line)).counts:
+            if number > 1 and (ending := parse_ending(line)).is_final:
                 found[ending.experiment_id] = digest(sealed(segment.without_checksum(line)))
     return found
 

@@ -13,9 +13,9 @@ from mutator.errors import MutatorError
 from mutator.outcomes.hazards_and_metrics import load_channels
 from mutator.outcomes.series_sampling import Sampler
 from mutator.store.run_folder import RunFolder
-from mutator.store.series_folder import INDEX, Index, SeriesFolder, making_again
-from mutator.store.series_packing import SUFFIX, pack_again
-from mutator.store.series_script import name_of, script_of
+from mutator.store.series_folder import INDEX_NAME, SeriesFolder, SeriesIndex, rerun_command
+from mutator.store.series_packing import SUFFIX, repack_series
+from mutator.store.series_script import script_bytes, script_name_of
 from mutator.workspace import Workspace
 
 
@@ -29,7 +29,7 @@ def repair_series(
     run, there = folder.path, SeriesFolder(folder.path)
     paths = {Path(problem.where) for problem in series(folder)[1] if problem.where}
     index = None
-    if there.path / f"{INDEX}.js" in paths:  # the content of the chunks is unknown
+    if there.path / f"{INDEX_NAME}.js" in paths:  # the content of the chunks is unknown
         paths |= {*there.path.glob("*.js")}
     elif paths:
         index = there.index
@@ -41,19 +41,21 @@ def repair_series(
         if path.suffix == SUFFIX:
             yield f"{name}: damaged blocks set aside; `mutator run` packs the others"
         elif index and (data := _golden_chunk(folder, workspace, index, path.stem)):
-            write_below(run, name, script_of(path.stem, data))
+            write_below(run, name, script_bytes(path.stem, data))
             yield f"{name} rebuilt from the golden runs"
         else:
             unlink_below(run, name)
-            yield f"{name} {found}: {making_again(run)} recreates the series of an experiment"
+            yield f"{name} {found}: {rerun_command(run)} recreates the series of an experiment"
     if index:
-        pack_again(run, index)
+        repack_series(run, index)
 
 
-def _golden_chunk(folder: RunFolder, workspace: Workspace | None, index: Index, name: str) -> bytes | None:
+def _golden_chunk(
+    folder: RunFolder, workspace: Workspace | None, index: SeriesIndex, name: str
+) -> bytes | None:
     """Return the rebuilt content of a chunk of golden series, if that is still possible."""
-    keys = {number: key for key, number in index.goldens.items()}
-    numbers = [number for number, (chunk, _) in enumerate(index.places) if chunk == name]
+    keys = {number: key for key, number in index.golden_entries.items()}
+    numbers = [number for number, (chunk, _) in enumerate(index.entry_places) if chunk == name]
     if workspace is None or not keys.keys() >= {*numbers}:
         return None
     try:
@@ -64,4 +66,4 @@ def _golden_chunk(folder: RunFolder, workspace: Workspace | None, index: Index, 
     except MutatorError:
         return None
     data = b"".join(Sampler(manifest, golden).encoded for golden in goldens)
-    return data if name_of(data) == name else None
+    return data if script_name_of(data) == name else None

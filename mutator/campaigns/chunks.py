@@ -6,7 +6,7 @@ from itertools import islice
 
 from mutator.model import Experiment, Record
 from mutator.store import plan_file
-from mutator.store.records import endings
+from mutator.store.records import endings_of
 from mutator.store.run_folder import RunFolder
 
 
@@ -44,7 +44,7 @@ def pending(folder: RunFolder, records: Mapping[str, Record]) -> tuple[Pending, 
 
     Experiments to run are those without a record, and harness errors, which are retried.
     """
-    done = {one.experiment_id for one in endings(records) if one.counts}
+    done = {one.experiment_id for one in endings_of(records) if one.is_final}
     names = plan_file.ids(folder.path) if done else None
     shard = folder.shard
     left: list[Pending] = []
@@ -53,6 +53,6 @@ def pending(folder: RunFolder, records: Mapping[str, Record]) -> tuple[Pending, 
             places = tuple(range(count))
         else:
             places = tuple(i for i in range(count) if next(names) not in done)
-        if places and (shard is None or shard.has(index)):
+        if places and (shard is None or shard.has_chunk(index)):
             left.append(Pending(index, places))
     return tuple(left)

@@ -100,7 +100,7 @@ def freeze_owned(plan: Plan | Planning, out: Path, workspace: Workspace) -> tupl
         check_sources(out, folder.head.sources, _sources(tally, plan, workspace))
         return folder, tally
     tally, found, places, files = _written(plan, out)
-    head = _head(plan, tally, found, workspace, places).as_json()
+    head = _head(plan, tally, found, workspace, places).file_bytes()
     file_digests.save_ledger(out, DigestLedger(files=files | {HEAD: FileDigest.of_bytes(head)}))
     write_atomic(out / HEAD, head)  # last, because this file makes the folder a run folder
     return RunFolder.open(out), tally
@@ -120,7 +120,7 @@ def _written(
     plan: Plan | Planning, out: Path
 ) -> tuple[Tally, str, list[plan_file.Chunk], dict[str, FileDigest]]:
     """Write the plan's files part by part; return totals, digest, chunk positions and file digests."""
-    plan_file.make_folder(out)
+    plan_file.create_plan_folder(out)
     write_atomic(out / CAMPAIGN, plan.campaign.source)
     with ExitStack() as stack:
         rows, lines, faults = (
@@ -141,7 +141,7 @@ def _written(
         plan_file.EXPERIMENTS: lines.digest,
         plan_file.FAULTS: faults.digest,
     }
-    return tally, found, writer.places, files
+    return tally, found, writer.chunks, files
 
 
 def _sources(tally: Tally, plan: Plan | Planning, workspace: Workspace) -> dict[str, str]:
@@ -153,7 +153,7 @@ def _head(
     plan: Plan | Planning, tally: Tally, found: str, workspace: Workspace, chunks: list[plan_file.Chunk]
 ) -> RunHead:
     manifest = workspace.manifest(plan.campaign.target)
-    canary = plan_file.to_plain(plan.canary) | {"fault": plain(plan.canary.fault)}
+    canary = plan_file.experiment_as_json(plan.canary) | {"fault": plain(plan.canary.fault)}
     return RunHead(
         schema=SCHEMA,
         plan=found,
@@ -170,7 +170,7 @@ def _head(
         runs=tally.runs,
         limits=plan.campaign.limits,
         **vars(target_facts(workspace, manifest)),
-        goldens=tuple(one.stored() for one in tally.needed()),
+        goldens=tuple(one.to_stored() for one in tally.needed()),
         canary=canary,
         canary_hazard=plan.campaign.canary.hazard,
         sources=_sources(tally, plan, workspace),

@@ -208,7 +208,7 @@ class Planning:
         )
 
     def _check_shards(self, chunks: int) -> None:
-        if self.choices.shard is not None and Shard.parse(self.choices.shard).of > chunks:
+        if self.choices.shard is not None and Shard.parse(self.choices.shard).shard_count > chunks:
             raise MutatorError(
                 self.choices.shard,
                 argument="shard",
@@ -285,7 +285,7 @@ def load_plan(folder: RunFolder, tally: Tally | None = None) -> Plan:
         reading=head.reading,
         experiments=plan_file.ExperimentsInOrder(folder.path, head.chunks)
         if large
-        else plan_file.read_all(folder.path),
+        else plan_file.load_experiments(folder.path),
         chunks=tuple(count for _, _, count in head.chunks),
         canary=folder.canary,
         runs=head.runs,

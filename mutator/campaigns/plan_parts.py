@@ -47,11 +47,11 @@ class Tally:
         for one in part.experiments:
             fault = one.fault
             self.groups[fault.module, fault.fault_type, one.method.value] += 1
-            self.goldens.setdefault(GoldenRun.of(one, several_seeds=self.several_seeds))
+            self.goldens.setdefault(GoldenRun.for_experiment(one, several_seeds=self.several_seeds))
             self.variants[fault.spec] = fault
 
     def needed(self) -> tuple[GoldenRun, ...]:
-        own = GoldenRun.of(self.canary, several_seeds=self.several_seeds)
+        own = GoldenRun.for_experiment(self.canary, several_seeds=self.several_seeds)
         return tuple(dict.fromkeys((*self.goldens, own)))
 
 

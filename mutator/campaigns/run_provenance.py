@@ -17,7 +17,7 @@ from mutator.store import file_digests
 from mutator.store.check_results import loaded_packages
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import HEAD, SCHEMA
-from mutator.store.work_stretches import Machine, Stretch, differences
+from mutator.store.work_stretches import Machine, Stretch, version_differences
 
 if TYPE_CHECKING:
     from mutator.workspace import Workspace
@@ -58,7 +58,7 @@ def check_versions(folder: RunFolder, *, accept: bool = False) -> tuple[str, ...
     """
     if not folder.stretches:
         return ()
-    found = differences(folder.stretches[-1], run_environment.python(), _packages(folder))
+    found = version_differences(folder.stretches[-1], run_environment.python(), _packages(folder))
     if found and not accept:
         raise other_versions(folder.path, "this run used", found)
     return found
@@ -124,5 +124,5 @@ def add_machine(folder: RunFolder, machine: Machine) -> RunFolder:
 
 def _with_stretches(folder: RunFolder, stretches: tuple[Stretch, ...]) -> RunFolder:
     """Write run.json with these stretches of work, and return the folder as it is then."""
-    file_digests.rewrite_file(folder.path, HEAD, replace(folder.head, stretches=stretches).as_json())
+    file_digests.rewrite_file(folder.path, HEAD, replace(folder.head, stretches=stretches).file_bytes())
     return RunFolder(folder.path)

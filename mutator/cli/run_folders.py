@@ -63,7 +63,7 @@ def merge(
     terminal = Terminal(as_json)
     with terminal.wait("merging"):
         merged = mutator.merge_runs(shards, out, accept_versions=accept_versions)
-        planned, seals = merged.folder.planned, merged.seals
+        planned, seals = merged.folder.planned_count, merged.seals
     if as_json:
         counts = {"run": str(out), "shards": len(shards), "experiments": planned}
         terminal.emit(counts | asdict(seals))

@@ -63,7 +63,9 @@ def load_compared_run(run: Path, only: str | None = None) -> ComparedRun:
     records = folder.records()
     equivalence_check.judge(folder, records)
     accepts = compile_filter(only, PLAN_COLUMNS) if only else None
-    experiments = tuple(e for e in plan_file.read_all(folder.path) if accepts is None or accepts(plan_row(e)))
+    experiments = tuple(
+        e for e in plan_file.load_experiments(folder.path) if accepts is None or accepts(plan_row(e))
+    )
     faults = {e.fault.id: e.fault for e in experiments}
     return ComparedRun(
         folder=folder,

@@ -8,8 +8,8 @@ from mutator._common.hashing import plain
 from mutator.comparison.compared_runs import ComparedRun
 from mutator.comparison.pairs import ExperimentMatching, ExperimentPair
 from mutator.store.run_folder import RunFolder
+from mutator.store.work_stretches import describe_stretches as ran_with
 from mutator.store.work_stretches import package_versions
-from mutator.store.work_stretches import told as ran_with
 
 _SHOWN_DIGEST_DIGITS = 12  # shown digits of a digest
 _HEAD_FIELDS = ("campaign", "target", "seed", "reading")
@@ -53,7 +53,7 @@ def _facts_of_run(side: ComparedRun) -> dict[str, str]:
     values["setting"] = ", ".join(dict.fromkeys(c for e in side.experiments for c in e.setting)) or "-"
     values["chosen"] = ", ".join(f"{k} {v}" for k, v in plain(head.choices).items() if v is not None) or "-"
     values |= {f"digest of {name}": value[:_SHOWN_DIGEST_DIGITS] for name, value in head.sources.items()}
-    if scale := side.folder.scale:
+    if scale := side.folder.severity_scale:
         bounds = ", ".join(f"{name} from {least:.3g} m/s" for name, least, _ in scale.classes[1:])
         values["scale of severity"] = f"{scale.name}: {bounds}"
     values["digest of plan"] = head.plan[:_SHOWN_DIGEST_DIGITS]
@@ -110,7 +110,7 @@ def campaign_parts_remark(a: ComparedRun, b: ComparedRun) -> str:
 
 
 def severity_remarks(a: ComparedRun, b: ComparedRun) -> tuple[str, ...]:
-    scales = [side.folder.scale for side in (a, b)]
+    scales = [side.folder.severity_scale for side in (a, b)]
     if None in scales:
         (unclassified,) = [s for s, scale in zip((a, b), scales, strict=True) if not scale][:1]
         return (

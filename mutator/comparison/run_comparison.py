@@ -173,7 +173,9 @@ def compare_runs(
     Raise MutatorError if no experiment has a partner, and CheckFailed if a run's equivalence check failed.
     """
     a, b = load_compared_run(run_a, only), load_compared_run(run_b, only)
-    scale = b.folder.scale if a.folder.scale else None  # classify both runs by the same scale, or neither
+    scale = (
+        b.folder.severity_scale if a.folder.severity_scale else None
+    )  # classify both runs by the same scale, or neither
     a, b = a.classified_by(scale), b.classified_by(scale)
     matching = match_experiments(a, b)
     if not matching.pairs:
@@ -216,7 +218,7 @@ def findings_of_gates(comparison: Comparison, gates: Sequence[Gate]) -> tuple[Ga
 def _pairs_reaching_class(comparison: Comparison, least: str) -> tuple[ExperimentPair, ...]:
     """Return the pairs that reach the severity class `least` in the second run but not in the first."""
     for side in (comparison.a, comparison.b):
-        if side.folder.scale is None:
+        if side.folder.severity_scale is None:
             raise MutatorError(
                 f"{side.name} has no severity classes",
                 where=side.folder.path,

@@ -27,7 +27,7 @@ from mutator.outcomes.series_sampling import Sampler
 from mutator.outcomes.verdict_rules import first_events, judge
 from mutator.preflight.preflight_rules import digest_of
 from mutator.store.run_folder import GoldenRun
-from mutator.store.series_format import encode
+from mutator.store.series_format import encode_series
 from mutator.store.series_packing import EncodedSeries
 from mutator.targets.manifest import TargetManifest
 
@@ -99,7 +99,7 @@ class Goldens:
         return files
 
     def key(self, experiment: Experiment) -> str:
-        return GoldenRun.of(experiment, several_seeds=self._several_seeds).key
+        return GoldenRun.for_experiment(experiment, several_seeds=self._several_seeds).key
 
     def trace(self, experiment: Experiment) -> Trace:
         return self._trace(self.folder(experiment))
@@ -221,9 +221,9 @@ class Runner:
             return None
         sampler = self.goldens.sampler(experiment)
         return EncodedSeries(
-            key=self.goldens.key(experiment),
+            golden_key=self.goldens.key(experiment),
             golden=sampler.encoded,
-            faulty=encode(sampler.series(faulty, record), sampler.golden),
+            faulty=encode_series(sampler.series(faulty, record), sampler.golden),
         )
 
     def _raising(self, experiment: Experiment, built: Mutant) -> set[str]:

@@ -22,14 +22,14 @@ def keep_end(folder: RunFolder, ended: Ended) -> None:
     if key := integrity.verified_content_key(folder.path):
         proof = ended.proof and {"sampled": ended.proof.sampled, "same": ended.proof.same}
         told = {"outcomes": dict(ended.outcomes), "proof": proof, "seals": asdict(ended.seals)}
-        verified_runs_cache.remember(key, ended=told)
+        verified_runs_cache.remember_facts(key, ended=told)
 
 
 def ended_before(folder: RunFolder) -> Ended | None:
     """Return the stored outcome of a finished run whose verified bytes have not changed; else None."""
-    if not folder.finished or not (key := integrity.verified_content_key(folder.path)):
+    if not folder.is_finished or not (key := integrity.verified_content_key(folder.path)):
         return None
-    known = verified_runs_cache.recall(key)
+    known = verified_runs_cache.recall_facts(key)
     if not known.get("verified") or "ended" not in known:
         return None
     told = known["ended"]

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from mutator.execution.session import Session
 from mutator.preflight import equivalence_check
-from mutator.store.run_progress import Progress, Tail
+from mutator.store.run_progress import Progress, RecordTail
 
 _NOTIFY_S = 0.5
 
@@ -34,11 +34,13 @@ def followed(session: Session) -> Iterator[None]:
 def _stages(session: Session) -> Iterator[Progress]:
     """Yield the current progress: of the experiments until all have a record, then of the proof."""
     folder = session.folder
-    experiments = Tail("experiments", folder.path / "records", folder.planned)
+    experiments = RecordTail("experiments", folder.path / "records", folder.planned_count)
     while (progress := experiments.poll()).done < progress.total:
         yield progress
     yield progress
-    proof = Tail("proof", folder.path / equivalence_check.FOLDER, len(equivalence_check.sampled(folder)))
+    proof = RecordTail(
+        "proof", folder.path / equivalence_check.FOLDER, len(equivalence_check.sampled(folder))
+    )
     while session.proof:
         yield proof.poll()
     while True:

@@ -12,7 +12,7 @@ from mutator.outcomes.golden_comparison import Trace, load_trace, trace_digest
 from mutator.outcomes.series_sampling import keep_series, sampled_traces
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
-from mutator.store.series_folder import SeriesFolder, making_again
+from mutator.store.series_folder import SeriesFolder, rerun_command
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 
@@ -34,7 +34,7 @@ class Traces:
 
     @cached_property
     def _experiments(self) -> Mapping[str, Experiment]:
-        return {experiment.id: experiment for experiment in plan_file.read_all(self.folder.path)}
+        return {experiment.id: experiment for experiment in plan_file.load_experiments(self.folder.path)}
 
     def record(self, experiment_id: str) -> Record:
         if experiment_id not in self._records:
@@ -47,9 +47,9 @@ class Traces:
         Reruns the experiment if no trace is stored. Raises MutatorError if that is impossible, or if the
         result differs from the campaign's.
         """
-        kept = self.folder.traces_of(experiment_id)
+        kept = self.folder.kept_traces_folder(experiment_id)
         experiment = self._experiments[experiment_id]
-        golden = self.folder.golden_folder(experiment)
+        golden = self.folder.golden_folder_of(experiment)
         if not golden.is_dir():
             golden = kept / "golden"
         if not (golden.is_dir() and self.is_kept(experiment_id)):
@@ -67,21 +67,21 @@ class Traces:
         """
         series = SeriesFolder(self.folder.path)
         record = self.record(experiment_id)
-        found = series.read(experiment_id, record)
+        found = series.load_series(experiment_id, record)
         if found is None and drive:
             keep_series(self.folder.path, self.manifest, *self.of(experiment_id), record)
-            found = series.read(experiment_id, record)
+            found = series.load_series(experiment_id, record)
         if found is None:
             raise MutatorError(
                 f"no series of {experiment_id}",
                 where=self.folder.path,
-                remedy=f"rerun the experiment: {making_again(self.folder.path, experiment_id)}",
+                remedy=f"rerun the experiment: {rerun_command(self.folder.path, experiment_id)}",
             )
         return sampled_traces(*found, self.manifest.time_channel)
 
     def is_kept(self, experiment_id: str) -> bool:
         """Return whether a stored faulty trace matches the record."""
-        faulty = self.folder.traces_of(experiment_id) / "faulty"
+        faulty = self.folder.kept_traces_folder(experiment_id) / "faulty"
         if not inside(faulty, self.manifest.trace_file).is_file():
             return False
         return trace_digest(self.manifest, faulty) == self.record(experiment_id).trace_digest

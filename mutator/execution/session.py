@@ -42,10 +42,10 @@ from mutator.results.table_reader import Results
 from mutator.store import file_digests
 from mutator.store.check_results import golden_digests
 from mutator.store.plan_choices import Choices
-from mutator.store.records import LINE_SCHEMAS, endings
+from mutator.store.records import LINE_SCHEMA_BY_FOLDER, endings_of
 from mutator.store.run_folder import RunFolder
-from mutator.store.run_progress import Progress, label
-from mutator.store.series_packing import pack, segments
+from mutator.store.run_progress import Progress, progress_label
+from mutator.store.series_packing import list_worker_files, pack_series
 from mutator.store.work_stretches import Machine
 from mutator.targets.required_packages import check_requirements
 from mutator.workspace import Workspace
@@ -141,11 +141,11 @@ class Session:
         """
         self._known = ended_before(self.folder)
         if self._known and are_there(self.folder):
-            self._done_before = self.folder.planned
+            self._done_before = self.folder.planned_count
             return
         self._known = None
         records = self.folder.records()
-        self._done_before = sum(one.counts for one in endings(records))
+        self._done_before = sum(one.is_final for one in endings_of(records))
         left = pending(self.folder, records)
         if left and self.engine != REFERENCE:
             equivalence_check.begin(self.folder.path)
@@ -174,7 +174,9 @@ class Session:
 
     def worker_name(self, name: str) -> str:
         """Return a name for a worker's files that no session used before."""
-        files = chain.from_iterable((self.folder.path / kind).glob("*.jsonl") for kind in LINE_SCHEMAS)
+        files = chain.from_iterable(
+            (self.folder.path / kind).glob("*.jsonl") for kind in LINE_SCHEMA_BY_FOLDER
+        )
         taken = [int(number[0]) for path in files if (number := re.match(r"\d+", path.name))]
         return f"{max(taken, default=0) + 1:04d}-{name}"
 
@@ -199,11 +201,11 @@ class Session:
         self.notify(Progress(stage="tables"))
         if self._known:
             return self._finish_again(self._known)
-        make_work(self.folder.work)  # readers refuse what a mutant can put in its place
+        make_work(self.folder.scratch_folder)  # readers refuse what a mutant can put in its place
         self._undo_writes_of_mutants()
         records = self.folder.records() if self._records is None else self._records
-        ends = Counter((one.status, one.outcome) for one in endings(records))
-        failed = (one.experiment_id for one in endings(records) if not one.counts)
+        ends = Counter((one.status, one.outcome) for one in endings_of(records))
+        failed = (one.experiment_id for one in endings_of(records) if not one.is_final)
         wrong = {name: records[name].detail for name in failed}
         done = len(records) - len(wrong)
         built = None
@@ -215,23 +217,23 @@ class Session:
         not_forked = "" if proven else self._not_forked
         if (
             proven
-            and done == self.folder.planned
+            and done == self.folder.planned_count
             and (why := equivalence_check.needless(self.folder)) is not None
         ):
             proven, not_forked = None, why
             with self._noting_full_disk():
                 equivalence_check.drop(self.folder)
-        if done == self.folder.planned and (proven is None or proven.whole):
+        if done == self.folder.planned_count and (proven is None or proven.whole):
             with self._noting_full_disk():
                 self._close_segments(finished=True)
         outcomes = Counter[str]()
         for (status, outcome), count in ends.items():
-            outcomes[label(status, outcome)] += count
+            outcomes[progress_label(status, outcome)] += count
         seals = seals_of(self.folder)
         if seals.seal:
             keep_end(self.folder, Ended(outcomes=outcomes, proof=proven, seals=seals))
         return Summary(
-            planned=self.folder.planned,
+            planned=self.folder.planned_count,
             done=done,
             ran=done - self._done_before,
             outcomes=outcomes,
@@ -268,8 +270,8 @@ class Session:
             built = table_building.ensure(self.folder.path)
             self._pack_series()
         return Summary(
-            planned=self.folder.planned,
-            done=self.folder.planned,
+            planned=self.folder.planned_count,
+            done=self.folder.planned_count,
             ran=0,
             outcomes=known.outcomes,
             harness_errors=(),
@@ -297,9 +299,9 @@ class Session:
     def _pack_series(self) -> None:
         """Pack the workers' series. While a worker is still running, leave this to the next session."""
         folder = self.folder
-        if segments(folder.path) and not wait_for_workers(folder.path):
+        if list_worker_files(folder.path) and not wait_for_workers(folder.path):
             ranks = worth(Results(folder.path).frame())
-            pack(folder.path, folder.head.plan, ranks, folder.series_mb)
+            pack_series(folder.path, folder.head.plan, ranks, folder.series_budget_mb)
 
 
 @contextmanager
@@ -331,7 +333,7 @@ def open_session(
                 shutil.rmtree(out, ignore_errors=True)
             raise
         file_digests.close_segments(folder.path)
-        clear_place(folder.work)
+        clear_place(folder.scratch_folder)
         folders = ("plan", "report", "series", "patches")
         written = (folder.path.iterdir(), *((folder.path / name).rglob("*") for name in folders))
         for path in chain(*written):
@@ -347,4 +349,4 @@ def open_session(
                 notify=notify,
             )
         finally:
-            clear_place(folder.work)
+            clear_place(folder.scratch_folder)

@@ -26,13 +26,13 @@ from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.file_digests import DigestLedger, FileDigest
 from mutator.store.patch_files import PatchWriter
-from mutator.store.records import endings
+from mutator.store.records import endings_of
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import HEAD
-from mutator.store.run_writer import copy_lines
+from mutator.store.run_writer import copy_line_files
 from mutator.store.series_folder import FOLDER as SERIES
-from mutator.store.series_packing import pack
-from mutator.store.work_stretches import Stretch, differences
+from mutator.store.series_packing import pack_series
+from mutator.store.work_stretches import Stretch, version_differences
 
 _MARK = f".{HEAD}."  # followed by a process id: marks an unfinished merge
 _REMEDY = "give the folder of each shard of one plan exactly once"
@@ -101,7 +101,7 @@ def _check_plans(folders: Sequence[RunFolder]) -> None:
                     expected="shards of one plan, with the same target, templates and scenarios",
                     remedy=_REMEDY,
                 )
-        one, other = (without(shard.head.content(), OUTSIDE[HEAD]) for shard in (first, folder))
+        one, other = (without(shard.head.as_json(), OUTSIDE[HEAD]) for shard in (first, folder))
         if differ := [key for key in {**one, **other} if one.get(key) != other.get(key)]:
             raise MutatorError(
                 f"'{differ[0]}' differs from {first.path / HEAD}",
@@ -120,10 +120,10 @@ def _check_numbers(folders: Sequence[RunFolder]) -> None:
             raise MutatorError(
                 "a whole run, not a shard", where=folder.path, expected="the run of a shard", remedy=_REMEDY
             )
-        of = of or shard.of
-        if shard.of != of:
+        of = of or shard.shard_count
+        if shard.shard_count != of:
             raise MutatorError(
-                f"shard {shard.number}/{shard.of}",
+                f"shard {shard.number}/{shard.shard_count}",
                 where=folder.path,
                 expected=f"one of {of} shards, like {folders[0].path}",
                 remedy=_REMEDY,
@@ -143,10 +143,10 @@ def _check_numbers(folders: Sequence[RunFolder]) -> None:
 
 def _check_complete(folder: RunFolder) -> None:
     records = folder.records()
-    done = sum(one.counts for one in endings(records))
-    if done < folder.planned:
+    done = sum(one.is_final for one in endings_of(records))
+    if done < folder.planned_count:
         raise MutatorError(
-            f"unfinished: {done} of {folder.planned} experiments are done",
+            f"unfinished: {done} of {folder.planned_count} experiments are done",
             where=folder.path,
             expected="a finished shard",
             remedy="resume it with the command that started it",
@@ -179,7 +179,9 @@ def _stretches(folders: Sequence[RunFolder], *, accept: bool) -> Iterator[Stretc
     first = folders[0]
     for folder in folders:
         ends = zip(first.stretches[-1:], folder.stretches[-1:], strict=False)
-        found = [text for one, other in ends for text in differences(one, other.python, other.packages)]
+        found = [
+            text for one, other in ends for text in version_differences(one, other.python, other.packages)
+        ]
         if found and not accept:
             raise other_versions(folder.path, f"unlike {first.path}, this shard used", found)
         assert folder.shard is not None
@@ -209,10 +211,10 @@ def _copy(folders: Sequence[RunFolder], out: Path, stretches: Sequence[Stretch])
     for folder in folders:
         _copy_patches(folder, out)
         assert folder.shard is not None
-        copy_lines(folder, out, f"-shard{folder.shard.number}")
+        copy_line_files(folder, out, f"-shard{folder.shard.number}")
     _pack_series(folders, out)
     choices = replace(first.head.choices, shard=None)
-    head = replace(first.head, choices=choices, stretches=tuple(stretches)).as_json()
+    head = replace(first.head, choices=choices, stretches=tuple(stretches)).file_bytes()
     file_digests.save_ledger(out, DigestLedger(files=files | {HEAD: FileDigest.of_bytes(head)}))
     file_digests.close_segments(out, finished=True)
     write_atomic(out / HEAD, head)
@@ -221,7 +223,7 @@ def _copy(folders: Sequence[RunFolder], out: Path, stretches: Sequence[Stretch])
 def _copy_patches(folder: RunFolder, out: Path) -> None:
     assert folder.shard is not None
     writer = PatchWriter(out, f"0001-shard{folder.shard.number}")
-    for record in endings(folder.records()):
+    for record in endings_of(folder.records()):
         name, known = record.experiment_id, record.patch
         for problem in integrity.patch_problems(folder.patches, name, known):
             raise problem
@@ -237,6 +239,6 @@ def _pack_series(folders: Sequence[RunFolder], out: Path) -> None:
         import pandas as pd
 
         first = folders[0]
-        frames = [frame_of(folder, plan_file.iterate(folder.path)) for folder in folders]
+        frames = [frame_of(folder, plan_file.iterate_experiments(folder.path)) for folder in folders]
         ranks = worth(pd.concat(frames, ignore_index=True))
-        pack(out, first.head.plan, ranks, first.series_mb, others=shards)
+        pack_series(out, first.head.plan, ranks, first.series_budget_mb, other_runs=shards)

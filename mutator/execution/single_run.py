@@ -85,14 +85,14 @@ def rerun(
     """
     folder = RunFolder.open(run)
     manifest = manifest_of(workspace, folder)
-    wanted = folder.find(experiment_id)
-    experiment = next(e for e in plan_file.read_all(folder.path) if e.id == wanted)
-    golden = folder.golden_folder(experiment)
+    wanted = folder.experiment_id_from(experiment_id)
+    experiment = next(e for e in plan_file.load_experiments(folder.path) if e.id == wanted)
+    golden = folder.golden_folder_of(experiment)
     single = run_single(
         workspace,
         manifest,
         experiment,
-        out or folder.traces_of(wanted),
+        out or folder.kept_traces_folder(wanted),
         limits=folder.limits,
         golden=golden if golden.is_dir() else None,
     )

@@ -27,11 +27,11 @@ def drawn(folder: RunFolder, count: int) -> list[str]:
 def driven_again(workspace: Workspace, folder: RunFolder, ids: Sequence[str]) -> Iterator[MutatorError]:
     """Rerun these experiments, and yield an error for each whose record differs."""
     manifest, records = manifest_of(workspace, folder), folder.records()
-    experiments = {experiment.id: experiment for experiment in plan_file.read_all(folder.path)}
+    experiments = {experiment.id: experiment for experiment in plan_file.load_experiments(folder.path)}
     with ScratchFolder("mutator-verify-") as scratch:
         for name in ids:
             experiment = experiments[name]
-            golden = folder.golden_folder(experiment)
+            golden = folder.golden_folder_of(experiment)
             single = run_single(
                 workspace,
                 manifest,

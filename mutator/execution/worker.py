@@ -24,7 +24,7 @@ from mutator.model import Experiment, Status
 from mutator.preflight import equivalence_check
 from mutator.preflight.equivalence_check import Sample
 from mutator.store import plan_file
-from mutator.store.planned_experiments import Planned
+from mutator.store.planned_experiments import PlannedExperiments
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_writer import RunWriter
 
@@ -53,22 +53,22 @@ class Worker:
         self.was_stopped = False  # a signal handler sets it
         self.folder = RunFolder.open(assignment.run)
         check_sources(self.folder.path, self.folder.head.sources, inputs.digests())
-        with raising_disk_full(self.folder.work):
-            self.folder.work.mkdir(exist_ok=True)
+        with raising_disk_full(self.folder.scratch_folder):
+            self.folder.scratch_folder.mkdir(exist_ok=True)
         self._inputs, self._manifest, self._assignment = inputs, inputs.manifest, assignment
         self._runner = self._make_runner(
-            self._engine(assignment.engine), with_series=bool(self.folder.series_mb)
+            self._engine(assignment.engine), with_series=bool(self.folder.series_budget_mb)
         )
         self._seed: int | None = None  # the seed being run
         self._prover: Runner | None = None
         self._needs_proof: bool | None = None  # None: not known yet
         self._planned: Mapping[str, Experiment] = {}
-        self._faults = plan_file.read_faults(self.folder.path)
+        self._faults = plan_file.load_faults(self.folder.path)
         self._writer = RunWriter(self.folder, assignment.name)  # last: nothing is written if the rest fails
 
     def run(self, pending: Pending) -> list[tuple[str, str]]:
         """Run the rest of a chunk; return (experiment id, detail) of each harness error."""
-        experiments = plan_file.read_chunk(
+        experiments = plan_file.load_chunk(
             self.folder.path, self.folder.head.chunks[pending.chunk], self._faults
         )
         self._make_room(experiments[0].seed)
@@ -101,7 +101,7 @@ class Worker:
             return []
         if self._prover is None:
             self._prover = self._make_runner(self._independent_engine())
-            self._planned = Planned(self.folder.path)
+            self._planned = PlannedExperiments(self.folder.path)
         errors = []
         for ended in self._prover.run([self._planned[sample.id]]):
             finished = self._blamed(ended)
@@ -113,7 +113,7 @@ class Worker:
     @property
     def written(self) -> Sums:
         """The digests of the files whose lines count."""
-        return self._writer.digests
+        return self._writer.sha256_by_file
 
     def close(self) -> None:
         self._runner.engine.close()
@@ -124,7 +124,7 @@ class Worker:
         several = len(folder.seeds) > 1
         goldens = Goldens(
             self._manifest,
-            folder.golden_folder,
+            folder.golden_folder_of,
             several_seeds=several,
             digests={
                 inside(folder.path / "golden", key): one for key, one in self._assignment.goldens.items()
@@ -145,7 +145,7 @@ class Worker:
         setting = Setting(
             manifest=self._manifest,
             models=self._inputs.models,
-            work=folder.work,
+            work=folder.scratch_folder,
             limits=folder.limits,
             parent=self._assignment.parent,
             secret=self._assignment.secret,
@@ -155,7 +155,7 @@ class Worker:
     def _independent_engine(self) -> Engine:
         folder = self.folder
         return ReferenceEngine(
-            self._manifest, folder.work, folder.limits, self._assignment.parent, independent=True
+            self._manifest, folder.scratch_folder, folder.limits, self._assignment.parent, independent=True
         )
 
     def _blamed(self, finished: Finished) -> Finished:

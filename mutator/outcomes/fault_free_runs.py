@@ -27,8 +27,8 @@ class FaultFreeRun:
 def load_fault_free_runs(folder: RunFolder, manifest: TargetManifest) -> tuple[FaultFreeRun, ...]:
     """Return the fault-free runs of a run folder, sorted by name. MutatorError if one cannot be read."""
     found = []
-    for one in sorted(folder.goldens):
-        place = folder.golden(*one)
+    for one in sorted(folder.golden_runs):
+        place = folder.golden_folder(*one)
         trace = load_trace(manifest, place)
         judged = judge_run(manifest, trace, load_record(manifest, place))
         plotted = [channel.name for channel in manifest.plotted if channel.name in trace]

@@ -15,8 +15,8 @@ import numpy as np
 from mutator.model import Record
 from mutator.outcomes.golden_comparison import Trace, on_steps
 from mutator.outcomes.trace_files import own_times
-from mutator.store.series_folder import SeriesFolder, run_facts, write_kept
-from mutator.store.series_format import Points, Series, encode
+from mutator.store.series_folder import SeriesFolder, run_facts, write_kept_series
+from mutator.store.series_format import ExtraPoints, Series, encode_series
 from mutator.targets.channels import Channel, Role
 from mutator.targets.manifest import TargetManifest
 
@@ -38,9 +38,9 @@ class Sampler:
         self._at = _thinned(self._time)
         self.golden = Series(
             t=self._time[self._at],
-            rows=self._rows(self._values[:, self._at]),
-            every=self._every,
-            about={
+            channel_values=self._rows(self._values[:, self._at]),
+            sample_every=self._every,
+            facts={
                 "start": float(self._time[0]),
                 "end": float(self._time[-1]),
                 "channels": [
@@ -53,7 +53,7 @@ class Sampler:
 
     @cached_property
     def encoded(self) -> bytes:
-        return encode(self.golden)
+        return encode_series(self.golden)
 
     def series(self, faulty: Trace, record: Record) -> Series:
         own = np.asarray(faulty[self._clock], dtype=float)
@@ -67,9 +67,9 @@ class Sampler:
         compared = end + 1 if is_prefix else len(time)  # as `golden.deviation` compares them
         return Series(
             t=time[at],
-            rows=self._rows(values[:, at]),
-            every=self._every,
-            about=run_facts(record) | {"end": float(max(self._time[-1], last))},
+            channel_values=self._rows(values[:, at]),
+            sample_every=self._every,
+            facts=run_facts(record) | {"end": float(max(self._time[-1], last))},
             points=_points(
                 time, golden[:, :compared], values[:, :compared], self._sampled(len(time), at), end, record
             ),
@@ -164,7 +164,7 @@ def _points(
     sampled: np.ndarray,
     end: int,
     record: Record,
-) -> Points:
+) -> ExtraPoints:
     """Return the steps that each channel keeps in addition to the `sampled` ones.
 
     `end` is the last step that both runs have. `golden` and `faulty` end with the last step that is compared.
@@ -183,7 +183,9 @@ def _points(
     rows, places = np.array(found, dtype=int).reshape(-1, 2).T
     one, other = _single(golden[rows, places]), _single(faulty[rows, places])
     shown = (one.view("<u4") != other.view("<u4")) | np.isin(places, list(hazards))
-    return Points(channel=rows[shown], t=time[places[shown]], golden=one[shown], faulty=other[shown])
+    return ExtraPoints(
+        channel_numbers=rows[shown], t=time[places[shown]], golden=one[shown], faulty=other[shown]
+    )
 
 
 def _until(time: np.ndarray, t: float) -> int:
@@ -214,10 +216,13 @@ def _told(channel: Channel, manifest: TargetManifest) -> dict[str, Any]:
 
 def sampled_traces(golden: Series, faulty: Series, time: str) -> tuple[Trace, Trace]:
     """Return the runs of a series as traces. Between its samples, a channel holds its value."""
-    names = [str(channel["name"]) for channel in golden.about["channels"]]
+    names = [str(channel["name"]) for channel in golden.facts["channels"]]
 
     def trace(run: Series) -> Trace:
-        rows = [np.repeat(row, every)[: len(run.t)] for row, every in zip(run.rows, run.every, strict=True)]
+        rows = [
+            np.repeat(row, every)[: len(run.t)]
+            for row, every in zip(run.channel_values, run.sample_every, strict=True)
+        ]
         return {time: run.t, **dict(zip(names, rows, strict=True))}
 
     return trace(golden), trace(faulty)
@@ -225,5 +230,5 @@ def sampled_traces(golden: Series, faulty: Series, time: str) -> tuple[Trace, Tr
 
 def keep_series(run: Path, manifest: TargetManifest, golden: Trace, faulty: Trace, record: Record) -> None:
     sampler = Sampler(manifest, golden)
-    data = encode(sampler.series(faulty, record), sampler.golden)
-    write_kept(SeriesFolder(run).kept(record.experiment_id), sampler.encoded, data)
+    data = encode_series(sampler.series(faulty, record), sampler.golden)
+    write_kept_series(SeriesFolder(run).kept_path(record.experiment_id), sampler.encoded, data)

@@ -66,7 +66,7 @@ def _build_drawing(frame: pd.DataFrame, traces: Traces | None, figure: ActionFig
     recorded = {channel.name for channel in (*manifest.compared, *manifest.plotted)}
     if missing := [name for name in figure.action_channels if name not in recorded]:
         return _empty_drawing(figure, f"the target records no {missing[0]}")
-    faults = plan_file.read_faults(traces.folder.path)
+    faults = plan_file.load_faults(traces.folder.path)
     examined = rows.head(MOST_EXAMINED).to_dict("records")
     for rank, row in enumerate(examined, start=1):
         record = traces.record(row["experiment_id"])

@@ -20,10 +20,10 @@ from mutator.engines.engine_jobs import RunMode
 from mutator.errors import CheckFailed
 from mutator.model import Experiment, Record, Status
 from mutator.store import file_digests, plan_file
-from mutator.store.records import PROOF, endings
+from mutator.store.records import PROOF_FOLDER, endings_of
 from mutator.store.run_folder import RunFolder
 
-FOLDER = PROOF
+FOLDER = PROOF_FOLDER
 _LEAST = 20
 _SHARE = 100  # one experiment in this many
 
@@ -83,10 +83,10 @@ def _sample_of(folder: RunFolder) -> set[str]:
 @lru_cache(maxsize=4)  # a session asks several times
 def _sampled_ids(run: Path, plan: str, seeds: int) -> tuple[str, ...]:
     if seeds == 1:
-        head = RunFolder.unverified(run).head
-        return tuple(e.id for e in sample(plan_file.read_all(run), head.seed))
+        head = RunFolder.open_unverified(run).head
+        return tuple(e.id for e in sample(plan_file.load_experiments(run), head.seed))
     found: list[str] = []
-    for seed, group in groupby(plan_file.iterate(run), key=lambda experiment: experiment.seed):
+    for seed, group in groupby(plan_file.iterate_experiments(run), key=lambda experiment: experiment.seed):
         some = tuple(group)
         more = pick(some, -(-len(some) // _SHARE), seed) if found else sample(some, seed)
         found += [experiment.id for experiment in more]
@@ -106,9 +106,9 @@ def needless(folder: RunFolder) -> str | None:
     if folder.shard is not None:
         return None
     told = folder.timings()
-    done = {one.experiment_id for one in endings(folder.records()) if one.counts}
+    done = {one.experiment_id for one in endings_of(folder.records()) if one.is_final}
     reasons = Counter[str]()
-    for name in folder.share():
+    for name in folder.planned_positions():
         if name not in done:  # not run yet; any timing is from an earlier session
             return None
         line = told.get(name, {})
@@ -139,7 +139,7 @@ def left(folder: RunFolder) -> tuple[Sample, ...]:
 def sampled(folder: RunFolder) -> list[str]:
     """Ids of the sample in this folder's share, in plan order."""
     wanted = _sample_of(folder)
-    return [name for name in folder.share() if name in wanted]
+    return [name for name in folder.planned_positions() if name in wanted]
 
 
 def judge(folder: RunFolder, records: Mapping[str, Record]) -> Proof | None:

@@ -67,21 +67,21 @@ def describe_unreached_triggers(workspace: Workspace, folder: RunFolder) -> list
     """Remarks on triggers of the plan that no golden run reaches; none unless the golden runs just ran or
     were cached.
     """
-    experiments = ((folder.golden_of(e).key, e) for e in plan_file.iterate(folder.path))
+    experiments = ((folder.golden_run_of(e).key, e) for e in plan_file.iterate_experiments(folder.path))
     observed = unreached_triggers.read_observed(_kept(folder))
     manifest = workspace.manifest(folder.head.target)
     return unreached_triggers.remarks(workspace, manifest, experiments, observed) if observed else []
 
 
 def are_there(folder: RunFolder) -> bool:
-    places = (folder.golden(*one) for one in folder.goldens)
+    places = (folder.golden_folder(*one) for one in folder.golden_runs)
     goldens = (inside(place, name) for place in places for name in folder.head.golden_files)
     return all(path.is_file() for path in (folder.path / FILE, *goldens))
 
 
 def _kept(folder: RunFolder) -> Path:
     """Return the folder that keeps golden runs until they are accepted. Their observations stay there."""
-    return folder.work / "kept"
+    return folder.scratch_folder / "kept"
 
 
 class _Checks:
@@ -92,9 +92,9 @@ class _Checks:
         self.kept = _kept(folder)
         self.manifest: TargetManifest = workspace.manifest(head.target)
         self.models = workspace.fault_models()
-        self.keys = folder.goldens
+        self.keys = folder.golden_runs
         now = RunInputs.of(workspace, self.manifest, folder.scenarios).digests()
-        self.variants = {fault.spec: fault for fault in plan_file.read_faults(folder.path).values()}
+        self.variants = {fault.spec: fault for fault in plan_file.load_faults(folder.path).values()}
         places = sorted((name, [i.location for i in f.injections]) for name, f in self.variants.items())
         content = [
             now,
@@ -124,7 +124,10 @@ class _Checks:
         except (MutatorError, OSError, KeyError, TypeError, AttributeError):
             return None  # missing or damaged
         if results is not None:
-            if self._driver(self.folder.work / "again").drive_goldens(workers, notify) != found["goldens"]:
+            if (
+                self._driver(self.folder.scratch_folder / "again").drive_goldens(workers, notify)
+                != found["goldens"]
+            ):
                 return None  # forged, or no longer true
             self._check_same_as_before(found["goldens"])
             self._install(read_bounded(copy / FILE))

@@ -17,7 +17,7 @@ from mutator.mutants.mutant_building import build
 from mutator.preflight import canary, unreached_triggers
 from mutator.preflight.preflight_rules import CheckRun, look
 from mutator.store.run_folder import RunFolder
-from mutator.store.run_progress import Pace, Progress
+from mutator.store.run_progress import Progress, StagePace
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always
 from mutator.workspace import Workspace
@@ -60,7 +60,7 @@ class CheckDriver:
 
     @contextmanager
     def _working(self, workers: int) -> Iterator[tuple[ReferenceEngine, ThreadPoolExecutor]]:
-        work = self.folder.work / "checks"
+        work = self.folder.scratch_folder / "checks"
         for scratch in (work, self.kept):
             remove_folder(scratch)
         work.mkdir(parents=True)
@@ -82,7 +82,7 @@ class CheckDriver:
     def _jobs(self) -> dict[tuple[str, Any], Job]:
         jobs: dict[tuple[str, Any], Job] = {}
         null = build(self.manifest, self.workspace.fault_models(), None, always())
-        for key in self.folder.goldens:
+        for key in self.folder.golden_runs:
             common: dict[str, Any] = {
                 "scenario": self.workspace.scenario(key.scenario),
                 "seed": self.folder.head.seed if key.seed is None else key.seed,
@@ -113,8 +113,8 @@ class CheckDriver:
 
 
 def _follow(stage: str, futures: Collection[Future[Any]], notify: Notify) -> None:
-    pace = Pace(stage, len(futures))
-    notify(pace.at(0))
+    pace = StagePace(stage, len(futures))
+    notify(pace.progress_at(0))
     for done, future in enumerate(as_completed(futures), 1):
         future.result()
-        notify(pace.at(done))
+        notify(pace.progress_at(done))

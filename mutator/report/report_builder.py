@@ -111,7 +111,7 @@ def _describe_plan(folder: RunFolder) -> str:
     experiments, runs = folder.head.experiments, folder.head.runs
     text = f"Planned: {counted(experiments, 'experiment')}"
     if folder.shard:
-        text += f", {folder.planned} of them in shard {folder.shard}"
+        text += f", {folder.planned_count} of them in shard {folder.shard}"
     if runs == experiments:
         text += "; each needs its own run"
     else:

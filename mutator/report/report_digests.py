@@ -45,7 +45,7 @@ def made_from(folder: RunFolder, workspace: Workspace | None) -> str:
     run = folder.path
     series = [
         series_facts(folder),
-        file_digests.sha256_of_file(run / series_store.FOLDER / f"{series_store.INDEX}.js"),
+        file_digests.sha256_of_file(run / series_store.FOLDER / f"{series_store.INDEX_NAME}.js"),
     ]
     return digest([SCHEMA, _sources(), run.name, list(_files_of(run)), series, _library(folder, workspace)])
 

@@ -21,7 +21,7 @@ from mutator.results.table_reader import Results
 from mutator.statistics.published_counts import PublishedCounts
 from mutator.statistics.results_frame import prepare_results
 from mutator.store import plan_file
-from mutator.store.planned_experiments import Planned
+from mutator.store.planned_experiments import PlannedExperiments
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -54,8 +54,8 @@ class ReportedRun:
     @classmethod
     def open(cls, folder: RunFolder, workspace: Workspace | None) -> "ReportedRun":
         """Open a run folder whose tables are up to date."""
-        experiments, records = Planned(folder.path), folder.records()
-        faults, fault_paths = plan_file.read_faults(folder.path), fault_paths_of(folder)
+        experiments, records = PlannedExperiments(folder.path), folder.records()
+        faults, fault_paths = plan_file.load_faults(folder.path), fault_paths_of(folder)
         results = Results(folder.path).frame()
         seen = Seen.of(folder, results, records, faults, fault_paths)
         return cls(
@@ -103,8 +103,8 @@ class ReportedRun:
         ends: dict[str, float] = {}
         try:
             manifest = self.workspace.manifest(self.folder.head.target)
-            for one in self.folder.goldens:
-                trace = load_trace(manifest, self.folder.golden(*one), [])
+            for one in self.folder.golden_runs:
+                trace = load_trace(manifest, self.folder.golden_folder(*one), [])
                 end = float(trace[manifest.time_channel][-1])
                 ends[one.scenario] = max(end, ends.get(one.scenario, end))
         except (MutatorError, KeyError):

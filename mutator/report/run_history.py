@@ -94,7 +94,7 @@ def write_history(folder: Path) -> History:
 
 
 def _past_run(path: Path) -> PastRun:
-    folder = RunFolder.unverified(path)
+    folder = RunFolder.open_unverified(path)
     rows = {row.experiment_id: row for row in Results(path).rows()}
     files = [*(path / "records").glob("*.jsonl"), Results(path).path]
     last = max(file.stat().st_mtime for file in files if file.exists())
@@ -123,9 +123,9 @@ def _cells(run: PastRun) -> list[str]:
     return [
         f"{run.date:%Y-%m-%d %H:%M}",
         run.commit,
-        f"{len(run.rows)} of {run.folder.planned}",
+        f"{len(run.rows)} of {run.folder.planned_count}",
         f"{len(hazards)} of {run.activated} activated",
-        told if run.folder.scale and hazards else "-",
+        told if run.folder.severity_scale and hazards else "-",
         f"{silent} of {len(hazards)}" if run.folder.has_alerts else "-",
         duration(run.cpu_s),
     ]

@@ -13,9 +13,9 @@ from mutator.model import Experiment, Record, Status
 from mutator.report.film import Filming, Shot
 from mutator.results.ranking import places
 from mutator.results.table_reader import Results
-from mutator.store.planned_experiments import Planned
+from mutator.store.planned_experiments import PlannedExperiments
 from mutator.store.run_folder import GoldenRun, RunFolder
-from mutator.store.run_progress import Pace, Progress
+from mutator.store.run_progress import Progress, StagePace
 from mutator.workspace import Workspace
 
 MOST, ONE_IN = 10, 20  # at most 10 experiments, and at most one in 20 of the planned ones
@@ -29,7 +29,7 @@ def take_stills(workspace: Workspace, folder: RunFolder, *, workers: int, notify
     manifest = workspace.manifest(folder.head.target)
     if manifest.film is None or not manifest.film.pictures:
         return ""
-    experiments = Planned(folder.path)
+    experiments = PlannedExperiments(folder.path)
     records = folder.records()
     due = _due(folder, manifest.film.pictures, experiments, records)
     if not due:
@@ -58,17 +58,17 @@ def take_stills(workspace: Workspace, folder: RunFolder, *, workers: int, notify
                 key: pool.submit(filming.golden, one, inside(scratch, key)) for key, one in driven.items()
             }
             found = [pool.submit(wrong, name, goldens[_golden_key(experiments[name])]) for name in due]
-            pace = Pace("pictures", len(found))
-            notify(pace.at(0))
+            pace = StagePace("pictures", len(found))
+            notify(pace.progress_at(0))
             for done, _ in enumerate(as_completed(found), 1):
-                notify(pace.at(done))
+                notify(pace.progress_at(done))
             return next(filter(None, (one.result() for one in found)), "")
         finally:
             pool.shutdown(cancel_futures=True)
 
 
 def _golden_key(experiment: Experiment) -> str:
-    return GoldenRun.of(experiment, several_seeds=True).key
+    return GoldenRun.for_experiment(experiment, several_seeds=True).key
 
 
 def _due(
@@ -84,7 +84,7 @@ def _due(
     order = [row for row in places(frame).argsort() if moved[row]]
     ids = (str(frame["experiment_id"].iloc[row]) for row in order)
     wanted = (name for name in ids if seeing & set(experiments[name].changes))
-    chosen = islice(wanted, min(MOST, folder.planned // ONE_IN))
+    chosen = islice(wanted, min(MOST, folder.planned_count // ONE_IN))
     due = {name: _missing(folder, name, records[name]) for name in chosen}
     return {name: shots for name, shots in due.items() if shots}
 

@@ -19,7 +19,7 @@ from mutator.results.table_columns import TIMINGS, Finished, cells_of, columns_o
 from mutator.results.table_files import CsvTable, ParquetTable, csv_lines, record_batch
 from mutator.store import file_digests, plan_file
 from mutator.store.file_digests import FileDigest
-from mutator.store.planned_experiments import Planned
+from mutator.store.planned_experiments import PlannedExperiments
 from mutator.store.run_folder import RunFolder
 
 CSV, PARQUET, TIMINGS_PARQUET = "results.csv", "results.parquet", "timings.parquet"
@@ -31,7 +31,7 @@ _BATCH = 2_000  # experiments read at a time
 
 def ensure(run: Path) -> Path:
     """Return the path of a run folder's results.csv. Rebuild the tables if any is out of date."""
-    folder = RunFolder.unverified(run)
+    folder = RunFolder.open_unverified(run)
     stamp = _stamp(folder)
     if stamp.get("made_from") == _made_from(folder) and stamp["tables"] == _found(folder):
         return folder.path / CSV
@@ -65,14 +65,16 @@ def write(folder: RunFolder, paths: Mapping[str, Path]) -> None:
     Experiments are read in batches, so that a million of them need only a few hundred MB of memory. For a
     large run, two processes build the batches.
     """
-    with beside(lambda: _write_timings(folder, paths[TIMINGS_PARQUET]), processes_for(folder.planned)) as end:
+    with beside(
+        lambda: _write_timings(folder, paths[TIMINGS_PARQUET]), processes_for(folder.planned_count)
+    ) as end:
         _write_results(folder, paths)
         end()
 
 
 def _write_results(folder: RunFolder, paths: Mapping[str, Path]) -> None:
-    records, planned, columns = folder.records(), Planned(folder.path), columns_of(folder.head)
-    scale, fault_paths = folder.scale, fault_paths_of(folder)
+    records, planned, columns = folder.records(), PlannedExperiments(folder.path), columns_of(folder.head)
+    scale, fault_paths = folder.severity_scale, fault_paths_of(folder)
 
     def made(batch: Sequence[str]) -> tuple[bytes, Any, Any]:
         finished = [Finished(planned[name], records[name], scale, fault_paths) for name in batch]

@@ -19,7 +19,7 @@ from mutator.results.table_columns import Finished, cells_of, columns_of
 from mutator.results.table_files import Column, record_batch, schema_of
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
-from mutator.store.run_head import read_head
+from mutator.store.run_head import load_head
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -77,13 +77,13 @@ class Results:
         return len(self.frame("experiment_id"))
 
     def rows(self) -> tuple[Row, ...]:
-        return tuple(rows_of(self.frame(), plan_file.read_faults(self.run)))
+        return tuple(rows_of(self.frame(), plan_file.load_faults(self.run)))
 
     def frame(self, *only: str) -> "pd.DataFrame":
         """Return a frame with the types of results.parquet, of all columns or only those named. Without a
         value, texts are '' and numbers NaN. `attrs["hazards"]` are the target's hazards.
         """
-        data, head = self.parquet(), read_head(self.run)
+        data, head = self.parquet(), load_head(self.run)
         columns = [column for column in columns_of(head) if not only or column.name in only]
         return typed(self._table(data, columns), head.hazards)
 
@@ -97,7 +97,7 @@ class Results:
         """
         import pandas as pd
 
-        data, head = self.parquet(), read_head(self.run)
+        data, head = self.parquet(), load_head(self.run)
         columns, hazards = columns_of(head), [name.lower() for name in head.hazards]
         frame: pd.DataFrame = _to_pandas(_plain(self._table(data, columns))).set_index("experiment_id")
         frame["kind"] = (frame["module"] + "/" + frame["fault_type"]).astype("category")
@@ -173,7 +173,7 @@ def frame_of(folder: RunFolder, experiments: Iterable[Experiment]) -> "pd.DataFr
     """
     import pyarrow as pa
 
-    columns, records, scale = columns_of(folder.head), folder.records(), folder.scale
+    columns, records, scale = columns_of(folder.head), folder.records(), folder.severity_scale
     finished = (Finished(one, records[one.id], scale) for one in experiments if one.id in records)
     pieces = iter(lambda: list(islice(finished, _BATCH)), [])
     batches = [record_batch(columns, cells_of(columns, piece)) for piece in pieces]

@@ -67,7 +67,7 @@ def _of_run(path: Path, written: int) -> dict[str, Typical]:
 
     frame = Results(path).frame()
     about = {one.name: one.about for one in RunFolder.open(path).head.about_hazards}
-    faults = plan_file.read_faults(path)
+    faults = plan_file.load_faults(path)
     labels = {name: group_label(fault) for name, fault in faults.items()}
     known = [labels.get(name, "") for name in frame["fault_id"]]
     rows: dict[str, list[int]] = {}

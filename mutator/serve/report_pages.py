@@ -23,7 +23,7 @@ from mutator.serve.report_cache import ReportCache
 from mutator.serve.responses import STORED, OpenFile, kind_of
 from mutator.serve.served_runs import Runs, open_in_run
 from mutator.store.run_folder import RunFolder
-from mutator.store.series_script import read_script, script_of
+from mutator.store.series_script import read_script, script_bytes
 from mutator.web import load_order
 from mutator.workspace import Workspace
 
@@ -88,7 +88,7 @@ class Shown:
         """Build a report. Raise MutatorError if the tables of a finished run do not follow from its records:
         the report shows them beside the run's seal.
         """
-        if folder.finished:
+        if folder.is_finished:
             for problem in tables(folder)[1]:
                 raise problem
         return report_builder.build_report(folder, self._workspace).files
@@ -115,7 +115,7 @@ def _series(run: Path, name: str) -> bytes:
     with open_in_run(run, name) as file:
         data = read_open(file, path)
     try:
-        if script_of(path.stem, read_script(path)) == data:
+        if script_bytes(path.stem, read_script(path)) == data:
             return data
     except MutatorError:
         pass

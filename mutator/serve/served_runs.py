@@ -81,9 +81,12 @@ def told(key: str, path: Path) -> dict[str, Any]:
     facts |= {"report": report_of(key)}
     facts |= {"state": "damaged", "outcomes": {}, "problem": ""}
     try:
-        folder = RunFolder.unverified(path)
+        folder = RunFolder.open_unverified(path)
         facts |= {"campaign": folder.head.campaign, "target": folder.head.target}
-        facts |= {"planned": folder.planned, "state": "finished" if folder.finished else "unfinished"}
+        facts |= {
+            "planned": folder.planned_count,
+            "state": "finished" if folder.is_finished else "unfinished",
+        }
         with suppress(FileNotFoundError):
             table = Results(path).path.stat()
             outcomes = _outcomes(path, table.st_mtime_ns, table.st_size)

@@ -30,5 +30,5 @@ def golden_digests(folder: RunFolder) -> dict[str, str]:
 
 def measured_cpu_s(folder: RunFolder) -> float | None:
     path = folder.path / FILE
-    found = read_json(path, SCHEMA).get("run_cpu_s") if path.is_file() else None
-    return found if isinstance(found, int | float) else None
+    run_cpu_s = read_json(path, SCHEMA).get("run_cpu_s") if path.is_file() else None
+    return run_cpu_s if isinstance(run_cpu_s, int | float) else None

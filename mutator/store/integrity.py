@@ -16,8 +16,8 @@ from mutator.errors import MutatorError
 from mutator.store import file_digests, plan_file, verified_runs_cache
 from mutator.store.checksummed_lines import Segment, bare_segment, intact_lines, read_segment
 from mutator.store.file_digests import DigestLedger, FileDigest
-from mutator.store.patch_files import Patches
-from mutator.store.records import SCHEMA, ending_on, second_record
+from mutator.store.patch_files import PatchFolder
+from mutator.store.records import SCHEMA, parse_ending, second_record_error
 from mutator.store.run_head import CAMPAIGN, HEAD, RunHead
 from mutator.store.shards import Shard
 
@@ -61,7 +61,7 @@ def run_problems(
         yield from unexpected
         file_errors += unexpected
         key = "" if file_errors or ledger.rewriting else cache_key_of(run, current_digests)
-    if key and not ignore_cache and verified_runs_cache.recall(key).get("verified"):
+    if key and not ignore_cache and verified_runs_cache.recall_facts(key).get("verified"):
         return
     try:
         planned = planned_positions(run, head, shard)
@@ -73,7 +73,7 @@ def run_problems(
         is_intact = False
         yield problem
     if key and is_intact:
-        verified_runs_cache.remember(key, verified=True)
+        verified_runs_cache.remember_facts(key, verified=True)
 
 
 def verified_content_key(run: Path) -> str:
@@ -92,7 +92,7 @@ def verified_content_key(run: Path) -> str:
 
 
 def current_digests_of(run: Path, ledger: DigestLedger) -> dict[str, FileDigest | None]:
-    names = list(dict.fromkeys((*ledger.names, *verified_runs_cache.other_files(run))))
+    names = list(dict.fromkeys((*ledger.names, *verified_runs_cache.list_patch_files(run))))
     return file_digests.digests_of_files(run, names)
 
 
@@ -100,7 +100,7 @@ def cache_key_of(run: Path, current_digests: Mapping[str, FileDigest | None]) ->
     """Return the `verified_runs_cache.key_of` of these files and the ledger."""
     ledger = FileDigest.of_file(run / file_digests.FILE)
     with_ledger = {**current_digests, file_digests.FILE: ledger}
-    return verified_runs_cache.key_of(
+    return verified_runs_cache.cache_key(
         {name: file_digest.sha256 if file_digest else None for name, file_digest in with_ledger.items()}
     )
 
@@ -127,7 +127,7 @@ def planned_positions(run: Path, head: RunHead, shard: Shard | None) -> dict[str
         )
     if shard is None:
         return positions
-    is_in_shard = [shard.has(chunk) for chunk, count in enumerate(counts) for _ in range(count)]
+    is_in_shard = [shard.has_chunk(chunk) for chunk, count in enumerate(counts) for _ in range(count)]
     return {name: place for name, place in positions.items() if is_in_shard[place]}
 
 
@@ -171,7 +171,7 @@ def _changed_file_problems(
     if name in (plan_file.EXPERIMENTS, plan_file.FAULTS):
         with suppress(MutatorError):  # a missing file is a separate problem
             line = next(
-                (problem.line for problem in plan_file.problems(run) if problem.where == str(path)), None
+                (problem.line for problem in plan_file.plan_problems(run) if problem.where == str(path)), None
             )
     yield MutatorError(
         f"changed: {_describe_digest(current)}",
@@ -220,7 +220,7 @@ def record_problems(
     run: Path, head: RunHead, ledger: DigestLedger, planned: Collection[str]
 ) -> Iterator[MutatorError]:
     """Yield a problem for each unplanned, duplicate or missing record."""
-    patches = Patches(run)
+    patches = PatchFolder(run)
     patch_digests = dict(patches.digests())
     for kind in file_digests.SEGMENT_FOLDERS:
         finals: dict[str, int] = {}  # id -> hash of its final record
@@ -235,7 +235,7 @@ def record_problems(
                     if kind == "records" and patch_digests.get(name, "") != patch:
                         yield from patch_problems(patches, name, patch, path.stem)
                     if name in finals:
-                        yield second_record(path, number, name, same=finals[name] == content)
+                        yield second_record_error(path, number, name, same=finals[name] == content)
                     finals[name] = content
             except MutatorError as err:
                 yield err
@@ -283,7 +283,7 @@ def _final_records(
     """Yield line number, experiment, patch and hash of each final record, or a line's problem."""
     for number, line in lines:
         try:
-            ending = ending_on(line)
+            ending = parse_ending(line)
         except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
             yield number, segment.damage_error(number), "", 0
             continue
@@ -296,12 +296,12 @@ def _final_records(
                 remedy=_remedy(segment.path.parent.parent, ""),
             )
             yield number, problem, "", 0
-        elif ending.counts:
+        elif ending.is_final:
             yield number, ending.experiment_id, ending.patch, hash(segment.without_checksum(line))
 
 
 def patch_problems(
-    patches: Patches, experiment_id: str, recorded_digest: str, worker: str = ""
+    patches: PatchFolder, experiment_id: str, recorded_digest: str, worker: str = ""
 ) -> Iterator[MutatorError]:
     """Yield a problem if a stored patch does not have the `recorded_digest` (empty: no mutant)."""
     if not recorded_digest:
@@ -313,7 +313,7 @@ def patch_problems(
             f"the patch of {experiment_id} is not the one that was run: SHA-256 {stored_digest[:16]}"
             if stored_digest
             else f"no patch of {experiment_id}",
-            where=patches.file(experiment_id, worker),
+            where=patches.file_of(experiment_id, worker),
             expected=f"SHA-256 {recorded_digest[:16]}, as in the record",
             remedy=_remedy(patches.run, ""),
         )

@@ -16,12 +16,12 @@ from mutator.errors import MutatorError
 from mutator.model import Experiment, Fault
 from mutator.store.plan_lines import (
     REMEDY,
-    content,
-    experiment_from,
-    experiment_of,
-    fault_from,
-    fault_of,
-    id_of,
+    experiment_from_json,
+    fault_from_json,
+    id_on_line,
+    parse_experiment,
+    parse_fault,
+    values_behind_id,
 )
 
 EXPERIMENTS = "plan/experiments.jsonl"
@@ -39,83 +39,89 @@ class PlanWriter:
     """Write experiments, and each fault once, to the given files."""
 
     def __init__(self, experiments: SupportsWrite, faults: SupportsWrite) -> None:
-        self.places: list[Chunk] = []
+        self.chunks: list[Chunk] = []
         self._experiments, self._faults = experiments, faults
-        self._known: set[str] = set()
+        self._written_fault_ids: set[str] = set()
         self._offset = 0
 
-    def append(self, experiments: Sequence[Experiment], chunks: Iterable[int]) -> None:
+    def append(self, experiments: Sequence[Experiment], chunk_lengths: Iterable[int]) -> None:
         """Write the experiments of the next chunks, which have these lengths."""
-        lines = (canonical(_line(experiment)).encode() + b"\n" for experiment in experiments)
-        for count in chunks:
+        lines = (canonical(_line_values(experiment)).encode() + b"\n" for experiment in experiments)
+        for count in chunk_lengths:
             data = b"".join(islice(lines, count))
             self._experiments.write(data)
-            self.places.append((self._offset, len(data), count))
+            self.chunks.append((self._offset, len(data), count))
             self._offset += len(data)
-        new = {one.fault.id: one.fault for one in experiments if one.fault.id not in self._known}
-        self._known.update(new)
-        self._faults.write(b"".join(canonical(plain(fault)).encode() + b"\n" for fault in new.values()))
+        new_faults = {
+            planned.fault.id: planned.fault
+            for planned in experiments
+            if planned.fault.id not in self._written_fault_ids
+        }
+        self._written_fault_ids.update(new_faults)
+        self._faults.write(
+            b"".join(canonical(plain(fault)).encode() + b"\n" for fault in new_faults.values())
+        )
 
 
-def write(run: Path, experiments: Sequence[Experiment], chunks: Sequence[int]) -> list[Chunk]:
-    make_folder(run)
+def write_plan(run: Path, experiments: Sequence[Experiment], chunk_lengths: Sequence[int]) -> list[Chunk]:
+    create_plan_folder(run)
     with writing_atomic(run / EXPERIMENTS) as lines, writing_atomic(run / FAULTS) as faults:
         writer = PlanWriter(lines, faults)
-        writer.append(experiments, chunks)
-    return writer.places
+        writer.append(experiments, chunk_lengths)
+    return writer.chunks
 
 
-def make_folder(run: Path) -> None:
+def create_plan_folder(run: Path) -> None:
     with raising_disk_full(run):
         (run / "plan").mkdir(parents=True, exist_ok=True)
 
 
-_Lines = Iterable[tuple[int | None, bytes]]  # line number, if known, and text
+_NumberedLines = Iterable[tuple[int | None, bytes]]  # line number, if known, and text
 
 
-def _lines(path: Path) -> _Lines:
-    return enumerate(lines_of(path), start=1)
+def _numbered_lines(path: Path) -> _NumberedLines:
+    return enumerate(read_lines(path), start=1)
 
 
-def _read(path: Path, lines: _Lines, read: Callable[[bytes], _T]) -> Iterator[_T]:
-    """Yield what `read` returns for each line of the plan file at `path`."""
+def _parse_lines(path: Path, lines: _NumberedLines, parse: Callable[[bytes], _T]) -> Iterator[_T]:
+    """Yield what `parse` returns for each line of the plan file at `path`."""
     for number, line in lines:
         try:
-            yield read(line)
+            yield parse(line)
         except MutatorError as err:
-            raise _placed(err, path, number) from None
+            raise _with_place(err, path, number) from None
 
 
-def _tried(path: Path, read: Callable[[bytes], _T]) -> Iterator[_T | MutatorError]:
-    """Yield what `read` returns for each line of the plan file at `path`, or the line's problem."""
-    for number, line in _lines(path):
+def _parsed_or_error(path: Path, parse: Callable[[bytes], _T]) -> Iterator[_T | MutatorError]:
+    """Yield what `parse` returns for each line of the plan file at `path`, or the line's problem."""
+    for number, line in _numbered_lines(path):
         try:
-            yield read(line)
+            yield parse(line)
         except MutatorError as err:
-            yield _placed(err, path, number)
+            yield _with_place(err, path, number)
 
 
-def _placed(err: MutatorError, path: Path, number: int | None) -> MutatorError:
+def _with_place(err: MutatorError, path: Path, number: int | None) -> MutatorError:
     return type(err)(err.got, where=path, line=number, expected=err.expected, remedy=err.remedy)
 
 
-def read_faults(run: Path) -> dict[str, Fault]:
+def load_faults(run: Path) -> dict[str, Fault]:
     path = run / FAULTS
-    return {fault.id: fault for fault in _read(path, _lines(path), fault_of)}
+    return {fault.id: fault for fault in _parse_lines(path, _numbered_lines(path), parse_fault)}
 
 
-def fault_lines(run: Path) -> dict[str, bytes]:
+def fault_line_by_id(run: Path) -> dict[str, bytes]:
     """Return the unparsed lines of the plan's faults by id, which is the digest of the line."""
-    lines = (line.rstrip(b"\n") for line in lines_of(run / FAULTS))
+    lines = (line.rstrip(b"\n") for line in read_lines(run / FAULTS))
     return {sha256(line).hexdigest()[:16]: line for line in lines}
 
 
-def lines_named(run: Path, names: Container[str]) -> Iterator[bytes]:
-    lines = lines_of(run / EXPERIMENTS)
-    return (line.rstrip(b"\n") for name, line in zip(ids(run), lines, strict=True) if name in names)
+def experiment_lines(run: Path, selected_ids: Container[str]) -> Iterator[bytes]:
+    lines = read_lines(run / EXPERIMENTS)
+    return (line.rstrip(b"\n") for name, line in zip(ids(run), lines, strict=True) if name in selected_ids)
 
 
-def chunk_lines(run: Path, chunk: Sequence[int]) -> list[bytes]:
+def read_chunk_lines(run: Path, chunk: Sequence[int]) -> list[bytes]:
     offset, length, _ = chunk
     with open_regular(run / EXPERIMENTS) as file:
         check_open(file, run / EXPERIMENTS)
@@ -123,17 +129,19 @@ def chunk_lines(run: Path, chunk: Sequence[int]) -> list[bytes]:
         return file.read(length).splitlines()
 
 
-def read_chunk(run: Path, chunk: Sequence[int], faults: Mapping[str, Fault]) -> tuple[Experiment, ...]:
+def load_chunk(run: Path, chunk: Sequence[int], faults: Mapping[str, Fault]) -> tuple[Experiment, ...]:
     path, count = run / EXPERIMENTS, chunk[2]
-    found = tuple(_experiments(path, ((None, line) for line in chunk_lines(run, chunk)), faults))
-    if len(found) != count:
-        got = f"{counted(len(found), 'experiment')} in a chunk of {count}"
+    experiments = tuple(
+        _parse_experiments(path, ((None, line) for line in read_chunk_lines(run, chunk)), faults)
+    )
+    if len(experiments) != count:
+        got = f"{counted(len(experiments), 'experiment')} in a chunk of {count}"
         raise MutatorError(got, where=path, remedy=REMEDY)
-    return found
+    return experiments
 
 
-def read_all(run: Path) -> tuple[Experiment, ...]:
-    return tuple(iterate(run))
+def load_experiments(run: Path) -> tuple[Experiment, ...]:
+    return tuple(iterate_experiments(run))
 
 
 class ExperimentsInOrder(Sequence[Experiment]):
@@ -147,7 +155,7 @@ class ExperimentsInOrder(Sequence[Experiment]):
         return self._ends[-1] if self._ends else 0
 
     def __iter__(self) -> Iterator[Experiment]:
-        return iterate(self._run)
+        return iterate_experiments(self._run)
 
     @overload
     def __getitem__(self, place: int) -> Experiment: ...
@@ -159,19 +167,19 @@ class ExperimentsInOrder(Sequence[Experiment]):
         at = range(len(self))[place]
         number = bisect_right(self._ends, at)
         chunk = self._chunks[number]
-        return read_chunk(self._run, chunk, self._faults)[at - self._ends[number] + chunk[2]]
+        return load_chunk(self._run, chunk, self._faults)[at - self._ends[number] + chunk[2]]
 
     @cached_property
     def _faults(self) -> dict[str, Fault]:
-        return read_faults(self._run)
+        return load_faults(self._run)
 
 
-def iterate(run: Path) -> Iterator[Experiment]:
+def iterate_experiments(run: Path) -> Iterator[Experiment]:
     path = run / EXPERIMENTS
-    yield from _experiments(path, _lines(path), read_faults(run))
+    yield from _parse_experiments(path, _numbered_lines(path), load_faults(run))
 
 
-def lines_of(path: Path) -> Iterator[bytes]:
+def read_lines(path: Path) -> Iterator[bytes]:
     try:
         with open_regular(path) as file:
             yield from bounded_lines(file, path)
@@ -179,42 +187,44 @@ def lines_of(path: Path) -> Iterator[bytes]:
         raise MutatorError(f"cannot be read ({err.strerror})", where=path, remedy=REMEDY) from None
 
 
-def experiment_on(path: Path, number: int, line: bytes, faults: Mapping[str, Fault]) -> Experiment:
-    [experiment] = _experiments(path, [(number, line)], faults)
+def parse_experiment_line(path: Path, number: int, line: bytes, faults: Mapping[str, Fault]) -> Experiment:
+    [experiment] = _parse_experiments(path, [(number, line)], faults)
     return experiment
 
 
-def _experiments(path: Path, lines: _Lines, faults: Mapping[str, Fault]) -> Iterator[Experiment]:
-    return _read(path, lines, partial(experiment_of, faults=faults))
+def _parse_experiments(
+    path: Path, lines: _NumberedLines, faults: Mapping[str, Fault]
+) -> Iterator[Experiment]:
+    return _parse_lines(path, lines, partial(parse_experiment, faults=faults))
 
 
 def ids(run: Path) -> Iterator[str]:
     path = run / EXPERIMENTS
-    return _read(path, _lines(path), id_of)
+    return _parse_lines(path, _numbered_lines(path), id_on_line)
 
 
-def problems(run: Path) -> Iterator[MutatorError]:
+def plan_problems(run: Path) -> Iterator[MutatorError]:
     """Yield a problem for each line that is damaged or does not match its id, and for each unused fault."""
-    planned, defined = run / EXPERIMENTS, run / FAULTS
-    found = list(_tried(defined, fault_of))
-    faults = {fault.id: fault for fault in found if isinstance(fault, Fault)}
-    used = set(_tried(planned, lambda line: content(line)["fault"]))
-    for number, fault in enumerate(found, start=1):
+    experiments_path, faults_path = run / EXPERIMENTS, run / FAULTS
+    faults_or_errors = list(_parsed_or_error(faults_path, parse_fault))
+    faults = {fault.id: fault for fault in faults_or_errors if isinstance(fault, Fault)}
+    used = set(_parsed_or_error(experiments_path, lambda line: values_behind_id(line)["fault"]))
+    for number, fault in enumerate(faults_or_errors, start=1):
         if isinstance(fault, MutatorError):
             yield fault
         elif fault.id not in used:
             got = f"fault {fault.id}, which no experiment uses"
-            yield MutatorError(got, where=defined, line=number, remedy=REMEDY)
-    experiments = _tried(planned, partial(experiment_of, faults=faults))
-    yield from (one for one in experiments if isinstance(one, MutatorError))
+            yield MutatorError(got, where=faults_path, line=number, remedy=REMEDY)
+    experiments = _parsed_or_error(experiments_path, partial(parse_experiment, faults=faults))
+    yield from (experiment for experiment in experiments if isinstance(experiment, MutatorError))
 
 
-def to_plain(experiment: Experiment) -> dict[str, Any]:
+def experiment_as_json(experiment: Experiment) -> dict[str, Any]:
     """Convert an experiment to JSON types, with its fault's id."""
-    return {name: plain(value) for name, value in _line(experiment).items()}
+    return {name: plain(value) for name, value in _line_values(experiment).items()}
 
 
-def _line(experiment: Experiment) -> dict[str, Any]:
+def _line_values(experiment: Experiment) -> dict[str, Any]:
     return {
         "id": experiment.id,
         "fault": experiment.fault.id,
@@ -228,10 +238,10 @@ def _line(experiment: Experiment) -> dict[str, Any]:
     }
 
 
-def canary_from(head: Path, data: Mapping[str, Any]) -> Experiment:
-    """Read the canary in the run.json at `head`; MutatorError if it is damaged."""
+def canary_from_json(head_path: Path, data: Mapping[str, Any]) -> Experiment:
+    """Read the canary in the run.json at `head_path`; MutatorError if it is damaged."""
     try:
-        fault = fault_from(data["fault"])
-        return experiment_from({**data, "fault": fault.id}, {fault.id: fault})
+        fault = fault_from_json(data["fault"])
+        return experiment_from_json({**data, "fault": fault.id}, {fault.id: fault})
     except (MutatorError, ValueError, LookupError, TypeError, AttributeError) as err:
-        raise MutatorError(f"damaged at 'canary' ({err})", where=head, remedy=REMEDY) from None
+        raise MutatorError(f"damaged at 'canary' ({err})", where=head_path, remedy=REMEDY) from None

@@ -28,65 +28,67 @@ from mutator.model import (
 )
 
 REMEDY = "the plan is damaged: restore the file from a copy of the run folder, or plan into a new one"
-_DAMAGE = (ValueError, LookupError, TypeError, AttributeError, RecursionError)
+_PARSE_ERRORS = (ValueError, LookupError, TypeError, AttributeError, RecursionError)
 
 # A plan can have a million lines. Patterns read a line in canonical JSON in a third of the time that a JSON
-# parser and `Experiment.id` take, and an id in a tenth. They only select text; `_from_canonical` checks it.
-_IDS = rb'"fault":("[0-9a-f]{16}"),"id":"([0-9a-f]{16})",'
-_ID = re.compile(rb'\{(?:"after_hazard":"[a-z_]+",)?' + _IDS)
-_LINE = re.compile(
-    rb"\{" + _IDS + rb'"method":("[a-z_]+"),"scenario":("[^"\\]*"),"scenario_digest":("[^"\\]*"),'
+# parser and `Experiment.id` take, and an id in a tenth. They only select text; `_parse_canonical` checks it.
+_IDS_REGEX = rb'"fault":("[0-9a-f]{16}"),"id":"([0-9a-f]{16})",'
+_IDS_PATTERN = re.compile(rb'\{(?:"after_hazard":"[a-z_]+",)?' + _IDS_REGEX)
+_LINE_PATTERN = re.compile(
+    rb"\{" + _IDS_REGEX + rb'"method":("[a-z_]+"),"scenario":("[^"\\]*"),"scenario_digest":("[^"\\]*"),'
     rb'"seed":(-?\d+),"setting":(\[[^\]]*\]),"trigger":(\{[^{}]*\})\}\n?'
 )
-_AN_ID = re.compile(r"[0-9a-f]{16}")
+_EXPERIMENT_ID_PATTERN = re.compile(r"[0-9a-f]{16}")
 # the input of Experiment.id
-_HASHED = ("fault", "scenario", "scenario_digest", "method", "trigger", "seed", "setting")
+_ID_FIELDS = ("fault", "scenario", "scenario_digest", "method", "trigger", "seed", "setting")
 
 _T = TypeVar("_T")
 
 
-def id_of(line: bytes) -> str:
-    """Return the id that a line states, which is used in names of files. `experiment_of` checks it."""
-    if found := _ID.match(line):
-        return found[2].decode()
-    return _parsed(line, lambda data: _checked_id(data["id"]))
+def id_on_line(line: bytes) -> str:
+    """Return the id that a line states, which is used in names of files. `parse_experiment` checks it."""
+    if match := _IDS_PATTERN.match(line):
+        return match[2].decode()
+    return _parse_json_line(line, lambda data: _checked_id(data["id"]))
 
 
-def content(line: bytes) -> dict[str, Any]:
+def values_behind_id(line: bytes) -> dict[str, Any]:
     """Return the values on a line that determine its id, as JSON types. They are not compared with the id."""
-    return _parsed(line, lambda data: {name: data[name] for name in _HASHED})
+    return _parse_json_line(line, lambda data: {name: data[name] for name in _ID_FIELDS})
 
 
-def experiment_of(line: bytes, faults: Mapping[str, Fault]) -> Experiment:
-    """Return the experiment on a line; MutatorError if it does not match `id_of`, or for an unknown field."""
-    return experiment_as_written(line, faults) or _parsed(
-        line, lambda data: experiment_from(data | {"id": id_of(line)}, faults)
+def parse_experiment(line: bytes, faults: Mapping[str, Fault]) -> Experiment:
+    """Return the experiment on a line; MutatorError if it does not match `id_on_line`, or for an unknown
+    field.
+    """
+    return parse_canonical_experiment(line, faults) or _parse_json_line(
+        line, lambda data: experiment_from_json(data | {"id": id_on_line(line)}, faults)
     )
 
 
-def fault_of(line: bytes) -> Fault:
+def parse_fault(line: bytes) -> Fault:
     """Return the fault on a line; MutatorError for an unknown field."""
-    return _parsed(line, fault_from)
+    return _parse_json_line(line, fault_from_json)
 
 
-def _parsed(line: bytes, read: Callable[[dict[str, Any]], _T]) -> _T:
+def _parse_json_line(line: bytes, convert: Callable[[dict[str, Any]], _T]) -> _T:
     try:
-        return read(json.loads(line))
-    except _DAMAGE:
+        return convert(json.loads(line))
+    except _PARSE_ERRORS:
         raise MutatorError("a damaged line", remedy=REMEDY) from None
 
 
 def _checked_id(name: object) -> str:
-    if isinstance(name, str) and _AN_ID.fullmatch(name):
+    if isinstance(name, str) and _EXPERIMENT_ID_PATTERN.fullmatch(name):
         return name
     raise ValueError(f"not an id: {name!a}")
 
 
-def experiment_as_written(line: bytes, faults: Mapping[str, Fault]) -> Experiment | None:
+def parse_canonical_experiment(line: bytes, faults: Mapping[str, Fault]) -> Experiment | None:
     """Return the experiment on a line in canonical JSON; None for any other, or if its id does not match."""
-    if not (found := _LINE.fullmatch(line)):
+    if not (match := _LINE_PATTERN.fullmatch(line)):
         return None
-    fault, name, method, scenario, scenario_digest, seed, setting, trigger = found.groups()
+    fault, name, method, scenario, scenario_digest, seed, setting, trigger = match.groups()
     # the input of Experiment.id
     hashed = b",".join((fault, scenario, scenario_digest, method, trigger, seed, setting))
     if sha256(b"[%b]" % hashed).hexdigest()[:16].encode() != name:
@@ -94,12 +96,12 @@ def experiment_as_written(line: bytes, faults: Mapping[str, Fault]) -> Experimen
     try:
         experiment = Experiment(
             fault=faults[fault[1:-1].decode()],
-            scenario=_scenario(scenario),
-            scenario_digest=_scalar(scenario_digest),
-            method=Method(_scalar(method)),
-            trigger=_trigger(trigger),
-            seed=_scalar(seed),
-            setting=_setting(setting),
+            scenario=_parse_scenario(scenario),
+            scenario_digest=_parse_scalar(scenario_digest),
+            method=Method(_parse_scalar(method)),
+            trigger=_parse_trigger(trigger),
+            seed=_parse_scalar(seed),
+            setting=_parse_setting(setting),
         )
     except (ValueError, LookupError, TypeError):
         return None
@@ -107,7 +109,7 @@ def experiment_as_written(line: bytes, faults: Mapping[str, Fault]) -> Experimen
     return experiment
 
 
-def _from_canonical(text: bytes) -> Any:
+def _parse_canonical(text: bytes) -> Any:
     """Parse canonical JSON; ValueError for any other, since an id is a digest of canonical JSON."""
     value = json.loads(text)
     if canonical(value).encode() != text:
@@ -115,28 +117,28 @@ def _from_canonical(text: bytes) -> Any:
     return value
 
 
-_scalar = lru_cache(maxsize=1024)(_from_canonical)
+_parse_scalar = lru_cache(maxsize=1024)(_parse_canonical)
 
 
 @lru_cache(maxsize=1024)
-def _scenario(text: bytes) -> str:
-    return check_library_name(_from_canonical(text), "plan")
+def _parse_scenario(text: bytes) -> str:
+    return check_library_name(_parse_canonical(text), "plan")
 
 
 @lru_cache(maxsize=64)
-def _setting(text: bytes) -> tuple[str, ...]:
-    return tuple(_from_canonical(text))
+def _parse_setting(text: bytes) -> tuple[str, ...]:
+    return tuple(_parse_canonical(text))
 
 
 @lru_cache(maxsize=16_384)
-def _trigger(text: bytes) -> Trigger:
-    data = _from_canonical(text)
-    if data.keys() != _known(Trigger):
+def _parse_trigger(text: bytes) -> Trigger:
+    data = _parse_canonical(text)
+    if data.keys() != _field_names(Trigger):
         raise ValueError("unknown fields")
     return Trigger(**{**data, "hold": Hold(data["hold"])})
 
 
-def experiment_from(data: Mapping[str, Any], faults: Mapping[str, Fault]) -> Experiment:
+def experiment_from_json(data: Mapping[str, Any], faults: Mapping[str, Fault]) -> Experiment:
     """Read the experiment on a line; MutatorError if its id does not match, or for an unknown field."""
     if data["fault"] not in faults:
         raise MutatorError(
@@ -145,15 +147,15 @@ def experiment_from(data: Mapping[str, Any], faults: Mapping[str, Fault]) -> Exp
     check_library_name(str(data["scenario"]), "plan")
     trigger = data["trigger"]
     values = {name: value for name, value in data.items() if name != "id"}
-    read = {
+    converted = {
         "fault": faults[data["fault"]],
         "method": Method(data["method"]),
-        "trigger": _make(Trigger, trigger, hold=Hold(trigger["hold"])),
+        "trigger": _object_from_json(Trigger, trigger, hold=Hold(trigger["hold"])),
         "setting": tuple(data["setting"]),
     }
     if "after_hazard" in data:
-        read["after_hazard"] = AfterHazard(data["after_hazard"])
-    experiment = _make(Experiment, values, **read)
+        converted["after_hazard"] = AfterHazard(data["after_hazard"])
+    experiment = _object_from_json(Experiment, values, **converted)
     if experiment.id != data["id"]:
         raise MutatorError(
             f"experiment {data['id']} has the content of {experiment.id}",
@@ -163,40 +165,40 @@ def experiment_from(data: Mapping[str, Any], faults: Mapping[str, Fault]) -> Exp
     return experiment
 
 
-def fault_from(data: Mapping[str, Any]) -> Fault:
+def fault_from_json(data: Mapping[str, Any]) -> Fault:
     """Read the fault on a line of the plan; MutatorError for an unknown field."""
-    return _make(
+    return _object_from_json(
         Fault,
         data,
-        injections=tuple(_injection_from(item) for item in data["injections"]),
+        injections=tuple(_injection_from_json(item) for item in data["injections"]),
         hold=Hold(data["hold"]) if data["hold"] else None,
         changes=tuple(data["changes"]),
     )
 
 
-def _injection_from(data: Mapping[str, Any]) -> Injection:
+def _injection_from_json(data: Mapping[str, Any]) -> Injection:
     location, anchor = data["location"], data["location"]["anchor"]
-    return _make(
+    return _object_from_json(
         Injection,
         data,
-        location=_make(
-            FaultLocation, location, anchor=_make(Anchor, anchor, kind=AnchorKind(anchor["kind"]))
+        location=_object_from_json(
+            FaultLocation, location, anchor=_object_from_json(Anchor, anchor, kind=AnchorKind(anchor["kind"]))
         ),
         params=tuple((name, value) for name, value in data["params"]),
     )
 
 
-def _make(kind: type[_T], data: Mapping[str, Any], /, **read: Any) -> _T:
-    """Create an object from its plain data and the converted values `read`. Missing fields get defaults."""
-    if unknown := sorted(data.keys() - _known(kind)):  # type: ignore[arg-type]
+def _object_from_json(kind: type[_T], data: Mapping[str, Any], /, **converted: Any) -> _T:
+    """Create an object from plain data and `converted` values. Missing fields get defaults."""
+    if unknown := sorted(data.keys() - _field_names(kind)):  # type: ignore[arg-type]
         raise MutatorError(
             f"{kind.__name__.lower()} has '{unknown[0]}', which this version of mutator does not know",
             expected="a plan that this version or an older one wrote",
             remedy="update mutator, or plan into a new folder",
         )
-    return kind(**{**data, **read})
+    return kind(**{**data, **converted})
 
 
 @lru_cache(maxsize=16)
-def _known(kind: type[Any]) -> frozenset[str]:
+def _field_names(kind: type[Any]) -> frozenset[str]:
     return frozenset(field.name for field in fields(kind))

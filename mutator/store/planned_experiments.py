@@ -8,10 +8,10 @@ from mutator.errors import MutatorError
 from mutator.model import Experiment
 from mutator.store import plan_file
 from mutator.store.indexed_lines import OpenFiles
-from mutator.store.plan_lines import id_of
+from mutator.store.plan_lines import id_on_line
 
 
-class Planned(Mapping[str, Experiment]):
+class PlannedExperiments(Mapping[str, Experiment]):
     """The experiments of the run folder at `run`, in plan order.
 
     Reading a line that is damaged or does not match its id raises MutatorError.
@@ -19,15 +19,15 @@ class Planned(Mapping[str, Experiment]):
 
     def __init__(self, run: Path) -> None:
         self._path = run / plan_file.EXPERIMENTS
-        self._faults = plan_file.read_faults(run)
+        self._faults = plan_file.load_faults(run)
         self._files = OpenFiles([self._path])
         self._index: dict[str, int] = {}
         self._offsets = array("Q", [0])
         offset = 0
-        for number, line in enumerate(plan_file.lines_of(self._path)):
+        for number, line in enumerate(plan_file.read_lines(self._path)):
             self._offsets.append(offset := offset + len(line))
             try:
-                name = id_of(line)
+                name = id_on_line(line)
             except MutatorError:
                 name = str(number)  # the line is reported when it is read
             self._index.setdefault(name, number)
@@ -36,7 +36,7 @@ class Planned(Mapping[str, Experiment]):
         number = self._index[name]
         begin, end = self._offsets[number : number + 2]
         line = self._files.read_part(0, begin, end - begin)
-        return plan_file.experiment_on(self._path, number + 1, line, self._faults)
+        return plan_file.parse_experiment_line(self._path, number + 1, line, self._faults)
 
     def __contains__(self, name: object) -> bool:
         return name in self._index

@@ -11,22 +11,22 @@ from mutator._common.confined_files import inside
 from mutator.errors import CheckFailed, MutatorError
 from mutator.model import Activation, Outcome, Record, RunError, Status
 from mutator.store.indexed_lines import IndexedLine, IndexedLines
-from mutator.store.timings import TIMINGS, TIMINGS_SCHEMA
+from mutator.store.timings import TIMINGS_FOLDER, TIMINGS_SCHEMA
 
 SCHEMA = "records/2"
-RECORDS, PROOF = "records", "proof"  # folders of files of lines
-LINE_SCHEMAS = {RECORDS: SCHEMA, TIMINGS: TIMINGS_SCHEMA, PROOF: SCHEMA}
-_NAMES = tuple(field.name for field in fields(Record))
-_RECORDS = ("activation", "error")  # fields that contain dataclasses
+RECORDS_FOLDER, PROOF_FOLDER = "records", "proof"  # folders of files of lines
+LINE_SCHEMA_BY_FOLDER = {RECORDS_FOLDER: SCHEMA, TIMINGS_FOLDER: TIMINGS_SCHEMA, PROOF_FOLDER: SCHEMA}
+_RECORD_FIELDS = tuple(field.name for field in fields(Record))
+_DATACLASS_FIELDS = ("activation", "error")  # fields that contain dataclasses
 
 
-def line_of(record: Record) -> dict[str, Any]:
+def record_as_json(record: Record) -> dict[str, Any]:
     """Convert a record like `asdict`, but without copying every tuple."""
-    line = {name: getattr(record, name) for name in _NAMES}
-    return line | {name: asdict(line[name]) for name in _RECORDS if line[name] is not None}
+    line = {name: getattr(record, name) for name in _RECORD_FIELDS}
+    return line | {name: asdict(line[name]) for name in _DATACLASS_FIELDS if line[name] is not None}
 
 
-def record_from(data: Mapping[str, Any]) -> Record:
+def record_from_json(data: Mapping[str, Any]) -> Record:
     activation = data["activation"]
     return Record(
         experiment_id=str(data["experiment_id"]),
@@ -53,7 +53,7 @@ def _pairs(items: list[list[Any]]) -> tuple[tuple[str, float], ...]:
     return tuple([(name, value) for name, value in items])  # a list is faster than a generator
 
 
-class Ending(NamedTuple):
+class RecordEnding(NamedTuple):
     """How an experiment ended: the most frequently read part of a record."""
 
     experiment_id: str
@@ -62,66 +62,70 @@ class Ending(NamedTuple):
     patch: str
 
     @property
-    def counts(self) -> bool:
+    def is_final(self) -> bool:
         """Whether the experiment is finished. A harness error is retried."""
         return self.status != Status.HARNESS_ERROR.value
 
 
 # Lines are canonical JSON. Quotation marks inside a string are escaped, so no pattern matches there.
-_NAME, _OUTCOME = b'"experiment_id":"', b'"outcome":'
-_END = re.compile(rb'"outcome":(?:null|"([a-z_]+)"),"patch":"([0-9a-f]*)","status":"([a-z_]+)"')
-_ONCE = (b'"experiment_id":', _OUTCOME, b'"patch":', b'"status":')
+_ID_KEY, _OUTCOME_KEY = b'"experiment_id":"', b'"outcome":'
+_ENDING_PATTERN = re.compile(rb'"outcome":(?:null|"([a-z_]+)"),"patch":"([0-9a-f]*)","status":"([a-z_]+)"')
+_KEYS_WRITTEN_ONCE = (b'"experiment_id":', _OUTCOME_KEY, b'"patch":', b'"status":')
 
 
-def ending_on(line: bytes) -> Ending:
+def parse_ending(line: bytes) -> RecordEnding:
     """Read the ending from a record's line, ten times as fast as the whole record.
 
     An invalid line raises the errors of `json.loads`, KeyError, TypeError or AttributeError.
     """
-    begin = line.find(_NAME) + len(_NAME)
-    found = _END.match(line, line.find(_OUTCOME))
-    if begin >= len(_NAME) and found and all(line.count(key) == 1 for key in _ONCE):
-        outcome = found[1].decode() if found[1] else None
-        return Ending(
-            line[begin : line.index(b'"', begin)].decode(), found[3].decode(), outcome, found[2].decode()
+    begin = line.find(_ID_KEY) + len(_ID_KEY)
+    match = _ENDING_PATTERN.match(line, line.find(_OUTCOME_KEY))
+    if begin >= len(_ID_KEY) and match and all(line.count(key) == 1 for key in _KEYS_WRITTEN_ONCE):
+        outcome = match[1].decode() if match[1] else None
+        return RecordEnding(
+            line[begin : line.index(b'"', begin)].decode(), match[3].decode(), outcome, match[2].decode()
         )
     data = json.loads(line)
-    return Ending(str(data["experiment_id"]), data["status"], data.get("outcome"), str(data.get("patch", "")))
+    return RecordEnding(
+        str(data["experiment_id"]), data["status"], data.get("outcome"), str(data.get("patch", ""))
+    )
 
 
-def endings(records: Mapping[str, Record]) -> Iterator[Ending]:
+def endings_of(records: Mapping[str, Record]) -> Iterator[RecordEnding]:
     for name in records:
         if isinstance(records, IndexedLines):
             line = records.line_of(name)
             try:
-                yield ending_on(line.data)
+                yield parse_ending(line.data)
             except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
                 raise records.damage_error(line) from None
         else:
-            one = records[name]
-            yield Ending(name, one.status.value, one.outcome.value if one.outcome else None, one.patch)
+            record = records[name]
+            yield RecordEnding(
+                name, record.status.value, record.outcome.value if record.outcome else None, record.patch
+            )
 
 
-def read_records(run: Path, folder: str = "records") -> IndexedLines[Record]:
+def load_records(run: Path, folder: str = "records") -> IndexedLines[Record]:
     """Return the record of each experiment that has one; a torn last line is skipped.
 
     A harness error is replaced by any other record of its experiment. MutatorError for a damaged line, and
     for a second final record of an experiment; CheckFailed if the two differ.
     """
     paths = sorted(inside(run, folder).glob("*.jsonl"))
-    return IndexedLines(paths, SCHEMA, record_from, _replaces)
+    return IndexedLines(paths, SCHEMA, record_from_json, _replaces)
 
 
-def _replaces(line: IndexedLine, known: IndexedLine) -> bool:
-    record, before = (record_from(one.content()) for one in (line, known))
+def _replaces(line: IndexedLine, earlier: IndexedLine) -> bool:
+    record, before = (record_from_json(record_line.content()) for record_line in (line, earlier))
     if record.status is Status.HARNESS_ERROR:
         return False
     if before.status is not Status.HARNESS_ERROR:
-        raise second_record(line.path, line.number, record.experiment_id, same=before == record)
+        raise second_record_error(line.path, line.number, record.experiment_id, same=before == record)
     return True
 
 
-def second_record(path: Path, line: int, experiment_id: str, *, same: bool) -> MutatorError:
+def second_record_error(path: Path, line: int, experiment_id: str, *, same: bool) -> MutatorError:
     """Make the error about a second final record of an experiment."""
     if same:
         return MutatorError(

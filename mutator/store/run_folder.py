@@ -18,17 +18,17 @@ from mutator.errors import MutatorError
 from mutator.model import AfterHazard, Experiment, Limits, Record
 from mutator.store import file_digests, integrity, plan_file
 from mutator.store.allowed_contents import SCRATCH_FOLDER, TRACES_FOLDER, check_contents
-from mutator.store.patch_files import Patches
-from mutator.store.records import read_records
-from mutator.store.run_head import HEAD, RunHead, StoredGolden, read_head
+from mutator.store.patch_files import PatchFolder
+from mutator.store.records import load_records
+from mutator.store.run_head import HEAD, RunHead, StoredGolden, load_head
 from mutator.store.shards import Shard
-from mutator.store.timings import read_timings
+from mutator.store.timings import load_timings
 from mutator.store.work_stretches import Stretch
 from mutator.targets.contact_severity import Scale
 
 STOP_NOTE = "Runs end at their first terminal hazard: later hazards and alerts are not recorded."
-SERIES_MB = 500  # budget of a run's series, unless the plan sets another
-_LOOKS = 3  # attempts to read a folder that its owner is writing
+DEFAULT_SERIES_MB = 500  # budget of a run's series, unless the plan sets another
+_MOST_READS = 3  # attempts to read a folder that its owner is writing
 
 
 class GoldenRun(NamedTuple):
@@ -39,7 +39,7 @@ class GoldenRun(NamedTuple):
     seed: int | None = None
 
     @classmethod
-    def of(cls, experiment: Experiment, *, several_seeds: bool) -> "GoldenRun":
+    def for_experiment(cls, experiment: Experiment, *, several_seeds: bool) -> "GoldenRun":
         """Return the golden run with which an experiment is compared."""
         return cls(experiment.scenario, experiment.changes, experiment.seed if several_seeds else None)
 
@@ -54,7 +54,7 @@ class GoldenRun(NamedTuple):
         scenario, changes, *seed = values
         return cls(scenario, tuple(changes), *seed)
 
-    def stored(self) -> StoredGolden:
+    def to_stored(self) -> StoredGolden:
         """Return the values as run.json has them."""
         golden = self.scenario, self.changes
         return golden if self.seed is None else (*golden, self.seed)
@@ -73,13 +73,13 @@ class RunFolder:
         MutatorError if there is none, if it has another schema, if it contains links or the like
         (`check_contents`), or if anything in it is damaged, missing or not in its plan.
         """
-        folder = cls.unverified(path)
+        folder = cls.open_unverified(path)
         for problem in folder.problems():
             raise problem
         return folder
 
     @classmethod
-    def unverified(cls, path: Path) -> "RunFolder":
+    def open_unverified(cls, path: Path) -> "RunFolder":
         """Like `open`, but without comparing the files with their digests."""
         if not cls.exists(path):
             raise MutatorError(
@@ -98,29 +98,31 @@ class RunFolder:
     def exists(path: Path) -> bool:
         return (path / HEAD).is_file()
 
-    def problems(self, *, anew: bool = False) -> list[MutatorError]:
+    def problems(self, *, ignore_cache: bool = False) -> list[MutatorError]:
         """Return all differences from what was written.
 
-        With `anew`, earlier verifications are ignored (`verified_runs`).
+        With `ignore_cache`, earlier verifications are ignored (`verified_runs_cache`).
         """
-        for _ in range(_LOOKS):
+        for _ in range(_MOST_READS):
             try:
                 ledger = file_digests.load_ledger(self.path)
             except MutatorError as err:
                 return [err]
-            found = list(integrity.run_problems(self.path, self.head, ledger, self.shard, ignore_cache=anew))
-            if not found or file_digests.load_ledger(self.path) == ledger:
+            problems = list(
+                integrity.run_problems(self.path, self.head, ledger, self.shard, ignore_cache=ignore_cache)
+            )
+            if not problems or file_digests.load_ledger(self.path) == ledger:
                 break
-        return found
+        return problems
 
     @property
-    def finished(self) -> bool:
+    def is_finished(self) -> bool:
         """Whether every experiment has a final record, and the equivalence check is complete."""
         return file_digests.load_ledger(self.path).finished
 
     @cached_property
     def head(self) -> RunHead:
-        return read_head(self.path)
+        return load_head(self.path)
 
     @property
     def provenance(self) -> dict[str, Any]:
@@ -151,11 +153,11 @@ class RunFolder:
         return None
 
     @property
-    def planned(self) -> int:
+    def planned_count(self) -> int:
         shard = self.shard
         if shard is None:
             return self.head.experiments
-        return sum(count for i, (_, _, count) in enumerate(self.head.chunks) if shard.has(i))
+        return sum(count for i, (_, _, count) in enumerate(self.head.chunks) if shard.has_chunk(i))
 
     @property
     def shard(self) -> Shard | None:
@@ -168,14 +170,14 @@ class RunFolder:
         return self.head.limits
 
     @property
-    def scale(self) -> Scale | None:
+    def severity_scale(self) -> Scale | None:
         """The scale of delta-v classes; None for a target without contacts."""
         return self.head.severity
 
     @property
-    def series_mb(self) -> int:
+    def series_budget_mb(self) -> int:
         chosen = self.head.choices.series_mb
-        return SERIES_MB if chosen is None else chosen
+        return DEFAULT_SERIES_MB if chosen is None else chosen
 
     @property
     def has_alerts(self) -> bool:
@@ -193,29 +195,29 @@ class RunFolder:
         return range(first, last + 1)
 
     @cached_property
-    def goldens(self) -> tuple[GoldenRun, ...]:
+    def golden_runs(self) -> tuple[GoldenRun, ...]:
         return tuple(map(GoldenRun.from_stored, self.head.goldens))
 
     @property
     def scenarios(self) -> set[str]:
-        return {one.scenario for one in self.goldens}
+        return {golden_run.scenario for golden_run in self.golden_runs}
 
-    def golden_of(self, experiment: Experiment) -> GoldenRun:
-        return GoldenRun.of(experiment, several_seeds=len(self.seeds) > 1)
+    def golden_run_of(self, experiment: Experiment) -> GoldenRun:
+        return GoldenRun.for_experiment(experiment, several_seeds=len(self.seeds) > 1)
 
-    def golden(self, scenario: str, changes: tuple[str, ...] = (), seed: int | None = None) -> Path:
+    def golden_folder(self, scenario: str, changes: tuple[str, ...] = (), seed: int | None = None) -> Path:
         return inside(self.path / "golden", GoldenRun(scenario, changes, seed).key)
 
-    def golden_folder(self, experiment: Experiment) -> Path:
-        return self.golden(*self.golden_of(experiment))
+    def golden_folder_of(self, experiment: Experiment) -> Path:
+        return self.golden_folder(*self.golden_run_of(experiment))
 
-    def traces_of(self, experiment_id: str) -> Path:
+    def kept_traces_folder(self, experiment_id: str) -> Path:
         """Return the folder of the traces that `rerun --trace` keeps."""
         return inside(self.path / TRACES_FOLDER, experiment_id)
 
     @cached_property
-    def patches(self) -> Patches:
-        return Patches(self.path)
+    def patches(self) -> PatchFolder:
+        return PatchFolder(self.path)
 
     def read_patch(self, experiment_id: str, record: Record | None) -> bytes | None:
         """Return the stored diff of an experiment with this record; None if it has not run, or had no mutant.
@@ -230,26 +232,26 @@ class RunFolder:
 
     def records(self, kind: str = "records") -> Mapping[str, Record]:
         """Return the records by experiment id, parsed on access; with kind `proof`, those of the proof."""
-        return read_records(self.path, kind)
+        return load_records(self.path, kind)
 
     def timings(self) -> Mapping[str, dict[str, Any]]:
         """Return the newest timing line of each experiment by id, parsed on access."""
-        return read_timings(self.path)
+        return load_timings(self.path)
 
     @property
     def canary(self) -> Experiment:
         """The experiment that must cause its hazard before the campaign starts."""
-        return plan_file.canary_from(self.path / HEAD, self.head.canary)
+        return plan_file.canary_from_json(self.path / HEAD, self.head.canary)
 
-    def share(self) -> dict[str, int]:
+    def planned_positions(self) -> dict[str, int]:
         return integrity.planned_positions(self.path, self.head, self.shard)
 
     @property
-    def work(self) -> Path:
+    def scratch_folder(self) -> Path:
         """Scratch folder. It can be deleted while no command owns the run folder."""
         return self.path / SCRATCH_FOLDER
 
-    def find(self, prefix: str) -> str:
+    def experiment_id_from(self, prefix: str) -> str:
         """Return the only planned experiment whose id starts with `prefix`; MutatorError if not unique."""
         hits = [name for name in plan_file.ids(self.path) if name.startswith(prefix)]
         if len(hits) != 1 or not prefix:

@@ -20,8 +20,10 @@ from mutator.targets.target_facts import TargetFacts
 SCHEMA = "run/3"
 HEAD, CAMPAIGN = RUN_HEAD, "campaign.yaml"
 REMEDY = "the run folder is damaged: restore the file from a copy of it"
-Names = tuple[str, ...]
-StoredGolden = tuple[str, Names] | tuple[str, Names, int]  # scenario, changes; seed, if the plan has several
+NameTuple = tuple[str, ...]
+StoredGolden = (
+    tuple[str, NameTuple] | tuple[str, NameTuple, int]
+)  # scenario, changes; seed, if the plan has several
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,7 +46,7 @@ class PlanFacts:
     seed: int
     seeds: tuple[int, int] | None = added(None)  # the first and the last, if the plan has several
     reading: str
-    operators: Names = added(())
+    operators: NameTuple = added(())
     choices: Choices
     experiments: int
     runs: int
@@ -66,32 +68,32 @@ class RunHead(TargetFacts, PlanFacts):
     chunks: tuple[Chunk, ...]
     later: Mapping[str, Any] = field(default_factory=dict)  # keys that a later version adds: kept, and sealed
 
-    def content(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return the keys and their values in JSON types, in the order of the file."""
-        found: dict[str, Any] = plain(self)
-        return {**{name: found[name] for name in _KEYS if name in found}, **found["later"]}
+        values: dict[str, Any] = plain(self)
+        return {**{name: values[name] for name in _HEAD_KEYS if name in values}, **values["later"]}
 
     def differences(self, other: "RunHead") -> Iterator[tuple[str, Any, Any]]:
         """Yield the keys whose values differ, with both values."""
-        for name in _KEYS:
+        for name in _HEAD_KEYS:
             mine, its = getattr(self, name), getattr(other, name)
             if mine != its:
                 yield name, mine, its
 
-    def as_json(self) -> bytes:
-        return json_bytes(self.content())
+    def file_bytes(self) -> bytes:
+        return json_bytes(self.as_json())
 
 
-_KEYS = tuple(one.name for one in fields(RunHead) if one.name != "later")
+_HEAD_KEYS = tuple(head_field.name for head_field in fields(RunHead) if head_field.name != "later")
 
 
-def read_head(run: Path) -> RunHead:
+def load_head(run: Path) -> RunHead:
     """Read the head of a run folder; MutatorError if it is damaged or has another schema."""
     path = run / HEAD
     try:
-        head = from_plain(RunHead, _sorted(read_json(path, SCHEMA)))
+        head = from_plain(RunHead, _with_unknown_keys_apart(read_json(path, SCHEMA)))
     except Misfit as err:
-        raise _damaged(path, err) from None
+        raise _damage_error(path, err) from None
     for name in head.golden_files:
         check_name(name, path)
     for name in (head.target, *(golden[0] for golden in head.goldens)):
@@ -99,16 +101,16 @@ def read_head(run: Path) -> RunHead:
     return head
 
 
-def _sorted(content: dict[str, Any]) -> dict[str, Any]:
+def _with_unknown_keys_apart(content: dict[str, Any]) -> dict[str, Any]:
     """Put the keys that this version does not know under `later`."""
-    known = {name: value for name, value in content.items() if name in _KEYS}
-    return known | {"later": {name: value for name, value in content.items() if name not in known}}
+    known_keys = {name: value for name, value in content.items() if name in _HEAD_KEYS}
+    return known_keys | {"later": {name: value for name, value in content.items() if name not in known_keys}}
 
 
-def _damaged(path: Path, misfit: Misfit) -> MutatorError:
+def _damage_error(path: Path, misfit: Misfit) -> MutatorError:
     if not misfit.path:
         return MutatorError(misfit.got, where=path, expected="a complete run.json", remedy=REMEDY)
     key, *below = misfit.path
-    place = "".join(f"[{one!a}]" for one in below)
-    got = f"damaged at '{key}' ({place + ': ' if place else ''}{misfit.got})"
+    place_below = "".join(f"[{key_below!a}]" for key_below in below)
+    got = f"damaged at '{key}' ({place_below + ': ' if place_below else ''}{misfit.got})"
     return MutatorError(got, where=path, expected=misfit.expected, remedy=REMEDY)

@@ -23,62 +23,70 @@ class Progress:
     remaining_s: float | None = None  #: estimated time in s to the end of the stage
 
 
-class Pace:
-    """Measure the rate of a stage from now on; `done` of `total` steps were completed before."""
+class StagePace:
+    """Measure the rate of a stage from now on; `finished_before` of `total` steps were completed earlier."""
 
-    def __init__(self, stage: str, total: int, done: int = 0) -> None:
-        self._stage, self._total, self._before = stage, total, done
-        self._began = time.monotonic()
+    def __init__(self, stage: str, total: int, finished_before: int = 0) -> None:
+        self._stage, self._total, self._finished_before = stage, total, finished_before
+        self._began_at = time.monotonic()
 
-    def at(self, done: int, *, detail: str = "", outcomes: Counter[str] | None = None) -> Progress:
-        elapsed = time.monotonic() - self._began
-        per_s = (done - self._before) / elapsed if done > self._before and elapsed else None
+    def progress_at(
+        self, finished: int, *, detail: str = "", outcomes: Counter[str] | None = None
+    ) -> Progress:
+        elapsed = time.monotonic() - self._began_at
+        per_s = (
+            (finished - self._finished_before) / elapsed
+            if finished > self._finished_before and elapsed
+            else None
+        )
         return Progress(
             stage=self._stage,
             detail=detail,
-            done=done,
+            done=finished,
             total=self._total,
             outcomes=outcomes or Counter(),
             per_s=per_s,
-            remaining_s=(self._total - done) / per_s if per_s else None,
+            remaining_s=(self._total - finished) / per_s if per_s else None,
         )
 
 
-class Tail:
+class RecordTail:
     """Follow the records of a run as workers append them, reading each byte once."""
 
     def __init__(self, stage: str, folder: Path, total: int) -> None:
         self._folder = folder
-        self._offsets: dict[Path, int] = {}
-        self._labels: dict[str, str] = {}
-        self._read()
-        self._pace = Pace(stage, total, len(self._labels))
+        self._offset_by_file: dict[Path, int] = {}
+        self._label_by_experiment: dict[str, str] = {}
+        self._read_new_lines()
+        self._pace = StagePace(stage, total, len(self._label_by_experiment))
 
     def poll(self) -> Progress:
-        self._read()
-        return self._pace.at(len(self._labels), outcomes=Counter(self._labels.values()))
+        self._read_new_lines()
+        return self._pace.progress_at(
+            len(self._label_by_experiment), outcomes=Counter(self._label_by_experiment.values())
+        )
 
-    def _read(self) -> None:
+    def _read_new_lines(self) -> None:
         for path in self._folder.glob("*.jsonl"):
-            offset = self._offsets.get(path, 0)
+            offset = self._offset_by_file.get(path, 0)
             with open_regular(path) as file:
                 file.seek(offset)
                 data = read_open(file, path, MOST_DATA)
             end = data.rfind(b"\n") + 1
-            self._offsets[path] = offset + end
+            self._offset_by_file[path] = offset + end
             for line in data[:end].splitlines():
-                self._count(line)
+                self._count_record(line)
 
-    def _count(self, line: bytes) -> None:
+    def _count_record(self, line: bytes) -> None:
         try:
             data = json.loads(line)
-            name = label(data["status"], data["outcome"])
-            if name != Status.HARNESS_ERROR or data["experiment_id"] not in self._labels:
-                self._labels[data["experiment_id"]] = name
+            name = progress_label(data["status"], data["outcome"])
+            if name != Status.HARNESS_ERROR or data["experiment_id"] not in self._label_by_experiment:
+                self._label_by_experiment[data["experiment_id"]] = name
         except (ValueError, KeyError):  # a head, or damage that `read_records` reports
             return
 
 
-def label(status: str, outcome: str | None) -> str:
+def progress_label(status: str, outcome: str | None) -> str:
     """Return an experiment's label in Progress: its outcome or, without one, its status."""
     return str(outcome or status)

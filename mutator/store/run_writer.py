@@ -8,10 +8,10 @@ from mutator._common.confined_files import inside
 from mutator.model import Record
 from mutator.store.checksummed_lines import LineWriter, verified_lines, write_with_new_head
 from mutator.store.patch_files import PatchWriter
-from mutator.store.records import LINE_SCHEMAS, PROOF, RECORDS, line_of
+from mutator.store.records import LINE_SCHEMA_BY_FOLDER, PROOF_FOLDER, RECORDS_FOLDER, record_as_json
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_packing import EncodedSeries, SeriesWriter
-from mutator.store.timings import TIMINGS
+from mutator.store.timings import TIMINGS_FOLDER
 
 
 class RunWriter:
@@ -24,9 +24,9 @@ class RunWriter:
     def __init__(self, folder: RunFolder, name: str) -> None:
         self._run, self._plan, self._name = folder.path, folder.head.plan, name
         self._patches = PatchWriter(folder.path, name)
-        self._series = SeriesWriter(folder.path, name) if folder.series_mb else None
-        self._records = self._open(RECORDS, self._sync_blocks)
-        self._timings = self._open(TIMINGS)
+        self._series = SeriesWriter(folder.path, name) if folder.series_budget_mb else None
+        self._records = self._open_lines(RECORDS_FOLDER, self._sync_blocks)
+        self._timings = self._open_lines(TIMINGS_FOLDER)
         self._proof: LineWriter | None = None  # most workers prove nothing
 
     def append(
@@ -41,13 +41,13 @@ class RunWriter:
         self.append_record(record)
 
     def append_record(self, record: Record) -> None:
-        self._records.append(line_of(record))
+        self._records.append(record_as_json(record))
 
     def append_proof(self, record: Record) -> None:
         """Append the record of an experiment that the equivalence check ran again."""
-        self._proof_file().append(line_of(record))
+        self._proof_file().append(record_as_json(record))
 
-    def extend(self, records: Iterable[bytes], timings: Iterable[bytes], patches: bytes) -> None:
+    def extend_results(self, records: Iterable[bytes], timings: Iterable[bytes], patches: bytes) -> None:
         """Append lines and blocks that were built elsewhere."""
         if patches:
             self._patches.extend(patches)
@@ -65,7 +65,7 @@ class RunWriter:
         self._proof_file().extend(records)
 
     @property
-    def digests(self) -> dict[str, str]:
+    def sha256_by_file(self) -> dict[str, str]:
         """The SHA-256 of each file whose lines count, by its name in the run folder."""
         writers = [self._records, *([self._proof] if self._proof else [])]
         return {writer.path.relative_to(self._run).as_posix(): writer.sha256 for writer in writers}
@@ -77,12 +77,12 @@ class RunWriter:
 
     def _proof_file(self) -> LineWriter:
         if self._proof is None:
-            self._proof = self._open(PROOF)
+            self._proof = self._open_lines(PROOF_FOLDER)
         return self._proof
 
-    def _open(self, kind: str, first: Callable[[], None] = lambda: None) -> LineWriter:
+    def _open_lines(self, kind: str, before_sync: Callable[[], None] = lambda: None) -> LineWriter:
         path = inside(self._run, f"{kind}/{self._name}.jsonl")
-        return LineWriter(path, {"schema": LINE_SCHEMAS[kind], "plan": self._plan}, first)
+        return LineWriter(path, {"schema": LINE_SCHEMA_BY_FOLDER[kind], "plan": self._plan}, before_sync)
 
     def _sync_blocks(self) -> None:
         self._patches.sync()
@@ -90,13 +90,13 @@ class RunWriter:
             self._series.sync()
 
 
-def copy_lines(folder: RunFolder, out: Path, suffix: str) -> None:
+def copy_line_files(folder: RunFolder, out: Path, suffix: str) -> None:
     """Copy all files of lines to another run folder of the same plan, with a suffix added to their names."""
-    for kind, schema in LINE_SCHEMAS.items():
+    for kind, schema in LINE_SCHEMA_BY_FOLDER.items():
         if (folder.path / kind).is_dir():
             (out / kind).mkdir(exist_ok=True)
         for path in sorted((folder.path / kind).glob("*.jsonl")):
-            place = inside(out / kind, f"{path.stem}{suffix}.jsonl")
+            copy_path = inside(out / kind, f"{path.stem}{suffix}.jsonl")
             lines = verified_lines(path, schema)
             head = {"schema": schema, "plan": folder.head.plan}
-            write_with_new_head(place, head, (line for _, _, line in lines))
+            write_with_new_head(copy_path, head, (line for _, _, line in lines))

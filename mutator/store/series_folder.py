@@ -17,78 +17,81 @@ from mutator._common.confined_files import check_name, inside
 from mutator._common.hashing import canonical
 from mutator.errors import MutatorError
 from mutator.model import Record
-from mutator.store.series_check import check_values
-from mutator.store.series_format import Series, decode
-from mutator.store.series_script import name_of, read_script, write_script
+from mutator.store.series_check import check_deviations
+from mutator.store.series_format import Series, decode_series
+from mutator.store.series_script import read_script, script_name_of, write_script
 
-SCHEMA, FOLDER, KEPT = "series/1", "series", "kept"
-INDEX = "index"
-_INDEX_RATIO, _INDEX_BYTES = 30, 1_000_000  # an index unpacks to at most this many times its size, and bytes
-_ID = 16  # hex digits of an experiment id
-_LENGTH = struct.Struct("<I")
+SCHEMA, FOLDER, KEPT_FOLDER = "series/1", "series", "kept"
+INDEX_NAME = "index"
+_MOST_INDEX_RATIO, _MOST_INDEX_BYTES = (
+    30,
+    1_000_000,
+)  # an index unpacks to at most this many times its size, and bytes
+_ID_DIGITS = 16  # hex digits of an experiment id
+_LENGTH_STRUCT = struct.Struct("<I")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Index:
+class SeriesIndex:
     """The content of `series/index.js`.
 
-    * `chunks`: (name, number of entries); `sizes`: the bytes of each entry, in order
-    * `goldens`, `entries`: the number of the entry of each golden run and each experiment
-    * `left_out`: how many experiments ended normally but have no series, mostly because of `budget_mb`
+    * `chunks`: (name, number of entries); `entry_sizes`: the bytes of each entry, in order
+    * `golden_entries`, `experiment_entries`: the number of the entry of each golden run and each experiment
+    * `left_out_count`: how many experiments ended normally but have no series, mostly because of `budget_mb`
     """
 
     plan: str
     chunks: tuple[tuple[str, int], ...]
-    sizes: tuple[int, ...]
-    goldens: Mapping[str, int]
-    entries: Mapping[str, int]
-    golden_of: Mapping[str, str]
-    left_out: int
+    entry_sizes: tuple[int, ...]
+    golden_entries: Mapping[str, int]
+    experiment_entries: Mapping[str, int]
+    golden_by_experiment: Mapping[str, str]
+    left_out_count: int
     budget_mb: int
 
-    def plain(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Convert to JSON types: ids joined into one text; entries as differences from the previous one."""
-        names, numbers = list(self.goldens), [*self.entries.values()]
+        names, numbers = list(self.golden_entries), [*self.experiment_entries.values()]
         return {
             "schema": SCHEMA,
             "plan": self.plan,
             "budget_mb": self.budget_mb,
-            "left_out": self.left_out,
+            "left_out": self.left_out_count,
             "chunks": [list(chunk) for chunk in self.chunks],
-            "sizes": self.sizes,
-            "goldens": self.goldens,
-            "ids": "".join(self.entries),
+            "sizes": self.entry_sizes,
+            "goldens": self.golden_entries,
+            "ids": "".join(self.experiment_entries),
             "entries": [b - a for a, b in zip([0, *numbers], numbers, strict=False)],
-            "golden_of": [names.index(self.golden_of[name]) for name in self.entries],
+            "golden_of": [names.index(self.golden_by_experiment[name]) for name in self.experiment_entries],
         }
 
     @classmethod
-    def of(cls, data: Mapping[str, Any]) -> "Index":
+    def from_json(cls, data: Mapping[str, Any]) -> "SeriesIndex":
         text, names = data["ids"], list(data["goldens"])
         if not re.fullmatch("[0-9a-f]*", text):
             raise ValueError("ids that are not hexadecimal")
-        ids = [text[i : i + _ID] for i in range(0, len(text), _ID)]
+        ids = [text[i : i + _ID_DIGITS] for i in range(0, len(text), _ID_DIGITS)]
         golden_of = (names[code] for code in data["golden_of"])
         return cls(
             plan=data["plan"],
             chunks=tuple((str(name), int(count)) for name, count in data["chunks"]),
-            sizes=tuple(data["sizes"]),
-            goldens=dict(data["goldens"]),
-            entries=dict(zip(ids, accumulate(data["entries"]), strict=True)),
-            golden_of=dict(zip(ids, golden_of, strict=True)),
-            left_out=data["left_out"],
+            entry_sizes=tuple(data["sizes"]),
+            golden_entries=dict(data["goldens"]),
+            experiment_entries=dict(zip(ids, accumulate(data["entries"]), strict=True)),
+            golden_by_experiment=dict(zip(ids, golden_of, strict=True)),
+            left_out_count=data["left_out"],
             budget_mb=data["budget_mb"],
         )
 
     @cached_property
-    def places(self) -> list[tuple[str, int]]:
+    def entry_places(self) -> list[tuple[str, int]]:
         """The chunk of each entry, and the offset of the entry in it."""
-        found, number = [], 0
+        places, number = [], 0
         for name, count in self.chunks:
-            sizes = self.sizes[number : number + count]
-            found += [(name, at) for at in accumulate(sizes[:-1], initial=0)]
+            sizes = self.entry_sizes[number : number + count]
+            places += [(name, at) for at in accumulate(sizes[:-1], initial=0)]
             number += count
-        return found
+        return places
 
 
 class SeriesFolder:
@@ -98,78 +101,80 @@ class SeriesFolder:
         self._goldens: dict[str, Series] = {}
 
     @cached_property
-    def index(self) -> Index | None:
+    def index(self) -> SeriesIndex | None:
         """The index of series; None if no series were packed. MutatorError if it is damaged."""
-        return read_index(self.path / f"{INDEX}.js") if self.is_packed else None
+        return load_index(self.path / f"{INDEX_NAME}.js") if self.is_packed else None
 
     @property
     def is_packed(self) -> bool:
-        return (self.path / f"{INDEX}.js").is_file()
+        return (self.path / f"{INDEX_NAME}.js").is_file()
 
-    def has(self, experiment_id: str) -> bool:
-        if self.kept(experiment_id).is_file():
+    def has_series(self, experiment_id: str) -> bool:
+        if self.kept_path(experiment_id).is_file():
             return True
-        return self.index is not None and experiment_id in self.index.entries
+        return self.index is not None and experiment_id in self.index.experiment_entries
 
     def is_readable(self, experiment_id: str, record: Record) -> bool:
         try:
-            return self.read(experiment_id, record) is not None
+            return self.load_series(experiment_id, record) is not None
         except MutatorError:
             return False
 
     def kept_ids(self) -> list[str]:
-        return sorted(path.stem for path in (self.path / KEPT).glob("*.js"))
+        return sorted(path.stem for path in (self.path / KEPT_FOLDER).glob("*.js"))
 
-    def read(self, experiment_id: str, record: Record) -> tuple[Series, Series] | None:
+    def load_series(self, experiment_id: str, record: Record) -> tuple[Series, Series] | None:
         """Return the golden and the faulty series of an experiment with this record, or None.
 
         MutatorError for damage, and for the series of another run.
         """
         try:
-            found = self._read(experiment_id)
-            if found is not None:
-                check_run(found[1].about, record)
-                check_values(*found, record)
-            return found
+            series = self._load_series(experiment_id)
+            if series is not None:
+                check_same_run(series[1].facts, record)
+                check_deviations(*series, record)
+            return series
         except MutatorError as err:
-            remedy = f"rerun the experiment: {making_again(self.path.parent, experiment_id)}"
+            remedy = f"rerun the experiment: {rerun_command(self.path.parent, experiment_id)}"
             where = err.where or self.path
             raise MutatorError(err.got, where=where, expected=err.expected, remedy=remedy) from None
 
-    def _read(self, experiment_id: str) -> tuple[Series, Series] | None:
-        if (path := self.kept(experiment_id)).exists():  # from a rerun; the packed series might be damaged
-            return read_kept(path)
+    def _load_series(self, experiment_id: str) -> tuple[Series, Series] | None:
+        if (
+            path := self.kept_path(experiment_id)
+        ).exists():  # from a rerun; the packed series might be damaged
+            return load_kept_series(path)
         index = self.index
-        if index is None or experiment_id not in index.entries:
+        if index is None or experiment_id not in index.experiment_entries:
             return None
-        return self.packed(index, experiment_id)
+        return self.load_packed_series(index, experiment_id)
 
-    def packed(self, index: Index, experiment_id: str) -> tuple[Series, Series]:
+    def load_packed_series(self, index: SeriesIndex, experiment_id: str) -> tuple[Series, Series]:
         """Return the golden and the faulty series in the chunks; MutatorError for damage."""
-        key = index.golden_of[experiment_id]
+        key = index.golden_by_experiment[experiment_id]
         if key not in self._goldens:
-            self._goldens[key] = decode(self.entry(index.goldens[key]))
+            self._goldens[key] = decode_series(self.read_entry(index.golden_entries[key]))
         golden = self._goldens[key]
-        return golden, decode(self.entry(index.entries[experiment_id]), golden)
+        return golden, decode_series(self.read_entry(index.experiment_entries[experiment_id]), golden)
 
-    def entry(self, number: int) -> bytes:
+    def read_entry(self, number: int) -> bytes:
         """Return the bytes of an entry of the index; MutatorError if its chunk is damaged."""
         assert self.index is not None
-        name, at = self.index.places[number]
+        name, at = self.index.entry_places[number]
         if self._chunk[0] != name:
-            self._chunk = (name, self.chunk(name))
-        return self._chunk[1][at : at + self.index.sizes[number]]
+            self._chunk = (name, self.read_chunk(name))
+        return self._chunk[1][at : at + self.index.entry_sizes[number]]
 
-    def chunk(self, name: str) -> bytes:
+    def read_chunk(self, name: str) -> bytes:
         """Return the bytes of a chunk; MutatorError if it is missing or damaged."""
         path = inside(self.path, f"{name}.js")
         data = read_script(path)
-        if name_of(data) != name:
+        if script_name_of(data) != name:
             raise MutatorError("damaged", where=path, expected="content that matches its name")
         return data
 
-    def kept(self, experiment_id: str) -> Path:
-        return inside(self.path / KEPT, f"{experiment_id}.js")
+    def kept_path(self, experiment_id: str) -> Path:
+        return inside(self.path / KEPT_FOLDER, f"{experiment_id}.js")
 
 
 def run_facts(record: Record) -> dict[str, Any]:
@@ -185,7 +190,7 @@ def run_facts(record: Record) -> dict[str, Any]:
     }
 
 
-def check_run(about: Mapping[str, Any], record: Record, where: Path | None = None) -> None:
+def check_same_run(about: Mapping[str, Any], record: Record, where: Path | None = None) -> None:
     """Raise MutatorError if a faulty series belongs to another run than the record."""
     for name, value in run_facts(record).items():
         if about.get(name) != value:
@@ -196,52 +201,52 @@ def check_run(about: Mapping[str, Any], record: Record, where: Path | None = Non
             )
 
 
-def making_again(run: Path, experiment_id: str = "ID") -> str:
+def rerun_command(run: Path, experiment_id: str = "ID") -> str:
     """Return the command that recreates the series of an experiment."""
     return f"`mutator rerun {experiment_id} --trace --run {run}`"
 
 
-def putting_aside(run: Path) -> str:
+def repair_remedy(run: Path) -> str:
     """Return the remedy for a damaged file of series."""
     aside = f"`mutator verify {run} --repair` sets the file aside"
-    return f"{aside}; {making_again(run)} recreates the series of an experiment"
+    return f"{aside}; {rerun_command(run)} recreates the series of an experiment"
 
 
-def read_index(path: Path) -> Index:
-    remedy = putting_aside(path.parent.parent)
+def load_index(path: Path) -> SeriesIndex:
+    remedy = repair_remedy(path.parent.parent)
     try:
         packed = read_script(path)
-        data = json.loads(unpacked(packed, _INDEX_RATIO * len(packed) + _INDEX_BYTES, gzip=True))
+        data = json.loads(unpacked(packed, _MOST_INDEX_RATIO * len(packed) + _MOST_INDEX_BYTES, gzip=True))
         if data["schema"] != SCHEMA:
             raise MutatorError(f"schema {data['schema']!r}", where=path, expected=SCHEMA, remedy=remedy)
-        index = Index.of(data)
-        for name in (*(name for name, _ in index.chunks), *index.goldens):
+        index = SeriesIndex.from_json(data)
+        for name in (*(name for name, _ in index.chunks), *index.golden_entries):
             check_name(name, path)
-        for number in (*index.goldens.values(), *index.entries.values()):
-            if number not in range(len(index.places)):
+        for number in (*index.golden_entries.values(), *index.experiment_entries.values()):
+            if number not in range(len(index.entry_places)):
                 raise ValueError(f"no entry {number}")
         return index
     except (ValueError, LookupError, TypeError, AttributeError, RecursionError, zlib.error) as err:
         raise MutatorError(f"a damaged index ({err})", where=path, remedy=remedy) from None
 
 
-def write_index(path: Path, index: Index) -> None:
-    text = canonical(index.plain()).encode()
+def save_index(path: Path, index: SeriesIndex) -> None:
+    text = canonical(index.as_json()).encode()
     write_script(path, gzip.compress(text, compresslevel=9, mtime=0))
 
 
-def write_kept(path: Path, golden: bytes, faulty: bytes) -> None:
+def write_kept_series(path: Path, golden: bytes, faulty: bytes) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_script(path, b"".join((_LENGTH.pack(len(golden)), golden, faulty)))
+    write_script(path, b"".join((_LENGTH_STRUCT.pack(len(golden)), golden, faulty)))
 
 
-def read_kept(path: Path) -> tuple[Series, Series]:
+def load_kept_series(path: Path) -> tuple[Series, Series]:
     """Read the golden and the faulty series of a rerun; MutatorError if the file is damaged."""
     data = read_script(path)
     try:
-        (length,) = _LENGTH.unpack_from(data)
-        at = _LENGTH.size
-        golden = decode(data[at : at + length])
-        return golden, decode(data[at + length :], golden)
+        (length,) = _LENGTH_STRUCT.unpack_from(data)
+        at = _LENGTH_STRUCT.size
+        golden = decode_series(data[at : at + length])
+        return golden, decode_series(data[at + length :], golden)
     except (struct.error, MutatorError):
         raise MutatorError("damaged", where=path, expected="the series of two runs") from None

@@ -12,20 +12,20 @@ from mutator._common.confined_files import inside
 from mutator._common.files import raising_disk_full
 from mutator.errors import MutatorError
 from mutator.store.checksummed_blocks import BlockWriter, read_blocks
-from mutator.store.series_folder import FOLDER, INDEX, Index, SeriesFolder, write_index
-from mutator.store.series_script import name_of, size_in_script, write_script
+from mutator.store.series_folder import FOLDER, INDEX_NAME, SeriesFolder, SeriesIndex, save_index
+from mutator.store.series_script import script_name_of, size_in_script, write_script
 
 SUFFIX = ".blocks"  # suffix of the workers' files in series/
-GOLDEN, EXPERIMENT = 0, 1  # kinds of blocks
+GOLDEN_BLOCK, EXPERIMENT_BLOCK = 0, 1  # kinds of blocks
 CHUNK_BYTES = 256_000  # size at which a chunk is complete; a page loads it in about 30 ms
 _MB = 1_000_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EncodedSeries:
-    """The bytes of an experiment's series, and of the series of its golden run `key`."""
+    """The bytes of an experiment's series, and of the series of its golden run `golden_key`."""
 
-    key: str
+    golden_key: str
     golden: bytes
     faulty: bytes
 
@@ -36,17 +36,17 @@ class SeriesWriter:
     def __init__(self, run: Path, worker: str) -> None:
         self._path = inside(run / FOLDER, f"{worker}{SUFFIX}")
         self._blocks: BlockWriter | None = None  # nothing appended yet
-        self._known: set[str] = set()
+        self._written_golden_keys: set[str] = set()
 
-    def append(self, experiment_id: str, one: EncodedSeries) -> None:
-        self.add_golden(one.key, lambda: one.golden)
-        self._writer().append(*series_block(experiment_id, one))
+    def append(self, experiment_id: str, series: EncodedSeries) -> None:
+        self.add_golden(series.golden_key, lambda: series.golden)
+        self._writer().append(*series_block(experiment_id, series))
 
     def add_golden(self, key: str, golden: Callable[[], bytes]) -> None:
         """Append the series that `golden` returns for a golden run, unless it was appended before."""
-        if key not in self._known:
-            self._writer().append(GOLDEN, key, golden())
-            self._known.add(key)
+        if key not in self._written_golden_keys:
+            self._writer().append(GOLDEN_BLOCK, key, golden())
+            self._written_golden_keys.add(key)
 
     def extend(self, blocks: bytes) -> None:
         """Append blocks that `series_block` built elsewhere, after the golden runs that they need."""
@@ -66,124 +66,128 @@ class SeriesWriter:
         return self._blocks
 
 
-def series_block(experiment_id: str, one: EncodedSeries) -> tuple[int, str, bytes]:
+def series_block(experiment_id: str, series: EncodedSeries) -> tuple[int, str, bytes]:
     """Return the kind, key and content of the block for an experiment's series."""
-    return EXPERIMENT, f"{experiment_id} {one.key}", one.faulty
+    return EXPERIMENT_BLOCK, f"{experiment_id} {series.golden_key}", series.faulty
 
 
-Read = Callable[[], bytes]
-Worth = Mapping[str, Any]  # experiment -> sort key, best first
+ReadBytes = Callable[[], bytes]
+RankByExperiment = Mapping[str, Any]  # experiment -> sort key, best first
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Entry:
+class _EntryToPack:
     digest: str
     size: int
-    read: Read
+    read: ReadBytes
 
 
 @dataclass(frozen=True, slots=True)
-class _Found:
+class _SeriesToPack:
     """The entries to pack: those of golden runs, and those of experiments with their golden runs."""
 
-    goldens: dict[str, _Entry]
-    experiments: dict[str, tuple[str, _Entry]]
+    goldens: dict[str, _EntryToPack]
+    experiments: dict[str, tuple[str, _EntryToPack]]
 
-    def add(self, other: "_Found") -> None:
+    def add(self, other: "_SeriesToPack") -> None:
         self.goldens.update(other.goldens)
         self.experiments.update(other.experiments)
 
 
-def segments(run: Path) -> list[Path]:
+def list_worker_files(run: Path) -> list[Path]:
     """Return the workers' files that are not packed yet."""
     return [path for path in sorted((run / FOLDER).glob(f"*{SUFFIX}")) if path.is_file()]
 
 
-def pack(run: Path, plan: str, worth: Worth, budget_mb: int, *, others: tuple[Path, ...] = ()) -> None:
-    """Pack the series of a run folder, and those of the run folders `others`.
+def pack_series(
+    run: Path, plan: str, ranks: RankByExperiment, budget_mb: int, *, other_runs: tuple[Path, ...] = ()
+) -> None:
+    """Pack the series of a run folder, and those of the run folders `other_runs`.
 
-    `worth` ranks all experiments that ended normally. Damaged series are left out. Packing can be repeated
+    `ranks` ranks all experiments that ended normally. Damaged series are left out. Packing can be repeated
     after a kill.
     """
-    appended = segments(run)
-    if not appended and not others:
+    appended = list_worker_files(run)
+    if not appended and not other_runs:
         return
-    found = _Found({}, {})
-    for folder in (run, *others):
-        found.add(_packed(SeriesFolder(folder)))
-        for path in segments(folder):
-            found.add(_appended(path))
+    to_pack = _SeriesToPack({}, {})
+    for folder in (run, *other_runs):
+        to_pack.add(_packed_series(SeriesFolder(folder)))
+        for path in list_worker_files(folder):
+            to_pack.add(_worker_series(path))
     with raising_disk_full(run):
         (run / FOLDER).mkdir(exist_ok=True)
-    index = _written(run / FOLDER, plan, found, worth, budget_mb, len(worth))
-    _remove_others(run, index)
+    index = _write_packed_files(run / FOLDER, plan, to_pack, ranks, budget_mb, len(ranks))
+    _remove_unindexed_files(run, index)
     for path in appended:
         path.unlink()
 
 
-def pack_again(run: Path, index: Index) -> None:
+def repack_series(run: Path, index: SeriesIndex) -> None:
     """Repack the content of `index`, without damaged and missing parts. The workers' files are kept."""
-    worth = {name: place for place, name in enumerate(index.entries)}
-    found = _packed(SeriesFolder(run))
-    ended = len(worth) + index.left_out
-    _remove_others(run, _written(run / FOLDER, index.plan, found, worth, index.budget_mb, ended))
+    ranks = {name: place for place, name in enumerate(index.experiment_entries)}
+    to_pack = _packed_series(SeriesFolder(run))
+    ended = len(ranks) + index.left_out_count
+    _remove_unindexed_files(
+        run, _write_packed_files(run / FOLDER, index.plan, to_pack, ranks, index.budget_mb, ended)
+    )
 
 
-def _remove_others(run: Path, index: Index) -> None:
-    known = {name for name, _ in index.chunks} | {INDEX}
+def _remove_unindexed_files(run: Path, index: SeriesIndex) -> None:
+    indexed = {name for name, _ in index.chunks} | {INDEX_NAME}
     for path in (run / FOLDER).glob("*.js"):
-        if path.stem not in known:
+        if path.stem not in indexed:
             path.unlink()
 
 
-def _packed(folder: SeriesFolder) -> _Found:
-    found = _Found({}, {})
+def _packed_series(folder: SeriesFolder) -> _SeriesToPack:
+    to_pack = _SeriesToPack({}, {})
     try:
         index = folder.index
     except MutatorError:
-        return found
+        return to_pack
     if index is None:
-        return found
-    goldens = _by_entry(index.goldens)
-    users = _by_entry(index.entries)
-    for number in range(len(index.sizes)):
+        return to_pack
+    goldens = _names_by_entry(index.golden_entries)
+    users = _names_by_entry(index.experiment_entries)
+    for number in range(len(index.entry_sizes)):
         try:
-            entry = _entry(folder.entry(number), lambda number=number: folder.entry(number))  # type: ignore[misc]
+            entry = _build_entry(folder.read_entry(number), lambda number=number: folder.read_entry(number))  # type: ignore[misc]
         except MutatorError:
             continue
         for name in goldens.get(number, ()):
-            found.goldens[name] = entry
+            to_pack.goldens[name] = entry
         for name in users.get(number, ()):
-            found.experiments[name] = (index.golden_of[name], entry)
-    return found
+            to_pack.experiments[name] = (index.golden_by_experiment[name], entry)
+    return to_pack
 
 
-def _by_entry(entries: Mapping[str, int]) -> dict[int, list[str]]:
+def _names_by_entry(entries: Mapping[str, int]) -> dict[int, list[str]]:
     """Return the keys of each entry number. Runs with equal bytes share an entry."""
-    found: dict[int, list[str]] = {}
+    names: dict[int, list[str]] = {}
     for name, number in entries.items():
-        found.setdefault(number, []).append(name)
-    return found
+        names.setdefault(number, []).append(name)
+    return names
 
 
-def _appended(path: Path) -> _Found:
-    found = _Found({}, {})
+def _worker_series(path: Path) -> _SeriesToPack:
+    to_pack = _SeriesToPack({}, {})
     for block in read_blocks(path).blocks:
         read = _reader(path, block.offset, len(block.data))
-        entry = _entry(block.data, read)
-        if block.kind == GOLDEN:
-            found.goldens[block.key] = entry
+        entry = _build_entry(block.data, read)
+        if block.kind == GOLDEN_BLOCK:
+            to_pack.goldens[block.key] = entry
         else:
             name, _, golden = block.key.partition(" ")
-            found.experiments[name] = (golden, entry)
-    return found
+            to_pack.experiments[name] = (golden, entry)
+    return to_pack
 
 
-def _entry(data: bytes, read: Read) -> _Entry:
-    return _Entry(digest=name_of(data), size=size_in_script(data), read=read)
+def _build_entry(data: bytes, read: ReadBytes) -> _EntryToPack:
+    return _EntryToPack(digest=script_name_of(data), size=size_in_script(data), read=read)
 
 
-def _reader(path: Path, offset: int, length: int) -> Read:
+def _reader(path: Path, offset: int, length: int) -> ReadBytes:
     def read() -> bytes:
         with path.open("rb") as file:
             file.seek(offset)
@@ -192,70 +196,84 @@ def _reader(path: Path, offset: int, length: int) -> Read:
     return read
 
 
-def _written(folder: Path, plan: str, found: _Found, worth: Worth, budget_mb: int, ended: int) -> Index:
-    """Write the chunks, then the index; `ended` is the number of experiments that ended normally."""
-    kept = _kept(found, worth, budget_mb * _MB)
-    golden_of = {name: found.experiments[name][0] for name in kept}
-    goldens = {name: found.goldens[name] for name in sorted({*golden_of.values()})}
-    first, then = _once(goldens.values()), _once(found.experiments[name][1] for name in kept)
-    chunks = [*_chunks(folder, first.values()), *_chunks(folder, then.values())]
-    numbers = {digest: number for number, digest in enumerate(first)}
-    later = {digest: number for number, digest in enumerate(then, start=len(first))}
-    index = Index(
+def _write_packed_files(
+    folder: Path, plan: str, to_pack: _SeriesToPack, ranks: RankByExperiment, budget_mb: int, ended_count: int
+) -> SeriesIndex:
+    """Write the chunks, then the index; `ended_count` is the number of experiments that ended normally."""
+    chosen = _choose_within_budget(to_pack, ranks, budget_mb * _MB)
+    golden_of = {name: to_pack.experiments[name][0] for name in chosen}
+    goldens = {name: to_pack.goldens[name] for name in sorted({*golden_of.values()})}
+    golden_entries, experiment_entries = (
+        _entry_by_digest(goldens.values()),
+        _entry_by_digest(to_pack.experiments[name][1] for name in chosen),
+    )
+    chunks = [
+        *_write_chunks(folder, golden_entries.values()),
+        *_write_chunks(folder, experiment_entries.values()),
+    ]
+    golden_numbers = {digest: number for number, digest in enumerate(golden_entries)}
+    experiment_numbers = {
+        digest: number for number, digest in enumerate(experiment_entries, start=len(golden_entries))
+    }
+    index = SeriesIndex(
         plan=plan,
         chunks=tuple((name, len(sizes)) for name, sizes in chunks),
-        sizes=tuple(size for _, sizes in chunks for size in sizes),
-        goldens={name: numbers[entry.digest] for name, entry in goldens.items()},
-        entries={name: later[found.experiments[name][1].digest] for name in kept},
-        golden_of=golden_of,
-        left_out=ended - len(kept),
+        entry_sizes=tuple(size for _, sizes in chunks for size in sizes),
+        golden_entries={name: golden_numbers[entry.digest] for name, entry in goldens.items()},
+        experiment_entries={name: experiment_numbers[to_pack.experiments[name][1].digest] for name in chosen},
+        golden_by_experiment=golden_of,
+        left_out_count=ended_count - len(chosen),
         budget_mb=budget_mb,
     )
-    write_index(folder / f"{INDEX}.js", index)
+    save_index(folder / f"{INDEX_NAME}.js", index)
     return index
 
 
-def _kept(found: _Found, worth: Worth, budget: int) -> list[str]:
-    """Return the experiments, best first, that fit into `budget` bytes together with their golden runs.
+def _choose_within_budget(to_pack: _SeriesToPack, ranks: RankByExperiment, budget_bytes: int) -> list[str]:
+    """Return the experiments, best first, that fit into `budget_bytes` together with their golden runs.
 
     The others would not fit in a later session, either, so they can be dropped.
     """
-    there = [name for name in found.experiments if name in worth]
-    kept: list[str] = []
+    planned = [name for name in to_pack.experiments if name in ranks]
+    chosen: list[str] = []
     counted: set[str] = set()
-    for name in sorted(there, key=lambda name: (worth[name], name)):
-        golden, entry = found.experiments[name]
-        if golden not in found.goldens:  # its block is damaged
+    for name in sorted(planned, key=lambda name: (ranks[name], name)):
+        golden, entry = to_pack.experiments[name]
+        if golden not in to_pack.goldens:  # its block is damaged
             continue
-        new = {one.digest: one.size for one in (entry, found.goldens[golden]) if one.digest not in counted}
-        budget -= sum(new.values())
-        if budget < 0:
+        new_sizes = {
+            new_entry.digest: new_entry.size
+            for new_entry in (entry, to_pack.goldens[golden])
+            if new_entry.digest not in counted
+        }
+        budget_bytes -= sum(new_sizes.values())
+        if budget_bytes < 0:
             break
-        counted |= {*new}
-        kept.append(name)
-    return kept
+        counted |= {*new_sizes}
+        chosen.append(name)
+    return chosen
 
 
-def _once(entries: Iterable[_Entry]) -> dict[str, _Entry]:
-    found: dict[str, _Entry] = {}
+def _entry_by_digest(entries: Iterable[_EntryToPack]) -> dict[str, _EntryToPack]:
+    unique: dict[str, _EntryToPack] = {}
     for entry in entries:
-        found.setdefault(entry.digest, entry)
-    return found
+        unique.setdefault(entry.digest, entry)
+    return unique
 
 
-def _chunks(folder: Path, entries: Iterable[_Entry]) -> Iterator[tuple[str, list[int]]]:
+def _write_chunks(folder: Path, entries: Iterable[_EntryToPack]) -> Iterator[tuple[str, list[int]]]:
     parts: list[bytes] = []
     for entry in entries:
         parts.append(entry.read())
         if sum(map(len, parts)) >= CHUNK_BYTES:
-            yield _chunk(folder, parts)
+            yield _write_chunk(folder, parts)
             parts = []
     if parts:
-        yield _chunk(folder, parts)
+        yield _write_chunk(folder, parts)
 
 
-def _chunk(folder: Path, parts: list[bytes]) -> tuple[str, list[int]]:
+def _write_chunk(folder: Path, parts: list[bytes]) -> tuple[str, list[int]]:
     data = b"".join(parts)
-    path = inside(folder, f"{name_of(data)}.js")
+    path = inside(folder, f"{script_name_of(data)}.js")
     write_script(path, data)
     return path.stem, [len(part) for part in parts]

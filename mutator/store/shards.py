@@ -8,23 +8,26 @@ from mutator.errors import MutatorError
 
 @dataclass(frozen=True, slots=True)
 class Shard:
-    """Share `number`/`of`; numbers start at 1. It has every `of`-th chunk, so that it is representative."""
+    """Share `number` of `shard_count`; numbers start at 1.
+
+    It has every `shard_count`-th chunk, so that it is representative.
+    """
 
     number: int
-    of: int
+    shard_count: int
 
     @classmethod
     def parse(cls, text: str) -> "Shard":
         """Parse `k/n` from the command line; MutatorError for anything else."""
-        found = re.fullmatch(r"([1-9]\d{0,5})/([1-9]\d{0,5})", text)
-        if not found or int(found[1]) > int(found[2]):
+        match = re.fullmatch(r"([1-9]\d{0,5})/([1-9]\d{0,5})", text)
+        if not match or int(match[1]) > int(match[2]):
             raise MutatorError(
                 repr(text),
                 argument="shard",
                 expected="k/n, the k-th of n shares, such as 1/3",
             )
-        return cls(int(found[1]), int(found[2]))
+        return cls(int(match[1]), int(match[2]))
 
-    def has(self, chunk: int) -> bool:
+    def has_chunk(self, chunk: int) -> bool:
         """Return whether the chunk of this index (from 0) belongs to this share."""
-        return chunk % self.of == self.number - 1
+        return chunk % self.shard_count == self.number - 1

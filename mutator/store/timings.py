@@ -5,20 +5,20 @@ from typing import Any
 
 from mutator.store.indexed_lines import IndexedLines
 
-TIMINGS, TIMINGS_SCHEMA = "timings", "timings/2"  # the folder of the files of lines
-_LONGEST_S = 1e9  # of a run; sums of such times are finite
+TIMINGS_FOLDER, TIMINGS_SCHEMA = "timings", "timings/2"  # the folder of the files of lines
+_LONGEST_RUN_S = 1e9  # of a run; sums of such times are finite
 
 
-def read_timings(run: Path) -> IndexedLines[dict[str, Any]]:
+def load_timings(run: Path) -> IndexedLines[dict[str, Any]]:
     """Return the newest timing line of each experiment that has one; MutatorError for a damaged line."""
-    paths = sorted((run / TIMINGS).glob("*.jsonl"))
-    return IndexedLines(paths, TIMINGS_SCHEMA, _timing_from, lambda line, known: True)
+    paths = sorted((run / TIMINGS_FOLDER).glob("*.jsonl"))
+    return IndexedLines(paths, TIMINGS_SCHEMA, _checked_timing, lambda line, earlier: True)
 
 
-def _timing_from(data: dict[str, Any]) -> dict[str, Any]:
+def _checked_timing(data: dict[str, Any]) -> dict[str, Any]:
     """Check the types of a timing line, which anybody can edit: the seal leaves it out."""
     for name in ("cpu_s", "wall_s"):
-        if type(data[name]) not in (int, float) or not 0.0 <= data[name] <= _LONGEST_S:
+        if type(data[name]) not in (int, float) or not 0.0 <= data[name] <= _LONGEST_RUN_S:
             raise ValueError(name)
     for name in ("experiment_id", "host", "worker", "engine", "why"):
         value = data[name]  # `engine` is None if nothing ran

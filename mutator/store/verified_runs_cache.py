@@ -19,19 +19,19 @@ from mutator._common.version import VERSION
 from mutator.errors import MutatorError
 
 _SCHEMA = "verified/2"
-_PATCHES = "patches/*.blocks"  # verified files that are not in the ledger
-Digests = Mapping[str, str | None]  # SHA-256 by name
+_PATCH_FILE_GLOB = "patches/*.blocks"  # verified files that are not in the ledger
+Sha256ByName = Mapping[str, str | None]  # SHA-256 by name
 
 
-def other_files(run: Path) -> list[str]:
-    return sorted(path.relative_to(run).as_posix() for path in run.glob(_PATCHES))
+def list_patch_files(run: Path) -> list[str]:
+    return sorted(path.relative_to(run).as_posix() for path in run.glob(_PATCH_FILE_GLOB))
 
 
-def key_of(found: Digests) -> str:
-    return digest([_SCHEMA, VERSION, sorted(found.items())])
+def cache_key(digests: Sha256ByName) -> str:
+    return digest([_SCHEMA, VERSION, sorted(digests.items())])
 
 
-def recall(key: str) -> dict[str, Any]:
+def recall_facts(key: str) -> dict[str, Any]:
     """Return what the cache knows about a run; empty for an unknown run."""
     path = _path(key)
     try:
@@ -44,9 +44,9 @@ def recall(key: str) -> dict[str, Any]:
     return {}
 
 
-def remember(key: str, **facts: Any) -> None:
+def remember_facts(key: str, **facts: Any) -> None:
     """Add to what the cache knows about a run. An unwritable cache is ignored."""
-    data = recall(key) | facts
+    data = recall_facts(key) | facts
     path = _path(key)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

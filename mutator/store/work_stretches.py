@@ -66,26 +66,26 @@ class Stretch:
         return ", ".join(filter(None, (self.python, self.platform, self.cpu)))
 
 
-def differences(before: Stretch, python: str, packages: Mapping[str, str | None]) -> tuple[str, ...]:
+def version_differences(before: Stretch, python: str, packages: Mapping[str, str | None]) -> tuple[str, ...]:
     """List the differences between a stretch and the current versions: `numpy 1.26.4, here 2.1.0`."""
-    found = [] if before.python == python else [f"{before.python}, here {python}"]
+    texts = [] if before.python == python else [f"{before.python}, here {python}"]
     for name in sorted(before.packages.keys() | packages):
         old, new = before.packages.get(name), packages.get(name)
         if old != new:
-            found.append(f"{name} {old or 'none'}, here {new or 'none'}")
-    return tuple(found)
+            texts.append(f"{name} {old or 'none'}, here {new or 'none'}")
+    return tuple(texts)
 
 
-def told(stretches: Iterable[Stretch]) -> dict[str, str]:
+def describe_stretches(stretches: Iterable[Stretch]) -> dict[str, str]:
     """Describe the software and machines of stretches; several values are listed, oldest first."""
-    found: dict[str, dict[str, None]] = {}
+    texts_by_name: dict[str, dict[str, None]] = {}
     for stretch in stretches:
-        for name, text in _texts(stretch).items():
-            found.setdefault(name, {})[text] = None
-    return {name: ", ".join(texts) for name, texts in found.items()}
+        for name, text in _describe_stretch(stretch).items():
+            texts_by_name.setdefault(name, {})[text] = None
+    return {name: ", ".join(texts) for name, texts in texts_by_name.items()}
 
 
-def _texts(stretch: Stretch) -> dict[str, str]:
+def _describe_stretch(stretch: Stretch) -> dict[str, str]:
     texts = {"python": stretch.python, "platform": stretch.platform}
     if stretch.cpu:
         texts["processor"] = stretch.cpu
@@ -99,8 +99,8 @@ def _texts(stretch: Stretch) -> dict[str, str]:
 
 
 def package_versions(stretches: Iterable[Stretch]) -> dict[str, str]:
-    found: dict[str, dict[str, None]] = {}
+    versions_by_package: dict[str, dict[str, None]] = {}
     for stretch in stretches:
         for name, version in stretch.packages.items():
-            found.setdefault(name, {})[version] = None
-    return {name: ", ".join(versions) for name, versions in sorted(found.items())}
+            versions_by_package.setdefault(name, {})[version] = None
+    return {name: ", ".join(versions) for name, versions in sorted(versions_by_package.items())}

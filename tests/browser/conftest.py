@@ -26,8 +26,8 @@ from mutator.results import table_building
 from mutator.store.checksummed_lines import LineWriter
 from mutator.store.patch_files import PatchWriter
 from mutator.store.records import SCHEMA
-from mutator.store.series_format import encode
-from mutator.store.series_packing import EncodedSeries, SeriesWriter, pack
+from mutator.store.series_format import encode_series
+from mutator.store.series_packing import EncodedSeries, SeriesWriter, pack_series
 from mutator.workspace import Workspace
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
@@ -102,10 +102,10 @@ def run(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], 
     faulty = golden | {"gas": np.where(t < 2.0, golden["gas"], golden["gas"] + 0.3)}
     packed, kept = (record(experiment, 7, b"") for experiment in plan.experiments[1:3])
     sampler, writer = Sampler(manifest, golden), SeriesWriter(out.path, "0001-main")
-    data = encode(sampler.series(faulty, packed), sampler.golden)
-    writer.append(packed.experiment_id, EncodedSeries(key="A", golden=sampler.encoded, faulty=data))
+    data = encode_series(sampler.series(faulty, packed), sampler.golden)
+    writer.append(packed.experiment_id, EncodedSeries(golden_key="A", golden=sampler.encoded, faulty=data))
     writer.close()
-    pack(out.path, plan.digest, {packed.experiment_id: 0}, 1)
+    pack_series(out.path, plan.digest, {packed.experiment_id: 0}, 1)
     keep_series(out.path, manifest, golden, faulty, kept)
     with pytest.MonkeyPatch.context() as patch:  # figures take seconds and are tested elsewhere
         patch.setattr(figures_panel, "draw_figures", lambda frame: ())

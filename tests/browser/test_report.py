@@ -11,7 +11,7 @@ import pytest
 from mutator.report import report_builder
 from mutator.report.panels import figures_panel
 from mutator.store import plan_file
-from mutator.store.patch_files import Patches
+from mutator.store.patch_files import PatchFolder
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_folder import SeriesFolder
 
@@ -76,7 +76,7 @@ def test_an_opened_experiment_shows_its_diff_spec_and_commands(page: "Page", run
     page.page.click("#grid tr[data-at] >> nth=0")
     page.page.wait_for_selector("#experiment .diff")
     name = page.fragment.removeprefix("e=")
-    patch = (Patches(run).read(name) or b"").decode()
+    patch = (PatchFolder(run).read(name) or b"").decode()
     tagged = [line[1:] for line in patch.splitlines() if line.startswith("+") and "# fi:" in line]
     injected = [line for line in tagged if "fi:probe" not in line and "fi:observe" not in line]
     for mode in ("Side by side", "Unified"):
@@ -180,8 +180,8 @@ def test_the_first_tab_stop_skips_to_the_list(page: "Page") -> None:
 def test_series_are_loaded_from_their_files(page: "Page", run: Path, rows: list[dict[str, str]]) -> None:
     series = SeriesFolder(run)
     assert series.index is not None
-    names = {*series.index.entries, *series.kept_ids()}
-    planned = {experiment.id: experiment for experiment in plan_file.read_all(run)}
+    names = {*series.index.experiment_entries, *series.kept_ids()}
+    planned = {experiment.id: experiment for experiment in plan_file.load_experiments(run)}
     assert len(names) == 2
     for name in names:
         page.open(f"e={name}")
@@ -189,7 +189,7 @@ def test_series_are_loaded_from_their_files(page: "Page", run: Path, rows: list[
         assert "H3" in page.page.inner_text("#experiment .replay")
         one = record(planned[name], 7, b"")
         known = [name, one.trace_digest, dict(one.max_dev)]
-        found, read = page.page.evaluate(LOADED, known), series.read(name, one)
+        found, read = page.page.evaluate(LOADED, known), series.load_series(name, one)
         assert read is not None
         golden, faulty = read
         assert [channel["name"] for channel in found["channels"]] == [
@@ -200,8 +200,8 @@ def test_series_are_loaded_from_their_files(page: "Page", run: Path, rows: list[
             "speed",
         ]
         for number, channel in enumerate(found["channels"]):
-            one, other = golden.rows[number], faulty.rows[number]
-            assert channel["t"] == golden.times(number).tolist()
+            one, other = golden.channel_values[number], faulty.channel_values[number]
+            assert channel["t"] == golden.times_of(number).tolist()
             assert channel["golden"] == one.view("<u4").tolist()
             assert channel["faulty"] == other.view("<u4").tolist()
         assert found["marks"][-1] == ["hazard", pytest.approx(4.7), "H3"]

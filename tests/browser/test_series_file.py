@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from mutator.store.run_folder import RunFolder
-from mutator.store.series_folder import SeriesFolder, write_kept
-from mutator.store.series_format import Points, Series, encode
+from mutator.store.series_folder import SeriesFolder, write_kept_series
+from mutator.store.series_format import ExtraPoints, Series, encode_series
 from mutator.web import asset
 
 TRACE = "0123456789abcdef"
@@ -53,16 +53,18 @@ def load(
 
 def as_read(run: Path, name: str) -> list[dict[str, Any]]:
     """Return the channels that Python reads, as bits, including the points between the values."""
-    read = SeriesFolder(run).read(name, RunFolder.unverified(FIXTURE / "small").records()[name])
+    read = SeriesFolder(run).load_series(name, RunFolder.open_unverified(FIXTURE / "small").records()[name])
     assert read is not None
     golden, faulty = read
     found = []
-    for number, channel in enumerate(golden.about["channels"]):
-        mine = faulty.points.channel == number
-        t = np.concatenate((golden.times(number), faulty.points.t[mine]))
+    for number, channel in enumerate(golden.facts["channels"]):
+        mine = faulty.points.channel_numbers == number
+        t = np.concatenate((golden.times_of(number), faulty.points.t[mine]))
         order = np.argsort(t, kind="stable")
         runs = ((golden, faulty.points.golden), (faulty, faulty.points.faulty))
-        one, other = (np.concatenate((run.rows[number], points[mine]))[order] for run, points in runs)
+        one, other = (
+            np.concatenate((run.channel_values[number], points[mine]))[order] for run, points in runs
+        )
         bits = {"golden": one.view("<u4").tolist(), "faulty": other.view("<u4").tolist()}
         found.append({"name": channel["name"], "t": t[order].tolist(), **bits})
     return found
@@ -73,7 +75,7 @@ def test_a_page_and_python_read_the_numbers_of_the_fixture(browser: Any, run: Pa
     for name, known in expected.items():
         told = [{key: one[key] for key in ("name", "t", "golden", "faulty")} for one in known["channels"]]
         assert as_read(run, name) == told
-        largest = dict(RunFolder.unverified(FIXTURE / "small").records()[name].max_dev)
+        largest = dict(RunFolder.open_unverified(FIXTURE / "small").records()[name].max_dev)
         found = load(browser, run, name, known["about"]["trace"][:16], largest)
         assert [{key: one[key] for key in told[0]} for one in found["channels"]] == told
         assert (found["active"], found["tEnd"]) == (known["about"]["active"], known["about"]["t_end"])
@@ -84,9 +86,11 @@ def test_the_page_reads_the_points_between_the_values(browser: Any, run: Path) -
     t = np.arange(9) / 20
     rows = [np.arange(7, dtype="<f4"), np.array([1, np.inf, -np.inf, np.nan], dtype="<f4")]
     about = {"start": 0.0, "end": 0.3, "channels": [{"name": "a"}, {"name": "b"}]}
-    golden = Series(t=t[:7], rows=rows, every=[1, 2], about=about)
+    golden = Series(t=t[:7], channel_values=rows, sample_every=[1, 2], facts=about)
     single = np.array([7.5, np.inf], dtype="<f4")
-    points = Points(channel=np.array([0, 1]), t=np.array([0.11, 0.01]), golden=single, faulty=-single)
+    points = ExtraPoints(
+        channel_numbers=np.array([0, 1]), t=np.array([0.11, 0.01]), golden=single, faulty=-single
+    )
     longer = [np.arange(9, dtype="<f4") ** 2, np.array([1, 2, 3, 4, 5], dtype="<f4")]
     happened = {
         "trace": TRACE,
@@ -97,9 +101,9 @@ def test_the_page_reads_the_points_between_the_values(browser: Any, run: Path) -
         "t_end": None,
         "end": 0.4,
     }
-    faulty = Series(t=t, rows=longer, every=[1, 2], about=happened, points=points)
+    faulty = Series(t=t, channel_values=longer, sample_every=[1, 2], facts=happened, points=points)
     name = SeriesFolder(run).kept_ids()[0]
-    write_kept(SeriesFolder(run).kept(name), encode(golden), encode(faulty, golden))
+    write_kept_series(SeriesFolder(run).kept_path(name), encode_series(golden), encode_series(faulty, golden))
     (run / "series" / "index.js").unlink()
     page = run / "report" / "index.html"
     page.write_text(page.read_text().replace('"packed": true', '"packed": false'))
@@ -122,14 +126,14 @@ def test_the_series_of_another_run_is_not_shown(browser: Any, run: Path) -> None
 
 def test_curves_that_deviate_otherwise_than_the_record_says_are_not_shown(browser: Any, run: Path) -> None:
     """Such as those of the golden run, with everything else as in the record."""
-    for name, record in RunFolder.unverified(FIXTURE / "small").records().items():
-        found = SeriesFolder(run).read(name, record)
+    for name, record in RunFolder.open_unverified(FIXTURE / "small").records().items():
+        found = SeriesFolder(run).load_series(name, record)
         if found and any(by for _, by in record.max_dev):
             golden, faulty = found
-            write_kept(
-                SeriesFolder(run).kept(name),
-                encode(golden),
-                encode(replace(golden, about=faulty.about), golden),
+            write_kept_series(
+                SeriesFolder(run).kept_path(name),
+                encode_series(golden),
+                encode_series(replace(golden, facts=faulty.facts), golden),
             )
             break
     page = run / "report" / "index.html"

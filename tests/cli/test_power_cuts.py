@@ -18,7 +18,7 @@ from mutator.store.checksummed_blocks import read_blocks
 from mutator.store.checksummed_lines import read_segment
 from mutator.store.run_folder import RunFolder
 from mutator.store.series_folder import SeriesFolder
-from mutator.store.series_packing import pack, segments
+from mutator.store.series_packing import list_worker_files, pack_series
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
 WORDS = ("run", "small", "--out", "run", "-n", "0", "--limit", 4, "--engine", "reference")
@@ -122,23 +122,23 @@ def test_a_record_without_its_patch_is_refused(cli: Cli, cut: Path, seal: str, r
 
 @pytest.mark.slow
 def test_a_lost_series_is_restored_by_a_rerun(cli: Cli, cut: Path) -> None:
-    [path] = segments(cut)
+    [path] = list_worker_files(cut)
     data = path.read_bytes()
     names = [block.key.split()[0] for block in read_blocks(path).blocks if block.kind]
-    records = RunFolder.unverified(cut).records()
+    records = RunFolder.open_unverified(cut).records()
     places = {one: place for place, one in enumerate(names)}
     for length in (*range(last_block(path), len(data), 7), len(data) - 1):
         run = Path(shutil.copytree(cut / "series", Path("cut") / "series")).parent
         (run / "series" / path.name).write_bytes(data[:length])
-        pack(run, "p", places, 500)
+        pack_series(run, "p", places, 500)
         there = SeriesFolder(run)
         assert [name for name in names if there.is_readable(name, records[name])] == names[:-1]
-        assert there.read(names[-1], records[names[-1]]) is None
+        assert there.load_series(names[-1], records[names[-1]]) is None
         shutil.rmtree(run)
     path.write_bytes(data[: last_block(path) + 30])
     ran = cli(*WORDS)
     assert ran.code == 0, ran.err
-    assert [one for one in worth(Results(cut).frame()) if not SeriesFolder(cut).has(one)] == names[-1:]
+    assert [one for one in worth(Results(cut).frame()) if not SeriesFolder(cut).has_series(one)] == names[-1:]
     assert cli("verify", "run").code == 0
     assert cli("rerun", names[-1], "--trace", "--run", "run").code == 0
     assert SeriesFolder(cut).is_readable(names[-1], records[names[-1]])

@@ -13,9 +13,9 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.store.run_folder import RunFolder
-from mutator.store.series_folder import Index, SeriesFolder, write_kept
-from mutator.store.series_format import encode
-from mutator.store.series_packing import EncodedSeries, SeriesWriter, pack
+from mutator.store.series_folder import SeriesFolder, SeriesIndex, write_kept_series
+from mutator.store.series_format import encode_series
+from mutator.store.series_packing import EncodedSeries, SeriesWriter, pack_series
 
 Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
 
@@ -45,7 +45,7 @@ def sealed(cli: Cli, root: Path, shared: list[Any]) -> str:
 
 def series_of(name: str) -> object:
     run = Path("run")
-    return SeriesFolder(run).read(name, RunFolder.unverified(run).records()[name])
+    return SeriesFolder(run).load_series(name, RunFolder.open_unverified(run).records()[name])
 
 
 def test_an_audit_is_printed_on_one_page(cli: Cli, sealed: str) -> None:
@@ -108,7 +108,7 @@ def flip(path: Path) -> None:
     path.write_bytes(data)
 
 
-def packed() -> Index:
+def packed() -> SeriesIndex:
     index = SeriesFolder(Path("run")).index
     assert index is not None
     return index
@@ -127,7 +127,7 @@ def test_rerun_restores_damaged_series(
     cli: Cli, sealed: str, what: str, damage: Callable[[Path], None]
 ) -> None:
     before = {path.name: path.read_bytes() for path in Path("run/series").iterdir()}
-    name, *others = packed().entries
+    name, *others = packed().experiment_entries
     file = Path("run/series") / chunks()[what]
     damage(file)
     found = cli("verify", "run")
@@ -162,9 +162,9 @@ def test_rerun_restores_damaged_series(
 
 
 def test_the_audit_names_the_command_that_restores_a_series(cli: Cli, sealed: str) -> None:
-    name = next(iter(packed().entries))
+    name = next(iter(packed().experiment_entries))
     assert cli("show", name, "--run", "run", "--plot").code == 0
-    kept = SeriesFolder(Path("run")).kept(name)
+    kept = SeriesFolder(Path("run")).kept_path(name)
     assert cli("rerun", name, "--trace", "--run", "run").code == 0
     data = kept.read_bytes()
     flip(kept)
@@ -180,7 +180,7 @@ def test_the_series_of_another_run_is_not_used(cli: Cli, sealed: str) -> None:
     """The audit names it, and commands refuse it."""
     one, other, *_ = RunFolder.open(Path("run")).records()
     assert cli("rerun", one, "--trace", "--run", "run").code == 0
-    kept = SeriesFolder(Path("run")).kept(one)
+    kept = SeriesFolder(Path("run")).kept_path(one)
     script = kept.read_bytes().replace(one.encode(), other.encode(), 1)
     kept.with_name(f"{other}.js").write_bytes(script)
     with pytest.raises(MutatorError, match="the series of another run"):
@@ -193,10 +193,12 @@ def test_the_series_of_another_run_is_not_used(cli: Cli, sealed: str) -> None:
 
 def curves_of_golden(name: str) -> tuple[bytes, bytes]:
     """A forged series: everything as in the record, but the values of the golden run."""
-    found = SeriesFolder(Path("run")).read(name, RunFolder.unverified(Path("run")).records()[name])
+    found = SeriesFolder(Path("run")).load_series(
+        name, RunFolder.open_unverified(Path("run")).records()[name]
+    )
     assert found is not None
     golden, faulty = found
-    return encode(golden), encode(replace(golden, about=faulty.about), golden)
+    return encode_series(golden), encode_series(replace(golden, about=faulty.facts), golden)
 
 
 def deviating() -> str:
@@ -208,26 +210,35 @@ def pack_with(name: str, forged: bytes) -> None:
     """Pack the series again, under new names and with an index, with another series of one experiment."""
     there, index = SeriesFolder(Path("run")), packed()
     writer = SeriesWriter(Path("run"), "forged")
-    for one in index.entries:
-        key = index.golden_of[one]
-        golden, faulty = [there.entry(number) for number in (index.goldens[key], index.entries[one])]
-        writer.append(one, EncodedSeries(key=key, golden=golden, faulty=forged if one == name else faulty))
+    for one in index.experiment_entries:
+        key = index.golden_by_experiment[one]
+        golden, faulty = [
+            there.read_entry(number) for number in (index.golden_entries[key], index.experiment_entries[one])
+        ]
+        writer.append(
+            one, EncodedSeries(golden_key=key, golden=golden, faulty=forged if one == name else faulty)
+        )
     writer.close()
     for path in Path("run/series").glob("*.js"):
         path.unlink()
-    pack(Path("run"), index.plan, {one: place for place, one in enumerate(index.entries)}, index.budget_mb)
+    pack_series(
+        Path("run"),
+        index.plan,
+        {one: place for place, one in enumerate(index.experiment_entries)},
+        index.budget_mb,
+    )
 
 
 def test_curves_of_the_golden_run_are_not_shown_as_those_of_a_fault(cli: Cli, sealed: str) -> None:
     """Whether they are in a rerun's file or in a chunk with a new name and index."""
     name, there = deviating(), SeriesFolder(Path("run"))
     golden, forged = curves_of_golden(name)
-    write_kept(there.kept(name), golden, forged)
+    write_kept_series(there.kept_path(name), golden, forged)
     found = cli("verify", "run")
     assert found.code == 1 and f"- series/kept/{name}.js: the series of another run: " in found.out
     with pytest.raises(MutatorError, match="the series of another run"):
         series_of(name)
-    there.kept(name).unlink()
+    there.kept_path(name).unlink()
     pack_with(name, forged)
     found = cli("verify", "run")
     assert found.code == 1 and f"{name}: the series of another run: " in found.out
@@ -247,10 +258,12 @@ def test_a_packed_series_that_is_none_is_reported(cli: Cli, sealed: str) -> None
 
 def test_a_rerun_s_golden_curves_must_be_those_of_the_golden_run(cli: Cli, sealed: str) -> None:
     name, there = deviating(), SeriesFolder(Path("run"))
-    found = there.read(name, RunFolder.unverified(Path("run")).records()[name])
+    found = there.load_series(name, RunFolder.open_unverified(Path("run")).records()[name])
     assert found is not None
-    golden, faulty = (replace(one, rows=[row + np.float32(1e-3) for row in one.rows]) for one in found)
-    write_kept(there.kept(name), encode(golden), encode(faulty, golden))
+    golden, faulty = (
+        replace(one, rows=[row + np.float32(1e-3) for row in one.channel_values]) for one in found
+    )
+    write_kept_series(there.kept_path(name), encode_series(golden), encode_series(faulty, golden))
     audit = cli("verify", "run")
     assert audit.code == 1 and f"series/kept/{name}.js: differs; expected the series of golden/" in audit.out
 

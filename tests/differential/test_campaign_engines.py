@@ -14,7 +14,7 @@ import pytest
 from mutator._common.folder_locks import living_workers, wait_for_workers
 from mutator.execution.campaign_running import run_campaign
 from mutator.preflight.equivalence_check import Proof
-from mutator.store.records import read_records
+from mutator.store.records import load_records
 from mutator.workspace import Workspace
 
 TABLES = ("results.csv", "results.parquet", "propagation.parquet")
@@ -48,11 +48,11 @@ def test_killing_servers_or_workers_changes_no_table(
     out = tmp_path / "run"
     for _ in range(3):
         process = _begun(toy, out)
-        done = len(read_records(out)) if out.exists() else 0
+        done = len(load_records(out)) if out.exists() else 0
         while process.poll() is None:
             time.sleep(0.02)
-            if out.exists() and len(read_records(out)) > done + 2:
-                done = len(read_records(out))
+            if out.exists() and len(load_records(out)) > done + 2:
+                done = len(load_records(out))
                 for pid in _victims(out, victim):
                     with suppress(ProcessLookupError):  # it might have ended with another worker
                         os.kill(pid, signal.SIGKILL)

@@ -33,7 +33,7 @@ def test_the_engines_give_the_same_records(tmp_path: Path, campaign: str, limit:
     for one in plan.goldens():
         job = Job(name=one.key, scenario=clone.scenario(one.scenario), seed=plan.seed, changes=one.changes)
         outputs[one.key] = reference.execute(job, tmp_path / one.key).out
-    goldens = Goldens(manifest, lambda e: outputs[GoldenRun.of(e, several_seeds=False).key])
+    goldens = Goldens(manifest, lambda e: outputs[GoldenRun.for_experiment(e, several_seeds=False).key])
     found: dict[str, dict[str, Record]] = {}
     for name in ENGINES:
         work = tmp_path / name

@@ -20,9 +20,9 @@ from mutator.execution.session import Session
 from mutator.execution.shard_merging import merge
 from mutator.results import table_building
 from mutator.store import approvals
-from mutator.store.patch_files import Patches
+from mutator.store.patch_files import PatchFolder
 from mutator.store.plan_choices import Choices
-from mutator.store.records import read_records
+from mutator.store.records import load_records
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -40,7 +40,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path],
         choices = Choices(shard=None if shard == "whole" else shard)
         summary = run_campaign(toy, "small", out, choices=choices)
         assert summary.exit_code == 0
-        assert summary.done == summary.planned == RunFolder.open(out).planned
+        assert summary.done == summary.planned == RunFolder.open(out).planned_count
     return made
 
 
@@ -60,7 +60,7 @@ def test_merged_shards_equal_the_single_run(runs: Runs, tmp_path: Path) -> None:
         assert (tmp_path / "out" / name).read_bytes() == (runs["whole"] / name).read_bytes()
     merged, whole = (
         {name: found.read(name) for name in found}
-        for found in map(Patches, (tmp_path / "out", runs["whole"]))
+        for found in map(PatchFolder, (tmp_path / "out", runs["whole"]))
     )
     assert merged == whole and None not in merged.values()
     series = [
@@ -97,7 +97,7 @@ def test_merged_shards_have_the_seal_of_the_single_run(runs: Runs, tmp_path: Pat
 def test_the_whole_plan_decides_the_engine_of_a_shard(
     runs: Runs, toy: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(engine_choice, "WORTH_IT", RunFolder.open(runs["whole"]).planned)
+    monkeypatch.setattr(engine_choice, "WORTH_IT", RunFolder.open(runs["whole"]).planned_count)
     assert {Session(toy, RunFolder.open(path)).engine for path in runs.values()} == {"fork"}
 
 
@@ -113,7 +113,7 @@ def test_an_approval_is_merged_if_every_shard_has_it(copies: Runs, tmp_path: Pat
 
 
 def test_each_experiment_is_in_exactly_one_shard(runs: Runs) -> None:
-    one, two, whole = (set(read_records(runs[name])) for name in ("1/2", "2/2", "whole"))
+    one, two, whole = (set(load_records(runs[name])) for name in ("1/2", "2/2", "whole"))
     assert not one & two
     assert one | two == whole
     assert len({RunFolder.open(path).head.plan for path in runs.values()}) == 1
@@ -121,7 +121,7 @@ def test_each_experiment_is_in_exactly_one_shard(runs: Runs) -> None:
 
 def test_a_shard_resumes_without_its_option(copies: Runs, toy: Workspace) -> None:
     summary = run_campaign(toy, "small", copies["1/2"])
-    assert (summary.ran, summary.done) == (0, RunFolder.open(copies["1/2"]).planned)
+    assert (summary.ran, summary.done) == (0, RunFolder.open(copies["1/2"]).planned_count)
     with pytest.raises(MutatorError, match="shard 2/2"):
         run_campaign(toy, "small", copies["1/2"], choices=Choices(shard="2/2"))
 
@@ -270,7 +270,7 @@ def test_merged_shards_of_the_shipped_controller_equal_its_single_run(tmp_path: 
     shards = [ran(f"shard{k}", 2, f"{k}/3") for k in (1, 2, 3)]
     merge(shards, tmp_path / "merged")
     assert len((one / "results.csv").read_text().splitlines()) == 1 + 40
-    assert sum(RunFolder.open(shard).planned for shard in shards) == 40
+    assert sum(RunFolder.open(shard).planned_count for shard in shards) == 40
     for name in DERIVED:
         whole = (one / name).read_bytes()
         assert (two / name).read_bytes() == whole

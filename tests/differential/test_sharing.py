@@ -24,7 +24,7 @@ from mutator.execution.cluster.piece_queue import Board
 from mutator.execution.cluster.unpacked_bundle import Site
 from mutator.preflight.preflight_checks import run_checks
 from mutator.store import plan_file
-from mutator.store.records import line_of
+from mutator.store.records import record_as_json
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -129,11 +129,11 @@ def test_one_experiment_of_a_shared_run_can_run_on_a_cluster(runs: tuple[Path, P
     runner = PieceRunner(site, read_inputs(site), "w", os.getpid())
     [record] = runner.run(piece, lambda name: None).records
     [name] = piece.ids
-    assert record == canonical(line_of(folder.records()[name])).encode()
+    assert record == canonical(record_as_json(folder.records()[name])).encode()
 
 
 def _scenarios(folder: RunFolder, chunk: Pending) -> list[str]:
-    lines = plan_file.chunk_lines(folder.path, folder.head.chunks[chunk.chunk])
+    lines = plan_file.read_chunk_lines(folder.path, folder.head.chunks[chunk.chunk])
     return [json.loads(line)["scenario"] for line in lines]
 
 

@@ -190,7 +190,7 @@ def passes(genuine: tuple[Workspace, Path, Seals], run: Path) -> bool:
     """Whether a run passes the audit with all expected digests and its pages."""
     workspace, _, seals = genuine
     try:
-        found = seals_of(RunFolder.unverified(run))
+        found = seals_of(RunFolder.open_unverified(run))
     except (MutatorError, LookupError, ValueError, TypeError, AttributeError):
         return False
     if found != seals:
@@ -203,7 +203,7 @@ def passes(genuine: tuple[Workspace, Path, Seals], run: Path) -> bool:
 
 def has_results_digest(genuine: tuple[Workspace, Path, Seals], run: Path) -> bool:
     try:
-        return seals_of(RunFolder.unverified(run)).results_digest == genuine[2].results_digest
+        return seals_of(RunFolder.open_unverified(run)).results_digest == genuine[2].results_digest
     except (MutatorError, LookupError, ValueError, TypeError, AttributeError):
         return False
 
@@ -263,7 +263,7 @@ def test_no_forgery_passes_outside_the_list(
         if is_of_results(forgery) and not is_outside(forgery) and has_results_digest(genuine, run):
             wrong.append(f"results digest: {forgery.name}")
         if is_outside(forgery):
-            assert seals_of(RunFolder.unverified(run)) == genuine[2], forgery.name
+            assert seals_of(RunFolder.open_unverified(run)) == genuine[2], forgery.name
             assert mutator.verify(run, workspace=genuine[0]).not_sealed["other files"]
     kinds = dict.fromkeys(forgery.kind for forgery in every)
     rows = [

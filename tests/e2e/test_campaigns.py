@@ -22,7 +22,7 @@ from mutator.execution.single_run import rerun, run_single
 from mutator.execution.worker import Worker
 from mutator.model import Status
 from mutator.store import plan_file
-from mutator.store.patch_files import Patches
+from mutator.store.patch_files import PatchFolder
 from mutator.store.plan_choices import Choices
 from mutator.store.run_progress import Progress
 from mutator.workspace import Workspace
@@ -116,7 +116,7 @@ def test_a_run_leaves_its_results_and_no_scratch_files(finished_once: Finished) 
     assert {p.name for p in (out / "golden").iterdir()} == {"A", "A+alone"}
     for row in rows_of(out):
         name = row["experiment_id"]
-        assert (Patches(out).read(name) or b"").startswith(b"diff --git a/")
+        assert (PatchFolder(out).read(name) or b"").startswith(b"diff --git a/")
 
 
 def test_the_next_command_deletes_half_written_files(toy: Workspace, finished: Path) -> None:
@@ -136,7 +136,9 @@ def test_a_stored_patch_produces_the_mutant(toy: Workspace, finished: Path, tmp_
     name = row["experiment_id"]
     tree = tmp_path / "patched"
     shutil.copytree(toy.library.parent / "tree", tree, ignore=shutil.ignore_patterns("__pycache__"))
-    subprocess.run(["patch", "-p1", "-s", "-d", str(tree)], input=Patches(finished).read(name), check=True)
+    subprocess.run(
+        ["patch", "-p1", "-s", "-d", str(tree)], input=PatchFolder(finished).read(name), check=True
+    )
     single, same = rerun(toy, finished, name)
     assert same
     assert (tree / "toycar" / "_fi.py").is_file()
@@ -162,14 +164,14 @@ def test_rerun_gives_the_same_record_and_a_trace(
 
 
 def test_one_experiment_can_run_without_a_campaign(toy: Workspace, finished: Path, tmp_path: Path) -> None:
-    experiment = plan_file.read_all(finished)[0]
+    experiment = plan_file.load_experiments(finished)[0]
     single = run_single(toy, toy.manifest("toycar"), experiment, tmp_path / "alone")
     assert single.record.status is Status.OK
     assert (single.golden / "log.npz").is_file()
     assert (tmp_path / "alone" / "mutant.patch").is_file()
     hostile = Choices(only='fault_type == "unsound"')
     run_campaign(toy, "hostile", tmp_path / "hostile", choices=hostile)
-    unsound = plan_file.read_all(tmp_path / "hostile")[0]
+    unsound = plan_file.load_experiments(tmp_path / "hostile")[0]
     refused = run_single(toy, toy.manifest("toycar"), unsound, tmp_path / "alone")
     assert (refused.mutant, refused.record.status) == (None, Status.INVALID_MUTANT)
     (toy.library.parent / "tree" / "toycar" / "go.py").write_text("raise SystemExit(1)")

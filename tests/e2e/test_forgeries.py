@@ -24,8 +24,8 @@ from mutator.execution.campaign_running import run_campaign
 from mutator.model import Experiment
 from mutator.results import table_building
 from mutator.store import plan_file
-from mutator.store.patch_files import Patches
-from mutator.store.patch_files import rewrite as rewrite_patches
+from mutator.store.patch_files import PatchFolder
+from mutator.store.patch_files import rewrite_patch_file as rewrite_patches
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 from tests.made_up_results import edit_results
@@ -96,24 +96,24 @@ def a_time(run: Path, deep: bool) -> None:
 def a_patch(run: Path, deep: bool) -> None:
     _, _, record = hazardous(run)
     name = record["experiment_id"]
-    forged = (Patches(run).read(name) or b"").replace(b"# fi:", b"# by hand fi:", 1)
+    forged = (PatchFolder(run).read(name) or b"").replace(b"# fi:", b"# by hand fi:", 1)
     put_patch(run, name, forged)
     if deep:
         change(run, patch=digest(forged))
 
 
 def put_patch(run: Path, name: str, data: bytes) -> None:
-    found = Patches(run)
-    path = found.file(name) if name in set(found) else found.files()[0]  # each worker has one
-    kept = {other: found.read(other) or b"" for other in found if found.file(other) == path}
+    found = PatchFolder(run)
+    path = found.file_of(name) if name in set(found) else found.block_files()[0]  # each worker has one
+    kept = {other: found.read(other) or b"" for other in found if found.file_of(other) == path}
     patches = kept | {name: data}
     rewrite_patches(path, patches.items())
 
 
 def a_golden_trace(run: Path, deep: bool) -> None:
-    folder = RunFolder.unverified(run)
+    folder = RunFolder.open_unverified(run)
     scenario, changes = folder.head.goldens[0]
-    path = folder.golden(scenario, tuple(changes)) / folder.head.golden_files[0]
+    path = folder.golden_folder(scenario, tuple(changes)) / folder.head.golden_files[0]
     path.write_bytes(path.read_bytes()[:-1] + b"x")
     if deep:
         checks = json.loads((run / "checks.json").read_text())
@@ -139,7 +139,7 @@ def an_added_record(run: Path, deep: bool) -> None:
     path, place, record = hazardous(run)
     added = record | {"experiment_id": "0123456789abcdef"}
     if deep:
-        twin = next(e for e in plan_file.read_all(run) if e.id == record["experiment_id"])
+        twin = next(e for e in plan_file.load_experiments(run) if e.id == record["experiment_id"])
         twin = replace(twin, seed=twin.seed + 1)
         added = record | {"experiment_id": twin.id}
         replan(run, lambda experiments: [*experiments, twin])
@@ -148,19 +148,21 @@ def an_added_record(run: Path, deep: bool) -> None:
 
 
 def copy_patch(run: Path, name: str, other: str) -> None:
-    put_patch(run, other, Patches(run).read(name) or b"")
+    put_patch(run, other, PatchFolder(run).read(name) or b"")
 
 
 def a_plan_condition(run: Path, deep: bool) -> None:
     _, _, record = hazardous(run)
     name = record["experiment_id"]
-    old = next(e for e in plan_file.read_all(run) if e.id == name)
+    old = next(e for e in plan_file.load_experiments(run) if e.id == name)
     new = replace(old, trigger=replace(old.trigger, armed_after_s=old.trigger.armed_after_s + 1.0))
     path = run / plan_file.EXPERIMENTS
     if not deep:
-        one = canonical(plan_file.to_plain(old))
+        one = canonical(plan_file.experiment_as_json(old))
         assert one in path.read_text()
-        path.write_text(path.read_text().replace(one, canonical(plan_file.to_plain(new) | {"id": name})))
+        path.write_text(
+            path.read_text().replace(one, canonical(plan_file.experiment_as_json(new) | {"id": name}))
+        )
         return
     copy_patch(run, name, new.id)
     for file in (*(run / "records").iterdir(), *(run / "proof").iterdir()):
@@ -169,12 +171,12 @@ def a_plan_condition(run: Path, deep: bool) -> None:
 
 
 def replan(run: Path, changed: Callable[[list[Experiment]], list[Experiment]]) -> None:
-    plan = load_plan(RunFolder.unverified(run))
+    plan = load_plan(RunFolder.open_unverified(run))
     old = list(plan.experiments)
     new = tuple(changed(old))
     sizes = [*plan.chunks[:-1], plan.chunks[-1] + len(new) - len(old)]
     sizes = sizes if sizes[-1] else sizes[:-1]
-    chunks = plan_file.write(run, new, sizes)
+    chunks = plan_file.write_plan(run, new, sizes)
     path = run / "run.json"
     head = json.loads(path.read_text())
     head |= {"chunks": chunks, "experiments": len(new)}
@@ -246,7 +248,7 @@ EDITED = "results.csv: the table did not match the plan and records, so it was r
 
 
 def readers(run: Path, genuine: Path) -> dict[str, tuple[object, ...]]:
-    campaign = RunFolder.unverified(genuine).head.campaign
+    campaign = RunFolder.open_unverified(genuine).head.campaign
     name = hazardous(genuine)[2]["experiment_id"]
     out = run.parent
     return {
@@ -298,7 +300,7 @@ def test_the_api_finds_a_plain_forgery(
     with pytest.raises(MutatorError):
         _ = mutator.load_run(run, workspace=genuine[0]).experiment(name).patch
     with pytest.raises(MutatorError):
-        mutator.run(RunFolder.unverified(run).head.campaign, run, workspace=genuine[0]).report()
+        mutator.run(RunFolder.open_unverified(run).head.campaign, run, workspace=genuine[0]).report()
 
 
 def test_the_genuine_run_passes(genuine: tuple[Workspace, Path], run: Path, cli: Cli, tmp_path: Path) -> None:
@@ -331,7 +333,7 @@ def test_the_seal_reveals_a_forgery_with_consistent_digests(
         table_building.ensure(run)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert RunFolder.open(run).finished
+        assert RunFolder.open(run).is_finished
         table_building.ensure(run)
     found = mutator.verify(run, expect=known, workspace=genuine[0])
     assert not found.passed

@@ -9,7 +9,7 @@ from selfdrive.sim.detection_memory import FILE
 
 from mutator.execution.campaign_running import run_campaign
 from mutator.store.plan_choices import Choices
-from mutator.store.records import read_records
+from mutator.store.records import load_records
 from mutator.workspace import Workspace
 
 pytestmark = pytest.mark.slow
@@ -52,8 +52,8 @@ def test_the_frame_cache_changes_no_byte(
         assert run_campaign(workspace, "vision_levels_paper", out, workers=2, choices=FEW).exit_code == 0
     assert (cache / "mutator" / "targets" / "openpilot" / FILE).exists()
     cold, warm = runs
-    assert len(read_records(cold)) == 2
-    assert read_records(cold) == read_records(warm)
+    assert len(load_records(cold)) == 2
+    assert load_records(cold) == load_records(warm)
     for name in ("trace.npz", "record.json"):
         place = Path("golden") / "S1+pictures+paper_detector" / name
         assert (cold / place).read_bytes() == (warm / place).read_bytes()

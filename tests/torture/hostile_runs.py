@@ -14,7 +14,7 @@ from mutator._common.files import json_bytes
 from mutator._common.hashing import digest
 from mutator.store import file_digests
 from mutator.store.file_digests import FileDigest
-from mutator.store.series_folder import Index, write_index
+from mutator.store.series_folder import SeriesIndex, save_index
 from tests.made_up_results import edit_results
 
 UP = "../../home/mine"  # from a run folder to the user's files
@@ -266,17 +266,17 @@ def _many_files(sent: Sent) -> None:
 
 def _an_index_of_series_with_a_name_outside(sent: Sent) -> None:
     (sent.run / "series").mkdir(exist_ok=True)
-    index = Index(
+    index = SeriesIndex(
         plan=json.loads((sent.run / "run.json").read_bytes())["plan"],
         chunks=((f"../{UP}", 2),),
-        sizes=(4, 4),
-        goldens={f"../{UP}": 0},
-        entries={sent.experiment: 1},
-        golden_of={sent.experiment: f"../{UP}"},
-        left_out=0,
+        entry_sizes=(4, 4),
+        golden_entries={f"../{UP}": 0},
+        experiment_entries={sent.experiment: 1},
+        golden_by_experiment={sent.experiment: f"../{UP}"},
+        left_out_count=0,
         budget_mb=1,
     )
-    write_index(sent.run / "series" / "index.js", index)
+    save_index(sent.run / "series" / "index.js", index)
 
 
 def _an_experiment_with_a_name_outside(sent: Sent) -> None:

@@ -111,7 +111,7 @@ def use_api(sent: Sent) -> None:
         repr(found), found._repr_html_(), found.seal, found.counts(), found.results, found.propagation
         one = found.experiment(sent.experiment)
         repr(one), one.patch, one.stretch, one.is_drawn, one.fault_path
-        for golden in found.folder.goldens:
+        for golden in found.folder.golden_runs:
             found.golden(golden.scenario, golden.changes)
         one.traces()
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.store.patch_files import Patches
+from mutator.store.patch_files import PatchFolder
 from mutator.workspace import Workspace
 
 from ..differential.command import Command
@@ -126,7 +126,7 @@ def make_pair(toy: Workspace, folder: Path) -> Pair:
     began = time.monotonic()
     done("run", *WORDS, "-n", "2", "--out", folder / "timed")
     takes_s = time.monotonic() - began
-    experiment = next(iter(Patches(genuine)))
+    experiment = next(iter(PatchFolder(genuine)))
     place = Place(folder=folder / "case", genuine=genuine, campaign=WORDS, experiment=experiment)
     right = run(Place(folder=folder / "right", campaign=WORDS))
     return Pair(workspace=toy, place=place, takes_s=takes_s, right=right)

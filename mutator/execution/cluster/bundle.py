@@ -95,9 +95,9 @@ def _parts(workspace: Workspace, folder: RunFolder, engine: str) -> Iterator[tup
         "engine": engine,
         "limits": plain(head.limits),
         "seed": head.seed,
-        "series": bool(folder.series_mb),
+        "series": bool(folder.series_budget_mb),
         "several_seeds": len(folder.seeds) > 1,
-        "goldens": [{"golden": one.stored(), "digest": digests[one.key]} for one in folder.goldens],
+        "goldens": [{"golden": one.to_stored(), "digest": digests[one.key]} for one in folder.golden_runs],
         "manifest": manifest.path.name,
         "sandbox": workspace.sandbox,
     }

@@ -8,7 +8,7 @@ from typing import Any
 
 from mutator._common.message_text import counted
 from mutator._common.version import VERSION
-from mutator.store.work_stretches import Stretch, differences
+from mutator.store.work_stretches import Stretch, version_differences
 
 _RECENT = 20  # finished pieces used to measure a worker's rate
 
@@ -50,7 +50,7 @@ class Crew:
         """
         if facts["mutator"] != VERSION:
             return f"mutator {facts['mutator']}, here {VERSION}"
-        found = differences(self._stretch, facts["python"], facts["packages"])
+        found = version_differences(self._stretch, facts["python"], facts["packages"])
         return "" if self._accept else "; ".join(text.replace(", here", ", there") for text in found)
 
     def finished(self, name: str, count: int) -> None:

@@ -37,8 +37,8 @@ from mutator.execution.worker import timing_of
 from mutator.model import Experiment
 from mutator.preflight.preflight_rules import look
 from mutator.store.checksummed_blocks import block_bytes
-from mutator.store.patch_files import packed_patches
-from mutator.store.records import line_of
+from mutator.store.patch_files import pack_patches
+from mutator.store.records import record_as_json
 from mutator.store.run_folder import GoldenRun
 from mutator.store.series_packing import series_block
 from mutator.targets.required_packages import check_requirements
@@ -141,11 +141,11 @@ class PieceRunner:
                 shared_cache.make_room(self._manifest.cache_name)
 
     def _golden_of(self, experiment: Experiment) -> GoldenRun:
-        return GoldenRun.of(experiment, several_seeds=self._site.meta["several_seeds"])
+        return GoldenRun.for_experiment(experiment, several_seeds=self._site.meta["several_seeds"])
 
 
 def _made(finished: list[Finished], name: str, *, proof: bool) -> Result:
-    records = tuple(canonical(line_of(one.record)).encode() for one in finished)
+    records = tuple(canonical(record_as_json(one.record)).encode() for one in finished)
     if proof:
         return Result(number=0, ending=Ending.DONE, records=records)
     patches = [(one.experiment.id, one.mutant.patch_bytes) for one in finished if one.mutant is not None]
@@ -156,9 +156,9 @@ def _made(finished: list[Finished], name: str, *, proof: bool) -> Result:
         forked=any(one.mode in FAST for one in finished),
         records=records,
         timings=tuple(canonical(timing_of(one, name)).encode() for one in finished),
-        patches=packed_patches(patches),
+        patches=pack_patches(patches),
         series=b"".join(block_bytes(*series_block(experiment, one)) for experiment, one in series),
-        series_of=tuple(sorted({one.key for _, one in series})),
+        series_of=tuple(sorted({one.golden_key for _, one in series})),
     )
 
 

@@ -16,7 +16,7 @@ from mutator.execution.cluster.pieces import Kind, Piece
 from mutator.execution.cluster.work_by_golden import Group, Run, faults_of, golden_of, groups_of
 from mutator.preflight.equivalence_check import Sample
 from mutator.store import plan_file
-from mutator.store.plan_lines import id_of
+from mutator.store.plan_lines import id_on_line
 from mutator.store.run_folder import RunFolder
 
 LEAST_S, MOST_S = 0.5, 8.0  # shortest and longest intended duration of a piece
@@ -61,10 +61,12 @@ class Board:
     ) -> None:
         self._now, self._folder = now, folder
         self._number = 0
-        self._faults = plan_file.fault_lines(folder.path)
+        self._faults = plan_file.fault_line_by_id(folder.path)
         self._groups = groups_of(folder, pending, self._faults)
         self._sampled = {sample.id for sample in proof}
-        self._proof = [self._proof_piece(line) for line in plan_file.lines_named(folder.path, self._sampled)]
+        self._proof = [
+            self._proof_piece(line) for line in plan_file.experiment_lines(folder.path, self._sampled)
+        ]
         self._out: dict[int, _Out] = {}
         self._maker: dict[str, str] = {}  # the worker that ran each experiment of the sample
         self._at: dict[str, str] = {}  # the golden run that each worker has
@@ -249,7 +251,7 @@ class Board:
         )
 
     def _proof_piece(self, line: bytes) -> Piece:
-        lines = {id_of(line): line}
+        lines = {id_on_line(line): line}
         return self._piece(Kind.PROVE, golden_of(self._folder, line, self._faults), lines)
 
     def _part(self, piece: Piece, lines: Run, died_at: tuple[str, ...]) -> Piece:

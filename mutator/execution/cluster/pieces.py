@@ -8,7 +8,7 @@ from typing import Any
 
 from mutator.execution.cluster.parcel import pack, unpack
 from mutator.model import Experiment
-from mutator.store.plan_lines import experiment_of, fault_of
+from mutator.store.plan_lines import parse_experiment, parse_fault
 
 
 class Kind(StrEnum):
@@ -68,8 +68,8 @@ class Piece:
 
     def experiments(self) -> tuple[Experiment, ...]:
         """Parse the piece's experiments; MutatorError if a line does not match its id."""
-        faults = {fault.id: fault for fault in map(fault_of, self.faults)}
-        return tuple(experiment_of(line, faults) for line in self.lines.values())
+        faults = {fault.id: fault for fault in map(parse_fault, self.faults)}
+        return tuple(parse_experiment(line, faults) for line in self.lines.values())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -40,7 +40,7 @@ class Intake:
             return
         goldens = {key: partial(self._golden_series, key) for key in result.series_of}
         self._writer.extend_series(result.series, goldens)
-        self._writer.extend(result.records, result.timings, result.patches)
+        self._writer.extend_results(result.records, result.timings, result.patches)
 
     def give_up(self, piece: Piece, why: str) -> None:
         append = self._writer.append_record if piece.kind is Kind.RUN else self._writer.append_proof
@@ -50,9 +50,9 @@ class Intake:
     def close(self) -> Sums:
         """Close the files; return the digests of those whose lines count."""
         self._writer.close()
-        return self._writer.digests
+        return self._writer.sha256_by_file
 
     def _golden_series(self, key: str) -> bytes:
-        golden = next(one for one in self._folder.goldens if one.key == key)
-        trace = load_channels(self._manifest, self._folder.golden(*golden))
+        golden = next(one for one in self._folder.golden_runs if one.key == key)
+        trace = load_channels(self._manifest, self._folder.golden_folder(*golden))
         return Sampler(self._manifest, trace).encoded

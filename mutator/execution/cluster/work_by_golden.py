@@ -9,7 +9,7 @@ from typing import Any
 from mutator.campaigns.chunks import Pending
 from mutator.execution.cluster.pieces import Piece
 from mutator.store import plan_file
-from mutator.store.plan_lines import content, experiment_of, fault_of, id_of
+from mutator.store.plan_lines import id_on_line, parse_experiment, parse_fault, values_behind_id
 from mutator.store.run_folder import RunFolder
 
 _OF_A_RUN = ("fault", "trigger", "seed")  # equal for experiments that share a run
@@ -36,7 +36,7 @@ def groups_of(folder: RunFolder, pending: Sequence[Pending], faults: Faults) -> 
     """Return the pending work by golden run. All experiments of a chunk have the same golden run."""
     chunks: dict[str, list[Pending]] = {}
     for one in pending:
-        first = next(iter(plan_file.chunk_lines(folder.path, folder.head.chunks[one.chunk])))
+        first = next(iter(plan_file.read_chunk_lines(folder.path, folder.head.chunks[one.chunk])))
         chunks.setdefault(golden_of(folder, first, faults), []).append(one)
     return {
         golden: Group(golden, _runs_of(folder, ours), sum(len(one.places) for one in ours))
@@ -46,20 +46,20 @@ def groups_of(folder: RunFolder, pending: Sequence[Pending], faults: Faults) -> 
 
 def _runs_of(folder: RunFolder, pending: Sequence[Pending]) -> Iterator[Run]:
     for one in pending:
-        lines = list(plan_file.chunk_lines(folder.path, folder.head.chunks[one.chunk]))
+        lines = list(plan_file.read_chunk_lines(folder.path, folder.head.chunks[one.chunk]))
         for _, same in groupby((lines[place] for place in one.places), key=_what_runs):
-            yield {id_of(line): line for line in same}
+            yield {id_on_line(line): line for line in same}
 
 
 def _what_runs(line: bytes) -> list[Any]:
-    data = content(line)
+    data = values_behind_id(line)
     return [data[name] for name in _OF_A_RUN]
 
 
 def golden_of(folder: RunFolder, line: bytes, faults: Faults) -> str:
-    fault = fault_of(faults[content(line)["fault"]])
-    return folder.golden_of(experiment_of(line, {fault.id: fault})).key
+    fault = parse_fault(faults[values_behind_id(line)["fault"]])
+    return folder.golden_run_of(parse_experiment(line, {fault.id: fault})).key
 
 
 def faults_of(lines: Run, faults: Faults) -> tuple[bytes, ...]:
-    return tuple(dict.fromkeys(faults[content(line)["fault"]] for line in lines.values()))
+    return tuple(dict.fromkeys(faults[values_behind_id(line)["fault"]] for line in lines.values()))

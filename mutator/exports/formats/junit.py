@@ -14,7 +14,7 @@ from mutator.model import Experiment, Outcome, Status
 from mutator.results.plan_columns import plan_row
 from mutator.results.result_rows import Row
 from mutator.results.table_reader import Results
-from mutator.store.plan_file import read_all
+from mutator.store.plan_file import load_experiments
 
 ENDINGS = (Outcome.HAZARD, Outcome.SDC, Outcome.MASKED, Status.CRASHED, Status.TIMEOUT)
 _NO_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
@@ -28,7 +28,7 @@ def _content(request: ExportRequest) -> bytes:
         raise MutatorError(f"'{strangers[0]}'", argument="failures", expected=f"one of {', '.join(known)}")
     rows = {row.experiment_id: row for row in Results.up_to_date(folder.path).rows()}
     suites: dict[str, list[Experiment]] = {}
-    for experiment in read_all(folder.path):
+    for experiment in load_experiments(folder.path):
         cells = plan_row(experiment)
         suites.setdefault(f"{cells['module']}/{cells['fault_type']}", []).append(experiment)
     root = ET.Element("testsuites", name=folder.head.campaign)

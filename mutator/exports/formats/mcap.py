@@ -29,7 +29,7 @@ from mutator.outcomes.trace_files import own_times
 from mutator.results.table_reader import Results
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
-from mutator.store.series_folder import SeriesFolder, making_again
+from mutator.store.series_folder import SeriesFolder, rerun_command
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 
@@ -91,10 +91,10 @@ class Content:
 
     @cached_property
     def _experiments(self) -> Mapping[str, Experiment]:
-        return {experiment.id: experiment for experiment in plan_file.read_all(self._folder.path)}
+        return {experiment.id: experiment for experiment in plan_file.load_experiments(self._folder.path)}
 
     def has(self, experiment_id: str) -> bool:
-        return self._series.has(experiment_id) or self._exact(experiment_id) is not None
+        return self._series.has_series(experiment_id) or self._exact(experiment_id) is not None
 
     def of(self, experiment_id: str) -> bytes:
         """Return an experiment's file, from its exact traces if kept, else from its series."""
@@ -117,10 +117,10 @@ class Content:
         """Return the kept traces, if both runs have one. MutatorError if a trace does not match its record:
         using the coarser series instead would hide the mismatch.
         """
-        kept = self._folder.traces_of(experiment_id)
+        kept = self._folder.kept_traces_folder(experiment_id)
         if self._traces is None or not kept.is_dir() or experiment_id not in self._records:
             return None
-        golden = self._folder.golden_folder(self._experiments[experiment_id])
+        golden = self._folder.golden_folder_of(self._experiments[experiment_id])
         faulty = inside(kept / "faulty", self._traces.manifest.trace_file)
         if not (golden.is_dir() or (kept / "golden").is_dir()) or not faulty.is_file():
             return None
@@ -129,22 +129,25 @@ class Content:
                 f"the kept trace of {experiment_id} does not match its record",
                 where=faulty,
                 expected="the complete trace of the campaign's run",
-                remedy=f"rerun the experiment: {making_again(self._folder.path, experiment_id)}, "
+                remedy=f"rerun the experiment: {rerun_command(self._folder.path, experiment_id)}, "
                 f"or delete {kept}",
             )
         return self._traces.of(experiment_id)
 
     def _of_series(self, record: Record) -> tuple[list[Topic], list[Topic]]:
-        found = self._series.read(record.experiment_id, record)
+        found = self._series.load_series(record.experiment_id, record)
         assert found is not None  # `has` was checked
         golden, faulty = found
         points = faulty.points
         topics: tuple[list[Topic], list[Topic]] = ([], [])
-        for row, about in enumerate(golden.about["channels"]):
-            own = points.channel == row
+        for row, about in enumerate(golden.facts["channels"]):
+            own = points.channel_numbers == row
             runs = ((golden, points.golden), (faulty, points.faulty))
             for told, (run, more) in zip(topics, runs, strict=True):
-                pairs = [*_pairs(run.times(row), run.rows[row]), *_pairs(points.t[own], more[own])]
+                pairs = [
+                    *_pairs(run.times_of(row), run.channel_values[row]),
+                    *_pairs(points.t[own], more[own]),
+                ]
                 told.append(Topic(name=about["name"], about=_described(about), values=sorted(pairs)))
         return topics
 

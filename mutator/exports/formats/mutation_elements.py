@@ -37,7 +37,7 @@ def _content(request: ExportRequest) -> bytes:
 def report(folder: RunFolder, manifest: TargetManifest, models: FaultModels) -> dict[str, Any]:
     records = folder.records()
     drives: dict[str, list[Experiment]] = {}
-    for experiment in plan_file.read_all(folder.path):
+    for experiment in plan_file.load_experiments(folder.path):
         drives.setdefault(experiment.fault.id, []).append(experiment)
     files: dict[str, dict[str, Any]] = {}
     for experiments in drives.values():

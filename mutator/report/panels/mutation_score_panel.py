@@ -31,7 +31,7 @@ def build_mutation_score_panel(run: ReportedRun) -> Panel | None:
     runs = run.fault_free()
     score = mutation_score_sheet(
         run.frame,
-        plan_file.read_faults(run.folder.path),
+        plan_file.load_faults(run.folder.path),
         alerts_by_drive(runs) if runs else None,
         run.folder.head.operators,
     )

@@ -7,7 +7,7 @@ from mutator.report.panel import Panel, rendered
 from mutator.report.reported_run import ReportedRun
 from mutator.store.approvals import approval_summary
 from mutator.store.run_head import HEAD
-from mutator.store.work_stretches import package_versions, told
+from mutator.store.work_stretches import describe_stretches, package_versions
 
 PACKAGES = ("jinja2", "libcst", "numpy")  # packages that build mutants and compare runs; run.json lists all
 _NOTE = "The seal does not cover this. Whoever can write to the run folder can change it unnoticed."
@@ -48,9 +48,9 @@ def _facts(run: ReportedRun) -> list[tuple[str, str]]:
     folder = run.folder
     reviewed = approval_summary(folder.path)
     head, packages = folder.head, package_versions(folder.stretches)
-    chosen = without(head.content(), OUTSIDE[HEAD])["choices"]
+    chosen = without(head.as_json(), OUTSIDE[HEAD])["choices"]
     facts = {
-        "experiments": f"{len(run.results)} of {folder.planned} planned",
+        "experiments": f"{len(run.results)} of {folder.planned_count} planned",
         **({"proof": run.engines.state} if run.engines else {}),
         **({"reviewed": reviewed} if reviewed else {}),
         **seal_or_why_not(folder),
@@ -64,7 +64,7 @@ def _facts(run: ReportedRun) -> list[tuple[str, str]]:
         **{f"chosen: {name}": value for name, value in chosen.items() if value is not None},
         **{f"digest of {name}": value for name, value in head.sources.items()},
         "mutator": head.provenance.mutator,
-        **{name: text for name, text in told(folder.stretches).items() if name == "python"},
+        **{name: text for name, text in describe_stretches(folder.stretches).items() if name == "python"},
         **{name: packages[name] for name in PACKAGES if name in packages},
     }
     return [(name, str(value)) for name, value in facts.items()]

@@ -107,9 +107,9 @@ def driven_once(
     folder = RunFolder.open(
         write_run(toycar, root / "run", lambda e: None, campaign="small", only=LANE, limit=1)
     )
-    [experiment] = plan_file.read_all(folder.path)
+    [experiment] = plan_file.load_experiments(folder.path)
     single = run_single(toycar, toycar.manifest("toycar"), experiment, root / "single")
-    golden = folder.golden(experiment.scenario, experiment.changes)
+    golden = folder.golden_folder(experiment.scenario, experiment.changes)
     golden.parent.mkdir()
     single.golden.rename(golden)
     patches = PatchWriter(folder.path, "0002-a")
@@ -172,7 +172,7 @@ def test_only_a_rerun_that_equals_the_record_is_kept(driven: Run) -> None:
     assert len(trial.traces().faulty) == 120
     assert not (driven.path / "traces").exists()
     assert not experiment.is_drawn
-    kept = SeriesFolder(driven.path).kept(experiment.id)
+    kept = SeriesFolder(driven.path).kept_path(experiment.id)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(run_experiments, "rerun", lambda *where, **more: (rerun(*where, **more)[0], False))
         assert experiment.rerun(keep=True).same_as_record is False

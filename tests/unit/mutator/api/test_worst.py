@@ -11,7 +11,7 @@ from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import make_plan
 from mutator.model import Outcome, Record
 from mutator.store.checksummed_lines import line_file_bytes
-from mutator.store.records import SCHEMA, line_of
+from mutator.store.records import SCHEMA, record_as_json
 from mutator.workspace import Workspace
 
 
@@ -24,7 +24,9 @@ def test_filtered_results_are_sorted_by_severity(
     made = [record(e.id, **(hazard if i % 5 == 0 else {})) for i, e in enumerate(plan.experiments)]
     path = run / "records" / "0001-main.jsonl"
     path.parent.mkdir()
-    path.write_bytes(line_file_bytes(path, {"schema": SCHEMA, "plan": plan.digest}, map(line_of, made)))
+    path.write_bytes(
+        line_file_bytes(path, {"schema": SCHEMA, "plan": plan.digest}, map(record_as_json, made))
+    )
     monkeypatch.setattr(module, "_BATCH", 7)
     rows, count = worst_results(run)
     assert count == len(rows) == 24 and [bool(row.hazards) for row in rows] == [True] * 5 + [False] * 19

@@ -13,10 +13,10 @@ from mutator.errors import MutatorError, Outside
 from mutator.store import file_digests, plan_file
 from mutator.store.checksummed_lines import line_file_bytes, read_segment
 from mutator.store.file_digests import DigestLedger, FileDigest
-from mutator.store.patch_files import Patches
+from mutator.store.patch_files import PatchFolder
 from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
-from mutator.store.series_folder import Index, write_index
+from mutator.store.series_folder import SeriesIndex, save_index
 from mutator.workspace import Workspace
 
 
@@ -36,7 +36,7 @@ def run(made: Path, tmp_path: Path) -> Path:
 
 
 def repaired(run: Path) -> tuple[list[str], RunFolder]:
-    said = repair(RunFolder.unverified(run))
+    said = repair(RunFolder.open_unverified(run))
     return said, RunFolder.open(run)
 
 
@@ -66,7 +66,7 @@ def test_only_damaged_lines_of_a_segment_are_lost(run: Path, made: Path, loss: s
     said, folder = repaired(run)
     known = RunFolder.open(made).records()
     assert folder.records().items() <= known.items() and len(folder.records()) == 24 - lost
-    assert not folder.finished
+    assert not folder.is_finished
     assert (run / "damaged" / RECORDS).read_bytes() == damaged
     assert any(text.startswith(f"{RECORDS}: ") for text in said)
 
@@ -100,23 +100,23 @@ def test_a_missing_segment_loses_its_records(run: Path) -> None:
 
 def test_a_lost_patch_removes_its_record(run: Path, put_patches: Callable[..., None]) -> None:
     one, other = list(plan_file.ids(run))[:2]
-    [file] = Patches(run).files()
+    [file] = PatchFolder(run).block_files()
     put_patches(run, {one: b"other", other: None})
     before = file.read_bytes()
     said, folder = repaired(run)
     assert len(folder.records()) == 22 and not {one, other} & folder.records().keys()
     assert (run / "damaged" / file.relative_to(run)).read_bytes() == before
-    assert {*Patches(run)} == {*folder.records()}
+    assert {*PatchFolder(run)} == {*folder.records()}
     assert any(one in text for text in said)
 
 
 def test_a_damaged_first_block_removes_all_records_of_its_file(run: Path) -> None:
     """The first block is a complete patch, and the others are differences from it."""
-    [file] = Patches(run).files()
+    [file] = PatchFolder(run).block_files()
     data = file.read_bytes()
     file.write_bytes(data[:60] + bytes([data[60] ^ 1]) + data[61:])
     _, folder = repaired(run)
-    assert folder.records() == {} and [*Patches(run)] == []
+    assert folder.records() == {} and [*PatchFolder(run)] == []
     assert (run / "damaged" / file.relative_to(run)).is_file()
 
 
@@ -125,7 +125,7 @@ def test_files_that_run_can_rebuild_are_moved_aside(run: Path, name: str) -> Non
     (run / name).write_bytes(b"other")
     said, folder = repaired(run)
     assert said == [f"{name} set aside: `mutator run` rebuilds it"]
-    assert not folder.finished and not (run / name).exists()
+    assert not folder.is_finished and not (run / name).exists()
     assert (run / "damaged" / name).read_bytes() == b"other"
     (run / name).write_bytes(b"again")
     file_digests.close_segments(run, finished=True)
@@ -136,7 +136,7 @@ def test_files_that_run_can_rebuild_are_moved_aside(run: Path, name: str) -> Non
 def test_plan_csv_is_written_again_and_the_run_stays_finished(run: Path, made: Path) -> None:
     (run / "plan.csv").unlink()
     said, folder = repaired(run)
-    assert said == ["plan.csv rebuilt from the plan"] and folder.finished
+    assert said == ["plan.csv rebuilt from the plan"] and folder.is_finished
     assert (run / "plan.csv").read_bytes() == (made / "plan.csv").read_bytes()
 
 
@@ -161,22 +161,22 @@ def test_a_damaged_ledger_is_rebuilt_from_the_files(run: Path, content: bytes | 
     path.unlink() if content is None else path.write_bytes(content)
     said, folder = repaired(run)
     assert said == ["digests.json rebuilt from the current files: only an earlier seal can confirm them"]
-    assert len(folder.records()) == 24 and not folder.finished
+    assert len(folder.records()) == 24 and not folder.is_finished
 
 
 def test_a_damaged_campaign_file_or_plan_is_not_repaired(run: Path) -> None:
     """A user can replace the file with a copy."""
     (run / "campaign.yaml").write_text("other")
-    assert repair(RunFolder.unverified(run)) == []
+    assert repair(RunFolder.open_unverified(run)) == []
     assert (run / "campaign.yaml").read_text() == "other"
     edit(run / plan_file.EXPERIMENTS, lambda x: x[:-1])
     with pytest.raises(MutatorError, match="23 experiments"):
-        repair(RunFolder.unverified(run))
+        repair(RunFolder.open_unverified(run))
 
 
 def test_an_intact_run_is_not_changed(run: Path) -> None:
     before = (run / file_digests.FILE).stat().st_mtime_ns
-    assert repair(RunFolder.unverified(run)) == []
+    assert repair(RunFolder.open_unverified(run)) == []
     assert (run / file_digests.FILE).stat().st_mtime_ns == before and not (run / "damaged").exists()
 
 
@@ -184,9 +184,9 @@ def test_a_run_resumes_after_a_killed_repair(run: Path, monkeypatch: pytest.Monk
     edit(run / RECORDS, lambda x: [*x[:3], x[3].replace(b"ok", b"no"), *x[4:]])
     with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
         patched.setattr(file_digests, "close_segments", kill)
-        repair(RunFolder.unverified(run))
+        repair(RunFolder.open_unverified(run))
     folder = RunFolder.open(run)
-    assert (len(folder.records()), folder.finished) == (23, False)
+    assert (len(folder.records()), folder.is_finished) == (23, False)
 
 
 def kill(*_: object, **__: object) -> None:
@@ -195,7 +195,7 @@ def kill(*_: object, **__: object) -> None:
 
 def test_a_folder_in_use_is_refused(run: Path) -> None:
     with owned(run), pytest.raises(MutatorError, match="in use"):
-        repair(RunFolder.unverified(run))
+        repair(RunFolder.open_unverified(run))
 
 
 @pytest.mark.parametrize("name", NO_FILES)
@@ -221,7 +221,7 @@ def test_links_are_not_followed(run: Path, name: str) -> None:
         (run / name).symlink_to(mine)
     before = {path: path.read_bytes() for path in mine.iterdir()}
     with pytest.raises(Outside, match="a link, a pipe"):
-        repair(RunFolder.unverified(run))
+        repair(RunFolder.open_unverified(run))
     assert {path: path.read_bytes() for path in mine.iterdir()} == before
 
 
@@ -234,7 +234,7 @@ def test_a_file_outside_that_the_ledger_names_stays(run: Path, name: str) -> Non
         run, DigestLedger(files={**ledger.files, name: FileDigest.of_bytes(b"not mine")}, finished=True)
     )
     with pytest.raises(Outside, match=r"digests\.json"):
-        repair(RunFolder.unverified(run))
+        repair(RunFolder.open_unverified(run))
     assert (run.parent / "setup.py").read_text() == "mine"
 
 
@@ -246,7 +246,7 @@ def test_a_file_outside_that_a_record_names_stays(run: Path) -> None:
     segment = read_segment(run / RECORDS)
     lines = [segment.content(number) for number in segment.lines if number > 1]
     lines[0] |= {"experiment_id": name, "patch": "ab" * 32}
-    plan = RunFolder.unverified(run).head.plan
+    plan = RunFolder.open_unverified(run).head.plan
     (run / RECORDS).write_bytes(line_file_bytes(run / RECORDS, {"schema": SCHEMA, "plan": plan}, lines))
     repaired(run)
     assert mine.read_text() == "mine"
@@ -257,17 +257,17 @@ def test_a_file_outside_that_an_index_of_series_names_stays(run: Path, name: str
     mine = run.parent / "mine.js"
     mine.write_text("mine")
     (run / "series").mkdir()
-    index = Index(
-        plan=RunFolder.unverified(run).head.plan,
+    index = SeriesIndex(
+        plan=RunFolder.open_unverified(run).head.plan,
         chunks=((name, 1),),
-        sizes=(4,),
-        goldens={},
-        entries={},
-        golden_of={},
-        left_out=0,
+        entry_sizes=(4,),
+        golden_entries={},
+        experiment_entries={},
+        golden_by_experiment={},
+        left_out_count=0,
         budget_mb=1,
     )
-    write_index(run / "series" / "index.js", index)
+    save_index(run / "series" / "index.js", index)
     repaired(run)
     assert mine.read_text() == "mine"
 

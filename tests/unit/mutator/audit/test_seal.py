@@ -36,7 +36,7 @@ def run(made: Path, tmp_path: Path) -> Path:
 
 
 def sealed(run: Path) -> str | None:
-    return seals_of(RunFolder.unverified(run)).seal
+    return seals_of(RunFolder.open_unverified(run)).seal
 
 
 def test_the_seal_does_not_depend_on_workers_or_order(made: Path, run: Path, reseal: Reseal) -> None:
@@ -59,7 +59,7 @@ def test_the_seal_does_not_depend_on_workers_or_order(made: Path, run: Path, res
 
 def test_a_retried_harness_error_does_not_affect_the_seal(made: Path, run: Path) -> None:
     folder = RunFolder.open(run)
-    name = next(iter(folder.share()))
+    name = next(iter(folder.planned_positions()))
     head = {"schema": SCHEMA, "plan": folder.head.plan}
     path = run / "records" / "0002-a.jsonl"
     file_digests.close_segments(run, finished=False)
@@ -164,7 +164,7 @@ def crash(run: Path, detail: str, kind: str, message: str) -> None:
 
 def results_digest(run: Path, reseal: Reseal) -> str:
     reseal(run)
-    found = seals_of(RunFolder.unverified(run)).results_digest
+    found = seals_of(RunFolder.open_unverified(run)).results_digest
     assert found is not None
     return found
 
@@ -173,7 +173,7 @@ def test_the_results_digest_does_not_depend_on_versions(made: Path, run: Path, r
     """Nor on the proof, which the reference engine does without, and files that ids follow from."""
     for change in ONLY_SEALED:
         CHANGES[change](run)
-    assert results_digest(run, reseal) == seals_of(RunFolder.unverified(made)).results_digest
+    assert results_digest(run, reseal) == seals_of(RunFolder.open_unverified(made)).results_digest
     assert sealed(run) != sealed(made)
 
 
@@ -204,7 +204,7 @@ def test_any_change_of_a_result_or_its_judgement_changes_the_results_digest(
     made: Path, run: Path, reseal: Reseal, change: str
 ) -> None:
     CHANGES[change](run)
-    assert results_digest(run, reseal) != seals_of(RunFolder.unverified(made)).results_digest
+    assert results_digest(run, reseal) != seals_of(RunFolder.open_unverified(made)).results_digest
 
 
 def test_the_review_digest_covers_who_decided_what(made: Path, run: Path) -> None:

@@ -9,7 +9,7 @@ from mutator.campaigns.chunks import Pending, cut, pending
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import make_plan
 from mutator.model import Record, Status
-from mutator.store.plan_file import read_chunk, read_faults
+from mutator.store.plan_file import load_chunk, load_faults
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -42,8 +42,8 @@ def test_all_experiments_are_pending_at_first(folder: RunFolder) -> None:
 def test_experiments_without_a_valid_record_are_pending(
     folder: RunFolder, record: Callable[..., Record]
 ) -> None:
-    faults = read_faults(folder.path)
-    chunks = [read_chunk(folder.path, chunk, faults) for chunk in folder.head.chunks]
+    faults = load_faults(folder.path)
+    chunks = [load_chunk(folder.path, chunk, faults) for chunk in folder.head.chunks]
     records = {e.id: record(e.id) for e in (*chunks[0], chunks[1][1], chunks[2][0])}
     wrong = record(chunks[2][0].id, status=Status.HARNESS_ERROR, outcome=None)
     records[wrong.experiment_id] = wrong
@@ -54,7 +54,7 @@ def test_experiments_without_a_valid_record_are_pending(
 
 
 def test_the_chunks_together_contain_the_whole_plan(folder: RunFolder) -> None:
-    faults = read_faults(folder.path)
-    found = [e.id for chunk in folder.head.chunks for e in read_chunk(folder.path, chunk, faults)]
+    faults = load_faults(folder.path)
+    found = [e.id for chunk in folder.head.chunks for e in load_chunk(folder.path, chunk, faults)]
     assert len(found) == len(set(found)) == 24
-    assert folder.find(found[5][:10]) == found[5]
+    assert folder.experiment_id_from(found[5][:10]) == found[5]

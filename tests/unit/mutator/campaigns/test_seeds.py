@@ -69,9 +69,9 @@ def test_each_seed_has_its_own_golden_runs(
     """Even a run without a fault uses the seed."""
     folder = freeze(Planning(toycar, campaign()), tmp_path / "run", toycar)
     assert folder.seeds == range(3, 6)
-    keys = {one.key for one in folder.goldens}
+    keys = {one.key for one in folder.golden_runs}
     assert {"A@3", "A@4", "A@5"} <= keys
-    assert {folder.golden_folder(e).name for e in plan_file.read_all(folder.path)} <= keys
+    assert {folder.golden_folder_of(e).name for e in plan_file.load_experiments(folder.path)} <= keys
 
 
 def test_a_plan_written_in_parts_equals_the_one_in_memory(
@@ -96,7 +96,7 @@ def test_planned_experiments_can_be_read_by_position(
 ) -> None:
     folder = freeze(Planning(toycar, campaign()), tmp_path / "run", toycar)
     planned = plan_file.ExperimentsInOrder(folder.path, folder.head.chunks)
-    every = plan_file.read_all(folder.path)
+    every = plan_file.load_experiments(folder.path)
     assert (len(planned), tuple(planned)) == (len(every), every)
     assert [planned[i] for i in range(-3, len(every))] == [every[i] for i in range(-3, len(every))]
     assert planned[2:5] == list(every[2:5])

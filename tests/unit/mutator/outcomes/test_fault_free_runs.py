@@ -34,9 +34,9 @@ def folder(path: Path, runs: dict[tuple[str, str], dict]) -> RunFolder:
     """Create a run folder whose golden runs have the given records, by scenario and change."""
     goldens = [[scenario, [change] if change else []] for scenario, change in runs]
     (path / "run.json").write_text(json.dumps(made_head(goldens=goldens)))
-    made = RunFolder.unverified(path)
+    made = RunFolder.open_unverified(path)
     for (scenario, changes), record in zip(goldens, runs.values(), strict=True):
-        place = made.golden(scenario, tuple(changes))
+        place = made.golden_folder(scenario, tuple(changes))
         place.mkdir(parents=True)
         (place / "record.json").write_text(json.dumps(record))
         np.savez(place / "trace.npz", t=np.arange(3.0), v=np.array([2.0, np.nan, -1.0]))
@@ -72,6 +72,6 @@ def test_the_sentence_names_each_alert_once_with_its_scenarios(tmp_path: Path) -
 
 def test_a_missing_golden_run_is_an_error(tmp_path: Path) -> None:
     made = folder(tmp_path, {("A", ""): {"hazards": {}}})
-    (made.golden("A") / "record.json").unlink()
+    (made.golden_folder("A") / "record.json").unlink()
     with pytest.raises(MutatorError, match="golden"):
         load_fault_free_runs(made, MANIFEST)

@@ -313,7 +313,7 @@ def test_the_structure_is_read_from_run_json(tmp_path: Folder) -> None:
 
     def read(**changes: object) -> FaultPaths | None:
         (tmp_path / "run.json").write_text(json.dumps(made_head(**changes)))
-        return fault_paths_of(RunFolder.unverified(tmp_path))
+        return fault_paths_of(RunFolder.open_unverified(tmp_path))
 
     structure = STRUCTURE.model_dump(mode="json", by_alias=True)
     found = read(channels=CHANNELS, structure=structure)

@@ -13,8 +13,8 @@ from mutator.model import Record
 from mutator.outcomes.channel_departures import departures
 from mutator.outcomes.golden_comparison import Trace, compare
 from mutator.outcomes.series_sampling import Sampler, keep_series
-from mutator.store.series_folder import SeriesFolder, write_kept
-from mutator.store.series_format import Series, decode, encode
+from mutator.store.series_folder import SeriesFolder, write_kept_series
+from mutator.store.series_format import Series, decode_series, encode_series
 from mutator.targets.channels import Role
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
@@ -39,8 +39,8 @@ def trace(time: np.ndarray = T, **channels: np.ndarray) -> Trace:
 
 
 def stored(sampler: Sampler, faulty: Trace, record: Record) -> tuple[Series, Series]:
-    golden = decode(sampler.encoded)
-    return golden, decode(encode(sampler.series(faulty, record), sampler.golden), golden)
+    golden = decode_series(sampler.encoded)
+    return golden, decode_series(encode_series(sampler.series(faulty, record), sampler.golden), golden)
 
 
 def test_a_channel_has_twenty_values_per_second_and_its_last_value(
@@ -50,9 +50,9 @@ def test_a_channel_has_twenty_values_per_second_and_its_last_value(
     golden, faulty = stored(one, trace(speed=np.cos(T)), record())
     assert golden.t.tolist() == [*T[::5], 4.99]
     assert faulty.t.tolist() == golden.t.tolist()
-    assert golden.rows[SPEED].tolist() == rounded(np.sin(golden.t))
-    assert faulty.rows[SPEED].tolist() == rounded(np.cos(golden.t))
-    assert [channel["name"] for channel in golden.about["channels"]][:2] == ["gas", "brake"]
+    assert golden.channel_values[SPEED].tolist() == rounded(np.sin(golden.t))
+    assert faulty.channel_values[SPEED].tolist() == rounded(np.cos(golden.t))
+    assert [channel["name"] for channel in golden.facts["channels"]][:2] == ["gas", "brake"]
 
 
 def test_internal_channels_have_ten_values_per_second(
@@ -63,8 +63,8 @@ def test_internal_channels_have_ten_values_per_second(
     speed = np.sin(T)
     speed[5] = 3.0
     golden, faulty = stored(one, trace(speed=speed), record())
-    assert golden.times(SPEED).tolist() == [*T[::10], 4.99]
-    assert faulty.rows[SPEED].tolist() == rounded(np.sin(golden.times(SPEED)))
+    assert golden.times_of(SPEED).tolist() == [*T[::10], 4.99]
+    assert faulty.channel_values[SPEED].tolist() == rounded(np.sin(golden.times_of(SPEED)))
     assert (faulty.points.t.tolist(), faulty.points.faulty.tolist()) == ([0.05], [3.0])
 
 
@@ -77,7 +77,7 @@ def test_no_peak_between_two_samples_is_lost(manifest: TargetManifest, record: C
     points = stored(one, trace(gas=gas), record(t_end=3.5))[1].points
     assert points.t.tolist() == [2.02, 3.03, 4.04]
     assert points.faulty.tolist() == rounded([0.1, -7.0, 9.0])
-    assert set(points.channel.tolist()) == {GAS}
+    assert set(points.channel_numbers.tolist()) == {GAS}
     assert len(stored(one, trace(), record())[1].points.t) == 0
 
 
@@ -87,7 +87,7 @@ def test_infinite_huge_and_missing_values_survive_rounding(
     speed = np.zeros(500)
     speed[:25:5] = np.inf, -np.inf, np.nan, 3.4e38, 1e300
     faulty = stored(Sampler(manifest, trace()), trace(speed=speed), record())[1]
-    first = faulty.rows[SPEED][:5]
+    first = faulty.channel_values[SPEED][:5]
     assert first[[0, 1, 4]].tolist() == [np.inf, -np.inf, np.inf] and np.isnan(first[2])
     assert first[3] == pytest.approx(3.4e38)
 
@@ -98,7 +98,7 @@ def test_all_channels_are_stored_at_a_hazard(manifest: TargetManifest, record: C
     hazards = (("H1", 2.52), ("H3", 3.0), ("H2", 7.0))  # there is already a sample at 3.00 s
     points = stored(one, trace(speed=speed, gap=gap), record(hazards=hazards))[1].points
     there = points.t == 2.52
-    assert points.channel[there].tolist() == [0, 1, 2, 3, SPEED]
+    assert points.channel_numbers[there].tolist() == [0, 1, 2, 3, SPEED]
     assert points.faulty[there] == pytest.approx([0, 0, 0, 6.48, 5.04], rel=1e-6)
     assert points.golden[there] == pytest.approx([0, 0, 0, 6.48, 2.52], rel=1e-6)
     assert not np.isin(points.t, [3.0, 7.0]).any()
@@ -111,7 +111,7 @@ def test_a_run_that_ends_early_keeps_its_last_step(
     one = Sampler(manifest, trace(speed=T))
     faulty = stored(one, trace(T[:303], speed=T[:303] ** 2), record())[1]
     assert faulty.t[-1] == 3.0
-    assert faulty.about["end"] == 4.99
+    assert faulty.facts["end"] == 4.99
     assert (faulty.points.t[-1], faulty.points.faulty[-1]) == (3.02, rounded([3.02**2])[0])
 
 
@@ -127,14 +127,14 @@ def test_a_run_that_lasts_longer_has_more_times(
     faulty = stored(Sampler(manifest, trace()), trace(time, speed=time), record())[1]
     assert faulty.t[-1] == 6.99
     assert np.diff(faulty.t).max() < 0.06
-    assert faulty.rows[SPEED].tolist() == rounded(faulty.t)
+    assert faulty.channel_values[SPEED].tolist() == rounded(faulty.t)
 
 
 def test_both_runs_share_one_time_axis(manifest: TargetManifest, record: Callable[..., Record]) -> None:
     time = np.arange(0.0, 5.0, 0.03)
     faulty = stored(Sampler(manifest, trace()), trace(time, speed=time), record())[1]
     place = np.searchsorted(time, faulty.t + 1e-9, side="right") - 1
-    assert faulty.rows[SPEED].tolist() == rounded(time[place])
+    assert faulty.channel_values[SPEED].tolist() == rounded(time[place])
 
 
 def test_a_channel_with_its_own_times_keeps_its_newest_value(
@@ -142,7 +142,7 @@ def test_a_channel_with_its_own_times_keeps_its_newest_value(
 ) -> None:
     own = {"gap": np.array([1.0, 2.0]), "gap@": np.array([1.0, 3.0])}
     golden = stored(Sampler(manifest, {**trace(), **own}), {**trace(), **own}, record())[0]
-    gap = dict(zip(golden.times(3).tolist(), golden.rows[3], strict=True))
+    gap = dict(zip(golden.times_of(3).tolist(), golden.channel_values[3], strict=True))
     assert np.isnan(gap[0.95])
     assert (gap[1.0], gap[2.95], gap[3.0]) == (1.0, 1.0, 2.0)
 
@@ -178,7 +178,7 @@ def test_the_curves_of_every_run_match_its_record(
 ) -> None:
     one = recorded(manifest, *PAIRS[name], record())
     keep_series(tmp_path, manifest, *PAIRS[name], one)
-    assert SeriesFolder(tmp_path).read(one.experiment_id, one) is not None
+    assert SeriesFolder(tmp_path).load_series(one.experiment_id, one) is not None
 
 
 @pytest.mark.parametrize("forged", ["golden", "larger", "later", "renamed", "nothing"])
@@ -189,10 +189,10 @@ def test_curves_that_deviate_otherwise_than_the_record_says_are_refused(
     pair = trace(gas=T), trace(gas=T**2)
     one = recorded(manifest, *pair, record())
     golden, faulty = stored(Sampler(manifest, pair[0]), pair[1], one)
-    channels = golden.about["channels"]
+    channels = golden.facts["channels"]
     curves = {
-        "golden": replace(golden, about=faulty.about),
-        "larger": replace(faulty, rows=[row + np.float32(1) for row in faulty.rows]),
+        "golden": replace(golden, facts=faulty.facts),
+        "larger": replace(faulty, channel_values=[row + np.float32(1) for row in faulty.channel_values]),
         "later": replace(faulty, t=np.concatenate((faulty.t[:1], faulty.t[1:] + 1))),
     }
     about = {
@@ -200,15 +200,15 @@ def test_curves_that_deviate_otherwise_than_the_record_says_are_refused(
         "nothing": {},
     }
     forgery = curves.get(forged, faulty)
-    reference = replace(golden, about=about.get(forged, golden.about))
-    path = SeriesFolder(tmp_path).kept(one.experiment_id)
-    write_kept(
+    reference = replace(golden, facts=about.get(forged, golden.facts))
+    path = SeriesFolder(tmp_path).kept_path(one.experiment_id)
+    write_kept_series(
         path,
-        encode(reference),
-        encode(forgery, golden if forged != "later" else replace(golden, t=golden.t[:0])),
+        encode_series(reference),
+        encode_series(forgery, golden if forged != "later" else replace(golden, t=golden.t[:0])),
     )
     with pytest.raises(MutatorError):
-        SeriesFolder(tmp_path).read(one.experiment_id, one)
+        SeriesFolder(tmp_path).load_series(one.experiment_id, one)
 
 
 def test_a_series_is_read_back_from_its_file(
@@ -216,11 +216,11 @@ def test_a_series_is_read_back_from_its_file(
 ) -> None:
     one = recorded(manifest, trace(), trace(speed=T), record(alerts=(("brake_hard", 2.5),)))
     keep_series(tmp_path, manifest, trace(), trace(speed=T), one)
-    path = SeriesFolder(tmp_path).kept(one.experiment_id)
+    path = SeriesFolder(tmp_path).kept_path(one.experiment_id)
     before = path.read_bytes()
     keep_series(tmp_path, manifest, trace(), trace(speed=T), one)
     assert path.read_bytes() == before
-    found = SeriesFolder(tmp_path).read(one.experiment_id, one)
+    found = SeriesFolder(tmp_path).load_series(one.experiment_id, one)
     assert found is not None
-    assert (found[0].rows[SPEED] == 0).all()
-    assert found[1].about["alerts"] == [["brake_hard", 2.5]]
+    assert (found[0].channel_values[SPEED] == 0).all()
+    assert found[1].facts["alerts"] == [["brake_hard", 2.5]]

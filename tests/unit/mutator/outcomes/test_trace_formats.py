@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mutator.outcomes.golden import load_record, load_trace
-from mutator.outcomes.judging import load_judged
 
 from mutator.errors import MutatorError
+from mutator.outcomes.golden_comparison import load_record, load_trace
+from mutator.outcomes.hazards_and_metrics import load_judged
 from mutator.targets.manifest_files import load_manifest
 
 from .cart import GAP, HEAD, SPEED, T, write_manifest

@@ -16,7 +16,7 @@ from mutator.preflight import equivalence_check
 from mutator.store import file_digests
 from mutator.store.checksummed_lines import LineWriter, read_segment
 from mutator.store.plan_choices import Choices
-from mutator.store.records import SCHEMA, read_records
+from mutator.store.records import SCHEMA, load_records
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
@@ -63,7 +63,7 @@ def test_an_incomplete_check_is_resumed(toycar: Workspace, proven: Path, reseal:
     reseal(proven, finished=False)
     folder = RunFolder.open(proven)
     assert len(equivalence_check.left(folder)) == 2
-    records = read_records(proven)
+    records = load_records(proven)
     assert equivalence_check.judge(folder, records) == equivalence_check.Proof(sampled=2, same=0)
     summary = run_campaign(toycar, "small", proven, engine="reference")
     assert (summary.proof, summary.ran, summary.exit_code) == (
@@ -123,7 +123,7 @@ def test_an_error_that_runs_share_fails_the_campaign(
         found, code = " ".join(map(": ".join, summary.harness_errors)), summary.exit_code
     except CheckFailed as err:
         found, code = str(err), err.exit_code
-    (name,) = read_records(out)
+    (name,) = load_records(out)
     if told:
         assert code and name in found and told in found
     else:
@@ -209,4 +209,4 @@ def test_an_experiment_that_must_run_again_can_be_forked(toycar: Workspace, tmp_
     assert equivalence_check.needless(folder) is not None
     for path in (run / "records").iterdir():
         path.write_bytes(b"".join(path.read_bytes().splitlines(keepends=True)[:-1]))
-    assert equivalence_check.needless(RunFolder.unverified(run)) is None
+    assert equivalence_check.needless(RunFolder.open_unverified(run)) is None

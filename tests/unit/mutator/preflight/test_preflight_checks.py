@@ -57,14 +57,14 @@ def test_a_sound_target_passes_and_is_not_checked_again(
 def test_a_damaged_golden_run_is_replaced(toycar: Workspace, tmp_path: Path) -> None:
     folder = frozen(toycar, tmp_path)
     run_checks(toycar, folder)
-    trace = folder.golden("A") / "log.npz"
+    trace = folder.golden_folder("A") / "log.npz"
     good = trace.read_bytes()
     trace.write_bytes(b"")
     run_checks(toycar, folder)
     assert trace.read_bytes() == good
-    shutil.rmtree(folder.golden("A", ("alone",)))
+    shutil.rmtree(folder.golden_folder("A", ("alone",)))
     run_checks(toycar, folder)
-    assert folder.golden("A", ("alone",)).is_dir()
+    assert folder.golden_folder("A", ("alone",)).is_dir()
 
 
 @pytest.mark.parametrize(
@@ -152,7 +152,7 @@ def test_changed_golden_runs_are_refused(
     ).close()
     monkeypatch.setattr(run_environment, "cpu", lambda: "another")
     assert all(result.passed for result in run_checks(toycar, folder))
-    shutil.rmtree(folder.work)
+    shutil.rmtree(folder.scratch_folder)
     before = {path: path.read_bytes() for path in folder.path.rglob("*") if path.is_file()}
     monkeypatch.setattr(run_environment, "cpu", lambda: "a third")
     original = ReferenceEngine.execute
@@ -166,7 +166,7 @@ def test_changed_golden_runs_are_refused(
     monkeypatch.setattr(ReferenceEngine, "execute", other)
     with pytest.raises(CheckFailed, match="differs from the one this run began with"):
         run_checks(toycar, folder)
-    shutil.rmtree(folder.work)
+    shutil.rmtree(folder.scratch_folder)
     assert {path: path.read_bytes() for path in folder.path.rglob("*") if path.is_file()} == before
 
 

@@ -68,7 +68,7 @@ def make_run(folder: Path, **head: object) -> Path:
     added to run.json."""
     (folder / "run.json").write_text(json.dumps(HEAD | head))
     write_results(folder, COLUMNS, LINES)
-    plan_file.write(folder, [], [])
+    plan_file.write_plan(folder, [], [])
     file_digests.save_ledger(folder, DigestLedger(files={}))
     (folder / "plots").mkdir()
     (folder / "plots" / ("0" * 16 + "-14.50s.jpg")).write_bytes(b"picture")

@@ -79,7 +79,7 @@ def test_pictures_beyond_the_budget_are_links(tmp_path: Path) -> None:
     plots.mkdir()
     for name in ("aa-2.00s.jpg", "aa-10.00s.jpg", "aa.mp4", "bb.svg"):
         (plots / name).write_bytes(b"1234")
-    made = media(RunFolder.unverified(tmp_path), tmp_path / "report", budget=5)
+    made = media(RunFolder.open_unverified(tmp_path), tmp_path / "report", budget=5)
     assert made == {
         "aa": {
             "stills": [["2.00", "data:image/jpeg;base64,MTIzNA=="], ["10.00", "../plots/aa-10.00s.jpg"]],

@@ -222,9 +222,9 @@ def test_inputs_of_a_report_are_not_read_without_limit(run: Path) -> None:
         with (run / name).open("wb") as file:
             file.truncate(4_000_000_000_000)
     with pytest.raises(MutatorError, match=r"records/huge\.jsonl: 4,000,000,000,000 bytes"):
-        made_from(RunFolder.unverified(run), None)
+        made_from(RunFolder.open_unverified(run), None)
     (run / "records/huge.jsonl").unlink()
-    assert made_from(RunFolder.unverified(run), None)
+    assert made_from(RunFolder.open_unverified(run), None)
 
 
 @pytest.mark.parametrize("text", ["{", "[1]", '{"schema": "report/1"}', *STAMPS])

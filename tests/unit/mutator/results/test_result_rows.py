@@ -31,7 +31,7 @@ SEEN = {
 
 def results(run: Path, *lines: dict[str, str]) -> Results:
     (run / "run.json").write_text(json.dumps(made_head(compared=["gas"])))
-    plan_file.write(run, [], [])
+    plan_file.write_plan(run, [], [])
     named = ({"experiment_id": f"{i:016x}", "fault_id": "f"} | line for i, line in enumerate(lines))
     write_results(run, COLUMNS, named)
     return Results(run)

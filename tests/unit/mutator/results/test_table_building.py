@@ -61,7 +61,7 @@ def folder(toycar: Workspace, tmp_path: Path, record: MakeRecord) -> RunFolder:
 
 def test_tables_are_sorted_and_complete(folder: RunFolder) -> None:
     rows = list(csv.DictReader(table_building.build(folder.path).open()))
-    assert (len(rows), folder.planned) == (22, 24)
+    assert (len(rows), folder.planned_count) == (22, 24)
     ids = [row["experiment_id"] for row in rows]
     assert ids == sorted(ids)
     table = pq.read_table(folder.path / "results.parquet")
@@ -98,11 +98,13 @@ def test_building_again_gives_the_same_bytes(folder: RunFolder, reseal: Callable
 
 def made_at_once(folder: RunFolder) -> dict[str, bytes]:
     records = folder.records()
-    planned = sorted(plan_file.read_all(folder.path), key=lambda e: e.id)
+    planned = sorted(plan_file.load_experiments(folder.path), key=lambda e: e.id)
     done = [(e, records[e.id]) for e in planned if e.id in records]
     columns = columns_of(folder.head)
     names = [column.name for column in columns]
-    made = [cells_of(columns, [Finished(*one, folder.scale, fault_paths_of(folder))]) for one in done]
+    made = [
+        cells_of(columns, [Finished(*one, folder.severity_scale, fault_paths_of(folder))]) for one in done
+    ]
     rows = [{name: cell for name, (cell,) in zip(names, cells, strict=True)} for cells in made]
     text = io.StringIO()
     writer = csv.DictWriter(text, names, lineterminator="\n", restval="")
@@ -137,7 +139,7 @@ def test_tables_built_in_batches_have_the_same_bytes(
     folder: RunFolder, monkeypatch: pytest.MonkeyPatch, record: MakeRecord, batch: int, processes: int
 ) -> None:
     left = (("gas", 2.0000001, 0.5), ("v_ego", 2.05, 1e-7), ("strange", 2.1, 3.0))
-    last = plan_file.read_all(folder.path)[22]
+    last = plan_file.load_experiments(folder.path)[22]
     lines = LineWriter(
         folder.path / "records" / "0002-gw0.jsonl", {"schema": SCHEMA, "plan": folder.head.plan}
     )
@@ -240,7 +242,7 @@ def test_an_interrupted_build_is_not_reported_as_an_edited_table(
     folder: RunFolder, monkeypatch: pytest.MonkeyPatch, record: MakeRecord
 ) -> None:
     table_building.build(folder.path)
-    planned = plan_file.read_all(folder.path)
+    planned = plan_file.load_experiments(folder.path)
     for killed_before, number in ((table_building.CSV, 2), (table_building.PARQUET, 3)):
         head = {"schema": SCHEMA, "plan": folder.head.plan}
         lines = LineWriter(folder.path / "records" / f"000{number}-gw0.jsonl", head)

@@ -37,7 +37,7 @@ from mutator.results.table_reader import Results, _table, frame_of, same_parquet
 from mutator.statistics.results_frame import hazard_names, load_usable_results, prepare_results
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
-from mutator.store.run_head import read_head
+from mutator.store.run_head import load_head
 from mutator.targets.process_environment import THREADS
 from mutator.targets.target_facts import metric_facts
 from mutator.workspace import Workspace
@@ -182,7 +182,7 @@ def test_exports_and_the_report_use_the_names_of_the_target(run: Path, crane: Wo
 def test_a_real_run_fills_each_column(crane: Workspace, tmp_path: Path, write_run: WriteRun) -> None:
     only = 'fault_type == "lane" and method == "random"'
     folder = write_run(crane, tmp_path / "one", lambda e: None, campaign="small", only=only, limit=1)
-    [experiment] = plan_file.read_all(folder)
+    [experiment] = plan_file.load_experiments(folder)
     manifest = crane.manifest("toycar")
     record = run_single(crane, manifest, experiment, tmp_path / "single").record
     assert record.status is Status.OK
@@ -261,8 +261,8 @@ def test_the_types_of_a_frame_are_those_of_the_table(run: Path) -> None:
     table = Results.up_to_date(run)
     (run / "results.csv").unlink()
     frame = table.frame()
-    kinds = {c.name: frame[c.name].dtype for c in columns_of(read_head(run))}
-    texts = {c.name for c in columns_of(read_head(run)) if c.type == "text"}
+    kinds = {c.name: frame[c.name].dtype for c in columns_of(load_head(run))}
+    texts = {c.name for c in columns_of(load_head(run)) if c.type == "text"}
     assert {name for name, kind in kinds.items() if kind == "str"} == texts
     assert all(kind.kind in "if" for name, kind in kinds.items() if name not in texts)
     assert set(frame["alerts"]) == {""} and frame["t_alert"].isna().all()
@@ -272,7 +272,7 @@ def test_the_types_of_a_frame_are_those_of_the_table(run: Path) -> None:
 def test_a_frame_computed_from_records_equals_the_stored_one(run: Path) -> None:
     """Without the columns of the fault's path, which take longest."""
     folder = RunFolder.open(run)
-    stored, computed = Results.up_to_date(run).frame(), frame_of(folder, plan_file.read_all(run))
+    stored, computed = Results.up_to_date(run).frame(), frame_of(folder, plan_file.load_experiments(run))
     names = [name for name in stored if name not in ("reached", "stopped_at")]
     computed = computed.sort_values("experiment_id", ignore_index=True)
     pd.testing.assert_frame_equal(computed[names], stored[names])

@@ -19,7 +19,7 @@ from mutator.serve.report_pages import Shown
 from mutator.serve.responses import without_places
 from mutator.serve.served_runs import Runs
 from mutator.store.run_folder import RunFolder
-from mutator.store.series_script import script_of
+from mutator.store.series_script import script_bytes
 from mutator.workspace import Workspace
 from tests.made_up_results import write_results
 
@@ -187,7 +187,7 @@ def test_series_are_served_unchanged(client: Client) -> None:
     """The page relies on the length in bytes, so the response is not encoded."""
     path = client.place / "runs/night/series/kept/0123456789abcdef.js"
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(script_of(path.stem, bytes(range(256)) + b'");alert(1);("'))
+    path.write_bytes(script_bytes(path.stem, bytes(range(256)) + b'");alert(1);("'))
     answer = client.get("/runs/night/series/kept/0123456789abcdef.js")
     assert (answer.status, answer.data) == (200, path.read_bytes())
     assert answer.headers["content-type"] == "application/javascript"
@@ -252,7 +252,7 @@ def test_other_files_of_a_run_cannot_act(client: Client, linked: Path, name: str
     (linked / "plots/a.svg").write_text("<svg xmlns='http://www.w3.org/2000/svg'/>")
     (linked / "series/kept").mkdir(parents=True, exist_ok=True)
     script = linked / "series/kept/0123456789abcdef.js"
-    script.write_bytes(script_of(script.stem, b"data"))
+    script.write_bytes(script_bytes(script.stem, b"data"))
     answer = client.get(f"/runs/linked/{name}")
     assert answer.status == 200
     policy = answer.headers["content-security-policy"].split("; ")

@@ -49,7 +49,7 @@ def experiment(client: Client) -> str:
 
 
 def test_the_run_of_a_job_is_complete_and_can_be_compared(busy: Client) -> None:
-    assert RunFolder.open(busy.place / "runs/first").finished
+    assert RunFolder.open(busy.place / "runs/first").is_finished
     [run] = busy.get("/api/runs").json["runs"]
     assert (run["key"], run["state"], run["done"]) == ("first", "finished", 2)
     report = busy.get(run["report"])
@@ -71,7 +71,7 @@ def test_an_exact_plot_is_stored_like_that_of_rerun(busy: Client) -> None:
     assert (job["state"], job["message"]) == ("done", "the same as the campaign's record, byte for byte")
     assert job["result"] == f"/runs/first/report/index.html#e={experiment(busy)}"
     assert busy.get(f"/runs/first/plots/{experiment(busy)}.svg").headers["content-type"] == "image/svg+xml"
-    assert RunFolder.open(busy.place / "runs/first").finished
+    assert RunFolder.open(busy.place / "runs/first").is_finished
 
 
 @pytest.mark.slow

@@ -18,9 +18,9 @@ from mutator.store import series_format
 from mutator.store.checksummed_blocks import block_bytes, read_blocks
 from mutator.store.checksummed_lines import read_segment, verified_lines
 from mutator.store.file_digests import FileDigest
-from mutator.store.patch_files import WHOLE, Patches
-from mutator.store.plan_file import lines_of
-from mutator.store.series_folder import read_index
+from mutator.store.patch_files import COMPLETE_BLOCK, PatchFolder
+from mutator.store.plan_file import read_lines
+from mutator.store.series_folder import load_index
 from mutator.store.series_script import write_script
 from tests.costs import is_cheap, is_refused
 
@@ -41,7 +41,7 @@ def sparse(tmp_path: Path) -> Path:
     [
         lambda path: read_segment(path),
         lambda path: list(verified_lines(path, "records/1")),
-        lambda path: list(lines_of(path)),
+        lambda path: list(read_lines(path)),
         lambda path: read_blocks(path),
         lambda path: read_json(path, "run/3"),
         FileDigest.of_file,
@@ -71,23 +71,25 @@ def test_a_patch_that_unpacks_to_too_much_is_damaged(tmp_path: Path) -> None:
     packer = zlib.compressobj(9)
     data = b"".join(packer.compress(bytes(10**6)) for _ in range(100)) + packer.flush()
     (tmp_path / "patches").mkdir()
-    (tmp_path / "patches" / "1-1.blocks").write_bytes(block_bytes(WHOLE, "a" * 16, data))
-    is_cheap(lambda: Patches(tmp_path).read("a" * 16))
-    assert Patches(tmp_path).read("a" * 16) is None
+    (tmp_path / "patches" / "1-1.blocks").write_bytes(block_bytes(COMPLETE_BLOCK, "a" * 16, data))
+    is_cheap(lambda: PatchFolder(tmp_path).read("a" * 16))
+    assert PatchFolder(tmp_path).read("a" * 16) is None
 
 
 def test_series_that_unpack_to_too_much_or_claim_many_values_are_damaged() -> None:
-    is_refused(lambda: series_format.decode(gzip.compress(bytes(100_000_000), 1)))
+    is_refused(lambda: series_format.decode_series(gzip.compress(bytes(100_000_000), 1)))
     times = np.arange(100_000.0).tobytes()
     head = b'{"known":0,"more":100000,"changed":[],"points":[],"every":[' + b"1," * 99_999 + b"1]}"
-    is_refused(lambda: series_format.decode(gzip.compress(struct.pack("<I", len(head)) + head + times)))
+    is_refused(
+        lambda: series_format.decode_series(gzip.compress(struct.pack("<I", len(head)) + head + times))
+    )
     deep = b"[" * 100_000
-    is_refused(lambda: series_format.decode(gzip.compress(struct.pack("<I", len(deep)) + deep)))
+    is_refused(lambda: series_format.decode_series(gzip.compress(struct.pack("<I", len(deep)) + deep)))
 
 
 def test_an_index_of_series_does_not_unpack_to_too_much(tmp_path: Path) -> None:
     write_script(tmp_path / "index.js", gzip.compress(b"[" + b"0," * 20_000_000, 1))
-    assert "a damaged index" in is_refused(lambda: read_index(tmp_path / "index.js"))
+    assert "a damaged index" in is_refused(lambda: load_index(tmp_path / "index.js"))
 
 
 def _zip(size: int, shape: int) -> bytes:

@@ -66,7 +66,7 @@ def test_a_folder_or_link_in_place_of_a_file_is_reported(run: Path, name: str, w
 
 def test_these_tests_list_all_sealed_files(run: Path) -> None:
     folder = RunFolder.open(run)
-    assert folder.finished and folder.problems() == []
+    assert folder.is_finished and folder.problems() == []
     found = {path.relative_to(run).as_posix() for path in run.rglob("*") if path.is_file()}
     others = {name for name in found if name.startswith(("patches/", "timings/", "golden/B", "golden/A+"))}
     assert found - others == {*SEALED, "owner.lock"} and len(others) == 8
@@ -118,7 +118,7 @@ def test_an_unknown_file_in_a_finished_run_is_reported(run: Path, name: str) -> 
 def test_files_outside_the_seal_are_not_checked(run: Path, name: str) -> None:
     (run / name).parent.mkdir(exist_ok=True)
     (run / name).write_text("anything")
-    assert RunFolder.open(run).finished
+    assert RunFolder.open(run).is_finished
 
 
 def test_swapped_files_are_reported(run: Path) -> None:
@@ -126,13 +126,13 @@ def test_swapped_files_are_reported(run: Path) -> None:
     content = a.read_bytes()
     a.write_bytes(b.read_bytes())
     b.write_bytes(content)
-    assert {error.where for error in RunFolder.unverified(run).problems()} == {str(a), str(b)}
+    assert {error.where for error in RunFolder.open_unverified(run).problems()} == {str(a), str(b)}
 
 
 def unsealed(run: Path, *lines: dict[str, object], plan: str | None = None) -> Path:
     """Turn a finished run into a killed one, with these lines in an unclosed segment."""
     file_digests.close_segments(run, finished=False)
-    head = {"schema": SCHEMA, "plan": plan or RunFolder.unverified(run).head.plan}
+    head = {"schema": SCHEMA, "plan": plan or RunFolder.open_unverified(run).head.plan}
     writer = LineWriter(run / "records" / "0002-a.jsonl", head)
     for line in lines:
         writer.append(line)
@@ -213,7 +213,7 @@ def test_an_invalid_value_in_run_json_is_reported_by_key(run: Path, key: str) ->
     del data[key]
     (run / "run.json").write_text(json.dumps(data))
     with pytest.raises(MutatorError, match=rf"run\.json: no key '{key}'"):
-        RunFolder.unverified(run)
+        RunFolder.open_unverified(run)
 
 
 @pytest.mark.parametrize("key", [field.name for field in fields(Stretch)])
@@ -225,10 +225,10 @@ def test_a_damaged_stretch_of_work_is_reported(run: Path, key: str) -> None:
         data["stretches"] = [stretch | {key: value}]
         (run / "run.json").write_text(json.dumps(data))
         with pytest.raises(MutatorError, match=r"run\.json: damaged at 'stretches'"):
-            RunFolder.unverified(run)
+            RunFolder.open_unverified(run)
     if key == "machines":  # this key is optional
         return
     data["stretches"] = [{name: value for name, value in stretch.items() if name != key}]
     (run / "run.json").write_text(json.dumps(data))
     with pytest.raises(MutatorError, match=r"run\.json: damaged at 'stretches'"):
-        RunFolder.unverified(run)
+        RunFolder.open_unverified(run)

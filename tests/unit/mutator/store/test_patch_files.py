@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.store.patch_files import Patches, PatchWriter
+from mutator.store.patch_files import PatchFolder, PatchWriter
 
 
 @pytest.fixture
@@ -17,7 +17,7 @@ def run(tmp_path: Path) -> Path:
 
 
 def test_a_patch_is_in_the_file_of_its_worker(run: Path) -> None:
-    assert Patches(run).file("a" * 16, "0002-gw7") == run / "patches" / "0001-gw0.blocks"
+    assert PatchFolder(run).file_of("a" * 16, "0002-gw7") == run / "patches" / "0001-gw0.blocks"
 
 
 def test_the_error_for_a_lost_patch_names_its_file(run: Path) -> None:
@@ -25,13 +25,13 @@ def test_the_error_for_a_lost_patch_names_its_file(run: Path) -> None:
     data = bytearray(path.read_bytes())
     data[-1] ^= 1
     path.write_bytes(data)
-    patches = Patches(run)
+    patches = PatchFolder(run)
     assert patches.read("b" * 16) is None
-    assert patches.file("b" * 16) == path
+    assert patches.file_of("b" * 16) == path
 
 
 def test_the_error_for_a_lost_file_takes_its_name_from_the_record(run: Path) -> None:
     path = run / "patches" / "0001-gw1.blocks"
     path.unlink()
-    assert Patches(run).file("b" * 16, "0001-gw1") == path
-    assert Patches(run).file("b" * 16) == run / "patches"
+    assert PatchFolder(run).file_of("b" * 16, "0001-gw1") == path
+    assert PatchFolder(run).file_of("b" * 16) == run / "patches"

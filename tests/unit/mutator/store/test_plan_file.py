@@ -15,10 +15,10 @@ Make = Callable[..., Experiment]
 
 def test_a_plan_is_read_as_written(experiment: Make, tmp_path: Path) -> None:
     plan = tuple(experiment(value, changes=("no_lead",)) for value in (1.0, 2.5, 3.0))
-    chunks = plan_file.write(tmp_path, plan, (2, 1))
-    faults = plan_file.read_faults(tmp_path)
-    assert plan_file.read_all(tmp_path) == plan
-    assert plan_file.read_chunk(tmp_path, chunks[1], faults) == plan[2:]
+    chunks = plan_file.write_plan(tmp_path, plan, (2, 1))
+    faults = plan_file.load_faults(tmp_path)
+    assert plan_file.load_experiments(tmp_path) == plan
+    assert plan_file.load_chunk(tmp_path, chunks[1], faults) == plan[2:]
     assert [*plan_file.ids(tmp_path)] == [e.id for e in plan]
 
 

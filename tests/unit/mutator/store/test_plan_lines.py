@@ -11,22 +11,22 @@ import pytest
 from mutator._common.hashing import canonical, plain
 from mutator.errors import MutatorError
 from mutator.model import AfterHazard, Experiment, Hold
-from mutator.store.plan_file import to_plain
+from mutator.store.plan_file import experiment_as_json
 from mutator.store.plan_lines import (
-    content,
-    experiment_as_written,
-    experiment_from,
-    experiment_of,
-    fault_from,
-    fault_of,
-    id_of,
+    experiment_from_json,
+    fault_from_json,
+    id_on_line,
+    parse_canonical_experiment,
+    parse_experiment,
+    parse_fault,
+    values_behind_id,
 )
 
 Make = Callable[..., Experiment]
 
 
 def line_of(experiment: Experiment) -> bytes:
-    return canonical(to_plain(experiment)).encode() + b"\n"
+    return canonical(experiment_as_json(experiment)).encode() + b"\n"
 
 
 def with_id_of_its_text(line: bytes) -> bytes:
@@ -37,7 +37,7 @@ def with_id_of_its_text(line: bytes) -> bytes:
     values[b"trigger"] = line[line.index(b'"trigger":') + 10 : -2]
     names = (b"fault", b"scenario", b"scenario_digest", b"method", b"trigger", b"seed", b"setting")
     digest = sha256(b"[%b]" % b",".join(values[name] for name in names)).hexdigest()[:16]
-    return line.replace(id_of(line).encode(), digest.encode())
+    return line.replace(id_on_line(line).encode(), digest.encode())
 
 
 def test_a_line_in_the_usual_format_is_read_fast(experiment: Make) -> None:
@@ -48,9 +48,9 @@ def test_a_line_in_the_usual_format_is_read_fast(experiment: Make) -> None:
         replace(experiment(), setting=("a", "b")),
     ):
         faults = {planned.fault.id: planned.fault}
-        line = canonical(to_plain(planned)).encode() + b"\n"
-        found = experiment_as_written(line, faults)
-        assert found == experiment_from(json.loads(line), faults) == planned
+        line = canonical(experiment_as_json(planned)).encode() + b"\n"
+        found = parse_canonical_experiment(line, faults)
+        assert found == experiment_from_json(json.loads(line), faults) == planned
         assert found.id == planned.id and "id" in vars(found)
         for old, new in (
             (b'"seed":', b'"seed":1'),
@@ -58,18 +58,18 @@ def test_a_line_in_the_usual_format_is_read_fast(experiment: Make) -> None:
             (b"hwt <=", b"hwt <"),
             (b'"name":', b'"Name":'),
         ):
-            assert old in line and experiment_as_written(line.replace(old, new), faults) is None
-        assert experiment_as_written(line, {}) is None
-    stopping = canonical(to_plain(replace(planned, after_hazard=AfterHazard.STOP))).encode()
-    assert experiment_as_written(stopping, faults) is None
+            assert old in line and parse_canonical_experiment(line.replace(old, new), faults) is None
+        assert parse_canonical_experiment(line, {}) is None
+    stopping = canonical(experiment_as_json(replace(planned, after_hazard=AfterHazard.STOP))).encode()
+    assert parse_canonical_experiment(stopping, faults) is None
 
 
 def test_a_missing_field_of_an_older_plan_has_its_default(experiment: Make) -> None:
     planned = experiment()
     planned = replace(planned, trigger=replace(planned.trigger, armed_after_s=0.0))
-    line = to_plain(planned)
+    line = experiment_as_json(planned)
     del line["trigger"]["armed_after_s"], line["trigger"]["hold_s"]
-    read = experiment_from(line, {planned.fault.id: planned.fault})
+    read = experiment_from_json(line, {planned.fault.id: planned.fault})
     assert (read.trigger.armed_after_s, read.trigger.hold_s, read.trigger.hold) == (0.0, None, Hold.WHILE)
 
 
@@ -77,14 +77,14 @@ def test_a_missing_field_of_an_older_plan_has_its_default(experiment: Make) -> N
 def test_an_unknown_field_of_a_newer_plan_is_refused(experiment: Make, where: str) -> None:
     """An unknown field could change the experiment."""
     planned = experiment()
-    fault, line = plain(planned.fault), to_plain(planned)
+    fault, line = plain(planned.fault), experiment_as_json(planned)
     injection = fault["injections"][0]
     places = {"experiment": line, "trigger": line["trigger"], "fault": fault, "injection": injection}
     places["anchor"] = injection["location"]["anchor"]
     places[where]["repeat"] = 2
     with pytest.raises(MutatorError, match=f"{where} has 'repeat', .* does not know"):
-        known = fault_from(fault)
-        experiment_from(line, {line["fault"]: known})
+        known = fault_from_json(fault)
+        experiment_from_json(line, {line["fault"]: known})
 
 
 SPELLINGS = [  # a number as canonical JSON, and as other JSON of the same value
@@ -104,21 +104,21 @@ def test_an_id_is_the_digest_of_canonical_numbers(experiment: Make, written: str
     planned = experiment()
     planned = replace(planned, trigger=replace(planned.trigger, hold_s=json.loads(written)))
     faults, line = {planned.fault.id: planned.fault}, line_of(planned)
-    found = experiment_as_written(line, faults)
-    assert found == planned and found.id == planned.id == id_of(line)
+    found = parse_canonical_experiment(line, faults)
+    assert found == planned and found.id == planned.id == id_on_line(line)
     spelled = line.replace(f'"hold_s":{written},'.encode(), f'"hold_s":{other},'.encode())
     forged = with_id_of_its_text(spelled)
-    assert with_id_of_its_text(line) == line != spelled and id_of(forged) != planned.id
+    assert with_id_of_its_text(line) == line != spelled and id_on_line(forged) != planned.id
     with pytest.raises(MutatorError, match=r"has the content of"):
-        experiment_of(forged, faults)
+        parse_experiment(forged, faults)
     if type(json.loads(other)) is type(json.loads(written)):
-        assert experiment_of(spelled, faults).id == planned.id
+        assert parse_experiment(spelled, faults).id == planned.id
 
 
 @pytest.mark.parametrize("seed", [0, -1, 2**70, 10**400])
 def test_a_seed_can_have_any_size(experiment: Make, seed: int) -> None:
     planned = replace(experiment(), seed=seed)
-    found = experiment_as_written(line_of(planned), {planned.fault.id: planned.fault})
+    found = parse_canonical_experiment(line_of(planned), {planned.fault.id: planned.fault})
     assert found is not None and (found.seed, found.id) == (seed, planned.id)
 
 
@@ -126,7 +126,7 @@ def test_minus_zero_is_no_seed(experiment: Make) -> None:
     planned = replace(experiment(), seed=0)
     forged = with_id_of_its_text(line_of(planned).replace(b'"seed":0', b'"seed":-0'))
     with pytest.raises(MutatorError, match="has the content of"):
-        experiment_of(forged, {planned.fault.id: planned.fault})
+        parse_experiment(forged, {planned.fault.id: planned.fault})
 
 
 @pytest.mark.parametrize("surrogate", [b"\\ud800", b"\xed\xa0\x80", b"\xff"])
@@ -135,7 +135,7 @@ def test_text_without_a_utf_8_form_has_no_id(experiment: Make, surrogate: bytes,
     planned = experiment()
     line = with_id_of_its_text(line_of(planned).replace(text, surrogate))
     with pytest.raises(MutatorError, match="a damaged line"):
-        experiment_of(line, {planned.fault.id: planned.fault})
+        parse_experiment(line, {planned.fault.id: planned.fault})
 
 
 def test_an_experiment_has_the_id_that_its_line_states(experiment: Make) -> None:
@@ -147,19 +147,19 @@ def test_an_experiment_has_the_id_that_its_line_states(experiment: Make) -> None
         line.replace(b"}\n", b",%b}\n" % other),
         line.replace(b'{"fault"', b'{%b,"fault"' % other),
     ):
-        stated = id_of(forged)
+        stated = id_on_line(forged)
         try:
-            assert experiment_of(forged, faults).id == stated
+            assert parse_experiment(forged, faults).id == stated
         except MutatorError as err:
             assert stated in err.got
-    reordered = json.dumps(dict(reversed(to_plain(planned).items()))).encode()
-    assert id_of(reordered) == experiment_of(reordered, faults).id == planned.id
+    reordered = json.dumps(dict(reversed(experiment_as_json(planned).items()))).encode()
+    assert id_on_line(reordered) == parse_experiment(reordered, faults).id == planned.id
 
 
 @pytest.mark.parametrize(
     "line", [b"", b"{}", b"[]", b"3", b'"id"', b"\xff", b'{"id":3}', b'{"id":"../x"}', b"[" * 10_000]
 )
 def test_a_damaged_line_is_refused_by_every_reader(line: bytes) -> None:
-    for read in (id_of, content, fault_of, lambda line: experiment_of(line, {})):
+    for read in (id_on_line, values_behind_id, parse_fault, lambda line: parse_experiment(line, {})):
         with pytest.raises(MutatorError, match="a damaged line; the plan is damaged: restore"):
             read(line)

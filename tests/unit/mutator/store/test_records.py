@@ -11,8 +11,8 @@ from mutator._common.hashing import canonical
 from mutator.errors import CheckFailed, MutatorError
 from mutator.model import Activation, Outcome, Record, RunError, Status
 from mutator.store.checksummed_lines import LineWriter
-from mutator.store.records import SCHEMA, line_of, read_records
-from mutator.store.run_progress import Tail
+from mutator.store.records import SCHEMA, load_records, record_as_json
+from mutator.store.run_progress import RecordTail
 
 HEAD = {"schema": SCHEMA, "plan": "p"}
 MakeRecord = Callable[..., Record]
@@ -34,14 +34,14 @@ def test_records_are_read_as_written(tmp_path: Path, record: MakeRecord) -> None
     second = record("b" * 16, status=Status.CRASHED, outcome=None, detail="Boom: ü", error=error)
     write(tmp_path, "0001-gw0.jsonl", first)
     write(tmp_path, "0001-gw1.jsonl", second)
-    assert read_records(tmp_path) == {"a" * 16: first, "b" * 16: second}
+    assert load_records(tmp_path) == {"a" * 16: first, "b" * 16: second}
 
 
 def test_a_line_equals_asdict(record: MakeRecord) -> None:
     activation = Activation(first=1.0, last=2.0, count=3)
     error = RunError(kind="ValueError", message="no", place="a.py:3")
     for one in (record(), replace(record(), activation=activation), replace(record(), error=error)):
-        assert canonical(line_of(one)) == canonical(asdict(one))
+        assert canonical(record_as_json(one)) == canonical(asdict(one))
 
 
 def test_a_record_without_an_error_has_no_such_key(tmp_path: Path, record: MakeRecord) -> None:
@@ -51,7 +51,7 @@ def test_a_record_without_an_error_has_no_such_key(tmp_path: Path, record: MakeR
     writer.close()
     line = json.loads(writer.path.read_text().splitlines()[1])
     assert "error" not in line
-    assert read_records(tmp_path)[line["experiment_id"]].error is None
+    assert load_records(tmp_path)[line["experiment_id"]].error is None
 
 
 @pytest.mark.parametrize("keep", [1, 20, -1, -2])
@@ -59,14 +59,14 @@ def test_an_incomplete_last_line_is_skipped(tmp_path: Path, record: MakeRecord, 
     path = write(tmp_path, "0001-gw0.jsonl", record("a" * 16), record("b" * 16))
     lines = path.read_bytes().splitlines(keepends=True)
     path.write_bytes(b"".join(lines[:-1]) + lines[-1][:keep])
-    assert set(read_records(tmp_path)) == {"a" * 16}
+    assert set(load_records(tmp_path)) == {"a" * 16}
 
 
 @pytest.mark.parametrize("content", [b"", b'{"sche'])
 def test_a_file_without_its_head_has_no_records(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "records").mkdir()
     (tmp_path / "records" / "0001-gw0.jsonl").write_bytes(content)
-    assert read_records(tmp_path) == {}
+    assert load_records(tmp_path) == {}
 
 
 def test_an_invalid_record_is_reported(tmp_path: Path) -> None:
@@ -74,13 +74,13 @@ def test_an_invalid_record_is_reported(tmp_path: Path) -> None:
     writer.append({"experiment_id": 3})
     writer.close()
     with pytest.raises(MutatorError, match=r"0001-gw0\.jsonl:2: a damaged line"):
-        read_records(tmp_path)["3"]
+        load_records(tmp_path)["3"]
 
 
 def test_a_newer_schema_is_refused(tmp_path: Path) -> None:
     LineWriter(tmp_path / "records" / "0001-gw0.jsonl", {"schema": "records/99"}).close()
     with pytest.raises(MutatorError, match="use a newer version of mutator"):
-        read_records(tmp_path)
+        load_records(tmp_path)
 
 
 @pytest.mark.parametrize("error_first", [True, False])
@@ -89,14 +89,14 @@ def test_any_record_replaces_a_harness_error(tmp_path: Path, record: MakeRecord,
     good = record()
     write(tmp_path, "0001-gw0.jsonl", wrong if error_first else good)
     write(tmp_path, "0002-gw0.jsonl", good if error_first else wrong)
-    assert read_records(tmp_path) == {good.experiment_id: good}
+    assert load_records(tmp_path) == {good.experiment_id: good}
 
 
 def test_two_different_records_of_one_experiment_fail(tmp_path: Path, record: MakeRecord) -> None:
     write(tmp_path, "0001-gw0.jsonl", record())
     write(tmp_path, "0003-gw0.jsonl", record(outcome=Outcome.SDC, t_manifest=2.5))
     with pytest.raises(CheckFailed, match="two records that differ"):
-        read_records(tmp_path)
+        load_records(tmp_path)
 
 
 def test_a_second_record_is_refused(tmp_path: Path, record: MakeRecord) -> None:
@@ -104,12 +104,12 @@ def test_a_second_record_is_refused(tmp_path: Path, record: MakeRecord) -> None:
     write(tmp_path, "0001-gw0.jsonl", record())
     write(tmp_path, "0002-gw0.jsonl", record())
     with pytest.raises(MutatorError, match=r"0002-gw0\.jsonl:2: a second record of experiment e{16}"):
-        read_records(tmp_path)
+        load_records(tmp_path)
 
 
 def test_progress_counts_complete_lines_as_they_arrive(tmp_path: Path, record: MakeRecord) -> None:
     write(tmp_path, "0001-gw0.jsonl", record("a" * 16))
-    tail = Tail("experiments", tmp_path / "records", 4)
+    tail = RecordTail("experiments", tmp_path / "records", 4)
     assert (tail.poll().done, tail.poll().per_s, tail.poll().remaining_s) == (1, None, None)
     writer = LineWriter(tmp_path / "records" / "0002-gw0.jsonl", HEAD)
     writer.append(asdict(record("b" * 16, status=Status.HARNESS_ERROR, outcome=None)))

@@ -68,9 +68,9 @@ def test_a_folder_that_is_not_a_run_is_refused(tmp_path: Path) -> None:
 
 def test_a_unique_prefix_of_an_id_finds_the_experiment(folder: RunFolder) -> None:
     with pytest.raises(MutatorError, match="no experiment 'zz'"):
-        folder.find("zz")
+        folder.experiment_id_from("zz")
     with pytest.raises(MutatorError, match="24 experiments start with ''"):
-        folder.find("")
+        folder.experiment_id_from("")
 
 
 def test_a_run_folder_has_one_owner(folder: RunFolder) -> None:
@@ -119,7 +119,7 @@ def test_a_lock_that_is_not_a_file_is_refused(folder: RunFolder, name: str) -> N
 def test_a_run_folder_without_its_plan_is_reported(folder: RunFolder) -> None:
     (folder.path / "plan" / "experiments.jsonl").unlink()
     with pytest.raises(MutatorError, match=r"experiments\.jsonl: cannot be read .*damaged"):
-        folder.find("00")
+        folder.experiment_id_from("00")
 
 
 @pytest.mark.parametrize("place", ["/proc/nosuch/run", "/dev/null/run"])

@@ -12,7 +12,7 @@ from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import make_plan
 from mutator.errors import MutatorError, Outside
 from mutator.store.run_folder import RunFolder
-from mutator.store.run_head import RunHead, read_head
+from mutator.store.run_head import RunHead, load_head
 from mutator.targets.target_facts import TargetFacts
 from mutator.workspace import Workspace
 from tests.made_head import made_head
@@ -50,10 +50,10 @@ def put(content: Any, path: tuple[str | int, ...], value: object) -> Any:
 def test_a_head_is_written_as_it_was_read(run: Path) -> None:
     """The seal covers its bytes, also those of keys that a later version adds."""
     path = run / "run.json"
-    assert read_head(run).as_json() == path.read_bytes()
+    assert load_head(run).file_bytes() == path.read_bytes()
     written = json.dumps(json.loads(path.read_text()) | {"a_later_key": [1]}, indent=1, ensure_ascii=False)
     path.write_text(written + "\n")
-    assert read_head(run).as_json() == path.read_bytes()
+    assert load_head(run).file_bytes() == path.read_bytes()
 
 
 def test_optional_keys_and_those_of_the_target_have_their_place(toycar: Workspace, tmp_path: Path) -> None:
@@ -79,14 +79,14 @@ def test_a_value_of_another_type_is_refused_by_its_key(run: Path) -> None:
             path.write_text(json.dumps(content))
             tried += 1
             try:
-                found = read_head(run)
+                found = load_head(run)
             except MutatorError as err:
                 text = str(err)
                 assert text.startswith(f"{path}: ") and text.isprintable() and err.remedy
                 assert f"'{place[0]}'" in text or place[0] in ("schema", "golden_files", "target", "goldens")
             else:
                 accepted += 1
-                assert json.loads(found.as_json()) == content
+                assert json.loads(found.file_bytes()) == content
     assert tried > 150 and accepted < tried / 5
 
 
@@ -97,11 +97,11 @@ def test_each_key_is_needed_unless_it_is_optional(run: Path) -> None:
     for key in original.keys() - {"schema"}:
         path.write_text(json.dumps({name: value for name, value in original.items() if name != key}))
         with pytest.raises(MutatorError, match=f"no key '{key}'; expected a complete run.json"):
-            RunFolder.unverified(run)
+            RunFolder.open_unverified(run)
 
 
 def test_names_in_the_head_lead_nowhere(tmp_path: Path) -> None:
     for change in ({"target": "../x.yaml"}, {"golden_files": ["../x"]}, {"goldens": [["x.yaml", []]]}):
         (tmp_path / "run.json").write_text(json.dumps(made_head(**change)))
         with pytest.raises(Outside, match=r"run\.json"):
-            read_head(tmp_path)
+            load_head(tmp_path)

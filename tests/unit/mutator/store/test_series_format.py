@@ -7,57 +7,61 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from mutator.errors import MutatorError
-from mutator.store.series_format import Points, Series, decode, encode
+from mutator.store.series_format import ExtraPoints, Series, decode_series, encode_series
 
 T = np.arange(6) / 20
 WORDS = arrays("<u4", (3, 6), elements=st.integers(0, 2**32 - 1))
 
 
-def series(values: np.ndarray, points: Points | None = None) -> Series:
+def series(values: np.ndarray, points: ExtraPoints | None = None) -> Series:
     """Series in which the last channel has a value at every second time only."""
     rows = [*values[:-1], values[-1, ::2].copy()]
     every = [1] * (len(values) - 1) + [2]
     return Series(
-        t=T[: values.shape[1]], rows=rows, every=every, about={"end": 1.0}, points=points or Points()
+        t=T[: values.shape[1]],
+        channel_values=rows,
+        sample_every=every,
+        facts={"end": 1.0},
+        points=points or ExtraPoints(),
     )
 
 
 def bits(one: Series) -> list[list[int]]:
-    return [row.view("<u4").tolist() for row in one.rows]
+    return [row.view("<u4").tolist() for row in one.channel_values]
 
 
 @given(WORDS, WORDS, st.integers(1, 6))
 def test_all_values_round_trip_bit_for_bit(one: np.ndarray, other: np.ndarray, count: int) -> None:
     golden = series(one.view("<f4"))
     faulty = series(np.ascontiguousarray(other[:, :count]).view("<f4"))
-    back = decode(encode(golden))
+    back = decode_series(encode_series(golden))
     assert bits(back) == bits(golden)
-    found = decode(encode(faulty, golden), back)
+    found = decode_series(encode_series(faulty, golden), back)
     assert bits(found) == bits(faulty)
     assert found.t.tolist() == T[:count].tolist()
-    assert found.about == {"end": 1.0}
+    assert found.facts == {"end": 1.0}
 
 
 def test_values_equal_to_the_golden_run_take_no_space() -> None:
     values = np.random.default_rng(1).random((20, 600)).astype("<f4")
-    golden = Series(t=np.arange(600) / 20, rows=list(values), every=[1] * 20, about={})
-    assert len(encode(golden, golden)) < 100
+    golden = Series(t=np.arange(600) / 20, channel_values=list(values), sample_every=[1] * 20, facts={})
+    assert len(encode_series(golden, golden)) < 100
 
 
 def test_points_round_trip() -> None:
     single = np.array([np.inf], dtype="<f4")
-    points = Points(channel=np.array([2]), t=np.array([0.013]), golden=single, faulty=-single)
+    points = ExtraPoints(channel_numbers=np.array([2]), t=np.array([0.013]), golden=single, faulty=-single)
     values = np.zeros((3, 6), dtype="<f4")
-    found = decode(encode(series(values, points), series(values)), series(values)).points
-    assert (found.channel.tolist(), found.t.tolist()) == ([2], [0.013])
+    found = decode_series(encode_series(series(values, points), series(values)), series(values)).points
+    assert (found.channel_numbers.tolist(), found.t.tolist()) == ([2], [0.013])
     assert (found.golden.tolist(), found.faulty.tolist()) == ([np.inf], [-np.inf])
 
 
 @pytest.mark.parametrize("place", [0, 15, -12, -1])
 def test_a_changed_byte_is_an_error(place: int) -> None:
-    data = bytearray(encode(series(np.ones((3, 6), dtype="<f4"))))
+    data = bytearray(encode_series(series(np.ones((3, 6), dtype="<f4"))))
     data[place] ^= 0xFF
     with pytest.raises(MutatorError, match="damaged"):
-        decode(bytes(data))
+        decode_series(bytes(data))
     with pytest.raises(MutatorError, match="damaged"):
-        decode(bytes(data[:-20]))
+        decode_series(bytes(data[:-20]))

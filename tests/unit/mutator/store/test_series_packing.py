@@ -9,9 +9,9 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.model import Activation, Outcome, Record, Status
-from mutator.store.series_folder import SeriesFolder, run_facts, write_kept
-from mutator.store.series_format import Series, encode
-from mutator.store.series_packing import EncodedSeries, SeriesWriter, pack, segments
+from mutator.store.series_folder import SeriesFolder, run_facts, write_kept_series
+from mutator.store.series_format import Series, encode_series
+from mutator.store.series_packing import EncodedSeries, SeriesWriter, list_worker_files, pack_series
 
 RECORD = Record(
     experiment_id="e" * 16,
@@ -34,18 +34,18 @@ VALUES = DRAW.random((151, 4, 600)).astype("<f4")
 def series(number: int) -> Series:
     return Series(
         t=np.arange(600) / 20,
-        rows=list(VALUES[number]),
-        every=[1] * 4,
-        about={"n": number} | run_facts(RECORD),
+        channel_values=list(VALUES[number]),
+        sample_every=[1] * 4,
+        facts={"n": number} | run_facts(RECORD),
     )
 
 
-GOLDEN = replace(series(150), about={"channels": []})
+GOLDEN = replace(series(150), facts={"channels": []})
 MADE = {
     name: EncodedSeries(
-        key="A" if number % 2 else "B+alone",
-        golden=encode(GOLDEN),
-        faulty=encode(series(number), GOLDEN),
+        golden_key="A" if number % 2 else "B+alone",
+        golden=encode_series(GOLDEN),
+        faulty=encode_series(series(number), GOLDEN),
     )
     for number, name in enumerate(IDS)
 }
@@ -67,7 +67,7 @@ def files(run: Path) -> dict[str, bytes]:
 def packed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     run = tmp_path_factory.mktemp("packed")
     append(run, "0001-main", IDS)
-    pack(run, "p", WORTH, 500)
+    pack_series(run, "p", WORTH, 500)
     return run
 
 
@@ -75,16 +75,16 @@ def test_each_series_is_found_in_its_chunk(packed: Path) -> None:
     folder = SeriesFolder(packed)
     index = folder.index
     assert index is not None
-    assert [*index.entries] == IDS[::-1]
-    assert len(index.sizes) == 151
+    assert [*index.experiment_entries] == IDS[::-1]
+    assert len(index.entry_sizes) == 151
     assert len(index.chunks) > 3
     for number, name in enumerate(IDS):
-        found = folder.read(name, RECORD)
+        found = folder.load_series(name, RECORD)
         assert found is not None
-        assert found[1].about == {"n": number} | run_facts(RECORD)
-        assert (np.array(found[1].rows) == VALUES[number]).all()
-    assert folder.read("f" * 16, RECORD) is None
-    assert segments(packed) == []
+        assert found[1].facts == {"n": number} | run_facts(RECORD)
+        assert (np.array(found[1].channel_values) == VALUES[number]).all()
+    assert folder.load_series("f" * 16, RECORD) is None
+    assert list_worker_files(packed) == []
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -95,22 +95,22 @@ def test_packed_bytes_do_not_depend_on_the_order_of_arrival(tmp_path: Path, pack
     for session, part in enumerate((order[: cuts[0]], order[: cuts[1]][cuts[0] - 1 :], order[cuts[1] :])):
         append(tmp_path, f"{session}-gw0", part[::2])
         append(tmp_path, f"{session}-gw1", part[1::2])
-        pack(tmp_path, "p", WORTH, 500)
+        pack_series(tmp_path, "p", WORTH, 500)
     assert files(tmp_path) == files(packed)
 
 
 def test_the_budget_keeps_the_best_series_however_often_they_are_packed(tmp_path: Path) -> None:
     runs = [tmp_path / "once", tmp_path / "twice"]
     append(runs[0], "0001-main", IDS)
-    pack(runs[0], "p", WORTH, 1)
+    pack_series(runs[0], "p", WORTH, 1)
     for session, part in enumerate((IDS[::2], IDS[1::2])):
         append(runs[1], f"{session}-main", part)
-        pack(runs[1], "p", WORTH, 1)
+        pack_series(runs[1], "p", WORTH, 1)
     assert sum(map(len, files(runs[0]).values())) < 1_010_000
     index = SeriesFolder(runs[0]).index
     assert index is not None
-    assert [*index.entries] == IDS[::-1][: len(index.entries)]
-    assert index.left_out == len(IDS) - len(index.entries) > 0
+    assert [*index.experiment_entries] == IDS[::-1][: len(index.experiment_entries)]
+    assert index.left_out_count == len(IDS) - len(index.experiment_entries) > 0
     assert files(runs[0]) == files(runs[1])
 
 
@@ -118,55 +118,55 @@ def test_merged_series_of_shards_equal_those_of_one_run(tmp_path: Path, packed: 
     shards = [tmp_path / name for name in "ab"]
     for shard, part in zip(shards, (IDS[:25], IDS[25:]), strict=True):
         append(shard, "0001-main", part)
-    pack(shards[0], "p", WORTH, 500)
+    pack_series(shards[0], "p", WORTH, 500)
     (tmp_path / "whole").mkdir()
-    pack(tmp_path / "whole", "p", WORTH, 500, others=tuple(shards))
+    pack_series(tmp_path / "whole", "p", WORTH, 500, other_runs=tuple(shards))
     assert files(tmp_path / "whole") == files(packed)
 
 
 def test_equal_golden_runs_stay_separate(tmp_path: Path) -> None:
     append(tmp_path, "0001-main", IDS[:2])
     for worker, names in (("0002-main", IDS[2:3]), ("0003-main", IDS[3:4])):
-        pack(tmp_path, "p", WORTH, 500)
+        pack_series(tmp_path, "p", WORTH, 500)
         append(tmp_path, worker, names)
-    pack(tmp_path, "p", WORTH, 500)
+    pack_series(tmp_path, "p", WORTH, 500)
     index = SeriesFolder(tmp_path).index
     assert index is not None
-    assert [*index.entries] == IDS[3::-1]
-    assert {*index.golden_of.values()} == {"A", "B+alone"}
+    assert [*index.experiment_entries] == IDS[3::-1]
+    assert {*index.golden_by_experiment.values()} == {"A", "B+alone"}
 
 
 def test_a_truncated_segment_loses_only_its_last_series(tmp_path: Path) -> None:
     append(tmp_path, "0001-main", IDS[:3])
-    [segment] = segments(tmp_path)
+    [segment] = list_worker_files(tmp_path)
     segment.write_bytes(segment.read_bytes()[:-100])
-    pack(tmp_path, "p", WORTH, 500)
+    pack_series(tmp_path, "p", WORTH, 500)
     index = SeriesFolder(tmp_path).index
     assert index is not None
-    assert [*index.entries] == IDS[1::-1]
+    assert [*index.experiment_entries] == IDS[1::-1]
 
 
 def test_experiments_of_a_damaged_chunk_can_be_rerun(tmp_path: Path) -> None:
     append(tmp_path, "0001-main", IDS[:3])
-    pack(tmp_path, "p", WORTH, 500)
+    pack_series(tmp_path, "p", WORTH, 500)
     index = SeriesFolder(tmp_path).index
     assert index is not None
     chunk = tmp_path / "series" / f"{index.chunks[-1][0]}.js"
     data = chunk.read_bytes()
     chunk.write_bytes(data[:300] + bytes([data[300] ^ 1]) + data[301:])
     with pytest.raises(MutatorError, match="damaged"):
-        SeriesFolder(tmp_path).read(IDS[0], RECORD)
+        SeriesFolder(tmp_path).load_series(IDS[0], RECORD)
     (tmp_path / "series" / "index.js").write_bytes(data)
     with pytest.raises(MutatorError, match="damaged"):
-        SeriesFolder(tmp_path).read(IDS[0], RECORD)
-    write_kept(SeriesFolder(tmp_path).kept(IDS[0]), MADE[IDS[0]].golden, MADE[IDS[0]].faulty)
-    found = SeriesFolder(tmp_path).read(IDS[0], RECORD)
+        SeriesFolder(tmp_path).load_series(IDS[0], RECORD)
+    write_kept_series(SeriesFolder(tmp_path).kept_path(IDS[0]), MADE[IDS[0]].golden, MADE[IDS[0]].faulty)
+    found = SeriesFolder(tmp_path).load_series(IDS[0], RECORD)
     assert found is not None
-    assert found[1].about == {"n": 0, **run_facts(RECORD)}
+    assert found[1].facts == {"n": 0, **run_facts(RECORD)}
 
 
 def test_the_series_of_another_run_is_refused(packed: Path) -> None:
     """A series names the trace and the events of its run."""
     for other in (replace(RECORD, trace_digest="0" * 64), replace(RECORD, hazards=(("H1", 2.5),))):
         with pytest.raises(MutatorError, match="the series of another run"):
-            SeriesFolder(packed).read(IDS[0], other)
+            SeriesFolder(packed).load_series(IDS[0], other)

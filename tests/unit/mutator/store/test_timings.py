@@ -7,7 +7,7 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.store.checksummed_lines import LineWriter
-from mutator.store.timings import TIMINGS_SCHEMA, read_timings
+from mutator.store.timings import TIMINGS_SCHEMA, load_timings
 
 LINE = {
     "experiment_id": "a" * 16,
@@ -29,7 +29,7 @@ def write(run: Path, line: dict[str, object]) -> None:
 
 def test_a_timing_is_read(tmp_path: Path) -> None:
     write(tmp_path, LINE)
-    assert dict(read_timings(tmp_path)) == {"a" * 16: LINE}
+    assert dict(load_timings(tmp_path)) == {"a" * 16: LINE}
 
 
 @pytest.mark.parametrize(
@@ -44,7 +44,7 @@ def test_a_timing_is_read(tmp_path: Path) -> None:
 def test_another_type_of_a_value_is_a_damaged_line(tmp_path: Path, name: str, value: object) -> None:
     write(tmp_path, LINE | {name: value})
     with pytest.raises(MutatorError, match="line") as error:
-        dict(read_timings(tmp_path))
+        dict(load_timings(tmp_path))
     assert (error.value.where, error.value.line) == (f"{tmp_path}/timings/1-1.jsonl", 2)
 
 
@@ -52,7 +52,7 @@ def test_another_type_of_a_value_is_a_damaged_line(tmp_path: Path, name: str, va
 def test_a_line_without_a_value_is_damaged(tmp_path: Path, name: str) -> None:
     write(tmp_path, {key: value for key, value in LINE.items() if key != name})
     with pytest.raises(MutatorError):
-        dict(read_timings(tmp_path))
+        dict(load_timings(tmp_path))
 
 
 @pytest.mark.parametrize("number", ["1e999", "-1e999", "NaN", "9" * 5000])
@@ -62,4 +62,4 @@ def test_a_time_is_finite(tmp_path: Path, number: str) -> None:
     head, line = path.read_text().splitlines()
     path.write_text(f"{head}\n{json.dumps(json.loads(line)).replace('0.5', number)}\n")
     with pytest.raises(MutatorError):
-        dict(read_timings(tmp_path))
+        dict(load_timings(tmp_path))

@@ -11,8 +11,8 @@ from mutator.errors import MutatorError
 from mutator.execution.campaign_running import run_campaign
 from mutator.execution.finished_run_cache import ended_before
 from mutator.store import file_digests, integrity, verified_runs_cache
-from mutator.store.patch_files import Patches
-from mutator.store.patch_files import rewrite as rewrite_patches
+from mutator.store.patch_files import PatchFolder
+from mutator.store.patch_files import rewrite_patch_file as rewrite_patches
 from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -50,7 +50,7 @@ def test_a_run_of_several_seeds_equals_a_run_of_each_seed(
         records = RunFolder.open(tmp_path / str(seed)).records()
         assert len(records) == 4
         assert all(several.records()[name] == records[name] for name in records)
-    assert several.finished
+    assert several.is_finished
 
 
 def test_a_verified_run_is_only_compared_byte_for_byte(
@@ -68,14 +68,14 @@ def test_a_verified_run_is_only_compared_byte_for_byte(
     for name in ("planned", "done", "ran", "outcomes", "proof", "seal", "results", "harness_errors"):
         assert getattr(again, name) == getattr(first, name), name
     with pytest.raises(AssertionError, match="verified again"):
-        RunFolder.open(run).problems(anew=True)
+        RunFolder.open(run).problems(ignore_cache=True)
 
 
 def test_a_change_after_verification_is_found(made: tuple[Workspace, Path], cache: Path) -> None:
     run = made[1]
     RunFolder.open(run)
-    patches = Patches(run)
-    [path] = patches.files()
+    patches = PatchFolder(run)
+    [path] = patches.block_files()
     before, kept = path.read_bytes(), {name: patches.read(name) or b"" for name in patches}
     try:
         name = next(iter(kept))
@@ -91,12 +91,12 @@ def test_a_damaged_entry_is_not_used(made: tuple[Workspace, Path], cache: Path) 
     run = made[1]
     RunFolder.open(run)
     key = integrity.verified_content_key(run)
-    assert verified_runs_cache.recall(key) == {"verified": True}
+    assert verified_runs_cache.recall_facts(key) == {"verified": True}
     [entry] = (cache / "mutator" / "runs").iterdir()
     entry.write_text(json.dumps(json.loads(entry.read_text()) | {"ended": {}}))
-    assert verified_runs_cache.recall(key) == {}
+    assert verified_runs_cache.recall_facts(key) == {}
     entry.write_text("[]")
-    assert verified_runs_cache.recall(key) == {}
+    assert verified_runs_cache.recall_facts(key) == {}
 
 
 def test_an_unfinished_run_has_no_entry(made: tuple[Workspace, Path], cache: Path) -> None:
@@ -116,5 +116,5 @@ def test_space_is_freed_for_the_images_of_the_next_seed(
     asked = []
     monkeypatch.setattr(shared_cache, "make_room", asked.append)
     run_campaign(made[0], "small", tmp_path / "run", choices=Choices(limit=4), engine="reference")
-    goldens = len(RunFolder.open(tmp_path / "run").goldens)
+    goldens = len(RunFolder.open(tmp_path / "run").golden_runs)
     assert asked == ["toycar"] * (goldens + 2)

@@ -14,9 +14,9 @@ from mutator.store.work_stretches import (
     CloneState,
     Machine,
     Stretch,
-    differences,
+    describe_stretches,
     package_versions,
-    told,
+    version_differences,
 )
 
 BEFORE = Stretch(
@@ -53,13 +53,13 @@ def test_a_damaged_stretch_is_refused(stretch: Any, got: str) -> None:
 
 def test_every_difference_is_named() -> None:
     packages = {"numpy": "2.1.0", "old": None, "new": "3.0"}
-    assert differences(BEFORE, "CPython 3.12.1", packages) == (
+    assert version_differences(BEFORE, "CPython 3.12.1", packages) == (
         "CPython 3.11.7, here CPython 3.12.1",
         "new none, here 3.0",
         "numpy 1.26.4, here 2.1.0",
         "old 1.0, here none",
     )
-    assert differences(BEFORE, BEFORE.python, BEFORE.packages | {"unused": None}) == ()
+    assert version_differences(BEFORE, BEFORE.python, BEFORE.packages | {"unused": None}) == ()
 
 
 def test_several_stretches_are_printed_together() -> None:
@@ -69,7 +69,7 @@ def test_several_stretches_are_printed_together() -> None:
         platform="Linux-6.1",
         accepted=("numpy 1.26.4, here 2.1.0",),
     )
-    assert told([BEFORE, after, after]) == {
+    assert describe_stretches([BEFORE, after, after]) == {
         "python": "CPython 3.11.7, CPython 3.12.1",
         "platform": "Linux-6.1",
         "processor": "Cray 1",

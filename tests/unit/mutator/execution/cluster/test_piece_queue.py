@@ -79,7 +79,7 @@ def test_each_experiment_is_run_exactly_once(folder: RunFolder, clock: Clock, id
     for piece in done:
         experiments = Piece.of(piece.packed()).experiments()
         assert [experiment.id for experiment in experiments] == list(piece.lines)
-        assert {folder.golden_of(experiment).key for experiment in experiments} >= {piece.golden}
+        assert {folder.golden_run_of(experiment).key for experiment in experiments} >= {piece.golden}
 
 
 def test_the_proof_reruns_an_experiment_on_another_worker(
@@ -104,7 +104,7 @@ def test_a_worker_prefers_experiments_with_its_current_golden_run(folder: RunFol
     for worker in ("alpha", "beta"):
         keys = [piece.golden for name, piece in done if name == worker]
         changes = sum(one != other for one, other in pairwise(keys))
-        assert changes <= len(folder.goldens)
+        assert changes <= len(folder.golden_runs)
 
 
 def test_the_last_pieces_are_shorter(folder: RunFolder, clock: Clock) -> None:

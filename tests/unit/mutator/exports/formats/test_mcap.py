@@ -20,8 +20,8 @@ from mutator.exports.write import export
 from mutator.model import Activation, Experiment, Outcome
 from mutator.store.cleaning import list_deletable_files
 from mutator.store.run_folder import RunFolder
-from mutator.store.series_folder import SeriesFolder, run_facts, write_kept
-from mutator.store.series_format import Points, Series, encode
+from mutator.store.series_folder import SeriesFolder, run_facts, write_kept_series
+from mutator.store.series_format import ExtraPoints, Series, encode_series
 from mutator.workspace import Workspace
 
 CHANNELS = [
@@ -37,17 +37,17 @@ CHANNELS = [
 ]
 GOLDEN = Series(
     t=np.array([0.0, 0.5, 1.0]),
-    rows=list(np.array([[0.0, 0.25, 0.5], [40.0, 30.0, math.inf]], dtype="<f4")),
-    every=[1, 1],
-    about={"start": 0.0, "end": 1.0, "channels": CHANNELS},
+    channel_values=list(np.array([[0.0, 0.25, 0.5], [40.0, 30.0, math.inf]], dtype="<f4")),
+    sample_every=[1, 1],
+    facts={"start": 0.0, "end": 1.0, "channels": CHANNELS},
 )
 FAULTY = Series(  # the run ended after 0.5 s; gas was 1 for one step in between
     t=np.array([0.0, 0.5]),
-    rows=list(np.array([[0.0, 0.75], [40.0, math.nan]], dtype="<f4")),
-    every=[1, 1],
-    about={"end": 1.0},
-    points=Points(
-        channel=np.array([0]),
+    channel_values=list(np.array([[0.0, 0.75], [40.0, math.nan]], dtype="<f4")),
+    sample_every=[1, 1],
+    facts={"end": 1.0},
+    points=ExtraPoints(
+        channel_numbers=np.array([0]),
         t=np.array([0.35]),
         golden=np.array([0.125], dtype="<f4"),
         faulty=np.array([1.0], dtype="<f4"),
@@ -79,11 +79,13 @@ def run(
     """A run of eight experiments. Only those with hazards have a series."""
     folder = tmp_path_factory.mktemp("mcap")
     run = write_run(copy_toycar(folder), folder / "run", became, limit=8)
-    golden = encode(GOLDEN)
+    golden = encode_series(GOLDEN)
     for record in RunFolder.open(run).records().values():
         if record.hazards:
-            faulty = replace(FAULTY, about=FAULTY.about | run_facts(record))
-            write_kept(SeriesFolder(run).kept(record.experiment_id), golden, encode(faulty, GOLDEN))
+            faulty = replace(FAULTY, facts=FAULTY.facts | run_facts(record))
+            write_kept_series(
+                SeriesFolder(run).kept_path(record.experiment_id), golden, encode_series(faulty, GOLDEN)
+            )
     return run
 
 
@@ -134,9 +136,9 @@ def test_negative_times_are_shifted(run: Path, tmp_path: Path) -> None:
     copy, name = tmp_path / "run", hazardous(run)[0]
     shutil.copytree(run, copy)
     early = replace(GOLDEN, t=GOLDEN.t - 0.5)
-    about = FAULTY.about | run_facts(RunFolder.open(copy).records()[name])
-    faulty = replace(FAULTY, t=FAULTY.t - 0.5, about=about)
-    write_kept(SeriesFolder(copy).kept(name), encode(early), encode(faulty, early))
+    about = FAULTY.facts | run_facts(RunFolder.open(copy).records()[name])
+    faulty = replace(FAULTY, t=FAULTY.t - 0.5, facts=about)
+    write_kept_series(SeriesFolder(copy).kept_path(name), encode_series(early), encode_series(faulty, early))
     only = f'experiment_id == "{name}"'
     [file] = export(copy, Format.MCAP, tmp_path / "out", parts=Parts(only=only)).iterdir()
     times = defaultdict(list)

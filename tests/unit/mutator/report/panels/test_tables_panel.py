@@ -41,12 +41,12 @@ HAZARD = {
 def run(tmp_path: Path) -> RunFolder:
     head = made_head(goldens=[["S1", []]], hazards=["H1"])
     (tmp_path / "run.json").write_text(json.dumps(head))
-    plan_file.write(tmp_path, [], [])
+    plan_file.write_plan(tmp_path, [], [])
     lines = [HAZARD | {"experiment_id": method, "method": method} for method in ("guided", "random")]
     write_results(tmp_path, result_columns(("H1",), (), (), SINCE), lines)
     (tmp_path / "golden" / "S1").mkdir(parents=True)
     np.savez(tmp_path / "golden" / "S1" / "trace.npz", t=np.arange(3000) / 100)
-    return RunFolder.unverified(tmp_path)
+    return RunFolder.open_unverified(tmp_path)
 
 
 def names(panel: Panel, suffix: str) -> set[str]:
@@ -91,5 +91,5 @@ def test_tables_of_alerts_mention_the_alerts_of_fault_free_runs(run: RunFolder) 
 def test_a_target_without_alerts_has_no_alert_tables(run: RunFolder, alerts: list[str]) -> None:
     head = json.loads((run.path / "run.json").read_text()) | {"alerts": alerts}
     (run.path / "run.json").write_text(json.dumps(head))
-    markdown = build_tables_panel(ReportedRun.open(RunFolder.unverified(run.path), HERE)).markdown
+    markdown = build_tables_panel(ReportedRun.open(RunFolder.open_unverified(run.path), HERE)).markdown
     assert ("no alert" in markdown.lower()) == bool(alerts)
