@@ -56,8 +56,8 @@ class ParsedFile:
     def resolve_value(self, location: FaultLocation) -> Expression:
         """Return the expression at the location; MutatorError with candidates unless exactly one matches."""
         functions = functions_named(self, location.function)
-        known = self.expressions.get(plain_name(location.function), ())
-        return choose_expression(known, location, self.where, functions[0].line)
+        expressions = self.expressions.get(plain_name(location.function), ())
+        return choose_expression(expressions, location, self.where, functions[0].line)
 
     def resolve_fixed(self, location: FaultLocation) -> FixedValue:
         """Return the constant or default at the location; MutatorError with candidates if there is none."""
@@ -85,7 +85,7 @@ class ParsedFile:
         if location.anchor.kind not in VALUE_ANCHORS:
             return self.resolve(location).names
         line = self.resolve_value(location).start[0]
-        above = [one for one in functions_named(self, location.function) if one.line <= line]
+        above = [function for function in functions_named(self, location.function) if function.line <= line]
         return max(above, key=lambda one: one.line).names
 
     def resolve(self, location: FaultLocation) -> Site:
@@ -136,12 +136,12 @@ def functions_named(file: ParsedFile, function: str) -> tuple[Function, ...]:
     name = plain_name(function)
     functions = file.functions.get(name)
     if not functions:
-        known = list(file.functions)
+        names = list(file.functions)
         raise MutatorError(
             f"no function '{function}'",
             where=file.where,
-            expected=f"a function of the file: {', '.join(known) or 'it has none'}",
-            remedy="correct the qualified name" + suggestion(name, known),
+            expected=f"a function of the file: {', '.join(names) or 'it has none'}",
+            remedy="correct the qualified name" + suggestion(name, names),
         )
     return functions
 
@@ -255,10 +255,12 @@ def _no_single_hit(
     what, place = _what(verb, anchor.name), f"in {location.function}"
     if hits:
         lines = ", ".join(str(s.first + 1) for _, s in hits)
-        take = valid_nth(len(hits))
-        found = counted(len(hits), "statement")
-        got = f"{what} matches {found} {place}: {'lines' if len(hits) > 1 else 'line'} {lines}"
-        remedy = f"give `nth`, {take}" if anchor.nth is None else f"`nth` is {anchor.nth}: give {take}"
+        nth_range = valid_nth(len(hits))
+        statement_count = counted(len(hits), "statement")
+        got = f"{what} matches {statement_count} {place}: {'lines' if len(hits) > 1 else 'line'} {lines}"
+        remedy = (
+            f"give `nth`, {nth_range}" if anchor.nth is None else f"`nth` is {anchor.nth}: give {nth_range}"
+        )
         line, expected = hits[0][1].first, "exactly one"
     elif pairs:
         statement = pairs[0][1]
@@ -277,14 +279,18 @@ def _what(verb: str, name: str) -> str:
 
 
 def _candidates(functions: tuple[Function, ...], verb: str) -> str:
-    found = [
+    candidates = [
         f"'{name}' (line {s.first + 1})" if name else f"line {s.first + 1}"
         for f in functions
         for s in f.statements
         if s.reason is None
         for name in s.names(verb)
     ]
-    return f"one of {', '.join(found)}" if found else "another kind of anchor: there is none of this kind"
+    return (
+        f"one of {', '.join(candidates)}"
+        if candidates
+        else "another kind of anchor: there is none of this kind"
+    )
 
 
 def _refuse_awkward(file: ParsedFile, anchor: Anchor, statement: Statement) -> None:

@@ -16,12 +16,12 @@ def compile_changed(file: ParsedFile, edits: Iterable[Edit], key: ReuseKey) -> b
     True if the changed functions compile, both with these edits and with normalized ones, and the file
     compiles with the import of the probe. False is inconclusive.
     """
-    as_they_are = in_order(edits)
+    unchanged = in_order(edits)
     normalized = [
         replace(edit, lines=tuple(text.encode(file.encoding).splitlines(keepends=True)))
-        for edit, (*_, text) in zip(as_they_are, key, strict=True)
+        for edit, (*_, text) in zip(unchanged, key, strict=True)
     ]
-    return all(_all_compile(file, some) for some in (as_they_are, normalized))
+    return all(_all_compile(file, some) for some in (unchanged, normalized))
 
 
 def _all_compile(file: ParsedFile, edits: Iterable[Edit]) -> bool:
@@ -34,7 +34,7 @@ def _all_compile(file: ParsedFile, edits: Iterable[Edit]) -> bool:
         else:
             functions[function].append(edit)
     return _compile_with(file, tuple(outside)) and all(
-        _compiles(file, function, own) for function, own in functions.items()
+        _compiles(file, function, function_edits) for function, function_edits in functions.items()
     )
 
 

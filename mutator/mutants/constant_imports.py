@@ -21,7 +21,7 @@ class _Import:
 
     module: str
     name: str
-    known: str
+    local_name: str
     line: int
     inside: bool  # inside a class
 
@@ -43,35 +43,41 @@ def importers(tree: SourceTree, path: str, name: str) -> tuple[str, ...]:
     """
     files = [tree.derived(file, _imports) for file in tree.files if file.endswith(".py")]
     exported = {file.module: file.exported for file in files}
-    found, refused = [(module_name(path), name)], set[str]()
-    for known in found:  # grows during the loop: an imported name can be imported again
+    names, refusals = [(module_name(path), name)], set[str]()
+    for imported in names:  # grows during the loop: an imported name can be imported again
         for file in files:
-            for one in file.names:
-                if (one.module, one.name) not in (known, (known[0], _ALL)):
+            for imported_name in file.names:
+                if (imported_name.module, imported_name.name) not in (imported, (imported[0], _ALL)):
                     continue
-                reason = _refused(one, file, known[1], exported.get(known[0]))
+                reason = _refused(imported_name, file, imported[1], exported.get(imported[0]))
                 if reason:
-                    refused.add(f"{file.path}:{one.line} {reason}")
-                elif one.name != _ALL and (file.module, one.known) not in found:
-                    found.append((file.module, one.known))
-    if refused:
+                    refusals.add(f"{file.path}:{imported_name.line} {reason}")
+                elif imported_name.name != _ALL and (file.module, imported_name.local_name) not in names:
+                    names.append((file.module, imported_name.local_name))
+    if refusals:
         raise MutatorError(
-            f"the constant '{name}' cannot be set everywhere: {'; '.join(sorted(refused))}",
+            f"the constant '{name}' cannot be set everywhere: {'; '.join(sorted(refusals))}",
             where=tree.root / path,
             expected="modules that import it by name and never assign to the name",
             remedy="anchor where the constant is used",
         )
-    return tuple(".".join(one) for one in found[1:])
+    return tuple(".".join(one) for one in names[1:])
 
 
-def _refused(one: _Import, file: _Imports, name: str, exported: frozenset[str] | None) -> str | None:
+def _refused(
+    imported_name: _Import, file: _Imports, name: str, exported: frozenset[str] | None
+) -> str | None:
     """Return why an import prevents setting the constant. `*` imports `exported`, if known."""
-    if one.name == _ALL:
-        meant = not name.startswith("_") if exported is None else name in exported
-        return "imports *" if meant else None
-    if one.inside:
+    if imported_name.name == _ALL:
+        is_imported = not name.startswith("_") if exported is None else name in exported
+        return "imports *" if is_imported else None
+    if imported_name.inside:
         return "imports it into a class"
-    return f"imports it, and also sets {one.known} in another way" if one.known in file.set else None
+    return (
+        f"imports it, and also sets {imported_name.local_name} in another way"
+        if imported_name.local_name in file.set
+        else None
+    )
 
 
 def module_name(path: str) -> str:
@@ -84,28 +90,28 @@ def _imports(path: str, data: bytes, root: Path) -> _Imports:
     except (SyntaxError, ValueError, RecursionError):
         return _Imports(path=path, module=module_name(path), names=(), set=frozenset())
     names = tuple(_of_body(tree.body, path, inside=False))
-    known = Counter(one.known for one in names if not one.inside)
+    count_by_name = Counter(imported_name.local_name for imported_name in names if not imported_name.inside)
     assigned = {symbol.get_name() for symbol in table.get_symbols() if symbol.is_assigned()}
-    several = {name for name, count in known.items() if count > 1}
+    repeated = {name for name, count in count_by_name.items() if count > 1}
     return _Imports(
         path=path,
         module=module_name(path),
         names=names,
-        set=set_by_functions(data) | assigned | several,
+        set=set_by_functions(data) | assigned | repeated,
         exported=_exported(tree),
     )
 
 
 def _exported(tree: ast.Module) -> frozenset[str] | None:
     """Return the names in `__all__` if it is assigned once, as a list or tuple of literal strings."""
-    made = [node for node in ast.walk(tree) if isinstance(node, ast.Name) and node.id == "__all__"]
+    targets = [node for node in ast.walk(tree) if isinstance(node, ast.Name) and node.id == "__all__"]
     for node in tree.body:
         if (
             isinstance(node, ast.Assign)
-            and node.targets == made
+            and node.targets == targets
             and isinstance(node.value, ast.List | ast.Tuple)
         ):
-            texts = [one.value for one in node.value.elts if isinstance(one, ast.Constant)]
+            texts = [element.value for element in node.value.elts if isinstance(element, ast.Constant)]
             return frozenset(map(str, texts)) if len(texts) == len(node.value.elts) else None
     return None
 
@@ -117,8 +123,10 @@ def _of_body(body: Iterable[ast.stmt], path: str, *, inside: bool) -> Iterator[_
             case ast.ImportFrom(module=module, names=names, level=level, lineno=line):
                 source = ".".join(filter(None, (_package(path, level), module)))
                 for alias in names:
-                    known = alias.asname or alias.name
-                    yield _Import(module=source, name=alias.name, known=known, line=line, inside=inside)
+                    local_name = alias.asname or alias.name
+                    yield _Import(
+                        module=source, name=alias.name, local_name=local_name, line=line, inside=inside
+                    )
             case ast.ClassDef(body=inner):
                 yield from _of_body(inner, path, inside=True)
             case ast.FunctionDef() | ast.AsyncFunctionDef():

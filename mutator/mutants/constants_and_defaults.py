@@ -45,20 +45,20 @@ def find_fixed(data: bytes, tree: ast.Module) -> tuple[FixedValue, ...]:
 
     If a constant is assigned several times, the last assignment is used.
     """
-    found: dict[tuple[AnchorKind, str, str], tuple[FixedValue, _Owner]] = {}
-    for one, owner in _Finder(data).of_body(tree.body, ()):
-        key = (one.kind, one.function, one.name)
-        _, before = found.pop(key, (None, owner))
-        if before is not owner:
-            what = "functions" if one.kind is AnchorKind.DEFAULT else "classes"
-            one = replace(one, reason=f"several {what} have the same name")
-        found[key] = one, owner
+    owned_values: dict[tuple[AnchorKind, str, str], tuple[FixedValue, _Owner]] = {}
+    for value, owner in _Finder(data).of_body(tree.body, ()):
+        key = (value.kind, value.function, value.name)
+        _, earlier_owner = owned_values.pop(key, (None, owner))
+        if earlier_owner is not owner:
+            what = "functions" if value.kind is AnchorKind.DEFAULT else "classes"
+            value = replace(value, reason=f"several {what} have the same name")
+        owned_values[key] = value, owner
     rebound = set_by_functions(data)
     return tuple(
         replace(one, reason="a function also sets it")
         if one.kind is AnchorKind.CONSTANT and one.path in rebound
         else one
-        for one, _ in found.values()
+        for one, _ in owned_values.values()
     )
 
 
@@ -142,7 +142,7 @@ class _Finder:
             )
 
     def place(self, whole: ast.stmt) -> tuple[int, bytes]:
-        line = self.lines[min(one.lineno for one in (whole, *getattr(whole, "decorator_list", ()))) - 1]
+        line = self.lines[min(node.lineno for node in (whole, *getattr(whole, "decorator_list", ()))) - 1]
         end = self.ends[bisect_left(self.ends, whole.end_lineno or 0)]
         return end, line[: len(line) - len(line.lstrip(b" \t\f"))]
 
@@ -159,7 +159,7 @@ def _names(target: ast.expr) -> Iterator[str]:
 
 
 def _of(scope: _Scope) -> Iterator[str]:
-    return (one.name for one in scope)
+    return (node.name for node in scope)
 
 
 def _path(scope: _Scope, *names: str) -> str:
@@ -179,25 +179,25 @@ def _not_a_constant(owner: ast.ClassDef, value: ast.expr) -> str | None:
         if name.endswith(_MADE_OTHERWISE):
             return f"its class derives from {name}, which does not allow a new value"
     if isinstance(value, ast.Call) and ast.unparse(value.func).endswith("field"):
-        given = {keyword.arg for keyword in value.keywords}
-        if "default_factory" in given or not ({"default", None} & given or value.args):
+        keywords = {keyword.arg for keyword in value.keywords}
+        if "default_factory" in keywords or not ({"default", None} & keywords or value.args):
             return "the field has no default that is computed once"
     return None
 
 
-def choose_fixed(known: Sequence[FixedValue], location: FaultLocation, where: Path) -> FixedValue:
+def choose_fixed(values: Sequence[FixedValue], location: FaultLocation, where: Path) -> FixedValue:
     """Return the constant or default that the location names.
 
     MutatorError with candidates if there is none, or if it cannot be set.
     """
     kind, name = location.anchor.kind, as_compiled(location.anchor.name)
     function = as_compiled(location.function)
-    alike = [one for one in known if one.kind is kind and one.function == function]
-    found = next((one for one in alike if one.name == name), None)
+    alike = [value for value in values if value.kind is kind and value.function == function]
+    match = next((one for one in alike if one.name == name), None)
     what = f"{kind.value} '{location.anchor.name}'" + (
         f" in {location.function}" if location.function else ""
     )
-    if found is None:
+    if match is None:
         names = [one.name for one in alike if not one.reason]
         raise MutatorError(
             f"no {what}",
@@ -207,12 +207,12 @@ def choose_fixed(known: Sequence[FixedValue], location: FaultLocation, where: Pa
             else "another kind of anchor: there is none of this kind",
             remedy="write the name exactly as in the source" + suggestion(name, names),
         )
-    if found.reason:
+    if match.reason:
         raise MutatorError(
-            f"the {what} cannot be set: {found.reason}",
+            f"the {what} cannot be set: {match.reason}",
             where=where,
-            line=found.first + 1,
+            line=match.first + 1,
             expected="a value that is computed once, when the module is loaded",
             remedy="anchor where the value is used",
         )
-    return found
+    return match

@@ -27,7 +27,7 @@ def valid_nth(count: int) -> str:
 
 
 def choose_expression(
-    known: Sequence[Expression], location: FaultLocation, where: Path, line: int
+    expressions: Sequence[Expression], location: FaultLocation, where: Path, function_line: int
 ) -> Expression:
     """Choose from a function's expressions the one that the location's anchor names.
 
@@ -35,27 +35,27 @@ def choose_expression(
     """
     anchor, kind = location.anchor, location.anchor.kind
     name = as_written(anchor.name)
-    hits = [one for one in known if one.answers(kind, name, anchor.which)]
+    matches = [expression for expression in expressions if expression.answers(kind, name, anchor.which)]
     nth = anchor.nth
-    if hits and (len(hits) == 1 if nth is None else nth <= len(hits)):
-        return hits[(nth or 1) - 1]
+    if matches and (len(matches) == 1 if nth is None else nth <= len(matches)):
+        return matches[(nth or 1) - 1]
     what = " ".join(filter(None, (f"`{kind.value}: {anchor.name}`".replace(": `", "`"), _which(anchor))))
-    if hits:
-        lines = ", ".join(str(one.start[0] + 1) for one in hits)
-        take = valid_nth(len(hits))
+    if matches:
+        lines = ", ".join(str(one.start[0] + 1) for one in matches)
+        nth_range = valid_nth(len(matches))
         raise MutatorError(
-            f"{what} names {counted(len(hits), 'expression')} in {location.function}: "
-            f"{'lines' if len(hits) > 1 else 'line'} {lines}",
+            f"{what} names {counted(len(matches), 'expression')} in {location.function}: "
+            f"{'lines' if len(matches) > 1 else 'line'} {lines}",
             where=where,
-            line=hits[0].start[0] + 1,
+            line=matches[0].start[0] + 1,
             expected="exactly one",
-            remedy=f"give `nth`, {take}" if nth is None else f"`nth` is {nth}: give {take}",
+            remedy=f"give `nth`, {nth_range}" if nth is None else f"`nth` is {nth}: give {nth_range}",
         )
     raise MutatorError(
         f"no {what} in {location.function}",
         where=where,
-        line=line + 1,
-        expected=_candidates(known, kind, name),
+        line=function_line + 1,
+        expected=_candidates(expressions, kind, name),
         remedy="write the expression exactly as in the source",
     )
 
@@ -64,15 +64,24 @@ def _which(anchor: Anchor) -> str:
     return f"with `which: {anchor.which}`" if anchor.which else ""
 
 
-def _candidates(known: Sequence[Expression], kind: AnchorKind, name: str) -> str:
+def _candidates(expressions: Sequence[Expression], kind: AnchorKind, name: str) -> str:
     """List the anchors of this kind that have this name or, if none has, the most similar names."""
-    roles = [(called, place, one) for one in known for own, called, place in one.roles if own is kind]
+    roles = [
+        (called, which, expression)
+        for expression in expressions
+        for role_kind, called, which in expression.roles
+        if role_kind is kind
+    ]
     roles = [role for role in roles if role[0] == name] or roles
     if len(roles) > _MOST:
         near = get_close_matches(name, [called for called, *_ in roles], n=_MOST, cutoff=0.0)
         roles = [role for role in roles if role[0] in near][:_MOST]
-    told = [
+    descriptions = [
         f"`{called}`" + (f" with `which: {place}`" if place else "") + f" (line {one.start[0] + 1})"
         for called, place, one in roles
     ]
-    return f"one of {', '.join(told)}" if told else "another kind of anchor: there is none of this kind"
+    return (
+        f"one of {', '.join(descriptions)}"
+        if descriptions
+        else "another kind of anchor: there is none of this kind"
+    )

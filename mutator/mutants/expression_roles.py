@@ -150,16 +150,16 @@ def _of(node: ast.expr, *roles: Role) -> _Pairs:
 def _call(node: ast.Call) -> _Pairs:
     called = source_of(node.func)
     yield from _base(node.func)
-    for place, argument in enumerate(node.args, 1):
-        yield from _of(argument, (AnchorKind.ARGUMENT, called, str(place)))
+    for number, argument in enumerate(node.args, 1):
+        yield from _of(argument, (AnchorKind.ARGUMENT, called, str(number)))
     for keyword in node.keywords:
         roles = [(AnchorKind.ARGUMENT, called, keyword.arg)] if keyword.arg else []
         yield from _of(keyword.value, *roles)
 
 
 def _comprehension(node: ast.ListComp | ast.SetComp | ast.GeneratorExp | ast.DictComp) -> _Pairs:
-    made = (node.key, node.value) if isinstance(node, ast.DictComp) else (node.elt,)
-    for value in made:
+    values = (node.key, node.value) if isinstance(node, ast.DictComp) else (node.elt,)
+    for value in values:
         yield from _of(value)
     for generator in node.generators:
         yield from _of(generator.iter)

@@ -47,16 +47,16 @@ class Expression:
     def answers(self, kind: AnchorKind, name: str, which: str | None) -> bool:
         """Return whether an anchor matches. An empty name matches any name; None as `which`, any position."""
         return any(
-            kind is own and name in (called, "") and which in (place, None)
-            for own, called, place in self.roles
+            kind is role_kind and name in (role_name, "") and which in (role_which, None)
+            for role_kind, role_name, role_which in self.roles
         )
 
 
-def _grouped(found: Iterable[Expression]) -> dict[str, tuple[Expression, ...]]:
-    functions: dict[str, list[Expression]] = defaultdict(list)
-    for one in found:
-        functions[one.function].append(one)
-    return {name: tuple(own) for name, own in functions.items()}
+def _grouped(expressions: Iterable[Expression]) -> dict[str, tuple[Expression, ...]]:
+    groups: dict[str, list[Expression]] = defaultdict(list)
+    for expression in expressions:
+        groups[expression.function].append(expression)
+    return {name: tuple(group) for name, group in groups.items()}
 
 
 def expressions_of(
@@ -65,24 +65,31 @@ def expressions_of(
     encoding = module.encoding.removesuffix("-sig")
     lines = [line.decode(encoding) for line in data.splitlines(keepends=True)]
     tokens = list(tokenize.tokenize(io.BytesIO(data).readline))
-    seen, untaggable, brackets = _seen_by_libcst(positions), _untaggable(data, tokens), _brackets(tokens)
-    found = []
+    libcst_extents, untaggable, brackets = (
+        _seen_by_libcst(positions),
+        _untaggable(data, tokens),
+        _brackets(tokens),
+    )
+    expressions = []
     for function, node, roles in expressions_in(ast.parse(data)):
         start, end = _extent(lines, node)
-        text, known = source_of(node), all(_extent(lines, one) in seen for one in _known_by(node))
-        if text and known and untaggable.isdisjoint((start[0], end[0])):
+        text, is_confirmed = (
+            source_of(node),
+            all(_extent(lines, part) in libcst_extents for part in _known_by(node)),
+        )
+        if text and is_confirmed and untaggable.isdisjoint((start[0], end[0])):
             bare = isinstance(node, ast.NamedExpr) or (
                 isinstance(node, ast.Tuple) and brackets.get(start) != end
             )
             roles = (*roles, (AnchorKind.VALUE, text, None))
-            found.append(_expression(lines, encoding, (function, node, roles), start, end, bare=bare))
-    return _grouped(sorted(found, key=lambda one: (one.start, (-one.end[0], -one.end[1]))))
+            expressions.append(_expression(lines, encoding, (function, node, roles), start, end, bare=bare))
+    return _grouped(sorted(expressions, key=lambda one: (one.start, (-one.end[0], -one.end[1]))))
 
 
 def _expression(
-    lines: Sequence[str], encoding: str, found: Found, start: _Point, end: _Point, *, bare: bool
+    lines: Sequence[str], encoding: str, expression: Found, start: _Point, end: _Point, *, bare: bool
 ) -> Expression:
-    function, node, roles = found
+    function, node, roles = expression
     one_line = start[0] == end[0]
     written = lines[start[0]][start[1] : end[1]] if one_line else roles[-1][1]
     alone = isinstance(node, _ATOMS) or (
@@ -129,27 +136,27 @@ def _seen_by_libcst(positions: Positions) -> frozenset[tuple[_Point, _Point]]:
 
 def _brackets(tokens: Iterable[tokenize.TokenInfo]) -> dict[_Point, _Point]:
     """Map the position of each opening bracket to the end of its closing bracket; lines from 0."""
-    found, begun = {}, list[_Point]()
+    ends, starts = {}, list[_Point]()
     for token in tokens:
         if token.type == tokenize.OP and token.string in "([{":
-            begun.append((token.start[0] - 1, token.start[1]))
+            starts.append((token.start[0] - 1, token.start[1]))
         elif token.type == tokenize.OP and token.string in ")]}":
-            found[begun.pop()] = (token.end[0] - 1, token.end[1])
-    return found
+            ends[starts.pop()] = (token.end[0] - 1, token.end[1])
+    return ends
 
 
 def _untaggable(data: bytes, tokens: Iterable[tokenize.TokenInfo]) -> frozenset[int]:
     """Return the lines (from 0) that cannot end in a comment."""
-    found = {i for i, line in enumerate(data.splitlines()) if line.endswith(b"\\")}
-    begun: list[int] = []  # first lines of the f-strings that are still open
+    lines = {i for i, line in enumerate(data.splitlines()) if line.endswith(b"\\")}
+    starts: list[int] = []  # first lines of the f-strings that are still open
     for token in tokens:
         kind = tokenize.tok_name[token.type]
         if kind == "FSTRING_START":
-            begun.append(token.start[0])
-        first = begun.pop() if kind == "FSTRING_END" else token.start[0]
+            starts.append(token.start[0])
+        first = starts.pop() if kind == "FSTRING_END" else token.start[0]
         if kind in ("STRING", "FSTRING_END"):
-            found.update(range(first - 1, token.end[0] - 1))
-    return frozenset(found)
+            lines.update(range(first - 1, token.end[0] - 1))
+    return frozenset(lines)
 
 
 NO_PARTS: dict[str, object] = {"left": None, "right": None, "called": None, "arguments": []}

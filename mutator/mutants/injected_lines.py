@@ -79,7 +79,7 @@ class Tag:
     @property
     def asked_for(self) -> list[str]:
         """The injections about which a changed line asks the probe."""
-        return [found["id"].decode() for found in _ASKED.finditer(self.code)]
+        return [match["id"].decode() for match in _ASKED.finditer(self.code)]
 
     @property
     def sets(self) -> bool:
@@ -93,12 +93,14 @@ def changed_parts(source: bytes) -> Iterator[tuple[str, int, int, int]]:
     """
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.IfExp):
-            asked = node.test.values if isinstance(node.test, ast.BoolOp) else [node.test]
-            own = [
-                one for one in asked if isinstance(one, ast.Call) and ast.unparse(one.func) in _OF_EXECUTION
+            terms = node.test.values if isinstance(node.test, ast.BoolOp) else [node.test]
+            checks = [
+                term
+                for term in terms
+                if isinstance(term, ast.Call) and ast.unparse(term.func) in _OF_EXECUTION
             ]
-            if own and isinstance(name := own[0].args[0], ast.Constant):
-                yield str(name.value), node.body.lineno, node.body.col_offset, own[0].col_offset
+            if checks and isinstance(name := checks[0].args[0], ast.Constant):
+                yield str(name.value), node.body.lineno, node.body.col_offset, checks[0].col_offset
 
 
 def tag_of(line: bytes) -> Tag | None:
@@ -131,19 +133,19 @@ def asks_for(tag: str, injection: Injection) -> str:
 
     The limits are checked only while the fault is active.
     """
-    asked = [f"{PROBE_NAME}.on()", f"({injection.where})"] if injection.where else []
+    terms = [f"{PROBE_NAME}.on()", f"({injection.where})"] if injection.where else []
     for name in ("call", "every"):
         if (number := getattr(injection, name)) is not None:
-            asked.append(f'{PROBE_NAME}.{name}("{tag}", {number})')
-    return " and ".join([*asked, asks(tag)])
+            terms.append(f'{PROBE_NAME}.{name}("{tag}", {number})')
+    return " and ".join([*terms, asks(tag)])
 
 
-def changed_value(asked: str, changed: str) -> str:
+def changed_value(condition: str, changed: str) -> str:
     """Return the source to put before an expression so that its value becomes `changed`.
 
-    `asked` is the call that asks the probe whether to change the value.
+    `condition` is the call that asks the probe whether to change the value.
     """
-    return f"({changed} if {asked} else "
+    return f"({changed} if {condition} else "
 
 
 def set_constant(tag: str, path: str, changed: str, imported: Iterable[str]) -> str:
@@ -151,8 +153,8 @@ def set_constant(tag: str, path: str, changed: str, imported: Iterable[str]) -> 
 
     `imported`: imports of the constant in other modules.
     """
-    more = "".join(f', "{name}"' for name in imported)
-    return f'{PROBE_NAME}.constant("{tag}", globals(), "{path}", lambda {ORIGINAL}: {changed}{more})'
+    further = "".join(f', "{name}"' for name in imported)
+    return f'{PROBE_NAME}.constant("{tag}", globals(), "{path}", lambda {ORIGINAL}: {changed}{further})'
 
 
 def set_default(tag: str, function: str, parameter: str, changed: str) -> str:

@@ -84,8 +84,8 @@ def injection_edit(
         site, texts = written_out(file, site, model.needs)
     _check_instance(file, site.names, site.first, injection)
     code = _limited(snippet(model, dict(injection.params), name, texts), injection, name, model)
-    make = guard if model.kind is SnippetKind.GUARD else insertion
-    edit = make(file, site, code, name)
+    make_edit = guard if model.kind is SnippetKind.GUARD else insertion
+    edit = make_edit(file, site, code, name)
     key = (variables, reuse_key(file, [edit], [name]))
     if key not in file.sound:
         _check_own_names(file, site, model, code, variables.union(*map(_bound, texts.values())))
@@ -108,12 +108,12 @@ def _value_edit(file: ParsedFile, model: FaultModel, injection: Injection, name:
 
 
 def _check_sets_nothing(file: ParsedFile, model: FaultModel, expression: Expression, changed: str) -> None:
-    new = (
+    new_names = (
         _set_within(ast.parse(changed, mode="eval")) - _set_within(expression.node) if ":=" in changed else ()
     )
-    if new:
+    if new_names:
         raise MutatorError(
-            f"the template sets '{min(new)}': {changed}",
+            f"the template sets '{min(new_names)}': {changed}",
             where=file.where,
             line=expression.start[0] + 1,
             expected="an expression that sets no name",
@@ -122,11 +122,11 @@ def _check_sets_nothing(file: ParsedFile, model: FaultModel, expression: Express
 
 
 def _set_within(node: ast.AST) -> set[str]:
-    return {one.target.id for one in ast.walk(node) if isinstance(one, ast.NamedExpr)}
+    return {part.target.id for part in ast.walk(node) if isinstance(part, ast.NamedExpr)}
 
 
 def _needs_more(file: ParsedFile, model: FaultModel, line: int) -> MutatorError:
-    wanted = {
+    expected_by_need = {
         None: f"an expression with these parts: {', '.join(sorted(model.parts))}",
         Needs.CALL: "a call: an anchor `result`, or another anchor whose expression is a call",
         Needs.STATEMENT: "a statement, or an expression in a function",
@@ -136,7 +136,7 @@ def _needs_more(file: ParsedFile, model: FaultModel, line: int) -> MutatorError:
         f"model {model.name} does not fit this anchor",
         where=file.where,
         line=line + 1,
-        expected=wanted[model.needs],
+        expected=expected_by_need[model.needs],
         remedy="anchor elsewhere, or use another model",
     )
 
@@ -171,7 +171,7 @@ def _variables(
     file: ParsedFile, names: frozenset[str], first: int, model: FaultModel, injection: Injection
 ) -> frozenset[str]:
     params = dict(injection.params)
-    found = set()
+    variables = set()
     for param in model.params:
         value = params.get(param.name)
         if param.type == "variable" and isinstance(value, str):
@@ -184,8 +184,8 @@ def _variables(
                     expected=f"a name used there: {', '.join(sorted(names))}",
                     remedy=f"correct `{param.name}`",
                 )
-            found.add(variable)
-    return frozenset(found)
+            variables.add(variable)
+    return frozenset(variables)
 
 
 def _check_instance(file: ParsedFile, names: frozenset[str], first: int, injection: Injection) -> None:
@@ -202,28 +202,28 @@ def _check_instance(file: ParsedFile, names: frozenset[str], first: int, injecti
 
 def _limited(code: tuple[str, ...], injection: Injection, name: str, model: FaultModel) -> tuple[str, ...]:
     """Add to the snippet a check for the instance or executions that the injection selects, if any."""
-    plain, asked = asks(name), asks_for(name, injection)
-    if asked == plain:
+    check, condition = asks(name), asks_for(name, injection)
+    if condition == check:
         return code
-    heads = {f"if {plain}:": f"if {asked}:", f"if not {plain}:": f"if not ({asked}):"}
-    if sum(line.count(plain) for line in code) != 1 or not any(line in heads for line in code):
+    limited_lines = {f"if {check}:": f"if {condition}:", f"if not {check}:": f"if not ({condition}):"}
+    if sum(line.count(check) for line in code) != 1 or not any(line in limited_lines for line in code):
         raise MutatorError(
             f"model {model.name}, with these parameters, cannot be limited by `where`, `call` or `every`",
             where=model.template_path,
-            expected=f"a template with exactly one probe check, `if {plain}:` or `if not {plain}:`",
+            expected=f"a template with exactly one probe check, `if {check}:` or `if not {check}:`",
             remedy="remove `where`, `call` and `every`, or use another model",
         )
-    return tuple(heads.get(line, line) for line in code)
+    return tuple(limited_lines.get(line, line) for line in code)
 
 
 def _check_own_names(
     file: ParsedFile, site: Site, model: FaultModel, code: Sequence[str], variables: frozenset[str]
 ) -> None:
     block = [*code, "    pass"] if model.kind is SnippetKind.GUARD else code
-    taken = ({as_compiled(name) for name in _bound("\n".join(block))} - variables) & site.names
-    if taken:
+    clashes = ({as_compiled(name) for name in _bound("\n".join(block))} - variables) & site.names
+    if clashes:
         raise MutatorError(
-            f"the injected lines set '{min(taken)}', a name that the function uses itself",
+            f"the injected lines set '{min(clashes)}', a name that the function uses itself",
             where=file.where,
             line=site.first + 1,
             expected="lines that set only parameters and names that the function does not use",

@@ -86,7 +86,7 @@ def _build(
     mutant_id = content_id([manifest.tree.digest, models.digest, fault.id if fault else None, trigger])
     edits = _edits(manifest, changes)
     probe_file = probe_path(manifest.package)
-    sets = any(one.location.anchor.kind in FIXED_ANCHORS for one in injections)
+    sets = any(injection.location.anchor.kind in FIXED_ANCHORS for injection in injections)
     probe = _probe(manifest, models, mutant_id, trigger, hold, ids, sets)
     text = probe.text
     splicer.check_probe(text, (mutant_id, *ids), models.folder / PROBE_CODE)
@@ -110,7 +110,7 @@ def _edits(manifest: TargetManifest, changes: Sequence[InjectionEdit]) -> dict[s
     edits: dict[str, list[Edit | ValueEdit]] = {manifest.observation.location.path: [_observation(manifest)]}
     for change in changes:
         edits.setdefault(change.file.path, []).append(change.edit)
-    return {path: in_lines(parsed(manifest.tree, path), own) for path, own in edits.items()}
+    return {path: in_lines(parsed(manifest.tree, path), file_edits) for path, file_edits in edits.items()}
 
 
 def _observation(manifest: TargetManifest) -> Edit:
@@ -129,10 +129,12 @@ def _probe(
     ids: tuple[str, ...],
     sets: bool,
 ) -> Probe:
-    own = probe_path(manifest.package).removesuffix("py")
-    if taken := [path for path in manifest.tree.files if path.startswith((own, f"{own[:-1]}/"))]:
+    probe_stem = probe_path(manifest.package).removesuffix("py")
+    if clashes := [
+        path for path in manifest.tree.files if path.startswith((probe_stem, f"{probe_stem[:-1]}/"))
+    ]:
         raise MutatorError(
-            f"the target has a file {taken[0]}",
+            f"the target has a file {clashes[0]}",
             where=manifest.root,
             expected="no file of this name, because the probe uses it",
             remedy="rename the target's file, or point the manifest at the original tree",
@@ -189,20 +191,20 @@ class _ReusingSplicer(_Splicer):
             super().check_probe(text, ids, where)
 
     def change(self, file: ParsedFile, edits: Sequence[Edit], ids: Sequence[str]) -> Change:
-        known = known_changes(self._tree, file.path)
+        cache = known_changes(self._tree, file.path)
         key = reuse_key(file, edits, ids)
-        if key in known:
-            found = known[key]
-            if isinstance(found, Change):  # only on reuse: most changes of values are used once
-                found = known[key] = ReusableChange.of(found)
-            return found.filled(inserted_lines(edits))
+        if key in cache:
+            cached = cache[key]
+            if isinstance(cached, Change):  # only on reuse: most changes of values are used once
+                cached = cache[key] = ReusableChange.of(cached)
+            return cached.filled(inserted_lines(edits))
         if compile_changed(file, edits, key):
-            known[key] = change = self.spliced(file, edits)
+            cache[key] = change = self.spliced(file, edits)
             return change
         change = super().change(file, edits, ids)
         reusable = ReusableChange.of(change)
         if always_compiles(file, reusable, key):
-            known[key] = reusable
+            cache[key] = reusable
         return change
 
 

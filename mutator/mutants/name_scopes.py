@@ -75,9 +75,9 @@ def _moved(before: SymbolTable, after: SymbolTable, inserted: Container[int]) ->
         name, home = symbol.get_name(), _home(symbol)
         if homes.get(name, "unknown") != home:
             yield Moved(name=name, scope=before.get_name(), before=home, after=homes.get(name, "unknown"))
-    kept = [child for child in after.get_children() if child.get_lineno() not in inserted]
-    for one, other in zip(before.get_children(), kept, strict=False):
-        yield from _moved(one, other, inserted)
+    unchanged = [child for child in after.get_children() if child.get_lineno() not in inserted]
+    for child_before, child_after in zip(before.get_children(), unchanged, strict=False):
+        yield from _moved(child_before, child_after, inserted)
 
 
 def _home(symbol: Symbol) -> str:

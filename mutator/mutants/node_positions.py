@@ -71,7 +71,7 @@ def _point(position: CodePosition) -> _Point:
 
 def places_by_ast(tree: ast.Module) -> frozenset[Place]:
     """Return the positions of functions and anchorable statements, with columns in bytes of UTF-8."""
-    found = set()
+    positions = set()
     for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             first, text = node.body[0], ast.get_docstring(node, clean=False)
@@ -81,5 +81,5 @@ def places_by_ast(tree: ast.Module) -> frozenset[Place]:
         else:
             continue
         start = (node.lineno, node.col_offset)
-        found.add(Place(kind=type(node).__name__, start=start, to=to, docstring=docstring))
-    return frozenset(found)
+        positions.add(Place(kind=type(node).__name__, start=start, to=to, docstring=docstring))
+    return frozenset(positions)

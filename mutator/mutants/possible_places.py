@@ -45,9 +45,9 @@ def places_of(file: ParsedFile, models: FaultModels, function: str | None = None
     if function is not None:
         functions_named(file, function)  # raises if there is none
         names = (plain_name(function),)
-    found = [place for name in names for place in lister.of_function(name)]
-    found += lister.fixed(None if function is None else names[0])
-    return sorted(found, key=lambda place: place.line)
+    places = [place for name in names for place in lister.of_function(name)]
+    places += lister.fixed(None if function is None else names[0])
+    return sorted(places, key=lambda place: place.line)
 
 
 class _Lister:
@@ -61,17 +61,17 @@ class _Lister:
             if function.entry is not None:
                 yield from self.statement(name, AnchorKind.ENTRY, "", i + 1 if len(functions) > 1 else None)
         for verb, kinds in _VERBS.items():
-            found = (s for f in functions for s in f.statements if not s.reason)
-            statements = sorted(found, key=lambda s: s.opens is not None)  # in the order of `nth`
-            count, seen = (Counter[str]() for _ in range(2))
-            count.update(one for s in statements for one in s.names(verb))
+            anchorable = (s for f in functions for s in f.statements if not s.reason)
+            statements = sorted(anchorable, key=lambda s: s.opens is not None)  # in the order of `nth`
+            totals, numbers = (Counter[str]() for _ in range(2))
+            totals.update(one for s in statements for one in s.names(verb))
             for statement in statements:
                 names = statement.names(verb)
-                seen.update(names)
-                told = [one for one in names if writable(one)]
-                for one in told[-1:] if verb == "return" else told:
+                numbers.update(names)
+                usable_names = [one for one in names if writable(one)]
+                for one in usable_names[-1:] if verb == "return" else usable_names:
                     for kind in kinds:
-                        yield from self.statement(name, kind, one, seen[one] if count[one] > 1 else None)
+                        yield from self.statement(name, kind, one, numbers[one] if totals[one] > 1 else None)
         yield from self.values(name)
 
     def statement(self, function: str, kind: AnchorKind, name: str, nth: int | None) -> Iterator[ListedPlace]:
@@ -103,23 +103,23 @@ class _Lister:
         return True
 
     def values(self, function: str) -> Iterator[ListedPlace]:
-        known = self.file.expressions.get(function, ())
-        count = Counter(role for one in known for role in dict.fromkeys(one.roles))
-        seen = Counter[Any]()
-        for one in known:
+        expressions = self.file.expressions.get(function, ())
+        totals = Counter(role for expression in expressions for role in dict.fromkeys(expression.roles))
+        numbers = Counter[Any]()
+        for one in expressions:
             kind, name, which = role = one.roles[0]
-            seen.update(dict.fromkeys(one.roles, 1))
-            nth = seen[role] if count[role] > 1 else None
+            numbers.update(dict.fromkeys(one.roles, 1))
+            nth = numbers[role] if totals[role] > 1 else None
             location = self.location(function, Anchor(kind=kind, name=name, which=which, nth=nth))
             models = tuple(model.name for model in self.models if changes(model, one))
             yield ListedPlace(line=one.start[0] + 1, location=location, models=models)
 
     def fixed(self, function: str | None) -> Iterator[ListedPlace]:
         models = tuple(model.name for model in self.models if changes(model, None))
-        for one in self.file.fixed:
-            if one.reason is None and function in (None, one.function):
-                location = self.location(one.function, Anchor(kind=one.kind, name=one.name))
-                yield ListedPlace(line=one.first + 1, location=location, models=models)
+        for value in self.file.fixed:
+            if value.reason is None and function in (None, value.function):
+                location = self.location(value.function, Anchor(kind=value.kind, name=value.name))
+                yield ListedPlace(line=value.first + 1, location=location, models=models)
 
     def location(self, function: str, anchor: Anchor) -> FaultLocation:
         return FaultLocation(path=self.file.path, function=function, anchor=anchor)

@@ -69,7 +69,7 @@ class Probe:
         Blank lines keep the line numbers unchanged.
         """
         pairs = list(zip(self.own, self.shared, strict=True))
-        own = (one + "\n" * other.count("\n") for one, other in pairs)
+        own = (settings + "\n" * code.count("\n") for settings, code in pairs)
         return "".join(own), "".join("\n" * one.count("\n") + other for one, other in pairs)
 
     @property
@@ -185,21 +185,21 @@ def report_problem(report: object, mutant: str, injections: Sequence[str]) -> st
         return "its probe has no report"
     if report.get("mutant") != mutant:
         return "the probe that ran is not the one of this mutant"
-    triggered, told = report.get("triggered"), report.get("injections")
-    if not isinstance(told, dict) or told.keys() != set(injections):
+    triggered, entries = report.get("triggered"), report.get("injections")
+    if not isinstance(entries, dict) or entries.keys() != set(injections):
         return "the injections in its probe's report are not its own"
-    if not all(_is_told(one, "count") for one in told.values()):
+    if not all(_is_told(entry, "count") for entry in entries.values()):
         return "its probe's report of the injections is damaged"
     if not (triggered is None or (_is_told(triggered, "steps") and triggered["steps"])):
         return "its probe's report of the trigger is damaged"
     return "" if triggered or not activation_of(report) else "an injection was active and its trigger was not"
 
 
-def _is_told(told: object, number: str) -> bool:
+def _is_told(entry: object, count_key: str) -> bool:
     """Return whether an entry is valid: a first time, a last time and a count, or None, None and 0."""
-    if not isinstance(told, dict) or told.keys() != {"first", "last", number}:
+    if not isinstance(entry, dict) or entry.keys() != {"first", "last", count_key}:
         return False
-    first, last, count = told["first"], told["last"], told[number]
+    first, last, count = entry["first"], entry["last"], entry[count_key]
     if type(count) is not int or count < 1:
         return type(count) is int and count == 0 and first is last is None
     return all(type(time) is float and math.isfinite(time) for time in (first, last)) and first <= last

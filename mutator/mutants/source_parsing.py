@@ -20,11 +20,11 @@ _LONE_CR = re.compile(rb"\r(?!\n)")
 
 
 def refuse_unfit(data: bytes, where: Path) -> None:
-    if found := _LONE_CR.search(data):
+    if match := _LONE_CR.search(data):
         raise MutatorError(
             "a line ends in CR alone",
             where=where,
-            line=data[: found.start()].count(b"\n") + 1,
+            line=data[: match.start()].count(b"\n") + 1,
             expected="LF or CRLF",
             remedy="convert the file's line ends",
         )
@@ -96,10 +96,12 @@ def reading(where: Path) -> Iterator[None]:
 def libcst_module(data: bytes, where: Path) -> tuple[cst.Module, Positions]:
     """Parse the file with LibCST; MutatorError unless LibCST reproduces the file's bytes."""
     module = cst.parse_module(data)
-    given = module.bytes
-    if given != data:
-        pairs = zip_longest(data.splitlines(keepends=True), given.splitlines(keepends=True))
-        line = next(i for i, (one, other) in enumerate(pairs) if one != other)
+    written = module.bytes
+    if written != data:
+        pairs = zip_longest(data.splitlines(keepends=True), written.splitlines(keepends=True))
+        line = next(
+            i for i, (original_line, written_line) in enumerate(pairs) if original_line != written_line
+        )
         text = b"".join(data.splitlines()[line : line + 1]).decode(errors="replace").strip()
         raise MutatorError(
             f"LibCST does not reproduce the line `{text}`",

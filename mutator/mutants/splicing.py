@@ -99,17 +99,17 @@ def setting(file: ParsedFile, value: FixedValue, code: str, tag: str) -> Edit:
 
 
 def value_change(
-    file: ParsedFile, expression: Expression, changed: str, tag: str, asked: str | None = None
+    file: ParsedFile, expression: Expression, changed: str, tag: str, condition: str | None = None
 ) -> ValueEdit:
     """Return the edit that gives `expression` the value `changed` while the injection `tag` is active.
 
-    `changed` is source on one line. `asked` replaces the default call that asks the probe.
+    `changed` is source on one line. `condition` replaces the default call that asks the probe.
     """
     opened, closed = ("(", "))") if expression.bare else ("", ")")
     return ValueEdit(
         start=expression.start,
         end=expression.end,
-        before=_encoded(file, changed_value(asked or asks(tag), changed) + opened, expression.start[0]),
+        before=_encoded(file, changed_value(condition or asks(tag), changed) + opened, expression.start[0]),
         after=closed.encode(),
         changed=changed,
         tag=tag,
@@ -120,31 +120,31 @@ def in_lines(file: ParsedFile, edits: Iterable[Edit | ValueEdit]) -> list[Edit]:
     """Convert edits of values to edits that replace whole lines of the target; other edits are unchanged."""
     edits = list(edits)
     values = sorted((e for e in edits if isinstance(e, ValueEdit)), key=lambda e: e.start)
-    for one, other in pairwise(values):
-        if other.start < one.end:
+    for one, following in pairwise(values):
+        if following.start < one.end:
             raise MutatorError(
                 "two injections into one expression",
                 where=file.where,
-                line=other.start[0] + 1,
+                line=following.start[0] + 1,
                 expected="expressions that do not overlap",
                 remedy="remove one of the injections",
             )
-    written: dict[int, list[tuple[int, bytes, str]]] = defaultdict(list)
+    texts_by_line: dict[int, list[tuple[int, bytes, str]]] = defaultdict(list)
     for edit in values:
-        written[edit.start[0]].append((edit.start[1], edit.before, edit.tag))
-        written[edit.end[0]].append((edit.end[1], edit.after, edit.tag))
-    lines = [_instead(file, index, texts) for index, texts in written.items()]
+        texts_by_line[edit.start[0]].append((edit.start[1], edit.before, edit.tag))
+        texts_by_line[edit.end[0]].append((edit.end[1], edit.after, edit.tag))
+    lines = [_instead(file, index, texts) for index, texts in texts_by_line.items()]
     return [*(edit for edit in edits if isinstance(edit, Edit)), *lines]
 
 
 def _instead(file: ParsedFile, index: int, texts: Sequence[tuple[int, bytes, str]]) -> Edit:
     whole = file.lines[index]
-    was = whole.rstrip(b"\r\n")
-    line = was
+    original = whole.rstrip(b"\r\n")
+    line = original
     for column, text, _ in reversed(texts):
         line = line[:column] + text + line[column:]
-    tag = tag_instead(dict.fromkeys(tag for *_, tag in texts), was)
-    return Edit(index=index, rank=Rank.INSTEAD, lines=(line + tag + whole[len(was) :],))
+    tag = tag_instead(dict.fromkeys(tag for *_, tag in texts), original)
+    return Edit(index=index, rank=Rank.INSTEAD, lines=(line + tag + whole[len(original) :],))
 
 
 def probe_import(file: ParsedFile, package: str | None) -> Edit:
@@ -205,9 +205,9 @@ def _depth(edit: Edit) -> int:
 def apply_edits(file: ParsedFile, edits: Iterable[Edit]) -> tuple[Piece, ...]:
     """Return the edited file as pieces, for `joined`; MutatorError if two guards wrap one statement."""
     pieces: list[Piece] = []
-    done = 0
+    next_line = 0
     for edit in in_order(edits):
-        if edit.index < done:
+        if edit.index < next_line:
             raise MutatorError(
                 "two guards around one statement, or an injection inside a guarded one",
                 where=file.where,
@@ -215,21 +215,21 @@ def apply_edits(file: ParsedFile, edits: Iterable[Edit]) -> tuple[Piece, ...]:
                 expected="one guard per statement, and no other injection in it",
                 remedy="remove one of the injections",
             )
-        _keep(pieces, file.lines[done : edit.index])
-        done = edit.index
+        _keep(pieces, file.lines[next_line : edit.index])
+        next_line = edit.index
         added = list(edit.lines)
-        if done and edit.index == len(file.lines):
+        if next_line and edit.index == len(file.lines):
             added = _end_of_file(pieces, added, file.newline)
         if edit.rank is Rank.INSTEAD:
             pieces.append(Piece(sign="-", lines=file.lines[edit.index : edit.index + 1]))
-            done += 1
+            next_line += 1
         if edit.reindent:
-            done += edit.reindent
-            wrapped = file.lines[edit.index : done]
+            next_line += edit.reindent
+            wrapped = file.lines[edit.index : next_line]
             pieces.append(Piece(sign="-", lines=wrapped))
             added += _indented(wrapped, edit.unit)
         pieces.append(Piece(sign="+", lines=tuple(added)))
-    _keep(pieces, file.lines[done:])
+    _keep(pieces, file.lines[next_line:])
     return tuple(pieces)
 
 
@@ -272,22 +272,22 @@ def unsplice(data: bytes) -> bytes:
     """Return the original bytes of a mutated file."""
     lines = data.splitlines(keepends=True)
     result: list[bytes] = []
-    left = 0  # lines still indented by a guard
+    indented_count = 0  # lines still indented by a guard
     margin = unit = b""
     for line in lines:
         tag = tag_of(line)
         if tag and tag.was is not None:
             result.append(tag.was + line[len(line.rstrip(b"\r\n")) :])
         elif tag:
-            left = tag.guarded
+            indented_count = tag.guarded
             margin, unit = _margin(line), b""
-        elif left and not unit:
+        elif indented_count and not unit:
             unit = _margin(line)[len(margin) :]
             result.append(margin + line[len(margin) + len(unit) :])
-            left -= 1
-        elif left:
+            indented_count -= 1
+        elif indented_count:
             result.append(line[len(unit) :] if line.strip() else line)
-            left -= 1
+            indented_count -= 1
         else:
             result.append(line)
     if result and tag_of(lines[-1]) and not lines[-1].endswith((b"\n", b"\r")):

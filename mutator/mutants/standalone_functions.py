@@ -9,7 +9,7 @@ def outer_functions(tree: ast.AST) -> Iterator[range]:
     """Yield the lines (from 0) of each outermost function, including decorators."""
     for node in ast.iter_child_nodes(tree):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
-            first = min(one.lineno for one in (node, *node.decorator_list)) - 1
+            first = min(part.lineno for part in (node, *node.decorator_list)) - 1
             yield range(first, node.end_lineno or node.lineno)
         elif not isinstance(node, ast.expr):
             yield from outer_functions(node)

@@ -77,15 +77,17 @@ def _small_statements(data: bytes) -> Mapping[int, tuple[ast.stmt, ast.stmt | No
     The next one is None if it is missing or shares its lines with another.
     """
     return {
-        one.lineno - 1: (one, following if _is_fit(one, following, beyond) else None)
+        statement.lineno - 1: (statement, following if _is_fit(statement, following, beyond) else None)
         for block in _blocks(ast.parse(data))
-        for one, following, beyond in zip(block, [*block[1:], None], [*block[2:], None, None], strict=False)
-        if isinstance(one, _SMALL)
+        for statement, following, beyond in zip(
+            block, [*block[1:], None], [*block[2:], None, None], strict=False
+        )
+        if isinstance(statement, _SMALL)
     }
 
 
-def _is_fit(one: ast.stmt, following: ast.stmt | None, beyond: ast.stmt | None) -> bool:
-    if not isinstance(following, _SMALL) or following.lineno <= (one.end_lineno or 0):
+def _is_fit(statement: ast.stmt, following: ast.stmt | None, beyond: ast.stmt | None) -> bool:
+    if not isinstance(following, _SMALL) or following.lineno <= (statement.end_lineno or 0):
         return False
     return beyond is None or beyond.lineno > (following.end_lineno or 0)
 

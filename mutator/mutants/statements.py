@@ -186,7 +186,7 @@ class _Collector(cst.CSTVisitor):
             return
         first = body.body[0]
         decorators = first.decorators if isinstance(first, cst.FunctionDef | cst.ClassDef) else ()
-        opens = min(self.positions[one].start.line for one in (first, *decorators)) - 1
+        opens = min(self.positions[node].start.line for node in (first, *decorators)) - 1
         line = self.positions[target].start.line - 1
         statements.append(Statement(first=line, last=opens, assigns=tuple(_that_stay(names)), opens=opens))
 
@@ -194,13 +194,13 @@ class _Collector(cst.CSTVisitor):
         statements = self.open[-1] if self.open else None
         if statements is not None and names and all(names):
             span = self.positions[node]
-            kept = tuple(names)
+            bound_names = tuple(names)
             statements.append(
                 Statement(
                     first=span.start.line - 1,
                     last=span.end.line,
-                    assigns=() if calls else kept,
-                    calls=kept if calls else (),
+                    assigns=() if calls else bound_names,
+                    calls=bound_names if calls else (),
                     reason=reason,
                 )
             )

@@ -112,8 +112,8 @@ class TemplateEnvironment(ImmutableSandboxedEnvironment):
             keep_trailing_newline=True,
             finalize=finalize,
         )
-        kept = {name: self.filters[name] for name in _KEPT_FILTERS}
-        self.filters = {name: _counting(function) for name, function in {**kept, **filters}.items()}
+        jinja_filters = {name: self.filters[name] for name in _KEPT_FILTERS}
+        self.filters = {name: _counting(function) for name, function in {**jinja_filters, **filters}.items()}
         self.filter_names = frozenset(self.filters)
         self.filters |= {_TURNS: _turns, _READ: _counting(lambda value: value)}
         self.globals = dict(functions)
@@ -133,18 +133,18 @@ class TemplateEnvironment(ImmutableSandboxedEnvironment):
 
     def _check(self, tree: nodes.Template) -> None:
         """Reject what is not allowed, before any part of it is evaluated; loops stand beside each other."""
-        waiting: deque[tuple[nodes.Node, int, bool]] = deque([(tree, 0, False)])
-        seen = 0
-        while waiting:
-            node, depth, in_loop = waiting.popleft()
-            seen += 1
-            if why := self._problem(node, depth, seen, in_loop):
+        queue: deque[tuple[nodes.Node, int, bool]] = deque([(tree, 0, False)])
+        node_count = 0
+        while queue:
+            node, depth, in_loop = queue.popleft()
+            node_count += 1
+            if why := self._problem(node, depth, node_count, in_loop):
                 raise TemplateSyntaxError(why, node.lineno)
             in_loop = in_loop or isinstance(node, nodes.For)
-            waiting.extend((child, depth + 1, in_loop) for child in node.iter_child_nodes())
+            queue.extend((child, depth + 1, in_loop) for child in node.iter_child_nodes())
 
-    def _problem(self, node: nodes.Node, depth: int, seen: int, in_loop: bool) -> str:
-        if depth > MOST_DEPTH or seen > MOST_NODES:
+    def _problem(self, node: nodes.Node, depth: int, node_count: int, in_loop: bool) -> str:
+        if depth > MOST_DEPTH or node_count > MOST_NODES:
             return f"more than {MOST_NODES} parts, or nested more than {MOST_DEPTH} deep"
         if not isinstance(node, _NODES):
             return f"`{getattr(node, 'operator', None) or type(node).__name__.lower()}` is not allowed"

@@ -60,8 +60,8 @@ def signed(value: int | float) -> str:
 def exchanged(arguments: Sequence[str], first: int, second: int) -> list[str]:
     """Exchange the values of two arguments of a call, counted from 1; keywords stay in place."""
     parts = [_ARGUMENT.fullmatch(text) for text in arguments]
-    for place in (first, second):
-        part = parts[place - 1] if 0 < place <= len(parts) else None
+    for number in (first, second):
+        part = parts[number - 1] if 0 < number <= len(parts) else None
         if part is None or first == second or part["value"].startswith("*"):
             raise MutatorError(
                 f"arguments {first} and {second} of ({', '.join(arguments)}) cannot be exchanged",
@@ -75,14 +75,14 @@ def exchanged(arguments: Sequence[str], first: int, second: int) -> list[str]:
 
 def taken_for(written: str, read: str) -> float:
     """Return the factor by which a quantity changes if it is written in one unit and read in another."""
-    one, other = units.UNITS[written], units.UNITS[read]
-    if one.dimension != other.dimension or one == other:
+    written_unit, read_unit = units.UNITS[written], units.UNITS[read]
+    if written_unit.dimension != read_unit.dimension or written_unit == read_unit:
         raise MutatorError(
             f"written in {written}, read as {read}",
-            expected=f"two different units of {one.dimension}",
+            expected=f"two different units of {written_unit.dimension}",
             remedy="correct one of them",
         )
-    return units.convert(1.0, other, one)
+    return units.convert(1.0, read_unit, written_unit)
 
 
 def refuse(why: str) -> NoReturn:
