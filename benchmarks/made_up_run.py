@@ -33,7 +33,7 @@ from mutator.mutants.mutant_building import build
 from mutator.outcomes.golden_comparison import load_trace
 from mutator.outcomes.series_sampling import Sampler
 from mutator.preflight import equivalence_check
-from mutator.preflight.preflight_rules import digest_of
+from mutator.preflight.preflight_rules import output_digest_of
 from mutator.store import file_digests, plan_file
 from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
@@ -69,7 +69,7 @@ def make(size: int, out: Path) -> str:
     patches = patches_of(workspace, first)
     records = made_up_records(workspace, first)
     write_segments(folder, ids, records, patches)
-    equivalence_check.begin(out)
+    equivalence_check.mark_as_needed(out)
     write_proof(folder, ids, records, patches)
     write_series(workspace, folder, ids, first)
     add_stretch(
@@ -136,7 +136,7 @@ def goldens(workspace: Workspace, folder: RunFolder, experiments: Sequence[Exper
                 limits = folder.limits
                 found = run_golden(workspace, manifest, next(drives), Path(scratch) / "one", limits=limits)
                 driven[like] = Path(shutil.move(found, place))
-        known[one.key] = digest_of(manifest, place)
+        known[one.key] = output_digest_of(manifest, place)
     checks = {"schema": CHECKS_SCHEMA, "digest": "", "results": [], "goldens": known}
     data = json.dumps(checks | {"packages": [], "run_cpu_s": 1.0}).encode()
     files = [path for path in (run / "golden").rglob("*") if path.is_file()]
@@ -237,10 +237,10 @@ def write_proof(
     """Write the sample of the equivalence check with the experiments' records."""
     lines = _bodies(records, patches)
     proof = Lines(
-        folder.path / equivalence_check.FOLDER / "0001-gw0.jsonl",
+        folder.path / equivalence_check.PROOF_FOLDER / "0001-gw0.jsonl",
         {"plan": folder.head.plan, "schema": SCHEMA},
     )
-    wanted = set(equivalence_check.sampled(folder))
+    wanted = set(equivalence_check.sample_ids(folder))
     counts = [0] * WORKERS
     for number, name in enumerate(ids):
         worker = number // PIECE % WORKERS

@@ -22,8 +22,8 @@ from mutator.campaigns.plan import make_plan
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Experiment
 from mutator.mutants.anchors import parse_file
-from mutator.mutants.mutant_building import build, build_directly
-from mutator.operators.mutation_selection import find_mutations, sampled
+from mutator.mutants.mutant_building import build, build_without_reuse
+from mutator.operators.mutation_selection import sample_mutations, select_mutations
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always
 from mutator.workspace import Workspace
@@ -42,11 +42,11 @@ def rate(make: Callable[[Experiment], object], experiments: list[Experiment]) ->
 
 def operators(manifest: TargetManifest, models: FaultModels, count: int) -> tuple[float, float]:
     """Return how many mutants of operators are found and how many are built per second of CPU."""
-    find_mutations(manifest, models, ["return"], PLACES)  # parses the files, as every campaign must
+    select_mutations(manifest, models, ["return"], PLACES)  # parses the files, as every campaign must
     start = process_time()
-    found = find_mutations(manifest, models, OPERATORS.names(), PLACES)
+    found = select_mutations(manifest, models, OPERATORS.names(), PLACES)
     took = process_time() - start
-    faults = [mutation.fault("as_described") for mutation in sampled(found, count, 1)]
+    faults = [mutation.fault("as_described") for mutation in sample_mutations(found, count, 1)]
     trigger = always()
     build(manifest, models, faults[0], trigger)  # parses the file that observes
     start = process_time()
@@ -69,7 +69,7 @@ def main() -> None:
         build(manifest, models, experiment.fault, experiment.trigger)
 
     def spliced(experiment: Experiment) -> None:
-        build_directly(manifest, models, experiment.fault, experiment.trigger)
+        build_without_reuse(manifest, models, experiment.fault, experiment.trigger)
 
     def parsed(experiment: Experiment) -> None:
         changed = {manifest.observation.location, *(i.location for i in experiment.fault.injections)}

@@ -223,7 +223,7 @@ class Reach:
 
     def __init__(self, file: ParsedFile, models: FaultModels, tree: SourceTree) -> None:
         self.file, self.models, self.tree = file, models, tree
-        known = [one for group in file.expressions.values() for one in group]
+        known = [one for group in file.expressions_by_function.values() for one in group]
         self.spots = {(*one.start, *one.end) for one in known}
 
     def reaches(self, site: Site) -> bool:
@@ -244,14 +244,14 @@ class Reach:
         return True
 
     def is_assigned(self, site: Site) -> bool:
-        functions = self.file.functions.get(site.function, ())
+        functions = self.file.functions_by_name.get(site.function, ())
         known = [s for f in functions for s in f.statements if s.reason is None and site.name in s.assigns]
         for nth, statement in enumerate(known, 1):
             if statement.first < _spot(site.node)[0] + 1 <= max(statement.last, statement.first + 1):
                 anchor = Anchor(kind=AnchorKind.AFTER_ASSIGN, name=site.name, nth=nth)
                 location = FaultLocation(path=self.file.path, function=site.function, anchor=anchor)
                 try:
-                    self.file.resolve(location)
+                    self.file.resolve_statement(location)
                 except MutatorError:
                     continue
                 return True

@@ -68,7 +68,7 @@ def masked(experiment: Experiment) -> Record:
 
 
 def make_up_checks(workspace: Workspace, folder: RunFolder) -> None:
-    looked_at = preflight_checks._Checks(workspace, folder)
+    looked_at = preflight_checks._PreflightChecks(workspace, folder)
     goldens = {}
     for one in looked_at.keys:
         key = one.key
@@ -76,10 +76,12 @@ def make_up_checks(workspace: Workspace, folder: RunFolder) -> None:
         out.mkdir(parents=True)
         for name in looked_at.manifest.outputs:
             (out / name).write_bytes(bytes(500_000))
-        goldens[key] = preflight_rules.digest_of(looked_at.manifest, out)
+        goldens[key] = preflight_rules.output_digest_of(looked_at.manifest, out)
     said = {"schema": CHECKS_SCHEMA, "digest": looked_at.digest, "results": [], "goldens": goldens}
-    looked_at._install(json_bytes(said | {"run_cpu_s": 1.0}))
-    preflight_cache.store(preflight_cache.entry(looked_at.digest), folder.path, FILE, looked_at.kept)
+    looked_at._store_in_run_folder(json_bytes(said | {"run_cpu_s": 1.0}))
+    preflight_cache.store_checks(
+        preflight_cache.entry_path(looked_at.digest), folder.path, FILE, looked_at.kept
+    )
 
 
 def until_the_first_run(workspace: Workspace, out: Path) -> float:

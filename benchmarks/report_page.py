@@ -25,7 +25,7 @@ from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import make_plan
 from mutator.model import Experiment, Record, Trigger
 from mutator.mutants.mutant_building import build
-from mutator.mutants.readable_patches import readable
+from mutator.mutants.readable_patches import readable_patch
 from mutator.outcomes.series_sampling import Sampler
 from mutator.report import experiment_list as report_browse
 from mutator.report import markdown_and_html as report_page
@@ -106,7 +106,9 @@ def patches(workspace: Workspace, experiments: Sequence[Experiment]) -> Iterator
     for experiment in experiments:
         key = (experiment.fault.id, experiment.trigger)
         if key not in known:
-            known[key] = readable(build(manifest, models, experiment.fault, experiment.trigger).patch)[0]
+            known[key] = readable_patch(build(manifest, models, experiment.fault, experiment.trigger).patch)[
+                0
+            ]
         yield experiment.id, "", known[key]
 
 

@@ -30,7 +30,7 @@ from mutator.model import (
     Status,
     Trigger,
 )
-from mutator.mutants.anchors import ParsedFile, parsed
+from mutator.mutants.anchors import ParsedFile, parsed_file
 from mutator.store import file_digests
 from mutator.store.checksummed_lines import LineWriter, read_segment
 from mutator.store.file_digests import FileDigest
@@ -327,7 +327,7 @@ def of_operators() -> Callable[[Workspace, str], Callable[[Plan], Plan]]:
     def of(workspace: Workspace, path: str, drives: int = 2) -> Callable[[Plan], Plan]:
         def changed(plan: Plan) -> Plan:
             tree = workspace.manifest(plan.campaign.target).tree
-            faults = list(operator_faults(parsed(tree, path)))
+            faults = list(operator_faults(parsed_file(tree, path)))
             some = [
                 dataclasses.replace(drive, fault=fault, **({"trigger": always()} if number == 1 else {}))
                 for fault in faults
@@ -341,7 +341,7 @@ def of_operators() -> Callable[[Workspace, str], Callable[[Plan], Plan]]:
 
 
 def operator_faults(file: ParsedFile) -> Iterator[Fault]:
-    for function, known in file.expressions.items():
+    for function, known in file.expressions_by_function.items():
         seen: list[str] = []
         for expression in known:
             seen.append(expression.text)

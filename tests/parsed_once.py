@@ -30,7 +30,7 @@ def parsed_once() -> Iterator[None]:
     """
     parse_yaml, parse_python, load_model = yaml_files.parse, anchors.parse_file, fault_model_files._load
     models: dict[tuple[str, bytes, bytes], FaultModel] = {}
-    run_example, examples = library_check.run_example, dict[str, str]()
+    run_example, examples = library_check.apply_example, dict[str, str]()
 
     @lru_cache(maxsize=1024)
     def yaml_of(text: str) -> bytes:
@@ -53,7 +53,7 @@ def parsed_once() -> Iterator[None]:
             found = python_of(path, data)
         except MutatorError:
             return parse_python(path, data, root)
-        return dataclasses.replace(found, where=root / path, sound=set(), _sites={})
+        return dataclasses.replace(found, full_path=root / path, verified_edits=set(), _resolved_anchors={})
 
     def model(path: Path) -> FaultModel:
         template = path.with_suffix(".py.j2")
@@ -72,5 +72,5 @@ def parsed_once() -> Iterator[None]:
         patch.setattr(yaml_files, "parse", yaml)
         patch.setattr(anchors, "parse_file", python)
         patch.setattr(fault_model_files, "_load", model)
-        patch.setattr(library_check, "run_example", example_of)
+        patch.setattr(library_check, "apply_example", example_of)
         yield

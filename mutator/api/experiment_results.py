@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from mutator.api.html import diff_html, facts_html, text_html
 from mutator.figures.run_plot import draw_run, marks_of
 from mutator.model import Experiment, Fault, Outcome, Record, Status, Trigger
-from mutator.mutants.readable_patches import readable
+from mutator.mutants.readable_patches import readable_patch
 from mutator.outcomes.golden_comparison import Trace, on_steps
 from mutator.outcomes.trace_files import own_times
 from mutator.outcomes.verdict_rules import reaction_time, severity_of, since_activation, since_manifestation
@@ -116,7 +116,7 @@ class ExperimentResult(ABC):
     @property
     def diff(self) -> str:
         """The source diff without the probe, for reading."""
-        return readable(self.patch)[0]
+        return readable_patch(self.patch)[0]
 
     def propagation(self) -> "pd.DataFrame":
         """Return the channels that differ from the golden run, earliest first: name (index), component, role,

@@ -8,16 +8,16 @@ from pathlib import Path
 from mutator._common.shipped_files import write_library
 from mutator.api.selection import WorkspaceLike, open_workspace
 from mutator.checks import fast_engine_check, library_check
-from mutator.checks.doctor import examine
-from mutator.checks.drive_check import check_drive
+from mutator.checks.doctor import examine_machine
+from mutator.checks.drive_check import drive_findings
 from mutator.checks.findings import Finding
 from mutator.checks.unused_draws import unused_draws_finding
 from mutator.errors import MutatorError
-from mutator.mutants.anchors import parsed
+from mutator.mutants.anchors import parsed_file
 from mutator.mutants.possible_places import ListedPlace, places_of
-from mutator.onboarding.first_library import write_library_for
-from mutator.onboarding.source_survey import look_at
-from mutator.onboarding.todo_marks import unfilled
+from mutator.onboarding.first_library import write_first_library
+from mutator.onboarding.source_survey import survey_source
+from mutator.onboarding.todo_marks import unfilled_mark_errors
 from mutator.stpa.analysis_checks import check_analysis
 from mutator.stpa.analysis_files import Analysis
 from mutator.stpa.structure_drawing import draw
@@ -38,13 +38,13 @@ def init_library(folder: str | Path, *, target: str | PathLike[str] | None = Non
     if target is None:
         write_library(Path(folder))
     else:
-        write_library_for(look_at(os.fspath(target)), Path(folder))
+        write_first_library(survey_source(os.fspath(target)), Path(folder))
     return Path(folder)
 
 
 def unfilled_places(folder: str | Path) -> list[MutatorError]:
     """Return the places in a new library that you still have to fill in."""
-    return list(unfilled(Path(folder)))
+    return list(unfilled_mark_errors(Path(folder)))
 
 
 def check_library(workspace: WorkspaceLike = None, *, target: str | None = None) -> list[MutatorError]:
@@ -53,7 +53,7 @@ def check_library(workspace: WorkspaceLike = None, *, target: str | None = None)
     `target` names a manifest; default: the library's only one.
     """
     found = open_workspace(workspace)
-    return library_check.check_library(found, found.target_name(target))
+    return library_check.library_problems(found, found.target_name(target))
 
 
 def find_places(
@@ -68,7 +68,7 @@ def find_places(
     manifest = found.manifest(found.target_name(target))
     path, _, function = where.partition("::")
     check_file(manifest, path)
-    return places_of(parsed(manifest.tree, path), found.fault_models(), function or None)
+    return places_of(parsed_file(manifest.tree, path), found.fault_models(), function or None)
 
 
 def check_target(
@@ -89,9 +89,11 @@ def check_target(
     found = open_workspace(workspace)
     name = found.target_name(target)
     manifest = found.manifest(name)
-    driven = check_drive(found, name, scenarios) if drive else [fast_engine_check.loading(manifest)]
+    driven = (
+        drive_findings(found, name, scenarios) if drive else [fast_engine_check.loading_finding(manifest)]
+    )
     unused = unused_draws_finding(found.specs(), found.fault_models())
-    return [*driven, fast_engine_check.variants(found, manifest), unused]
+    return [*driven, fast_engine_check.variants_finding(found, manifest), unused]
 
 
 def check_hazard_analysis(
@@ -120,12 +122,12 @@ def doctor(workspace: "Workspace | str | PathLike[str] | MutatorError | None" = 
     can be the error raised by the search for a library.
     """
     if isinstance(workspace, MutatorError):
-        return examine(workspace)
+        return examine_machine(workspace)
     try:
         found = open_workspace(workspace)
     except MutatorError as error:
-        return examine(error)
-    return examine(found)
+        return examine_machine(error)
+    return examine_machine(found)
 
 
 def _analysis(workspace: WorkspaceLike) -> Analysis:

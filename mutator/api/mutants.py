@@ -9,7 +9,7 @@ from mutator.api.selection import Bench, FaultLike, TriggerLike, WorkspaceLike
 from mutator.errors import MutatorError
 from mutator.model import Fault, Trigger
 from mutator.mutants.mutant_building import Mutant, build, write_tree
-from mutator.mutants.readable_patches import readable
+from mutator.mutants.readable_patches import readable_patch
 from mutator.targets.manifest import TargetManifest
 
 
@@ -41,7 +41,7 @@ class BuiltMutant:
     @property
     def diff(self) -> str:
         """The patch without the probe, for reading."""
-        return readable(self.patch)[0]
+        return readable_patch(self.patch)[0]
 
     @property
     def files(self) -> dict[str, bytes]:

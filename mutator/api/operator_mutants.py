@@ -8,9 +8,9 @@ from mutator._common.message_text import counted
 from mutator.api.selection import Bench
 from mutator.errors import MutatorError
 from mutator.model import Fault, Limits
-from mutator.operators.executed_lines import GoldenDrive, lines_of
-from mutator.operators.mutation_selection import find_mutations, sampled
-from mutator.operators.operator_lookup import operators_named
+from mutator.operators.executed_lines import GoldenRunInputs, measure_executed_lines
+from mutator.operators.mutation_selection import sample_mutations, select_mutations
+from mutator.operators.operator_lookup import unique_operator_names
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,17 +40,17 @@ def operator_faults(bench: Bench, choice: OperatorChoice) -> tuple[tuple[Fault, 
     executed = None
     if choice.scenario is not None:
         scenario = bench.workspace.scenario(choice.scenario)
-        drive = GoldenDrive(scenario=scenario, changes=(), seed=choice.seed)
-        [executed] = lines_of(bench.manifest, [drive], Limits())
-    operators = operators_named(choice.operators)
-    found = find_mutations(bench.manifest, bench.models, operators, choice.places, executed)
+        drive = GoldenRunInputs(scenario=scenario, changes=(), seed=choice.seed)
+        [executed] = measure_executed_lines(bench.manifest, [drive], Limits())
+    operators = unique_operator_names(choice.operators)
+    found = select_mutations(bench.manifest, bench.models, operators, choice.places, executed)
     if not found.mutations:
         raise MutatorError(
             f"no mutant in {', '.join(choice.places)} ({found.told})",
             argument="in",
             remedy="choose other places or operators, or include lines that are not executed",
         )
-    drawn = sampled(found, choice.sample, choice.seed)
+    drawn = sample_mutations(found, choice.sample, choice.seed)
     told = (
         found.told if len(drawn) == len(found.mutations) else f"{counted(len(drawn), 'draw')} of {found.told}"
     )

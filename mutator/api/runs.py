@@ -207,7 +207,7 @@ class Run(RunContents):
 
     def check_equivalence(self) -> None:
         """Raise CheckFailed if the equivalence check of the run failed."""
-        equivalence_check.judge(self.folder, self.folder.records())
+        equivalence_check.compare_sample(self.folder, self.folder.records())
 
     def verify(self, *, rerun: int = 0, expect: str | None = None, repair: bool = False) -> Audit:
         """Audit the folder: see `mutator.verify`."""

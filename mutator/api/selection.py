@@ -11,7 +11,7 @@ from typing import TypeAlias
 
 from mutator._common.argument_checks import check_number, check_whole
 from mutator.campaigns.plan_warnings import changes_nothing
-from mutator.checks.library_check import check_spec
+from mutator.checks.library_check import spec_problems
 from mutator.config import units
 from mutator.errors import MutatorError, MutatorWarning
 from mutator.faults.fault_models import FaultModels
@@ -80,7 +80,7 @@ class Bench:
         check_whole("seed", 0 if choice.seed is None else choice.seed)
         declared = self.workspace.spec(choice.spec)
         spec = choice.narrowed(declared)
-        for problem in check_spec(spec, self.models, self.manifest):
+        for problem in spec_problems(spec, self.models, self.manifest):
             raise problem
         faults = expand(spec, choice.seed or 0, choice.reading, models=self.models, manifest=self.manifest)
         if choice.value is not None:

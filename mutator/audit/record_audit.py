@@ -207,18 +207,20 @@ def proof(
     """Yield records of the proof that differ from those of the run or are not in the sample, and experiments
     of the sample that have no record.
     """
-    place = folder.path / equivalence_check.FOLDER
+    place = folder.path / equivalence_check.PROOF_FOLDER
     if not place.is_dir():
         modes = {str(line["engine"]) for line in folder.timings().values()}
         if forked := sorted(modes & FAST):
             yield MutatorError("missing", where=place, expected=f"a proof of the engine `{forked[0]}`")
         return
     known = {one.record.experiment_id: one.record for one in records}
-    sampled = set(equivalence_check.sampled(folder))
+    sampled = set(equivalence_check.sample_ids(folder))
     for one in proven:
         record = known.get(one.record.experiment_id)
         if record is not None and record != one.record:
-            yield one.difference(equivalence_check.difference(one.record, record), "what the run recorded")
+            yield one.difference(
+                equivalence_check.describe_difference(one.record, record), "what the run recorded"
+            )
         if one.record.experiment_id not in sampled:
             yield one.difference("in the proof", "only experiments of the sample that the plan determines")
     missing = sorted(sampled - {one.record.experiment_id for one in proven})

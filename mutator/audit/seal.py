@@ -20,7 +20,7 @@ from mutator._common.confined_files import inside
 from mutator._common.files import read_json
 from mutator._common.hashing import canonical, digest
 from mutator.campaigns.freezing import CSV
-from mutator.preflight.equivalence_check import FOLDER as PROOF
+from mutator.preflight.equivalence_check import PROOF_FOLDER as PROOF
 from mutator.store import file_digests, plan_file
 from mutator.store.approvals import review_digest
 from mutator.store.check_results import FILE as CHECKS

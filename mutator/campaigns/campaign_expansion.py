@@ -22,7 +22,7 @@ from mutator.errors import MutatorError
 from mutator.faults.fault_specs import FaultSpec
 from mutator.faults.spec_expansion import expand
 from mutator.model import Experiment, Fault, Method, Trigger
-from mutator.operators.executed_lines import GoldenDrive
+from mutator.operators.executed_lines import GoldenRunInputs
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always, at_time, draw_time
 from mutator.workspace import Workspace
@@ -181,9 +181,9 @@ class Expansion:
                     found[one.fault.id] = replace(one, when=tuple(dict.fromkeys((*known.when, *one.when))))
         return list(found.values())
 
-    def _drives(self) -> dict[str, GoldenDrive]:
+    def _drives(self) -> dict[str, GoldenRunInputs]:
         return {
-            name: GoldenDrive(
+            name: GoldenRunInputs(
                 scenario=self._scenario_file(name),
                 changes=self.campaign.setting_in(self.reading),
                 seed=self.seed,

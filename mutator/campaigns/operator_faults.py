@@ -8,8 +8,8 @@ from mutator.campaigns.operator_selection import OperatorSelection, When
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Fault, Limits
-from mutator.operators.executed_lines import Executed, GoldenDrive, lines_of
-from mutator.operators.mutation_selection import Found, find_mutations, sampled
+from mutator.operators.executed_lines import ExecutedLines, GoldenRunInputs, measure_executed_lines
+from mutator.operators.mutation_selection import SelectedMutations, sample_mutations, select_mutations
 from mutator.operators.mutations import Mutation
 from mutator.operators.statement_facts import facts_of
 from mutator.targets.manifest import TargetManifest
@@ -29,17 +29,23 @@ class OperatorFaults:
 
     def __init__(self, manifest: TargetManifest, models: FaultModels, limits: Limits) -> None:
         self._manifest, self._models, self._limits = manifest, models, limits
-        self._found: dict[tuple[OperatorSelection, frozenset[tuple[str, frozenset[int]]]], Found] = {}
+        self._found: dict[
+            tuple[OperatorSelection, frozenset[tuple[str, frozenset[int]]]], SelectedMutations
+        ] = {}
         self.told: dict[str, None] = {}  # lines that say what was found and left out, without duplicates
 
     def of(
-        self, selection: OperatorSelection, drives: Mapping[str, GoldenDrive], seed: int, reading: str
+        self, selection: OperatorSelection, drives: Mapping[str, GoldenRunInputs], seed: int, reading: str
     ) -> list[OperatorFault]:
         executed = dict(
-            zip(drives, lines_of(self._manifest, list(drives.values()), self._limits), strict=True)
+            zip(
+                drives,
+                measure_executed_lines(self._manifest, list(drives.values()), self._limits),
+                strict=True,
+            )
         )
         found = self._enumerated(selection, list(executed.values()))
-        drawn = sampled(found, selection.sample, seed)
+        drawn = sample_mutations(found, selection.sample, seed)
         if not drawn:
             raise MutatorError(
                 f"no mutant in {', '.join(selection.places)} ({found.told})",
@@ -57,12 +63,14 @@ class OperatorFaults:
             for one in drawn
         ]
 
-    def _enumerated(self, selection: OperatorSelection, executed: Sequence[Executed]) -> Found:
+    def _enumerated(
+        self, selection: OperatorSelection, executed: Sequence[ExecutedLines]
+    ) -> SelectedMutations:
         files = dict.fromkeys(path for lines in executed for path in lines)
         union = {path: frozenset().union(*(lines.get(path, ()) for lines in executed)) for path in files}
         key = (selection, frozenset(union.items()))
         if key not in self._found:
-            self._found[key] = find_mutations(
+            self._found[key] = select_mutations(
                 self._manifest, self._models, selection.operators, selection.places, union
             )
         return self._found[key]

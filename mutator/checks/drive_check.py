@@ -17,9 +17,9 @@ from mutator._common.files import ScratchFolder
 from mutator.campaigns.campaign_expansion import Expansion
 from mutator.campaigns.campaign_files import Campaign, load_campaign
 from mutator.checks import fast_engine_check, nondeterminism_causes
-from mutator.checks.findings import Finding, Level
+from mutator.checks.findings import CheckState, Finding
 from mutator.checks.first_difference import describe_first_difference
-from mutator.checks.reachability import Reach
+from mutator.checks.reachability import ReachTracker
 from mutator.engines import forkable
 from mutator.engines.engine_jobs import Execution, Job
 from mutator.engines.fork_engine import ForkEngine
@@ -30,19 +30,19 @@ from mutator.errors import NotForkable
 from mutator.model import Experiment, Limits
 from mutator.mutants.injected_lines import tag_of
 from mutator.mutants.mutant_building import build
-from mutator.mutants.probe import is_probe
+from mutator.mutants.probe import is_probe_path
 from mutator.preflight import canary
-from mutator.preflight.preflight_rules import CheckRun, judge_golden, judge_null, look
+from mutator.preflight.preflight_rules import CheckRun, golden_problem, null_mutant_problem, read_check_run
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always
 from mutator.workspace import Workspace
 
 _OTHER_HASH_SEED = 4242
-_BRIEF_S = 5.0  # slower golden runs are not repeated for the fast engines
-_MOST = 20  # places listed in a finding
+_MOST_REPEATED_RUN_S = 5.0  # slower golden runs are not repeated for the fast engines
+_MOST_PLACES = 20  # places listed in a finding
 
 
-def check_drive(workspace: Workspace, target: str, scenarios: Sequence[str] = ()) -> list[Finding]:
+def drive_findings(workspace: Workspace, target: str, scenarios: Sequence[str] = ()) -> list[Finding]:
     """Return the findings from golden runs of the scenarios (default: those of the target's campaigns, or
     else all).
 
@@ -51,11 +51,11 @@ def check_drive(workspace: Workspace, target: str, scenarios: Sequence[str] = ()
     unknown scenario or a mistake in the library; `check_library` reports all such mistakes.
     """
     with ScratchFolder("mutator-drive-") as scratch:
-        return _Drive(workspace, target, scenarios, scratch).findings()
+        return _DriveCheck(workspace, target, scenarios, scratch).findings()
 
 
 @dataclass(frozen=True)
-class _Golden:
+class _GoldenRuns:
     """The runs of a scenario.
 
     `first` runs the pristine target, and `watched` the counting mutant with another hash seed. `again` runs
@@ -67,19 +67,19 @@ class _Golden:
     again: Execution
 
 
-class _Drive:
+class _DriveCheck:
     def __init__(self, workspace: Workspace, target: str, scenarios: Sequence[str], scratch: Path) -> None:
         self.workspace = workspace
         self.manifest: TargetManifest = workspace.manifest(target)
-        loaded = [load_campaign(workspace.campaign(name)) for name in workspace.campaigns]
-        mine = [campaign for campaign in loaded if campaign.target == self.manifest.name]
-        used = dict.fromkeys(name for campaign in mine for name in campaign.scenarios)
+        campaigns = [load_campaign(workspace.campaign(name)) for name in workspace.campaigns]
+        target_campaigns = [campaign for campaign in campaigns if campaign.target == self.manifest.name]
+        used = dict.fromkeys(name for campaign in target_campaigns for name in campaign.scenarios)
         self.scenarios = list(dict.fromkeys(scenarios)) or list(used) or list(workspace.scenarios)
         for name in self.scenarios:
             workspace.scenario(name)
-        self.campaigns = [one for one in mine if set(one.scenarios) & set(self.scenarios)]
-        self.reach = Reach(workspace, self.manifest, self.campaigns)
-        settings = [_setting(workspace, campaign) for campaign in self.campaigns] or [()]
+        self.campaigns = [one for one in target_campaigns if set(one.scenarios) & set(self.scenarios)]
+        self.reach = ReachTracker(workspace, self.manifest, self.campaigns)
+        settings = [_scenario_changes(workspace, campaign) for campaign in self.campaigns] or [()]
         self.setting = () if () in settings else settings[0]
         self.settings = list(dict.fromkeys(settings))
         limits = self.campaigns[0].limits if self.campaigns else Limits()
@@ -91,48 +91,54 @@ class _Drive:
 
     def findings(self) -> list[Finding]:
         with ThreadPoolExecutor(usable_cores()) as pool:
-            jobs = [job for name in self.scenarios for job in self._jobs(name)]
+            jobs = [job for name in self.scenarios for job in self._first_jobs(name)]
             runs = dict(zip((job.name for job in jobs), pool.map(self._run, jobs), strict=True))
-            goldens = {name: self._golden(name, runs) for name in self.scenarios}
-            found = [self._determinism(name, golden) for name, golden in goldens.items()]
-            if all(self._look(golden.first).problem for golden in goldens.values()):
-                return found  # failed runs allow no further findings
-            found += self._clocks(goldens) if all(one.level is Level.OK for one in found) else []
-            found.append(self._forking(goldens, well=found[0].level is Level.OK))
+            goldens = {name: self._golden_runs(name, runs) for name in self.scenarios}
+            findings = [self._determinism_finding(name, golden) for name, golden in goldens.items()]
+            if all(self._check_run(golden.first).problem for golden in goldens.values()):
+                return findings  # failed runs allow no further findings
+            findings += (
+                self._clock_findings(goldens)
+                if all(finding.level is CheckState.OK for finding in findings)
+                else []
+            )
+            findings.append(
+                self._forking_finding(goldens, is_deterministic=findings[0].level is CheckState.OK)
+            )
             for name, golden in goldens.items():
-                self._take(name, self.setting, golden.watched)
-            canaries = pool.map(self._canary, self._canaries())
-            self._reach_more()
-            return [*found, *self.reach.findings(), *canaries]
+                self._record_reach(name, self.setting, golden.watched)
+            canaries = pool.map(self._canary_finding, self._canary_experiments())
+            self._run_with_further_changes()
+            return [*findings, *self.reach.findings(), *canaries]
 
     # Runs
 
-    def _jobs(self, scenario: str) -> Iterator[Job]:
-        yield self._job("first", scenario, self.setting)
-        yield self._counting(scenario, self.setting)
+    def _first_jobs(self, scenario: str) -> Iterator[Job]:
+        yield self._pristine_job("first", scenario, self.setting)
+        yield self._counting_job(scenario, self.setting)
 
-    def _golden(self, scenario: str, runs: Mapping[str, Execution]) -> _Golden:
+    def _golden_runs(self, scenario: str, runs: Mapping[str, Execution]) -> _GoldenRuns:
         first, watched = runs[f"first-{scenario}"], runs[f"counting-{scenario}"]
-        one, other = self._look(first), self._look(watched)
-        if one.problem or (one.digest == other.digest and not other.problem):
-            return _Golden(first, watched, watched)
-        again = replace(self._job("again", scenario, self.setting), hash_seed=_OTHER_HASH_SEED)
-        if other.problem:  # watching might be the cause
-            counting = self._counting(scenario, self.setting)
+        first_run, watched_run = self._check_run(first), self._check_run(watched)
+        if first_run.problem or (first_run.digest == watched_run.digest and not watched_run.problem):
+            return _GoldenRuns(first, watched, watched)
+        again = replace(self._pristine_job("again", scenario, self.setting), hash_seed=_OTHER_HASH_SEED)
+        if watched_run.problem:  # watching might be the cause
+            counting = self._counting_job(scenario, self.setting)
             watched = self._run(replace(counting, name=f"unwatched-{scenario}", watch=False))
-        return _Golden(first, watched, self._run(again))
+        return _GoldenRuns(first, watched, self._run(again))
 
-    def _job(self, kind: str, scenario: str, changes: tuple[str, ...]) -> Job:
+    def _pristine_job(self, kind: str, scenario: str, changes: tuple[str, ...]) -> Job:
         file = self.workspace.scenario(scenario)
         return Job(name=f"{kind}-{scenario}", scenario=file, seed=self.seed, changes=changes)
 
-    def _counting(self, scenario: str, changes: tuple[str, ...]) -> Job:
+    def _counting_job(self, scenario: str, changes: tuple[str, ...]) -> Job:
         mutant = self.reach.counting
         return replace(
-            self._job("counting", scenario, changes),
+            self._pristine_job("counting", scenario, changes),
             files=mutant.files,
             mutant=mutant.id,
-            injections=mutant.injections,
+            injections=mutant.injection_ids,
             hash_seed=_OTHER_HASH_SEED,
             watch=True,
         )
@@ -141,167 +147,198 @@ class _Drive:
         folder = inside(self.engine.work, f"{job.name}-{'-'.join(job.changes)}")
         return self.engine.execute(job, folder)
 
-    def _look(self, execution: Execution) -> CheckRun:
-        return look(self.manifest, execution)
+    def _check_run(self, execution: Execution) -> CheckRun:
+        return read_check_run(self.manifest, execution)
 
     # Determinism
 
-    def _determinism(self, scenario: str, golden: _Golden) -> Finding:
+    def _determinism_finding(self, scenario: str, golden: _GoldenRuns) -> Finding:
         """Check that the runs give the same bytes and reach no hazard."""
         name = f"golden {scenario}"
-        first, watched, again = (self._look(one) for one in (golden.first, golden.watched, golden.again))
-        problem = judge_golden(first, again)
-        if not problem and not (problem := judge_null(first, watched)):
-            found = f"the same bytes twice, in {golden.first.wall_s:.1f} s each"
-            return Finding(name=name, level=Level.OK, found=found)
+        first, watched, again = (
+            self._check_run(execution) for execution in (golden.first, golden.watched, golden.again)
+        )
+        problem = golden_problem(first, again)
+        if not problem and not (problem := null_mutant_problem(first, watched)):
+            success = f"the same bytes twice, in {golden.first.wall_s:.1f} s each"
+            return Finding(name=name, level=CheckState.OK, found=success)
         if first.problem or again.problem or watched.problem or first.digest == again.digest:
             remedy = "fix the target, the scenario or the manifest: no campaign can start"
-            return Finding(name=name, level=Level.FAIL, found=problem, remedy=remedy)
-        same = self._look(self._run(self._job("same", scenario, self.setting)))
-        return self._not_deterministic(name, golden, by_hash=same.digest == first.digest)
+            return Finding(name=name, level=CheckState.FAIL, found=problem, remedy=remedy)
+        same = self._check_run(self._run(self._pristine_job("same", scenario, self.setting)))
+        return self._nondeterminism_finding(name, golden, by_hash=same.digest == first.digest)
 
-    def _not_deterministic(self, name: str, golden: _Golden, *, by_hash: bool) -> Finding:
+    def _nondeterminism_finding(self, name: str, golden: _GoldenRuns, *, by_hash: bool) -> Finding:
         where = describe_first_difference(self.manifest, golden.first.out, golden.again.out)
-        places, remedy = nondeterminism_causes.likely(self.manifest, self._noted(golden), by_hash=by_hash)
+        places, remedy = nondeterminism_causes.likely_causes(
+            self.manifest, self._notes_with_target_lines(golden), by_hash=by_hash
+        )
         which = ", but only if their hash seeds differ" if by_hash else ""
         likely = f"; likely {'cause' if len(places) == 1 else 'causes'}:" if places else ""
         return Finding(
             name=name,
-            level=Level.FAIL,
+            level=CheckState.FAIL,
             found=f"two runs differ{which}; they first differ {where}{likely}",
             places=tuple(places),
             remedy=remedy,
         )
 
-    def _noted(self, golden: _Golden) -> dict[str, Any]:
+    def _notes_with_target_lines(self, golden: _GoldenRuns) -> dict[str, Any]:
         """Return the notes of the watched run, with the target's own line numbers."""
         files = self.reach.counting.files
         noted = [
-            one
-            | {"line": _own_line(files[one["file"]], one["line"]) if one["file"] in files else one["line"]}
-            for one in golden.watched.watched.get("noted", ())
-            if not is_probe(one["file"])
+            note
+            | {
+                "line": _target_line(files[note["file"]], note["line"])
+                if note["file"] in files
+                else note["line"]
+            }
+            for note in golden.watched.watched.get("noted", ())
+            if not is_probe_path(note["file"])
         ]
         return {**golden.watched.watched, "noted": noted}
 
-    def _clocks(self, goldens: Mapping[str, _Golden]) -> list[Finding]:
-        noted = [
+    def _clock_findings(self, goldens: Mapping[str, _GoldenRuns]) -> list[Finding]:
+        places = [
             place
             for golden in goldens.values()
-            for place in nondeterminism_causes.of_kind(self._noted(golden), CLOCK)
+            for place in nondeterminism_causes.places_of_kind(self._notes_with_target_lines(golden), CLOCK)
         ]
-        if not noted:
+        if not places:
             return []
-        found = "the target reads clocks, but neither trace nor record depends on them"
+        message = "the target reads clocks, but neither trace nor record depends on them"
         return [
-            Finding(name="clocks", level=Level.OK, found=found, places=tuple(dict.fromkeys(noted))[:_MOST])
+            Finding(
+                name="clocks",
+                level=CheckState.OK,
+                found=message,
+                places=tuple(dict.fromkeys(places))[:_MOST_PLACES],
+            )
         ]
 
     # Fast engines
 
-    def _forking(self, goldens: Mapping[str, _Golden], *, well: bool) -> Finding:
+    def _forking_finding(self, goldens: Mapping[str, _GoldenRuns], *, is_deterministic: bool) -> Finding:
         """Report whether a golden run can be forked between its steps.
 
         This is tried only if the run is fast and deterministic (`well`); otherwise, only its threads are
         checked.
         """
         scenario, golden = next(iter(goldens.items()))
-        tried = well and golden.first.wall_s <= _BRIEF_S
+        is_tried = is_deterministic and golden.first.wall_s <= _MOST_REPEATED_RUN_S
         refusal = forkable.unfit(self.manifest)
         if not refusal:
-            refusal = self._refusal(scenario, golden) if tried else _threads(golden.watched)
-        if refusal is None and not tried:
+            refusal = self._forking_refusal(scenario, golden) if is_tried else _thread_refusal(golden.watched)
+        if refusal is None and not is_tried:
             why = (
                 f"because a golden run takes {golden.first.wall_s:.0f} s"
-                if well
+                if is_deterministic
                 else "because a golden run fails or is not deterministic"
             )
-            found = f"no threads prevent forking; forking was not tried, {why}"
-            return Finding(name=fast_engine_check.NAME, level=Level.OK if well else Level.WARN, found=found)
-        told = fast_engine_check.finding(refusal)
+            message = f"no threads prevent forking; forking was not tried, {why}"
+            return Finding(
+                name=fast_engine_check.FINDING_NAME,
+                level=CheckState.OK if is_deterministic else CheckState.WARN,
+                found=message,
+            )
+        finding = fast_engine_check.forking_finding(refusal)
         if refusal is None or "thread" not in str(refusal):
-            return told
-        noted = [self._noted(one) for one in goldens.values()]
-        places = dict.fromkeys(place for one in noted for place in nondeterminism_causes.of_kind(one, THREAD))
-        return replace(told, places=tuple(places))
+            return finding
+        noted = [self._notes_with_target_lines(golden_runs) for golden_runs in goldens.values()]
+        places = dict.fromkeys(
+            place
+            for golden_runs in noted
+            for place in nondeterminism_causes.places_of_kind(golden_runs, THREAD)
+        )
+        return replace(finding, places=tuple(places))
 
-    def _refusal(self, scenario: str, golden: _Golden) -> NotForkable | None:
+    def _forking_refusal(self, scenario: str, golden: _GoldenRuns) -> NotForkable | None:
         null = build(self.manifest, self.workspace.fault_models(), None, always())
         work = self._scratch / "fork"
         work.mkdir()
-        fork = ForkEngine(self.manifest, work, self.engine.limits, null=null)
+        engine = ForkEngine(self.manifest, work, self.engine.limits, null=null)
         try:
-            return fork.refusal(replace(self._job("fork", scenario, self.setting), golden=golden.first.out))
+            return engine.refusal(
+                replace(self._pristine_job("fork", scenario, self.setting), golden=golden.first.out)
+            )
         finally:
-            fork.close()
+            engine.close()
 
     # Statements and triggers
 
-    def _take(self, scenario: str, changes: tuple[str, ...], execution: Execution) -> None:
+    def _record_reach(self, scenario: str, changes: tuple[str, ...], execution: Execution) -> None:
         self.reach.take(scenario, changes, execution.probe, execution.watched.get("seen", ()))
 
-    def _reach_more(self) -> None:
+    def _run_with_further_changes(self) -> None:
         """Run with the changes that faults and campaigns make, until every statement and trigger is reached
         or no changes are left.
         """
-        own = list(dict.fromkeys(one.changes for one in self.reach.unexecuted if one.changes))
-        for changes in own:
+        fault_changes = list(
+            dict.fromkeys(statement.changes for statement in self.reach.unexecuted if statement.changes)
+        )
+        for changes in fault_changes:
             for scenario in self.scenarios:
-                if any(one.changes == changes for one in self.reach.unexecuted):
-                    self._drive_on(scenario, (*changes, *self.setting))
+                if any(statement.changes == changes for statement in self.reach.unexecuted):
+                    self._run_counting_mutant(scenario, (*changes, *self.setting))
         for setting in self.settings:
-            left = [one.changes for one in self.reach.unexecuted] + [()] * bool(self.reach.untriggered)
-            for changes in dict.fromkeys(left):
+            remaining = [statement.changes for statement in self.reach.unexecuted] + [()] * bool(
+                self.reach.untriggered
+            )
+            for changes in dict.fromkeys(remaining):
                 if setting != self.setting:
-                    self._drive_on(self.scenarios[0], (*changes, *setting))
+                    self._run_counting_mutant(self.scenarios[0], (*changes, *setting))
 
-    def _drive_on(self, scenario: str, changes: tuple[str, ...]) -> None:
+    def _run_counting_mutant(self, scenario: str, changes: tuple[str, ...]) -> None:
         changes = tuple(dict.fromkeys(changes))
-        self._take(scenario, changes, self._run(self._counting(scenario, changes)))
+        self._record_reach(scenario, changes, self._run(self._counting_job(scenario, changes)))
 
     # Canaries
 
-    def _canaries(self) -> list[tuple[str, Experiment, str]]:
+    def _canary_experiments(self) -> list[tuple[str, Experiment, str]]:
         """Campaign, canary and hazard. Canaries that differ only in their setting are tried once."""
-        found: dict[object, tuple[str, Experiment, str]] = {}
-        for campaign in sorted(self.campaigns, key=lambda one: len(_setting(self.workspace, one))):
-            reading = _reading(self.workspace, campaign)
-            if campaign.canary not in found and campaign.canary.scenario in self.scenarios:
-                made = Expansion(self.workspace, campaign, self.manifest, campaign.seed, reading).canary()
-                found[campaign.canary] = (campaign.name, made, campaign.canary.hazard)
-        return list(found.values())
+        canaries: dict[object, tuple[str, Experiment, str]] = {}
+        for campaign in sorted(self.campaigns, key=lambda one: len(_scenario_changes(self.workspace, one))):
+            reading = _reading_of(self.workspace, campaign)
+            if campaign.canary not in canaries and campaign.canary.scenario in self.scenarios:
+                experiment = Expansion(
+                    self.workspace, campaign, self.manifest, campaign.seed, reading
+                ).canary()
+                canaries[campaign.canary] = (campaign.name, experiment, campaign.canary.hazard)
+        return list(canaries.values())
 
-    def _canary(self, one: tuple[str, Experiment, str]) -> Finding:
-        campaign, experiment, hazard = one
+    def _canary_finding(self, canary_experiment: tuple[str, Experiment, str]) -> Finding:
+        campaign, experiment, hazard = canary_experiment
 
         def run(tried: Experiment) -> CheckRun:
-            return self._look(self._run(canary.job(self.workspace, self.manifest, tried)))
+            return self._check_run(self._run(canary.build_job(self.workspace, self.manifest, tried)))
 
-        problem, found = canary.judge(canary.tries(self.workspace, self.manifest, experiment), run, hazard)
+        problem, success = canary.run_until_hazard(
+            canary.experiments_to_try(self.workspace, self.manifest, experiment), run, hazard
+        )
         return Finding(
             name=f"canary {campaign}",
-            level=Level.FAIL if problem else Level.OK,
-            found=f"{experiment.fault.spec} in {experiment.scenario} {problem or found}",
+            level=CheckState.FAIL if problem else CheckState.OK,
+            found=f"{experiment.fault.spec} in {experiment.scenario} {problem or success}",
             remedy="choose another fault, an earlier time or another scenario for `canary`"
             if problem
             else "",
         )
 
 
-def _threads(watched: Execution) -> NotForkable | None:
-    others = watched.watched.get("threads", [])
-    return NotForkable(too_many(others), turned_off(others)) if others else None
+def _thread_refusal(watched: Execution) -> NotForkable | None:
+    threads = watched.watched.get("threads", [])
+    return NotForkable(too_many(threads), turned_off(threads)) if threads else None
 
 
-def _reading(workspace: Workspace, campaign: Campaign) -> str:
+def _reading_of(workspace: Workspace, campaign: Campaign) -> str:
     return campaign.reading or workspace.readings().default
 
 
-def _setting(workspace: Workspace, campaign: Campaign) -> tuple[str, ...]:
-    return campaign.setting_in(_reading(workspace, campaign))
+def _scenario_changes(workspace: Workspace, campaign: Campaign) -> tuple[str, ...]:
+    return campaign.setting_in(_reading_of(workspace, campaign))
 
 
-def _own_line(data: bytes, line: int) -> int:
+def _target_line(data: bytes, line: int) -> int:
     """Convert a line number in a mutant's file to the one in the target's own file."""
     tags = map(tag_of, data.splitlines()[: line - 1])
-    return line - sum(tag is not None and tag.was is None for tag in tags)
+    return line - sum(tag is not None and tag.replaced_line is None for tag in tags)

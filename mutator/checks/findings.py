@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 
-class Level(StrEnum):
+class CheckState(StrEnum):
     """The effect of a finding on campaigns."""
 
     OK = "ok"
@@ -13,7 +13,7 @@ class Level(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Place:
+class FindingPlace:
     """A line that a finding is about, and what is there. `file` can be relative to the target's root."""
 
     file: str
@@ -30,7 +30,7 @@ class Finding:
     """The result of one check, with a remedy if there is a problem."""
 
     name: str
-    level: Level
+    level: CheckState
     found: str
     remedy: str = ""
-    places: tuple[Place, ...] = ()
+    places: tuple[FindingPlace, ...] = ()

@@ -19,8 +19,8 @@ from mutator.model import Fault
 from mutator.mutants.anchors import parse_file
 from mutator.mutants.injection_edits import edits_of, injection_edit
 from mutator.mutants.mutant_building import build
-from mutator.mutants.splicing import apply_edits, in_lines, joined, unsplice
-from mutator.onboarding.todo_marks import unfilled
+from mutator.mutants.splicing import apply_edits, as_line_edits, join_pieces, unsplice
+from mutator.onboarding.todo_marks import unfilled_mark_errors
 from mutator.stpa.analysis_checks import check_analysis
 from mutator.stpa.context_tables import ContextTable
 from mutator.targets.manifest import TargetManifest
@@ -29,10 +29,10 @@ from mutator.triggers.trigger_kinds import always
 from mutator.workspace import Workspace
 
 EXAMPLE_TAG = "example"
-T = TypeVar("T")
+Result = TypeVar("Result")
 
 
-def check_library(workspace: Workspace, target: str) -> list[MutatorError]:
+def library_problems(workspace: Workspace, target: str) -> list[MutatorError]:
     """Every problem of the library, templates and target, in file order.
 
     * All placeholders must be filled in.
@@ -43,76 +43,78 @@ def check_library(workspace: Workspace, target: str) -> list[MutatorError]:
     * Campaigns must load, and their studies must find valid data.
     * A hazard analysis, if any, must have no gap.
     """
-    found = _Found()
-    found.problems += unfilled(workspace.library)
-    manifest = found.tried(lambda: workspace.manifest(target))
+    collector = _ProblemCollector()
+    collector.problems += unfilled_mark_errors(workspace.library)
+    manifest = collector.tried(lambda: workspace.manifest(target))
     if manifest:
-        found.tried(lambda: check_requirements(manifest))
-        found.tried(lambda: workspace.scale_of(manifest))
-    models = found.tried(workspace.fault_models)
-    hazards = found.tried(workspace.hazards)
-    tables = [found.tried(partial(workspace.context_table, name)) for name in workspace.context_tables]
-    readings = found.tried(workspace.readings)
+        collector.tried(lambda: check_requirements(manifest))
+        collector.tried(lambda: workspace.scale_of(manifest))
+    models = collector.tried(workspace.fault_models)
+    hazards = collector.tried(workspace.hazards)
+    tables = [collector.tried(partial(workspace.context_table, name)) for name in workspace.context_tables]
+    readings = collector.tried(workspace.readings)
     spec_files = workspace.spec_files() if readings else ()
-    specs = [found.tried(partial(workspace.spec, path)) for path in spec_files]
+    specs = [collector.tried(partial(workspace.spec, path)) for path in spec_files]
     if models:
-        found.problems += check_examples(models)
+        collector.problems += example_problems(models)
     if manifest and hazards:
-        found.problems += _unknown_hazards(manifest, tuple(hazards.hazards), [t for t in tables if t])
-    if manifest and models and found.tried(lambda: build(manifest, models, None, always())):
+        collector.problems += _unknown_hazard_problems(
+            manifest, tuple(hazards.hazards), [t for t in tables if t]
+        )
+    if manifest and models and collector.tried(lambda: build(manifest, models, None, always())):
         for spec in specs:
-            found.problems += check_spec(spec, models, manifest) if spec else ()
+            collector.problems += spec_problems(spec, models, manifest) if spec else ()
     if readings:
-        found.problems += check_campaigns(workspace, readings, manifest)
-    if not found.problems:
-        checked = found.tried(workspace.specs)
-        analysis = found.tried(workspace.analysis)
-        if analysis and checked and manifest:
-            found.problems += check_analysis(analysis, checked, manifest)
-    return found.problems
+        collector.problems += campaign_problems(workspace, readings, manifest)
+    if not collector.problems:
+        specs_in_order = collector.tried(workspace.specs)
+        analysis = collector.tried(workspace.analysis)
+        if analysis and specs_in_order and manifest:
+            collector.problems += check_analysis(analysis, specs_in_order, manifest)
+    return collector.problems
 
 
-def check_campaigns(
+def campaign_problems(
     workspace: Workspace, readings: Readings, manifest: TargetManifest | None = None
 ) -> list[MutatorError]:
     """Problems of the library's campaigns, and those that their studies find in the library's data.
 
     With a `manifest`, triggers that use values which this target does not observe are problems too.
     """
-    found, asked = _Found(), set[str]()
+    collector, checked_studies = _ProblemCollector(), set[str]()
     for name in workspace.campaigns:
-        campaign = found.tried(partial(load_campaign, workspace.campaign(name)))
+        campaign = collector.tried(partial(load_campaign, workspace.campaign(name)))
         if campaign is None:
             continue
-        found.tried(partial(check_readings, campaign, readings))
+        collector.tried(partial(check_readings, campaign, readings))
         if manifest and manifest.name == campaign.target:
-            found.tried(partial(_check_triggers, campaign, manifest))
-        study = found.tried(partial(load_study, campaign))
-        if study and campaign.study and campaign.study not in asked:
-            asked.add(campaign.study)
+            collector.tried(partial(_check_triggers, campaign, manifest))
+        study = collector.tried(partial(load_study, campaign))
+        if study and campaign.study and campaign.study not in checked_studies:
+            checked_studies.add(campaign.study)
             problems = study_problems(campaign.study, study, workspace)
-            found.problems += [_placed(problem, campaign) for problem in problems]
-    return found.problems
+            collector.problems += [_located_problem(problem, campaign) for problem in problems]
+    return collector.problems
 
 
 def _check_triggers(campaign: Campaign, manifest: TargetManifest) -> None:
     listed_triggers(campaign.listed, campaign.yaml, manifest, armed_after_s=0.0, hold_s=None)
 
 
-def _placed(problem: MutatorError, campaign: Campaign) -> MutatorError:
+def _located_problem(problem: MutatorError, campaign: Campaign) -> MutatorError:
     """Locate a study's problem at the campaign that uses the study, unless the problem names a file."""
     if problem.where:
         return problem
     return campaign.yaml.error(("study",), problem.got, expected=problem.expected, remedy=problem.remedy)
 
 
-class _Found:
+class _ProblemCollector:
     """Collects problems instead of stopping at the first."""
 
     def __init__(self) -> None:
         self.problems: list[MutatorError] = []
 
-    def tried(self, make: Callable[[], T]) -> T | None:
+    def tried(self, make: Callable[[], Result]) -> Result | None:
         """Return the result of `make`; None if that fails."""
         try:
             return make()
@@ -121,7 +123,7 @@ class _Found:
             return None
 
 
-def check_spec(spec: FaultSpec, models: FaultModels, manifest: TargetManifest) -> Iterator[MutatorError]:
+def spec_problems(spec: FaultSpec, models: FaultModels, manifest: TargetManifest) -> Iterator[MutatorError]:
     for reading in spec.readings.names:
         try:
             faults = expand(spec, 0, reading, models=models, manifest=manifest)
@@ -132,23 +134,23 @@ def check_spec(spec: FaultSpec, models: FaultModels, manifest: TargetManifest) -
             if reading in variant.readings:
                 name = f"{spec.name}/{variant.name}"
                 fault = next(f for f in faults if f.spec == name)
-                yield from _unbuildable(spec, variant, fault, models, manifest)
+                yield from _build_problems(spec, variant, fault, models, manifest)
 
 
-def _unbuildable(
+def _build_problems(
     spec: FaultSpec, variant: Variant, fault: Fault, models: FaultModels, manifest: TargetManifest
 ) -> Iterator[MutatorError]:
     """Yield why a fault of a variant cannot be built, located at the injection that is the cause, if any."""
     try:
         build(manifest, models, fault, always())
     except MutatorError as error:
-        keys = (*variant.keys, fault.reading, *_cause(fault, models, manifest))
-        got = f"{fault.spec} ({fault.reading}): {error.got}{_where(error, manifest)}"
+        keys = (*variant.keys, fault.reading, *_keys_of_failing_injection(fault, models, manifest))
+        got = f"{fault.spec} ({fault.reading}): {error.got}{_describe_target_place(error, manifest)}"
         remedy = error.remedy or "correct the spec or the target"
         yield spec.source.error(keys, got, expected=error.expected, remedy=remedy)
 
 
-def _cause(fault: Fault, models: FaultModels, manifest: TargetManifest) -> Keys:
+def _keys_of_failing_injection(fault: Fault, models: FaultModels, manifest: TargetManifest) -> Keys:
     """Return the keys of the first injection without an edit; none if all have one."""
     for count in range(1, len(fault.injections) + 1):
         try:
@@ -158,7 +160,7 @@ def _cause(fault: Fault, models: FaultModels, manifest: TargetManifest) -> Keys:
     return ()
 
 
-def _where(error: MutatorError, manifest: TargetManifest) -> str:
+def _describe_target_place(error: MutatorError, manifest: TargetManifest) -> str:
     """Return the place of an error in the target, with the file named as in specs: ` (pkg/sonar.py:28)`."""
     if not error.where:
         return ""
@@ -166,29 +168,31 @@ def _where(error: MutatorError, manifest: TargetManifest) -> str:
     return f" ({path})" if error.line is None else f" ({path}:{error.line})"
 
 
-def _unknown_hazards(
-    manifest: TargetManifest, known: tuple[str, ...], tables: list[ContextTable]
+def _unknown_hazard_problems(
+    manifest: TargetManifest, hazard_names: tuple[str, ...], tables: list[ContextTable]
 ) -> Iterator[MutatorError]:
     for name in manifest.hazards:
-        if name not in known:
-            yield MutatorError(f"hazard '{name}'", where=manifest.path, expected=f"one of {', '.join(known)}")
+        if name not in hazard_names:
+            yield MutatorError(
+                f"hazard '{name}'", where=manifest.path, expected=f"one of {', '.join(hazard_names)}"
+            )
     for table in tables:
         for row in table.rows:
             for action, verdicts in row.actions.items():
                 for hazard in (verdicts.provided, verdicts.not_provided):
-                    if hazard is not None and hazard not in known:
+                    if hazard is not None and hazard not in hazard_names:
                         yield table.source.error(
                             ("contexts", row.id, "actions", action),
                             f"hazard '{hazard}' of {action} in {row.id}",
-                            expected=f"one of {', '.join(known)}, or null",
+                            expected=f"one of {', '.join(hazard_names)}, or null",
                         )
 
 
-def check_examples(models: FaultModels) -> Iterator[MutatorError]:
+def example_problems(models: FaultModels) -> Iterator[MutatorError]:
     for model in models:
         for example in model.examples:
             try:
-                after = run_example(model, models, example)
+                after = apply_example(model, models, example)
             except MutatorError as error:
                 yield MutatorError(f"the example fails: {error}", where=model.source.path, line=example.line)
                 continue
@@ -202,12 +206,12 @@ def check_examples(models: FaultModels) -> Iterator[MutatorError]:
                 )
 
 
-def run_example(model: FaultModel, models: FaultModels, example: Example) -> str:
+def apply_example(model: FaultModel, models: FaultModels, example: Example) -> str:
     """Splice the example's injection into its `before`; the result must also un-splice."""
     file = parse_file(example.injection.location.path, example.before.encode(), Path("example"))
     injection = resolve(example.injection, model, model.source)
     edit = injection_edit(file, models, injection, EXAMPLE_TAG)
-    after = joined(apply_edits(file, in_lines(file, [edit])))
+    after = join_pieces(apply_edits(file, as_line_edits(file, [edit])))
     if unsplice(after) != file.data:
         raise MutatorError("the example does not un-splice to its `before`")
     return after.decode()

@@ -14,50 +14,53 @@ import numpy as np
 from mutator._common.message_text import counted
 from mutator.campaigns.campaign_files import Campaign
 from mutator.campaigns.campaign_triggers import listed_triggers
-from mutator.checks.findings import Finding, Level, Place
+from mutator.checks.findings import CheckState, Finding, FindingPlace
 from mutator.faults.fault_models import FaultModel, FaultModels, SnippetKind
 from mutator.model import Fault, FaultLocation, Injection, Method, Trigger
 from mutator.mutants.mutant_building import Mutant, build
-from mutator.preflight.unreached_triggers import decision_of, holds
+from mutator.preflight.unreached_triggers import armed_condition_of, is_ever_active
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always, at_time
 from mutator.workspace import Workspace
 
-_COUNT = "count_only"
-_MOST = 20  # places listed in a finding
+_COUNTING_MODEL = "count_only"
+_MOST_PLACES = 20  # places listed in a finding
 
 
 @dataclass(frozen=True, kw_only=True)
-class Wanted:
+class SpecStatement:
     """A statement that fault specs name, and the scenario changes that its faults need."""
 
     location: FaultLocation
-    place: Place  # in the spec
+    place: FindingPlace  # in the spec
     changes: tuple[str, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Awaited:
+class AwaitedTrigger:
     """A trigger of a context table or of a campaign's list, armed as in campaigns."""
 
     trigger: Trigger
-    place: Place  # in the table or the campaign
+    place: FindingPlace  # in the table or the campaign
 
 
-class Reach:
+class ReachTracker:
     """The statements and triggers of a library that no run has reached yet."""
 
     def __init__(self, workspace: Workspace, manifest: TargetManifest, campaigns: Sequence[Campaign]) -> None:
         self._manifest = manifest
-        wanted = list(_statements(workspace, manifest))
-        self._statements = len(wanted)
-        self.counting, self._ids = _counting(workspace, manifest, [one.location for one in wanted])
-        self.unexecuted = wanted
-        self.untriggered = list(_triggers(workspace, manifest, campaigns))
-        self._triggers = len(self.untriggered)
-        self._driven: list[str] = []  # scenarios with their changes
-        self._decisions = {
-            one.trigger: decision_of(workspace, manifest, one.trigger) for one in self.untriggered
+        statements = list(_spec_statements(workspace, manifest))
+        self._statement_count = len(statements)
+        self.counting, self._location_by_id = _build_counting_mutant(
+            workspace, manifest, [statement.location for statement in statements]
+        )
+        self.unexecuted = statements
+        self.untriggered = list(_awaited_triggers(workspace, manifest, campaigns))
+        self._trigger_count = len(self.untriggered)
+        self._scenarios_run: list[str] = []  # scenarios with their changes
+        self._condition_by_trigger = {
+            statement.trigger: armed_condition_of(workspace, manifest, statement.trigger)
+            for statement in self.untriggered
         }
 
     def take(
@@ -65,82 +68,92 @@ class Reach:
         scenario: str,
         changes: Sequence[str],
         probe: Mapping[str, Any] | None,
-        seen: Iterable[Sequence[float]],
+        observations: Iterable[Sequence[float]],
     ) -> None:
         """Remove the statements and triggers that a run of the counting mutant reached, according to its
         probe's report and its observations (`seen`).
 
         A statement is removed only if the run had the changes that its fault needs.
         """
-        self._driven.append("+".join((scenario, *changes)))
+        self._scenarios_run.append("+".join((scenario, *changes)))
         counts = (probe or {}).get("injections", {})
-        executed = {self._ids[name] for name, told in counts.items() if told["count"]}
+        executed = {self._location_by_id[name] for name, entry in counts.items() if entry["count"]}
         self.unexecuted = [
-            one
-            for one in self.unexecuted
-            if one.location not in executed or not set(one.changes) <= set(changes)
+            statement
+            for statement in self.unexecuted
+            if statement.location not in executed or not set(statement.changes) <= set(changes)
         ]
-        rows = np.array(list(seen), dtype=float)
-        self.untriggered = [one for one in self.untriggered if not holds(self._decisions[one.trigger], rows)]
+        rows = np.array(list(observations), dtype=float)
+        self.untriggered = [
+            statement
+            for statement in self.untriggered
+            if not is_ever_active(self._condition_by_trigger[statement.trigger], rows)
+        ]
 
     def findings(self) -> list[Finding]:
         return [
             self._finding(
                 "statement",
-                self._statements,
-                [one.place for one in self.unexecuted],
+                self._statement_count,
+                [statement.place for statement in self.unexecuted],
                 "faults there are never active: anchor them elsewhere, or add a scenario that reaches these "
                 "statements",
             ),
             self._finding(
                 "trigger",
-                self._triggers,
-                [one.place for one in self.untriggered],
+                self._trigger_count,
+                [statement.place for statement in self.untriggered],
                 "faults with such a trigger are never active: add a scenario in which it holds, or remove "
                 "it from the campaigns",
             ),
         ]
 
-    def _finding(self, noun: str, count: int, left: Sequence[Place], remedy: str) -> Finding:
+    def _finding(self, noun: str, count: int, unreached: Sequence[FindingPlace], remedy: str) -> Finding:
         name, whole = f"{noun}s", counted(count, noun)
-        if not left:
-            found = f"{whole}, {'which is' if count == 1 else 'which are all'} reached" if count else "none"
-            return Finding(name=name, level=Level.OK, found=found)
-        found = f"{len(left)} of {whole} never reached in {', '.join(self._driven)}"
-        places = tuple(left[:_MOST])
-        return Finding(name=name, level=Level.WARN, found=found, remedy=remedy, places=places)
+        if not unreached:
+            message = f"{whole}, {'which is' if count == 1 else 'which are all'} reached" if count else "none"
+            return Finding(name=name, level=CheckState.OK, found=message)
+        message = f"{len(unreached)} of {whole} never reached in {', '.join(self._scenarios_run)}"
+        places = tuple(unreached[:_MOST_PLACES])
+        return Finding(name=name, level=CheckState.WARN, found=message, remedy=remedy, places=places)
 
 
-def _statements(workspace: Workspace, manifest: TargetManifest) -> Iterator[Wanted]:
+def _spec_statements(workspace: Workspace, manifest: TargetManifest) -> Iterator[SpecStatement]:
     """Yield the first injection of each statement, for each set of changes."""
-    seen = set[object]()
+    yielded = set[object]()
     for spec in workspace.specs():
         for variant in spec:
-            for injection in (one for reading in variant.readings.values() for one in reading):
+            for injection in (
+                injection_spec for reading in variant.readings.values() for injection_spec in reading
+            ):
                 at, key = injection.location, (injection.location, variant.changes)
-                if key not in seen:
-                    seen.add(key)
+                if key not in yielded:
+                    yielded.add(key)
                     anchor = f"{at.anchor.kind.value} {at.anchor.name}".strip()
                     what = f"{spec.name}/{variant.name}: {at.path}, {at.function}, {anchor}"
-                    place = Place(file=str(spec.path), line=spec.source.line(injection.keys), what=what)
-                    yield Wanted(location=at, place=place, changes=variant.changes)
+                    place = FindingPlace(
+                        file=str(spec.path), line=spec.source.line(injection.keys), what=what
+                    )
+                    yield SpecStatement(location=at, place=place, changes=variant.changes)
 
 
-def _counting(
+def _build_counting_mutant(
     workspace: Workspace, manifest: TargetManifest, locations: Iterable[FaultLocation]
 ) -> tuple[Mutant, Mapping[str, FaultLocation]]:
     """Return the mutant that counts at all these places, and the location of each injection id."""
     models, once = workspace.fault_models(), list(dict.fromkeys(locations))
-    injections = tuple(Injection(location=location, model=_COUNT) for location in once)
-    fault = Fault(_COUNT, _COUNT, _COUNT, _COUNT, None, "", "", injections)
-    mutant = build(manifest, _with_count(models), fault, always())
-    return mutant, dict(zip(mutant.injections, once, strict=True))
+    injections = tuple(Injection(location=location, model=_COUNTING_MODEL) for location in once)
+    fault = Fault(
+        _COUNTING_MODEL, _COUNTING_MODEL, _COUNTING_MODEL, _COUNTING_MODEL, None, "", "", injections
+    )
+    mutant = build(manifest, _with_counting_model(models), fault, always())
+    return mutant, dict(zip(mutant.injection_ids, once, strict=True))
 
 
-def _with_count(models: FaultModels) -> FaultModels:
+def _with_counting_model(models: FaultModels) -> FaultModels:
     some = next(iter(models))
     count = FaultModel(
-        name=_COUNT,
+        name=_COUNTING_MODEL,
         kind=SnippetKind.INSERT,
         about="counts",
         params=(),
@@ -150,52 +163,55 @@ def _with_count(models: FaultModels) -> FaultModels:
         source=some.source,
         template_path=some.template_path,
     )
-    return replace(models, models={**models.models, _COUNT: count})
+    return replace(models, models={**models.models, _COUNTING_MODEL: count})
 
 
-def _triggers(
+def _awaited_triggers(
     workspace: Workspace, manifest: TargetManifest, campaigns: Sequence[Campaign]
-) -> Iterator[Awaited]:
+) -> Iterator[AwaitedTrigger]:
     """Yield the triggers that campaigns use, each armed as early as in any campaign, and the latest random
     times. Without campaigns, the triggers of all context tables.
     """
-    armed: dict[tuple[str, str], float] = {}
+    armed_after_s_by_row: dict[tuple[str, str], float] = {}
     for campaign in campaigns:
         earliest = min(campaign.armed_after_s.values(), default=manifest.armed_after_s)
-        for row in _rows(workspace, campaign):
-            armed[row] = min(armed.get(row, earliest), earliest)
-        yield from _listed(campaign, manifest, earliest)
+        for row in _context_rows(workspace, campaign):
+            armed_after_s_by_row[row] = min(armed_after_s_by_row.get(row, earliest), earliest)
+        yield from _listed_triggers(campaign, manifest, earliest)
         if (until := campaign.random_until_s) is not None and Method.RANDOM in campaign.methods:
             what = f"{campaign.name}: random times until {until:g} s"
-            place = _place(campaign.path, campaign.yaml.line(("triggers", "random_until_s")), what)
-            yield Awaited(trigger=at_time(until, name=campaign.name), place=place)
-    for name in {table: None for table, _ in armed} if campaigns else workspace.context_tables:
+            place = _yaml_place(campaign.path, campaign.yaml.line(("triggers", "random_until_s")), what)
+            yield AwaitedTrigger(trigger=at_time(until, name=campaign.name), place=place)
+    for name in {table: None for table, _ in armed_after_s_by_row} if campaigns else workspace.context_tables:
         table = workspace.context_table(name)
         for trigger in table.triggers(armed_after_s=manifest.armed_after_s):
-            if not campaigns or (name, trigger.name) in armed:
-                after = armed.get((name, trigger.name), manifest.armed_after_s)
+            if not campaigns or (name, trigger.name) in armed_after_s_by_row:
+                after = armed_after_s_by_row.get((name, trigger.name), manifest.armed_after_s)
                 what = f"{name}, {trigger.name}: {trigger.condition}, armed after {after:g} s"
-                place = _place(table.source.path, table.source.line(("contexts", trigger.name)), what)
-                yield Awaited(trigger=replace(trigger, armed_after_s=after), place=place)
+                place = _yaml_place(table.source.path, table.source.line(("contexts", trigger.name)), what)
+                yield AwaitedTrigger(trigger=replace(trigger, armed_after_s=after), place=place)
 
 
-def _rows(workspace: Workspace, campaign: Campaign) -> list[tuple[str, str]]:
+def _context_rows(workspace: Workspace, campaign: Campaign) -> list[tuple[str, str]]:
     if campaign.table is None:
         return []
     rows = campaign.rows or [row.id for row in workspace.context_table(campaign.table).rows]
     return [(campaign.table, row) for row in rows]
 
 
-def _listed(campaign: Campaign, manifest: TargetManifest, armed_after_s: float) -> Iterator[Awaited]:
+def _listed_triggers(
+    campaign: Campaign, manifest: TargetManifest, armed_after_s: float
+) -> Iterator[AwaitedTrigger]:
     triggers = listed_triggers(
         campaign.listed, campaign.yaml, manifest, armed_after_s=armed_after_s, hold_s=campaign.hold_s
     )
     for i, trigger in enumerate(triggers):
         what = f"{campaign.name}: {trigger.name}"
-        yield Awaited(
-            trigger=trigger, place=_place(campaign.path, campaign.yaml.line(("triggers", "list", i)), what)
+        yield AwaitedTrigger(
+            trigger=trigger,
+            place=_yaml_place(campaign.path, campaign.yaml.line(("triggers", "list", i)), what),
         )
 
 
-def _place(path: Path, line: int | None, what: str) -> Place:
-    return Place(file=str(path), line=line, what=what)
+def _yaml_place(path: Path, line: int | None, what: str) -> FindingPlace:
+    return FindingPlace(file=str(path), line=line, what=what)

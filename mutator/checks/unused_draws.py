@@ -8,38 +8,38 @@ from jinja2 import TemplateError
 from jinja2.meta import find_undeclared_variables
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 
-from mutator.checks.findings import Finding, Level, Place
+from mutator.checks.findings import CheckState, Finding, FindingPlace
 from mutator.faults.fault_models import NAMES, FaultModels, SnippetKind
 from mutator.faults.fault_specs import FaultSpec
 from mutator.faults.injection_specs import Drawn, InjectionSpec, reference
 
-_NAME = "draws"
+_FINDING_NAME = "draws"
 
 
 def unused_draws_finding(specs: tuple[FaultSpec, ...], models: FaultModels) -> Finding:
-    places = [*_of_specs(specs, models), *_of_models(models)]
+    places = [*_unused_draw_places(specs, models), *_unused_parameter_places(models)]
     if not places:
-        return Finding(name=_NAME, level=Level.OK, found="all drawn values are used")
+        return Finding(name=_FINDING_NAME, level=CheckState.OK, found="all drawn values are used")
     return Finding(
-        name=_NAME,
-        level=Level.WARN,
+        name=_FINDING_NAME,
+        level=CheckState.WARN,
         found=f"{len(places)} unused",
         remedy="use the value in a parameter (`by_m: NAME`), or remove it, because no fault depends on it",
         places=tuple(places),
     )
 
 
-def _of_specs(specs: tuple[FaultSpec, ...], models: FaultModels) -> Iterator[Place]:
+def _unused_draw_places(specs: tuple[FaultSpec, ...], models: FaultModels) -> Iterator[FindingPlace]:
     for spec in specs:
         for variant in spec:
             draw = variant.draw
             for reading, injections in variant.readings.items():
-                if draw and not any(_uses(one, draw.name, models) for one in injections):
+                if draw and not any(_does_use_draw(injection, draw.name, models) for injection in injections):
                     what = f"{spec.name}/{variant.name} draws '{draw.name}', unused in reading {reading}"
-                    yield Place(file=str(spec.path), line=spec.source.line(draw.keys), what=what)
+                    yield FindingPlace(file=str(spec.path), line=spec.source.line(draw.keys), what=what)
 
 
-def _uses(injection: InjectionSpec, name: str, models: FaultModels) -> bool:
+def _does_use_draw(injection: InjectionSpec, name: str, models: FaultModels) -> bool:
     model = models.get(injection.model)
     for param in injection.params:
         schema = model.param(param.name)
@@ -49,7 +49,7 @@ def _uses(injection: InjectionSpec, name: str, models: FaultModels) -> bool:
     return False
 
 
-def _of_models(models: FaultModels) -> Iterator[Place]:
+def _unused_parameter_places(models: FaultModels) -> Iterator[FindingPlace]:
     environment = ImmutableSandboxedEnvironment()
     for model in models:
         try:
@@ -62,4 +62,4 @@ def _of_models(models: FaultModels) -> Iterator[Place]:
             if param.name not in used:
                 what = f"parameter '{param.name}' of model {model.name}, unused in its template"
                 line = model.source.line(("params", param.name))
-                yield Place(file=str(model.source.path), line=line, what=what)
+                yield FindingPlace(file=str(model.source.path), line=line, what=what)

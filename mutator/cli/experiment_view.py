@@ -11,7 +11,7 @@ from mutator.api.stored_experiments import StoredExperiment, newest_run, stored_
 from mutator.api.worst import worst_results
 from mutator.cli.console import NO_BREAK, STYLES, Terminal, short_path
 from mutator.errors import MutatorError
-from mutator.mutants.readable_patches import readable
+from mutator.mutants.readable_patches import readable_patch
 
 if TYPE_CHECKING:
     from mutator.api.experiment_results import ExperimentResult
@@ -80,7 +80,7 @@ def print_experiment(
     for name, value in facts.items():
         terminal.say(f"{name.ljust(width)}  {value}", style="bold" if name == "fault" else None)
     terminal.say()
-    diff, note = readable(patch)
+    diff, note = readable_patch(patch)
     terminal.diff(diff)
     terminal.say(note, style="dim")
     terminal.say()

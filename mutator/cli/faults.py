@@ -14,7 +14,7 @@ from mutator.cli import completion
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json, Manifest, Place, Reading, Run, Seed, Value, Variant, with_place
 from mutator.errors import EXIT_HARNESS_ERRORS, MutatorError
-from mutator.mutants.readable_patches import readable
+from mutator.mutants.readable_patches import readable_patch
 
 _TRIED = Path("runs/try")
 EXPERIMENT_ID = re.compile(r"[0-9a-f]{4,16}")
@@ -177,7 +177,7 @@ def _print_diffs(terminal: Terminal, diffs: list[tuple[str, str, str]], *, whole
     for fault, _, patch in diffs:
         # `patch` skips text before a diff, so piped output can include the heading.
         terminal.say(f"# {fault}", style="bold", whole=True)
-        text, note = (patch, "") if whole else readable(patch)
+        text, note = (patch, "") if whole else readable_patch(patch)
         terminal.diff(text)
         if note:
             terminal.note(note)

@@ -61,7 +61,7 @@ def load_compared_run(run: Path, only: str | None = None) -> ComparedRun:
     """
     folder = RunFolder.open(run)
     records = folder.records()
-    equivalence_check.judge(folder, records)
+    equivalence_check.compare_sample(folder, records)
     accepts = compile_filter(only, PLAN_COLUMNS) if only else None
     experiments = tuple(
         e for e in plan_file.load_experiments(folder.path) if accepts is None or accepts(plan_row(e))

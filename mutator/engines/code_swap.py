@@ -14,7 +14,7 @@ from types import CodeType
 
 from mutator.errors import NotSwappable
 from mutator.mutants.constant_imports import module_name
-from mutator.mutants.injected_lines import sets_values, tag_of
+from mutator.mutants.injected_lines import has_value_settings, tag_of
 from mutator.mutants.probe import Probe, probe_path
 from mutator.mutants.splicing import unsplice
 from mutator.targets.manifest import TargetManifest
@@ -69,7 +69,7 @@ def plan_swap(manifest: TargetManifest, files: Mapping[str, bytes], probe: Probe
         functions += found
         settings += _settings(path, data, f"{tree}/{path}")
         imports |= dict.fromkeys(needed)
-    own, shared = probe.in_two
+    own, shared = probe.settings_and_code
     name = f"{tree}/{probe_file}"
     # cached, because compiling the shared part takes ten times as long
     code = (compile(own, name, "exec", dont_inherit=True), _compiled(shared.encode(), name))
@@ -92,7 +92,7 @@ def _in_file(
 
 
 def _settings(path: str, mutated: bytes, filename: str) -> list[tuple[str, CodeType]]:
-    if not sets_values(mutated):
+    if not has_value_settings(mutated):
         return []
     lines = _only(mutated, sets=True)
     return [(module_name(path), _compiled(lines, filename))] if lines.strip() else []
@@ -100,10 +100,10 @@ def _settings(path: str, mutated: bytes, filename: str) -> list[tuple[str, CodeT
 
 def _only(mutated: bytes, *, sets: bool) -> bytes:
     """Keep only a file's lines that set values in the probe, or only the others; line numbers stay."""
-    if not sets and not sets_values(mutated):
+    if not sets and not has_value_settings(mutated):
         return mutated
     lines = mutated.splitlines(keepends=True)
-    chosen = [((tag := tag_of(line)) is not None and tag.sets) is sets for line in lines]
+    chosen = [((tag := tag_of(line)) is not None and tag.is_value_setting) is sets for line in lines]
     if all(chosen):
         return mutated
     return b"".join(
@@ -120,19 +120,19 @@ def _guarded_imports(path: str, lines: list[bytes]) -> tuple[str, ...]:
     """Return the modules that injected lines import. NotSwappable if a block does not ask the probe first."""
     imports: list[str] = []
     before, margin = "", 0
-    tags = [tag for line in lines if (tag := tag_of(line)) and tag.was is not None]
-    if {name for tag in tags for name in tag.ids} != {name for tag in tags for name in tag.asked_for}:
+    tags = [tag for line in lines if (tag := tag_of(line)) and tag.replaced_line is not None]
+    if {name for tag in tags for name in tag.ids} != {name for tag in tags for name in tag.changed_value_ids}:
         raise NotSwappable(f"{path} has a changed value that does not ask the probe first")
     for line in lines:
         tag = tag_of(line)
-        if tag and tag.of_fault and tag.was is None and not tag.sets:
+        if tag and tag.is_of_fault and tag.replaced_line is None and not tag.is_value_setting:
             indent = len(tag.code) - len(tag.code.lstrip())
-            if tag.id == before and indent == margin and tag.opens_original:
+            if tag.id == before and indent == margin and tag.is_else_of_guard:
                 before = ""  # the next injected lines must ask the probe again
                 continue
             if tag.id != before or indent <= margin:
                 margin = indent
-                if not tag.asks_probe:
+                if not tag.is_guard:
                     raise NotSwappable(f"{path} has an injected statement that does not ask the probe first")
             elif found := _IMPORT.match(tag.code):
                 imports.append((found[1] or found[2]).decode())

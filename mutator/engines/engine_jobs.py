@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Limits, Status
-from mutator.mutants.probe import Probe, is_probe, report_problem
+from mutator.mutants.probe import Probe, is_probe_path, report_problem
 from mutator.targets.manifest import TargetManifest
 
 
@@ -70,7 +70,7 @@ class Raised:
     @property
     def place(self) -> str:
         """`file:line` of the innermost target line outside the probe; empty if there is none."""
-        return next((f"{path}:{line}" for path, line, _ in self.stacks[0] if not is_probe(path)), "")
+        return next((f"{path}:{line}" for path, line, _ in self.stacks[0] if not is_probe_path(path)), "")
 
     @property
     def text(self) -> str:

@@ -53,7 +53,7 @@ class Start:
 
 def first_active(probe: Probe, seen: Observed) -> Start | None:
     """Return the point where a mutant leaves the golden run; None if its trigger never holds."""
-    return _first_active(*probe.decision, seen)
+    return _first_active(*probe.armed_condition, seen)
 
 
 @lru_cache(maxsize=64)  # cached, because faults share triggers (contexts of the hazard analysis)

@@ -36,7 +36,7 @@ from mutator.engines.thread_messages import too_many, turned_off
 from mutator.errors import ForkServerLost, NotForkable, NotSwappable
 from mutator.model import Limits, Status
 from mutator.mutants.mutant_building import Mutant, build
-from mutator.mutants.probe import Probe, probe_module, silent_report, state_after
+from mutator.mutants.probe import Probe, probe_module, probe_state_after, untriggered_report
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stop_code import stop_source
 from mutator.triggers.trigger_kinds import always
@@ -214,7 +214,7 @@ class ForkEngine:
             "probe": swap.probe,
             "functions": [(f.module, f.path, f.old, f.new) for f in swap.functions],
             "settings": swap.settings,
-            "probe_state": state_after(start.observed, start.began, start.t),
+            "probe_state": probe_state_after(start.observed, start.began, start.t),
             "stop": stop_source(self._manifest) if job.stop else None,
             "watch": [value.name for value in self._manifest.observation.values] if watch else None,
         }
@@ -348,7 +348,7 @@ def _golden(job: Job, golden: Path) -> Execution:
         status=Status.OK,
         detail="",
         out=golden,
-        probe=silent_report(job.mutant),
+        probe=untriggered_report(job.mutant),
         cpu_s=0.0,
         wall_s=0.0,
         mode=RunMode.GOLDEN,

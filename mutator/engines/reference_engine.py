@@ -32,8 +32,8 @@ from mutator.engines.target_processes import (
     steady,
 )
 from mutator.model import Limits, Status
-from mutator.mutants.anchors import parsed
-from mutator.mutants.probe import probe_module, state_after
+from mutator.mutants.anchors import parsed_file
+from mutator.mutants.probe import probe_module, probe_state_after
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stop_code import stop_source
 
@@ -186,11 +186,11 @@ class ReferenceEngine:
 
     def _observation(self) -> tuple[str, list[int]]:
         location = self.manifest.observation.location
-        first, last = parsed(self.manifest.tree, location.path).span(location)
+        first, last = parsed_file(self.manifest.tree, location.path).line_span(location)
         return location.path, [line + 1 for line in range(first, max(last, first + 1))]
 
     def _observed(self) -> tuple[str, list[str]]:
-        holder, _ = state_after(0, None, None)
+        holder, _ = probe_state_after(0, None, None)
         return holder, [value.name for value in self.manifest.observation.values]
 
     def _guarded(self, job: Job, request: Path, home: RunHome) -> Ended:

@@ -25,7 +25,7 @@ from mutator.outcomes.golden_comparison import Trace
 from mutator.outcomes.hazards_and_metrics import Judged, load_channels, load_judged
 from mutator.outcomes.series_sampling import Sampler
 from mutator.outcomes.verdict_rules import first_events, judge
-from mutator.preflight.preflight_rules import digest_of
+from mutator.preflight.preflight_rules import output_digest_of
 from mutator.store.run_folder import GoldenRun
 from mutator.store.series_format import encode_series
 from mutator.store.series_packing import EncodedSeries
@@ -94,7 +94,7 @@ class Goldens:
     def _watched(self, folder: Path) -> UnchangedFiles:
         paths = [path for name in self._manifest.outputs if (path := inside(folder, name)).is_file()]
         files = UnchangedFiles({str(path): read_bounded(path) for path in paths})
-        if self._digests is not None and digest_of(self._manifest, folder) != self._digests[folder]:
+        if self._digests is not None and output_digest_of(self._manifest, folder) != self._digests[folder]:
             raise _changed(folder)
         return files
 
@@ -174,7 +174,7 @@ class Runner:
             files=built.files,
             mutant=built.id,
             probe=built.probe,
-            injections=built.injections,
+            injections=built.injection_ids,
             golden=self.goldens.folder(experiment),
             stop=stop,
             golden_ends=stop and self.goldens.ends(experiment),
@@ -228,7 +228,7 @@ class Runner:
 
     def _raising(self, experiment: Experiment, built: Mutant) -> set[str]:
         models = [self.models.get(injection.model) for injection in experiment.fault.injections]
-        return {name for name, model in zip(built.injections, models, strict=True) if model.raises}
+        return {name for name, model in zip(built.injection_ids, models, strict=True) if model.raises}
 
     def _record(
         self, experiment: Experiment, built: Mutant, execution: Execution

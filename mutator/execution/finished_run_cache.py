@@ -4,7 +4,7 @@ from collections import Counter
 from dataclasses import asdict, dataclass
 
 from mutator.audit.seal import Seals
-from mutator.preflight.equivalence_check import Proof
+from mutator.preflight.equivalence_check import EquivalenceResult
 from mutator.store import integrity, verified_runs_cache
 from mutator.store.run_folder import RunFolder
 
@@ -14,7 +14,7 @@ class Ended:
     """The outcome that every later session of a finished run reports."""
 
     outcomes: Counter[str]
-    proof: Proof | None
+    proof: EquivalenceResult | None
     seals: Seals
 
 
@@ -36,6 +36,6 @@ def ended_before(folder: RunFolder) -> Ended | None:
     proof = told["proof"]
     return Ended(
         outcomes=Counter(told["outcomes"]),
-        proof=Proof(sampled=proof["sampled"], same=proof["same"]) if proof else None,
+        proof=EquivalenceResult(sampled=proof["sampled"], same=proof["same"]) if proof else None,
         seals=Seals(**told["seals"]),
     )

@@ -39,7 +39,7 @@ def _stages(session: Session) -> Iterator[Progress]:
         yield progress
     yield progress
     proof = RecordTail(
-        "proof", folder.path / equivalence_check.FOLDER, len(equivalence_check.sampled(folder))
+        "proof", folder.path / equivalence_check.PROOF_FOLDER, len(equivalence_check.sample_ids(folder))
     )
     while session.proof:
         yield proof.poll()

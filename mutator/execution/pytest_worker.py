@@ -18,7 +18,7 @@ from mutator.errors import DiskFull, HarnessErrors, MutatorError, Shortage
 from mutator.execution.stopped_workers import on_stop
 from mutator.execution.worker import Assignment, Worker, bind_to_parent
 from mutator.execution.written_files import Sums
-from mutator.preflight.equivalence_check import Sample
+from mutator.preflight.equivalence_check import SampledExperiment
 
 INPUT = "mutator_campaign"
 PROBLEM = "mutator_problem"
@@ -40,7 +40,7 @@ class CampaignItem(pytest.Item):
 class WorkItem(CampaignItem):
     """One chunk of the plan, or one experiment of the proof. A hazard is a result, not a failure."""
 
-    def __init__(self, *, work: Pending | Sample, worker: "LazyWorker", **keywords: Any) -> None:
+    def __init__(self, *, work: Pending | SampledExperiment, worker: "LazyWorker", **keywords: Any) -> None:
         super().__init__(**keywords)
         self.work = work
         self.worker = worker
@@ -95,7 +95,9 @@ class LazyWorker:
         return worker.written
 
 
-def collect(session: pytest.Session, works: Sequence[Pending | Sample], worker: LazyWorker) -> bool:
+def collect(
+    session: pytest.Session, works: Sequence[Pending | SampledExperiment], worker: LazyWorker
+) -> bool:
     """Make the session's items: chunks, then experiments of the proof.
 
     The proof has the smallest items and comes last, so that the workers finish at about the same time.
@@ -128,9 +130,9 @@ class WorkerSide:
         )
         self._config = config
         self._registration = register_worker(run)
-        self._work: list[Pending | Sample] = [
+        self._work: list[Pending | SampledExperiment] = [
             *(Pending(chunk, tuple(places)) for chunk, places in given["pending"]),
-            *(Sample(number, name) for number, name in given["proof"]),
+            *(SampledExperiment(number, name) for number, name in given["proof"]),
         ]
         self._worker = LazyWorker(partial(RunInputs.unpacked, given["inputs"]), assignment)
         on_stop(self._worker.note_stop)

@@ -35,7 +35,11 @@ from mutator.execution.frozen_plan import open_frozen
 from mutator.execution.written_files import WrittenFiles
 from mutator.model import Record
 from mutator.preflight import equivalence_check
-from mutator.preflight.preflight_checks import are_there, describe_unreached_triggers, run_checks
+from mutator.preflight.preflight_checks import (
+    checks_and_goldens_exist,
+    describe_unreached_triggers,
+    run_checks,
+)
 from mutator.results import table_building
 from mutator.results.ranking import worth
 from mutator.results.table_reader import Results
@@ -68,7 +72,7 @@ class Summary:
     problem: str  #: why the session ended early (disk full, a worker died); else empty
     interrupted: bool  #: whether a signal ended the session
     results: Path | None  #: path of results.csv; None if the disk was full
-    proof: equivalence_check.Proof | None  #: the equivalence check; None if none was needed
+    proof: equivalence_check.EquivalenceResult | None  #: the equivalence check; None if none was needed
     seals: Seals  #: the digests to publish: the seal, the results digest and the review digest
     not_forked: (
         str  #: why no experiment was forked; empty if one was, or if the reference engine was requested
@@ -115,7 +119,7 @@ class Session:
         self.accept_versions = accept_versions
         self.notify: Notify = notify or (lambda progress: None)
         self.pending: tuple[Pending, ...] = ()
-        self.proof: tuple[equivalence_check.Sample, ...] = ()
+        self.proof: tuple[equivalence_check.SampledExperiment, ...] = ()
         self.manifest = workspace.manifest(folder.head.target)
         # count the whole plan, so that all shards and an unsharded run agree on whether a proof is needed
         experiments = folder.head.experiments
@@ -140,7 +144,7 @@ class Session:
         Unless `accept_versions`, raises MutatorError if versions of Python or packages have changed.
         """
         self._known = ended_before(self.folder)
-        if self._known and are_there(self.folder):
+        if self._known and checks_and_goldens_exist(self.folder):
             self._done_before = self.folder.planned_count
             return
         self._known = None
@@ -148,9 +152,9 @@ class Session:
         self._done_before = sum(one.is_final for one in endings_of(records))
         left = pending(self.folder, records)
         if left and self.engine != REFERENCE:
-            equivalence_check.begin(self.folder.path)
-        self.proof = equivalence_check.left(self.folder)
-        if left or self.proof or not are_there(self.folder):
+            equivalence_check.mark_as_needed(self.folder.path)
+        self.proof = equivalence_check.remaining_sample(self.folder)
+        if left or self.proof or not checks_and_goldens_exist(self.folder):
             check_requirements(self.manifest)
             check_versions(self.folder, accept=self.accept_versions)
             run_checks(self.workspace, self.folder, workers=self.workers, notify=self.notify)
@@ -213,16 +217,16 @@ class Session:
             self._close_segments()
             built = table_building.ensure(self.folder.path)
             self._pack_series()
-        proven = equivalence_check.judge(self.folder, records)
+        proven = equivalence_check.compare_sample(self.folder, records)
         not_forked = "" if proven else self._not_forked
         if (
             proven
             and done == self.folder.planned_count
-            and (why := equivalence_check.needless(self.folder)) is not None
+            and (why := equivalence_check.reason_not_needed(self.folder)) is not None
         ):
             proven, not_forked = None, why
             with self._noting_full_disk():
-                equivalence_check.drop(self.folder)
+                equivalence_check.remove_proof(self.folder)
         if done == self.folder.planned_count and (proven is None or proven.whole):
             with self._noting_full_disk():
                 self._close_segments(finished=True)

@@ -151,8 +151,8 @@ def _check_complete(folder: RunFolder) -> None:
             expected="a finished shard",
             remedy="resume it with the command that started it",
         )
-    equivalence_check.judge(folder, records)
-    if left := len(equivalence_check.left(folder)):
+    equivalence_check.compare_sample(folder, records)
+    if left := len(equivalence_check.remaining_sample(folder)):
         raise MutatorError(
             f"unfinished: its proof has {counted(left, 'experiment')} left to run",
             where=folder.path,

@@ -43,7 +43,7 @@ def driven_again(workspace: Workspace, folder: RunFolder, ids: Sequence[str]) ->
             known, found = records[name], single.record
             if known != found:
                 yield MutatorError(
-                    f"{name} rerun: {equivalence_check.difference(found, known)}",
+                    f"{name} rerun: {equivalence_check.describe_difference(found, known)}",
                     where=folder.path,
                     expected="the record of the campaign",
                 )

@@ -22,7 +22,7 @@ from mutator.execution.experiment_runner import Finished, Goldens, Runner, witho
 from mutator.execution.written_files import Sums
 from mutator.model import Experiment, Status
 from mutator.preflight import equivalence_check
-from mutator.preflight.equivalence_check import Sample
+from mutator.preflight.equivalence_check import SampledExperiment
 from mutator.store import plan_file
 from mutator.store.planned_experiments import PlannedExperiments
 from mutator.store.run_folder import RunFolder
@@ -88,7 +88,7 @@ class Worker:
             shared_cache.make_room(self._manifest.cache_name)
         self._seed = seed
 
-    def prove(self, sample: Sample) -> list[tuple[str, str]]:
+    def prove(self, sample: SampledExperiment) -> list[tuple[str, str]]:
         """Run an experiment of the proof's sample on the reference engine; return harness errors as `run`
         does.
 
@@ -96,7 +96,7 @@ class Worker:
         experiment was forked, nothing is run.
         """
         if self._needs_proof is None:
-            self._needs_proof = equivalence_check.needless(self.folder) is None
+            self._needs_proof = equivalence_check.reason_not_needed(self.folder) is None
         if not self._needs_proof:
             return []
         if self._prover is None:

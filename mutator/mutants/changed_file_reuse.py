@@ -11,14 +11,14 @@ from pathlib import Path
 from mutator.mutants.anchors import ParsedFile
 from mutator.mutants.injected_lines import tag_of
 from mutator.mutants.normalized_source import compiles, normalized
-from mutator.mutants.splicing import Edit, in_order
+from mutator.mutants.splicing import Edit, sort_edits
 from mutator.targets.source_tree import SourceTree
 
 ReuseKey = tuple[tuple[int, int, int, bytes, str], ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Change:
+class ChangedFile:
     """A changed file. In the patch, bytes that are not UTF-8 become surrogate escapes."""
 
     data: bytes
@@ -26,35 +26,36 @@ class Change:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ReusableChange:
+class ReusableChangedFile:
     """The parts of a change before, between and after its inserted lines."""
 
     data: tuple[bytes, ...]
     patch: tuple[str, ...]
 
     @classmethod
-    def of(cls, change: Change) -> "ReusableChange":
+    def of(cls, change: ChangedFile) -> "ReusableChangedFile":
         """Remove the tagged lines from a change."""
         patch = change.patch.encode("utf-8", "surrogateescape")
         return cls(
-            data=tuple(_parts(change.data, b"")), patch=tuple(_text(part) for part in _parts(patch, b"+"))
+            data=tuple(_split_at_tagged_lines(change.data, b"")),
+            patch=tuple(_decode_patch(part) for part in _split_at_tagged_lines(patch, b"+")),
         )
 
-    def filled(self, lines: Sequence[bytes]) -> Change:
+    def filled(self, lines: Sequence[bytes]) -> ChangedFile:
         """Insert these lines, given without their line ends."""
         data: list[bytes] = [b""] * (2 * len(lines) + 1)
         patch = [""] * len(data)
         data[::2], data[1::2] = self.data, lines
-        patch[::2], patch[1::2] = self.patch, map(_text, lines)
-        return Change(data=b"".join(data), patch="".join(patch))
+        patch[::2], patch[1::2] = self.patch, map(_decode_patch, lines)
+        return ChangedFile(data=b"".join(data), patch="".join(patch))
 
 
-def known_changes(tree: SourceTree, path: str) -> dict[ReuseKey, ReusableChange | Change]:
+def reuse_cache(tree: SourceTree, path: str) -> dict[ReuseKey, ReusableChangedFile | ChangedFile]:
     """Return the changes of this file that are already known. Callers add new ones to the dictionary."""
-    return tree.derived(path, _none_yet)
+    return tree.derived(path, _empty_cache)
 
 
-def _none_yet(path: str, data: bytes, root: Path) -> dict[ReuseKey, ReusableChange | Change]:
+def _empty_cache(path: str, data: bytes, root: Path) -> dict[ReuseKey, ReusableChangedFile | ChangedFile]:
     return {}
 
 
@@ -62,15 +63,15 @@ def reuse_key(file: ParsedFile, edits: Sequence[Edit], ids: Sequence[str]) -> Re
     """Return what edits must have in common to share a reusable change; `ids` are the ids in their lines."""
     return tuple(
         (e.index, e.rank, e.reindent, e.unit, normalized(b"".join(e.lines).decode(file.encoding), ids))
-        for e in in_order(edits)
+        for e in sort_edits(edits)
     )
 
 
 def inserted_lines(edits: Sequence[Edit]) -> list[bytes]:
-    return [line.rstrip(b"\r\n") for line in chain.from_iterable(e.lines for e in in_order(edits))]
+    return [line.rstrip(b"\r\n") for line in chain.from_iterable(e.lines for e in sort_edits(edits))]
 
 
-def always_compiles(file: ParsedFile, change: ReusableChange, key: ReuseKey) -> bool:
+def always_compiles(file: ParsedFile, change: ReusableChangedFile, key: ReuseKey) -> bool:
     """Return whether the change compiles with normalized lines, and so for every mutant with this key.
 
     Un-splicing needs no check: it depends only on the tags, which are part of the key.
@@ -80,7 +81,7 @@ def always_compiles(file: ParsedFile, change: ReusableChange, key: ReuseKey) -> 
     return compiles(change.filled(lines).data)
 
 
-def _parts(data: bytes, sign: bytes) -> list[bytes]:
+def _split_at_tagged_lines(data: bytes, sign: bytes) -> list[bytes]:
     parts = [b""]
     for line in data.splitlines(keepends=True):
         if tag_of(line):
@@ -91,5 +92,5 @@ def _parts(data: bytes, sign: bytes) -> list[bytes]:
     return parts
 
 
-def _text(data: bytes) -> str:
+def _decode_patch(data: bytes) -> str:
     return data.decode("utf-8", "surrogateescape")

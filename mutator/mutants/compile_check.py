@@ -6,53 +6,53 @@ from dataclasses import replace
 
 from mutator.mutants.anchors import ParsedFile
 from mutator.mutants.changed_file_reuse import ReuseKey
-from mutator.mutants.splicing import Edit, Rank, apply_edits, in_order, joined
-from mutator.mutants.standalone_functions import compiled_alone
+from mutator.mutants.splicing import Edit, EditRank, apply_edits, join_pieces, sort_edits
+from mutator.mutants.standalone_functions import compile_standalone
 
 
-def compile_changed(file: ParsedFile, edits: Iterable[Edit], key: ReuseKey) -> bool:
+def certainly_compiles(file: ParsedFile, edits: Iterable[Edit], key: ReuseKey) -> bool:
     """Return whether the file certainly compiles with these edits and with all others that have this key.
 
     True if the changed functions compile, both with these edits and with normalized ones, and the file
     compiles with the import of the probe. False is inconclusive.
     """
-    unchanged = in_order(edits)
+    unchanged = sort_edits(edits)
     normalized = [
         replace(edit, lines=tuple(text.encode(file.encoding).splitlines(keepends=True)))
         for edit, (*_, text) in zip(unchanged, key, strict=True)
     ]
-    return all(_all_compile(file, some) for some in (unchanged, normalized))
+    return all(_all_parts_compile(file, some) for some in (unchanged, normalized))
 
 
-def _all_compile(file: ParsedFile, edits: Iterable[Edit]) -> bool:
+def _all_parts_compile(file: ParsedFile, edits: Iterable[Edit]) -> bool:
     functions: dict[range, list[Edit]] = defaultdict(list)
     outside: list[Edit] = []
     for edit in edits:
-        function = file.outer_function(edit.index - 1 if edit.rank is Rank.AFTER else edit.index)
-        if function is None or edit.rank is Rank.AFTER_WHOLE:  # such lines are between functions
+        function = file.outermost_function_at(edit.index - 1 if edit.rank is EditRank.AFTER else edit.index)
+        if function is None or edit.rank is EditRank.AFTER_WHOLE:  # such lines are between functions
             outside.append(edit)
         else:
             functions[function].append(edit)
-    return _compile_with(file, tuple(outside)) and all(
-        _compiles(file, function, function_edits) for function, function_edits in functions.items()
+    return _rest_compiles(file, tuple(outside)) and all(
+        _function_compiles(file, function, function_edits) for function, function_edits in functions.items()
     )
 
 
-def _compile_with(file: ParsedFile, outside: tuple[Edit, ...]) -> bool:
+def _rest_compiles(file: ParsedFile, outside: tuple[Edit, ...]) -> bool:
     """Return whether the file compiles with `outside`, and `outside` has at most the probe's import."""
     if len(outside) > 1 or any(edit.index != file.import_line for edit in outside):
         return False
-    if outside not in file.sound:
+    if outside not in file.verified_edits:
         try:
-            compile(joined(apply_edits(file, outside)), "<import>", "exec", dont_inherit=True)
+            compile(join_pieces(apply_edits(file, outside)), "<import>", "exec", dont_inherit=True)
         except (SyntaxError, ValueError, RecursionError):
             return False
-        file.sound.add(outside)
+        file.verified_edits.add(outside)
     return True
 
 
-def _compiles(file: ParsedFile, function: range, edits: Iterable[Edit]) -> bool:
+def _function_compiles(file: ParsedFile, function: range, edits: Iterable[Edit]) -> bool:
     alone = replace(file, lines=file.lines[function.start : function.stop])
     moved = [replace(edit, index=edit.index - function.start) for edit in edits]
-    data = joined(apply_edits(alone, moved))
-    return compiled_alone(data.splitlines(keepends=True), file.encoding) is not None
+    data = join_pieces(apply_edits(alone, moved))
+    return compile_standalone(data.splitlines(keepends=True), file.encoding) is not None

@@ -8,51 +8,51 @@ from pathlib import Path
 from symtable import symtable
 
 from mutator.errors import MutatorError
-from mutator.mutants.expression_roles import blocks
-from mutator.mutants.name_scopes import set_by_functions
+from mutator.mutants.expression_roles import blocks_of
+from mutator.mutants.name_scopes import globals_set_in_functions
 from mutator.targets.source_tree import SourceTree
 
-_ALL = "*"
+_STAR = "*"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Import:
+class _ImportedName:
     """`from module import name as known`, on a line (from 1)."""
 
     module: str
     name: str
     local_name: str
     line: int
-    inside: bool  # inside a class
+    in_class: bool  # inside a class
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Imports:
+class _ModuleImports:
     path: str
     module: str
-    names: tuple[_Import, ...]
-    set: frozenset[str]
-    exported: frozenset[str] | None = None  # the names in `__all__`, if they are literal strings
+    imported_names: tuple[_ImportedName, ...]
+    rebound_names: frozenset[str]
+    exported_names: frozenset[str] | None = None  # the names in `__all__`, if they are literal strings
 
 
-def importers(tree: SourceTree, path: str, name: str) -> tuple[str, ...]:
+def imports_of_constant(tree: SourceTree, path: str, name: str) -> tuple[str, ...]:
     """Return `module.NAME` for each import of the constant `name` from the module at `path`.
 
     MutatorError if an import prevents setting the constant: a star import, an import into a class, or one in
     a module that also sets the name in another way.
     """
-    files = [tree.derived(file, _imports) for file in tree.files if file.endswith(".py")]
-    exported = {file.module: file.exported for file in files}
+    files = [tree.derived(file, _module_imports) for file in tree.files if file.endswith(".py")]
+    exported = {file.module: file.exported_names for file in files}
     names, refusals = [(module_name(path), name)], set[str]()
     for imported in names:  # grows during the loop: an imported name can be imported again
         for file in files:
-            for imported_name in file.names:
-                if (imported_name.module, imported_name.name) not in (imported, (imported[0], _ALL)):
+            for imported_name in file.imported_names:
+                if (imported_name.module, imported_name.name) not in (imported, (imported[0], _STAR)):
                     continue
-                reason = _refused(imported_name, file, imported[1], exported.get(imported[0]))
+                reason = _refusal_reason(imported_name, file, imported[1], exported.get(imported[0]))
                 if reason:
                     refusals.add(f"{file.path}:{imported_name.line} {reason}")
-                elif imported_name.name != _ALL and (file.module, imported_name.local_name) not in names:
+                elif imported_name.name != _STAR and (file.module, imported_name.local_name) not in names:
                     names.append((file.module, imported_name.local_name))
     if refusals:
         raise MutatorError(
@@ -61,21 +61,21 @@ def importers(tree: SourceTree, path: str, name: str) -> tuple[str, ...]:
             expected="modules that import it by name and never assign to the name",
             remedy="anchor where the constant is used",
         )
-    return tuple(".".join(one) for one in names[1:])
+    return tuple(".".join(module_and_name) for module_and_name in names[1:])
 
 
-def _refused(
-    imported_name: _Import, file: _Imports, name: str, exported: frozenset[str] | None
+def _refusal_reason(
+    imported_name: _ImportedName, file: _ModuleImports, name: str, exported: frozenset[str] | None
 ) -> str | None:
-    """Return why an import prevents setting the constant. `*` imports `exported`, if known."""
-    if imported_name.name == _ALL:
+    """Return why an import prevents setting the constant. `*` imports the `exported` names, if known."""
+    if imported_name.name == _STAR:
         is_imported = not name.startswith("_") if exported is None else name in exported
         return "imports *" if is_imported else None
-    if imported_name.inside:
+    if imported_name.in_class:
         return "imports it into a class"
     return (
         f"imports it, and also sets {imported_name.local_name} in another way"
-        if imported_name.local_name in file.set
+        if imported_name.local_name in file.rebound_names
         else None
     )
 
@@ -84,25 +84,27 @@ def module_name(path: str) -> str:
     return path.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
 
 
-def _imports(path: str, data: bytes, root: Path) -> _Imports:
+def _module_imports(path: str, data: bytes, root: Path) -> _ModuleImports:
     try:
         tree, table = ast.parse(data), symtable(data, path, "exec")  # type: ignore[arg-type]  # as `compile`
     except (SyntaxError, ValueError, RecursionError):
-        return _Imports(path=path, module=module_name(path), names=(), set=frozenset())
-    names = tuple(_of_body(tree.body, path, inside=False))
-    count_by_name = Counter(imported_name.local_name for imported_name in names if not imported_name.inside)
+        return _ModuleImports(
+            path=path, module=module_name(path), imported_names=(), rebound_names=frozenset()
+        )
+    names = tuple(_imports_in_body(tree.body, path, inside=False))
+    count_by_name = Counter(imported_name.local_name for imported_name in names if not imported_name.in_class)
     assigned = {symbol.get_name() for symbol in table.get_symbols() if symbol.is_assigned()}
     repeated = {name for name, count in count_by_name.items() if count > 1}
-    return _Imports(
+    return _ModuleImports(
         path=path,
         module=module_name(path),
-        names=names,
-        set=set_by_functions(data) | assigned | repeated,
-        exported=_exported(tree),
+        imported_names=names,
+        rebound_names=globals_set_in_functions(data) | assigned | repeated,
+        exported_names=_exported_names(tree),
     )
 
 
-def _exported(tree: ast.Module) -> frozenset[str] | None:
+def _exported_names(tree: ast.Module) -> frozenset[str] | None:
     """Return the names in `__all__` if it is assigned once, as a list or tuple of literal strings."""
     targets = [node for node in ast.walk(tree) if isinstance(node, ast.Name) and node.id == "__all__"]
     for node in tree.body:
@@ -116,26 +118,26 @@ def _exported(tree: ast.Module) -> frozenset[str] | None:
     return None
 
 
-def _of_body(body: Iterable[ast.stmt], path: str, *, inside: bool) -> Iterator[_Import]:
+def _imports_in_body(body: Iterable[ast.stmt], path: str, *, inside: bool) -> Iterator[_ImportedName]:
     """Yield the imports of a module and its classes, but not those in functions, which last for one call."""
     for statement in body:
         match statement:
             case ast.ImportFrom(module=module, names=names, level=level, lineno=line):
-                source = ".".join(filter(None, (_package(path, level), module)))
+                source = ".".join(filter(None, (_relative_package(path, level), module)))
                 for alias in names:
                     local_name = alias.asname or alias.name
-                    yield _Import(
-                        module=source, name=alias.name, local_name=local_name, line=line, inside=inside
+                    yield _ImportedName(
+                        module=source, name=alias.name, local_name=local_name, line=line, in_class=inside
                     )
             case ast.ClassDef(body=inner):
-                yield from _of_body(inner, path, inside=True)
+                yield from _imports_in_body(inner, path, inside=True)
             case ast.FunctionDef() | ast.AsyncFunctionDef():
                 pass
             case _:
-                for block in blocks(statement):
-                    yield from _of_body(block, path, inside=inside)
+                for block in blocks_of(statement):
+                    yield from _imports_in_body(block, path, inside=inside)
 
 
-def _package(path: str, level: int) -> str:
+def _relative_package(path: str, level: int) -> str:
     """Return the package where a relative import of this level starts; empty for an absolute one."""
     return ".".join(path.split("/")[:-level]) if level else ""

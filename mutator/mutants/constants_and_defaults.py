@@ -16,53 +16,53 @@ from pathlib import Path
 from mutator._common.message_text import suggestion
 from mutator.errors import MutatorError
 from mutator.model import AnchorKind, FaultLocation
-from mutator.mutants.expression_roles import blocks
-from mutator.mutants.name_scopes import as_compiled, set_by_functions
+from mutator.mutants.expression_roles import blocks_of
+from mutator.mutants.name_scopes import globals_set_in_functions, normalize_identifier
 
-_MADE_OTHERWISE = ("Enum", "Flag", "NamedTuple", "TypedDict")  # endings of base class names
+_READ_ONLY_BASES = ("Enum", "Flag", "NamedTuple", "TypedDict")  # endings of base class names
 _Function = ast.FunctionDef | ast.AsyncFunctionDef
-_Scope = tuple[ast.ClassDef, ...]  # enclosing classes, from the outermost
+_EnclosingClasses = tuple[ast.ClassDef, ...]  # enclosing classes, from the outermost
 _Owner = ast.stmt | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FixedValue:
-    """A constant or a default, on lines `first` to `last` (from 0, `last` exclusive)."""
+class ConstantOrDefault:
+    """A constant or a default, on lines `first_line` to `end_line` (from 0, the last exclusive)."""
 
     kind: AnchorKind
     function: str
     name: str  # `LIMIT`, `Class.LIMIT` or a parameter of `function`
-    first: int
-    last: int
-    index: int  # the tagged line is inserted before this line, indented by `indent`
+    first_line: int
+    end_line: int
+    insertion_line: int  # the tagged line is inserted before this line, indented by `indent`
     indent: bytes
-    path: str  # dotted path from the module, in the compiler's spelling
-    reason: str | None = None  # why the value cannot be set
+    dotted_path: str  # dotted path from the module, in the compiler's spelling
+    unsettable_reason: str | None = None  # why the value cannot be set
 
 
-def find_fixed(data: bytes, tree: ast.Module) -> tuple[FixedValue, ...]:
+def list_constants_and_defaults(data: bytes, tree: ast.Module) -> tuple[ConstantOrDefault, ...]:
     """Return all fixed values of a file, in source order.
 
     If a constant is assigned several times, the last assignment is used.
     """
-    owned_values: dict[tuple[AnchorKind, str, str], tuple[FixedValue, _Owner]] = {}
-    for value, owner in _Finder(data).of_body(tree.body, ()):
+    owned_values: dict[tuple[AnchorKind, str, str], tuple[ConstantOrDefault, _Owner]] = {}
+    for value, owner in _Finder(data).values_in_body(tree.body, ()):
         key = (value.kind, value.function, value.name)
         _, earlier_owner = owned_values.pop(key, (None, owner))
         if earlier_owner is not owner:
             what = "functions" if value.kind is AnchorKind.DEFAULT else "classes"
-            value = replace(value, reason=f"several {what} have the same name")
+            value = replace(value, unsettable_reason=f"several {what} have the same name")
         owned_values[key] = value, owner
-    rebound = set_by_functions(data)
+    rebound = globals_set_in_functions(data)
     return tuple(
-        replace(one, reason="a function also sets it")
-        if one.kind is AnchorKind.CONSTANT and one.path in rebound
-        else one
-        for one, _ in owned_values.values()
+        replace(value, unsettable_reason="a function also sets it")
+        if value.kind is AnchorKind.CONSTANT and value.dotted_path in rebound
+        else value
+        for value, _ in owned_values.values()
     )
 
 
-def parameters(arguments: ast.arguments) -> Iterator[tuple[str, ast.expr]]:
+def parameters_with_default(arguments: ast.arguments) -> Iterator[tuple[str, ast.expr]]:
     """Yield the parameters that have a default, each with its default."""
     places = [*arguments.posonlyargs, *arguments.args]
     with_default = places[len(places) - len(arguments.defaults) :]
@@ -79,16 +79,16 @@ class _Finder:
     def __init__(self, data: bytes) -> None:
         self.lines = data.splitlines(keepends=True)
         tokens = tokenize.tokenize(io.BytesIO(data).readline)
-        self.ends = [token.start[0] for token in tokens if token.type == tokenize.NEWLINE]
+        self.statement_end_lines = [token.start[0] for token in tokens if token.type == tokenize.NEWLINE]
 
-    def of_body(
-        self, body: Sequence[ast.stmt], scope: _Scope, around: ast.stmt | None = None
-    ) -> Iterator[tuple[FixedValue, _Owner]]:
+    def values_in_body(
+        self, body: Sequence[ast.stmt], scope: _EnclosingClasses, around: ast.stmt | None = None
+    ) -> Iterator[tuple[ConstantOrDefault, _Owner]]:
         for statement in body:
             whole = around or statement
             match statement:
                 case ast.ClassDef():
-                    yield from self.of_body(statement.body, (*scope, statement))
+                    yield from self.values_in_body(statement.body, (*scope, statement))
                 case ast.FunctionDef() | ast.AsyncFunctionDef():
                     yield from self.defaults(statement, scope, whole)
                 case ast.Assign(targets=targets, value=value):
@@ -99,73 +99,73 @@ class _Finder:
                 ):
                     yield from self.constants([target], value, scope, whole)
                 case _:
-                    for block in blocks(statement):
-                        yield from self.of_body(block, scope, whole)
+                    for block in blocks_of(statement):
+                        yield from self.values_in_body(block, scope, whole)
 
     def constants(
-        self, targets: Iterable[ast.expr], value: ast.expr, scope: _Scope, whole: ast.stmt
-    ) -> Iterator[tuple[FixedValue, _Owner]]:
-        for name in (name for target in targets for name in _names(target)):
-            index, indent = self.place(whole)
+        self, targets: Iterable[ast.expr], value: ast.expr, scope: _EnclosingClasses, whole: ast.stmt
+    ) -> Iterator[tuple[ConstantOrDefault, _Owner]]:
+        for name in (name for target in targets for name in _assigned_names(target)):
+            index, indent = self.insertion_point(whole)
             yield (
-                FixedValue(
+                ConstantOrDefault(
                     kind=AnchorKind.CONSTANT,
                     function="",
-                    name=".".join((*_of(scope), name)),
-                    first=value.lineno - 1,
-                    last=value.end_lineno or 0,
-                    index=index,
+                    name=".".join((*_class_names(scope), name)),
+                    first_line=value.lineno - 1,
+                    end_line=value.end_lineno or 0,
+                    insertion_line=index,
                     indent=indent,
-                    path=_path(scope, name),
-                    reason=_not_a_constant(scope[-1], value) if scope else None,
+                    dotted_path=_dotted_path(scope, name),
+                    unsettable_reason=_unsettable_reason(scope[-1], value) if scope else None,
                 ),
                 scope[-1] if scope else None,
             )
 
     def defaults(
-        self, function: _Function, scope: _Scope, whole: ast.stmt
-    ) -> Iterator[tuple[FixedValue, _Owner]]:
-        for name, value in parameters(function.args):
-            index, indent = self.place(whole)
+        self, function: _Function, scope: _EnclosingClasses, whole: ast.stmt
+    ) -> Iterator[tuple[ConstantOrDefault, _Owner]]:
+        for name, value in parameters_with_default(function.args):
+            index, indent = self.insertion_point(whole)
             yield (
-                FixedValue(
+                ConstantOrDefault(
                     kind=AnchorKind.DEFAULT,
-                    function=".".join((*_of(scope), function.name)),
+                    function=".".join((*_class_names(scope), function.name)),
                     name=name,
-                    first=value.lineno - 1,
-                    last=value.end_lineno or 0,
-                    index=index,
+                    first_line=value.lineno - 1,
+                    end_line=value.end_lineno or 0,
+                    insertion_line=index,
                     indent=indent,
-                    path=_path(scope, function.name, name),
+                    dotted_path=_dotted_path(scope, function.name, name),
                 ),
                 function,
             )
 
-    def place(self, whole: ast.stmt) -> tuple[int, bytes]:
+    def insertion_point(self, whole: ast.stmt) -> tuple[int, bytes]:
         line = self.lines[min(node.lineno for node in (whole, *getattr(whole, "decorator_list", ()))) - 1]
-        end = self.ends[bisect_left(self.ends, whole.end_lineno or 0)]
+        end = self.statement_end_lines[bisect_left(self.statement_end_lines, whole.end_lineno or 0)]
         return end, line[: len(line) - len(line.lstrip(b" \t\f"))]
 
 
-def _names(target: ast.expr) -> Iterator[str]:
+def _assigned_names(target: ast.expr) -> Iterator[str]:
     match target:
         case ast.Name(id=name):
             yield name
         case ast.Tuple(elts=elements) | ast.List(elts=elements):
             for element in elements:
-                yield from _names(element)
+                yield from _assigned_names(element)
         case ast.Starred(value=value):
-            yield from _names(value)
+            yield from _assigned_names(value)
 
 
-def _of(scope: _Scope) -> Iterator[str]:
+def _class_names(scope: _EnclosingClasses) -> Iterator[str]:
     return (node.name for node in scope)
 
 
-def _path(scope: _Scope, *names: str) -> str:
+def _dotted_path(scope: _EnclosingClasses, *names: str) -> str:
     """Return the dotted path from the module, with private names spelled as the compiler spells them."""
     path, private = list[str](), ""
-    for name in (*_of(scope), *names):
+    for name in (*_class_names(scope), *names):
         hidden = private and name.startswith("__") and not name.endswith("__")
         path.append(f"_{private}{name}" if hidden else name)
         if len(path) <= len(scope):
@@ -173,10 +173,10 @@ def _path(scope: _Scope, *names: str) -> str:
     return ".".join(path)
 
 
-def _not_a_constant(owner: ast.ClassDef, value: ast.expr) -> str | None:
+def _unsettable_reason(owner: ast.ClassDef, value: ast.expr) -> str | None:
     for base in owner.bases:
         name = ast.unparse(base)
-        if name.endswith(_MADE_OTHERWISE):
+        if name.endswith(_READ_ONLY_BASES):
             return f"its class derives from {name}, which does not allow a new value"
     if isinstance(value, ast.Call) and ast.unparse(value.func).endswith("field"):
         keywords = {keyword.arg for keyword in value.keywords}
@@ -185,20 +185,22 @@ def _not_a_constant(owner: ast.ClassDef, value: ast.expr) -> str | None:
     return None
 
 
-def choose_fixed(values: Sequence[FixedValue], location: FaultLocation, where: Path) -> FixedValue:
+def choose_constant_or_default(
+    values: Sequence[ConstantOrDefault], location: FaultLocation, where: Path
+) -> ConstantOrDefault:
     """Return the constant or default that the location names.
 
     MutatorError with candidates if there is none, or if it cannot be set.
     """
-    kind, name = location.anchor.kind, as_compiled(location.anchor.name)
-    function = as_compiled(location.function)
+    kind, name = location.anchor.kind, normalize_identifier(location.anchor.name)
+    function = normalize_identifier(location.function)
     alike = [value for value in values if value.kind is kind and value.function == function]
-    match = next((one for one in alike if one.name == name), None)
+    match = next((value for value in alike if value.name == name), None)
     what = f"{kind.value} '{location.anchor.name}'" + (
         f" in {location.function}" if location.function else ""
     )
     if match is None:
-        names = [one.name for one in alike if not one.reason]
+        names = [one.name for one in alike if not one.unsettable_reason]
         raise MutatorError(
             f"no {what}",
             where=where,
@@ -207,11 +209,11 @@ def choose_fixed(values: Sequence[FixedValue], location: FaultLocation, where: P
             else "another kind of anchor: there is none of this kind",
             remedy="write the name exactly as in the source" + suggestion(name, names),
         )
-    if match.reason:
+    if match.unsettable_reason:
         raise MutatorError(
-            f"the {what} cannot be set: {match.reason}",
+            f"the {what} cannot be set: {match.unsettable_reason}",
             where=where,
-            line=match.first + 1,
+            line=match.first_line + 1,
             expected="a value that is computed once, when the module is loaded",
             remedy="anchor where the value is used",
         )

@@ -10,10 +10,10 @@ from mutator.errors import MutatorError
 from mutator.model import Anchor, AnchorKind, FaultLocation
 from mutator.mutants.expressions import Expression
 
-_MOST = 12  # candidates listed in an error
+_MOST_CANDIDATES = 12  # candidates listed in an error
 
 
-def as_written(name: str) -> str:
+def normalized_text(name: str) -> str:
     """Return the normalized text by which anchors are compared; invalid text is unchanged."""
     try:
         return ast.unparse(ast.parse(name.strip(), mode="eval"))
@@ -21,7 +21,7 @@ def as_written(name: str) -> str:
         return name
 
 
-def valid_nth(count: int) -> str:
+def describe_valid_nth(count: int) -> str:
     """Return which values of `nth` select one of `count` hits."""
     return f"a number from 1 to {count}" if count > 1 else "1, or leave it out"
 
@@ -34,15 +34,19 @@ def choose_expression(
     The function begins at `line`, counted from 0. MutatorError with candidates unless exactly one matches.
     """
     anchor, kind = location.anchor, location.anchor.kind
-    name = as_written(anchor.name)
-    matches = [expression for expression in expressions if expression.answers(kind, name, anchor.which)]
+    name = normalized_text(anchor.name)
+    matches = [
+        expression for expression in expressions if expression.matches_anchor(kind, name, anchor.which)
+    ]
     nth = anchor.nth
     if matches and (len(matches) == 1 if nth is None else nth <= len(matches)):
         return matches[(nth or 1) - 1]
-    what = " ".join(filter(None, (f"`{kind.value}: {anchor.name}`".replace(": `", "`"), _which(anchor))))
+    what = " ".join(
+        filter(None, (f"`{kind.value}: {anchor.name}`".replace(": `", "`"), _describe_which(anchor)))
+    )
     if matches:
         lines = ", ".join(str(one.start[0] + 1) for one in matches)
-        nth_range = valid_nth(len(matches))
+        nth_range = describe_valid_nth(len(matches))
         raise MutatorError(
             f"{what} names {counted(len(matches), 'expression')} in {location.function}: "
             f"{'lines' if len(matches) > 1 else 'line'} {lines}",
@@ -55,16 +59,16 @@ def choose_expression(
         f"no {what} in {location.function}",
         where=where,
         line=function_line + 1,
-        expected=_candidates(expressions, kind, name),
+        expected=_describe_candidates(expressions, kind, name),
         remedy="write the expression exactly as in the source",
     )
 
 
-def _which(anchor: Anchor) -> str:
+def _describe_which(anchor: Anchor) -> str:
     return f"with `which: {anchor.which}`" if anchor.which else ""
 
 
-def _candidates(expressions: Sequence[Expression], kind: AnchorKind, name: str) -> str:
+def _describe_candidates(expressions: Sequence[Expression], kind: AnchorKind, name: str) -> str:
     """List the anchors of this kind that have this name or, if none has, the most similar names."""
     roles = [
         (called, which, expression)
@@ -73,9 +77,9 @@ def _candidates(expressions: Sequence[Expression], kind: AnchorKind, name: str) 
         if role_kind is kind
     ]
     roles = [role for role in roles if role[0] == name] or roles
-    if len(roles) > _MOST:
-        near = get_close_matches(name, [called for called, *_ in roles], n=_MOST, cutoff=0.0)
-        roles = [role for role in roles if role[0] in near][:_MOST]
+    if len(roles) > _MOST_CANDIDATES:
+        near = get_close_matches(name, [called for called, *_ in roles], n=_MOST_CANDIDATES, cutoff=0.0)
+        roles = [role for role in roles if role[0] in near][:_MOST_CANDIDATES]
     descriptions = [
         f"`{called}`" + (f" with `which: {place}`" if place else "") + f" (line {one.start[0] + 1})"
         for called, place, one in roles

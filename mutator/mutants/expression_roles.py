@@ -5,11 +5,11 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from mutator.model import AnchorKind
 
-Role = tuple[AnchorKind, str, str | None]  # an anchor's kind, name and `which`
-Found = tuple[str, ast.expr, tuple[Role, ...]]
+AnchorRole = tuple[AnchorKind, str, str | None]  # an anchor's kind, name and `which`
+ExpressionInFunction = tuple[str, ast.expr, tuple[AnchorRole, ...]]
 
-_NOT_ALONE = ast.Starred | ast.Slice | ast.GeneratorExp | ast.Yield | ast.YieldFrom
-_BLOCKS = ("body", "orelse", "finalbody")
+_UNCHANGEABLE_NODES = ast.Starred | ast.Slice | ast.GeneratorExp | ast.Yield | ast.YieldFrom
+_BLOCK_FIELDS = ("body", "orelse", "finalbody")
 
 
 def source_of(node: ast.AST) -> str:
@@ -23,76 +23,80 @@ def source_of(node: ast.AST) -> str:
         return ""
 
 
-def expressions_in(tree: ast.Module) -> Iterator[Found]:
+def expressions_in(tree: ast.Module) -> Iterator[ExpressionInFunction]:
     """Yield function name, expression and roles for each expression in a function's body."""
-    yield from _of_scope(tree.body, (), inside=False)
+    yield from _in_scope(tree.body, (), inside=False)
 
 
-def _of_scope(body: Iterable[ast.stmt], scope: tuple[str, ...], *, inside: bool) -> Iterator[Found]:
+def _in_scope(
+    body: Iterable[ast.stmt], scope: tuple[str, ...], *, inside: bool
+) -> Iterator[ExpressionInFunction]:
     for statement in body:
         if isinstance(statement, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
             in_function = not isinstance(statement, ast.ClassDef)
-            yield from _of_scope(statement.body, (*scope, statement.name), inside=in_function)
+            yield from _in_scope(statement.body, (*scope, statement.name), inside=in_function)
             continue
         if inside:
             name = ".".join(scope)
-            yield from ((name, node, roles) for node, roles in _of_statement(statement))
-        for block in blocks(statement):
-            yield from _of_scope(block, scope, inside=inside)
+            yield from ((name, node, roles) for node, roles in _in_statement(statement))
+        for block in blocks_of(statement):
+            yield from _in_scope(block, scope, inside=inside)
 
 
-def blocks(statement: ast.stmt) -> Iterator[list[ast.stmt]]:
+def blocks_of(statement: ast.stmt) -> Iterator[list[ast.stmt]]:
     """Yield the blocks of a statement: its body, alternatives, cases."""
-    for name in _BLOCKS:
+    for name in _BLOCK_FIELDS:
         yield getattr(statement, name, [])
     for part in (*getattr(statement, "handlers", ()), *getattr(statement, "cases", ())):
         yield part.body
 
 
-_Pairs = Iterator[tuple[ast.expr, tuple[Role, ...]]]
+_ExpressionsWithRoles = Iterator[tuple[ast.expr, tuple[AnchorRole, ...]]]
 
 
-def _of_statement(statement: ast.stmt) -> _Pairs:
+def _in_statement(statement: ast.stmt) -> _ExpressionsWithRoles:
     match statement:
         case ast.Assign(targets=targets, value=value):
-            yield from _assigned(targets, value)
+            yield from _in_assignment(targets, value)
         case (
             ast.AugAssign(target=target, value=value)
             | ast.AnnAssign(target=target, value=ast.expr() as value)
         ):
-            yield from _assigned([target], value)
+            yield from _in_assignment([target], value)
         case ast.Return(value=ast.expr() as value):
-            yield from _of(value, (AnchorKind.RETURN_VALUE, source_of(value), None))
+            yield from _in_expression(value, (AnchorKind.RETURN_VALUE, source_of(value), None))
         case ast.If(test=test) | ast.While(test=test) | ast.Assert(test=test):
-            yield from _condition(test)
+            yield from _in_condition(test)
         case ast.For(target=target, iter=value) | ast.AsyncFor(target=target, iter=value):
-            yield from _of(value)
+            yield from _in_expression(value)
             yield from _in_target(target)
         case ast.With(items=items) | ast.AsyncWith(items=items):
             for item in items:
-                yield from _of(item.context_expr)
+                yield from _in_expression(item.context_expr)
         case ast.Match(subject=subject, cases=cases):
-            yield from _of(subject)
+            yield from _in_expression(subject)
             for case in cases:
                 if case.guard:
-                    yield from _condition(case.guard)
+                    yield from _in_condition(case.guard)
         case ast.Expr(value=value) if not isinstance(value, ast.Constant):
-            yield from _of(value)
+            yield from _in_expression(value)
         case ast.Raise(exc=ast.expr() as value):
-            yield from _of(value)
+            yield from _in_expression(value)
 
 
-def _assigned(targets: Sequence[ast.expr], value: ast.expr) -> _Pairs:
-    yield from _of(value, *((AnchorKind.ASSIGNED_VALUE, source_of(target), None) for target in targets))
+def _in_assignment(targets: Sequence[ast.expr], value: ast.expr) -> _ExpressionsWithRoles:
+    yield from _in_expression(
+        value, *((AnchorKind.ASSIGNED_VALUE, source_of(target), None) for target in targets)
+    )
     for target in targets:
         yield from _in_target(target)
 
 
-def _condition(test: ast.expr) -> _Pairs:
-    yield from _of(test, (AnchorKind.CONDITION, source_of(test), None))
+def _in_condition(test: ast.expr) -> _ExpressionsWithRoles:
+    yield from _in_expression(test, (AnchorKind.CONDITION, source_of(test), None))
 
 
-def _in_target(target: ast.expr) -> _Pairs:
+def _in_target(target: ast.expr) -> _ExpressionsWithRoles:
     """Yield the expressions evaluated to find an assignment's target, such as an index."""
     match target:
         case ast.Tuple(elts=elements) | ast.List(elts=elements):
@@ -101,67 +105,71 @@ def _in_target(target: ast.expr) -> _Pairs:
         case ast.Starred(value=value):
             yield from _in_target(value)
         case ast.Subscript(value=value, slice=index):
-            yield from _base(value)
-            yield from _of(index)
+            yield from _in_base(value)
+            yield from _in_expression(index)
         case ast.Attribute(value=value):
-            yield from _base(value)
+            yield from _in_base(value)
 
 
-def _base(node: ast.expr) -> _Pairs:
+def _in_base(node: ast.expr) -> _ExpressionsWithRoles:
     """Yield the object of an attribute, item or method. Plain names are skipped."""
     if isinstance(node, ast.Attribute):
-        yield from _base(node.value)
+        yield from _in_base(node.value)
     elif not isinstance(node, ast.Name):
-        yield from _of(node)
+        yield from _in_expression(node)
 
 
-def _of(node: ast.expr, *roles: Role) -> _Pairs:
+def _in_expression(node: ast.expr, *roles: AnchorRole) -> _ExpressionsWithRoles:
     if isinstance(node, ast.JoinedStr):
         yield node, roles  # before Python 3.12, the expressions inside it have no positions
         return
     if isinstance(node, ast.Call):
         roles = (*roles, (AnchorKind.RESULT, source_of(node.func), None))
     parts = node.elts if isinstance(node, ast.Tuple) else ()
-    if not isinstance(node, _NOT_ALONE) and not any(isinstance(p, ast.Slice | ast.Starred) for p in parts):
+    if not isinstance(node, _UNCHANGEABLE_NODES) and not any(
+        isinstance(p, ast.Slice | ast.Starred) for p in parts
+    ):
         yield node, roles
     match node:
         case ast.Call():
-            yield from _call(node)
+            yield from _in_call(node)
         case ast.Attribute() | ast.Subscript():
             yield from _in_target(node)
         case ast.IfExp(test=test, body=body, orelse=other):
-            yield from _of(body)
-            yield from _condition(test)
-            yield from _of(other)
+            yield from _in_expression(body)
+            yield from _in_condition(test)
+            yield from _in_expression(other)
         case ast.NamedExpr(target=target, value=value):
-            yield from _of(value, (AnchorKind.ASSIGNED_VALUE, source_of(target), None))
+            yield from _in_expression(value, (AnchorKind.ASSIGNED_VALUE, source_of(target), None))
         case ast.Lambda(body=body):
-            yield from _of(body)
+            yield from _in_expression(body)
         case ast.UnaryOp(operand=ast.Constant()):
             pass  # -1 is one constant
         case ast.ListComp() | ast.SetComp() | ast.GeneratorExp() | ast.DictComp():
-            yield from _comprehension(node)
+            yield from _in_comprehension(node)
         case _:
             for child in ast.iter_child_nodes(node):
                 if isinstance(child, ast.expr):
-                    yield from _of(child)
+                    yield from _in_expression(child)
 
 
-def _call(node: ast.Call) -> _Pairs:
+def _in_call(node: ast.Call) -> _ExpressionsWithRoles:
     called = source_of(node.func)
-    yield from _base(node.func)
+    yield from _in_base(node.func)
     for number, argument in enumerate(node.args, 1):
-        yield from _of(argument, (AnchorKind.ARGUMENT, called, str(number)))
+        yield from _in_expression(argument, (AnchorKind.ARGUMENT, called, str(number)))
     for keyword in node.keywords:
         roles = [(AnchorKind.ARGUMENT, called, keyword.arg)] if keyword.arg else []
-        yield from _of(keyword.value, *roles)
+        yield from _in_expression(keyword.value, *roles)
 
 
-def _comprehension(node: ast.ListComp | ast.SetComp | ast.GeneratorExp | ast.DictComp) -> _Pairs:
+def _in_comprehension(
+    node: ast.ListComp | ast.SetComp | ast.GeneratorExp | ast.DictComp,
+) -> _ExpressionsWithRoles:
     values = (node.key, node.value) if isinstance(node, ast.DictComp) else (node.elt,)
     for value in values:
-        yield from _of(value)
+        yield from _in_expression(value)
     for generator in node.generators:
-        yield from _of(generator.iter)
+        yield from _in_expression(generator.iter)
         for test in generator.ifs:
-            yield from _condition(test)
+            yield from _in_condition(test)

@@ -14,13 +14,15 @@ from dataclasses import dataclass
 import libcst as cst
 
 from mutator.model import AnchorKind
-from mutator.mutants.expression_roles import Found, Role, expressions_in, source_of
+from mutator.mutants.expression_roles import AnchorRole, ExpressionInFunction, expressions_in, source_of
 from mutator.mutants.node_positions import Positions
 
 # line and column, from 0; in `Expression`, columns count bytes, elsewhere characters
-_Point = tuple[int, int]
+_LineColumn = tuple[int, int]
 
-_ATOMS = ast.Name | ast.Attribute | ast.Call | ast.Subscript | ast.Constant | ast.List | ast.Dict | ast.Set
+_UNSPLITTABLE_NODES = (
+    ast.Name | ast.Attribute | ast.Call | ast.Subscript | ast.Constant | ast.List | ast.Dict | ast.Set
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,11 +34,11 @@ class Expression:
     """
 
     function: str
-    start: _Point
-    end: _Point
-    roles: tuple[Role, ...]
-    written: str  # source on one line, in parentheses if an adjacent operator could split it
-    bare: bool  # an unparenthesized tuple or a `:=`; parentheses around it are not part of it
+    start: _LineColumn
+    end: _LineColumn
+    roles: tuple[AnchorRole, ...]
+    one_line_source: str  # source on one line, in parentheses if an adjacent operator could split it
+    is_bare: bool  # an unparenthesized tuple or a `:=`; parentheses around it are not part of it
     node: ast.expr
 
     @property
@@ -44,7 +46,7 @@ class Expression:
         """The expression's name in anchors, independent of spacing and quotes."""
         return self.roles[-1][1]
 
-    def answers(self, kind: AnchorKind, name: str, which: str | None) -> bool:
+    def matches_anchor(self, kind: AnchorKind, name: str, which: str | None) -> bool:
         """Return whether an anchor matches. An empty name matches any name; None as `which`, any position."""
         return any(
             kind is role_kind and name in (role_name, "") and which in (role_which, None)
@@ -52,47 +54,59 @@ class Expression:
         )
 
 
-def _grouped(expressions: Iterable[Expression]) -> dict[str, tuple[Expression, ...]]:
+def _grouped_by_function(expressions: Iterable[Expression]) -> dict[str, tuple[Expression, ...]]:
     groups: dict[str, list[Expression]] = defaultdict(list)
     for expression in expressions:
         groups[expression.function].append(expression)
     return {name: tuple(group) for name, group in groups.items()}
 
 
-def expressions_of(
+def list_expressions(
     data: bytes, module: cst.Module, positions: Positions
 ) -> dict[str, tuple[Expression, ...]]:
     encoding = module.encoding.removesuffix("-sig")
     lines = [line.decode(encoding) for line in data.splitlines(keepends=True)]
     tokens = list(tokenize.tokenize(io.BytesIO(data).readline))
     libcst_extents, untaggable, brackets = (
-        _seen_by_libcst(positions),
-        _untaggable(data, tokens),
-        _brackets(tokens),
+        _libcst_extents(positions),
+        _untaggable_lines(data, tokens),
+        _closing_brackets(tokens),
     )
     expressions = []
     for function, node, roles in expressions_in(ast.parse(data)):
-        start, end = _extent(lines, node)
+        start, end = _extent_of(lines, node)
         text, is_confirmed = (
             source_of(node),
-            all(_extent(lines, part) in libcst_extents for part in _known_by(node)),
+            all(_extent_of(lines, part) in libcst_extents for part in _nodes_to_confirm(node)),
         )
         if text and is_confirmed and untaggable.isdisjoint((start[0], end[0])):
             bare = isinstance(node, ast.NamedExpr) or (
                 isinstance(node, ast.Tuple) and brackets.get(start) != end
             )
             roles = (*roles, (AnchorKind.VALUE, text, None))
-            expressions.append(_expression(lines, encoding, (function, node, roles), start, end, bare=bare))
-    return _grouped(sorted(expressions, key=lambda one: (one.start, (-one.end[0], -one.end[1]))))
+            expressions.append(
+                _build_expression(lines, encoding, (function, node, roles), start, end, bare=bare)
+            )
+    return _grouped_by_function(
+        sorted(
+            expressions, key=lambda expression: (expression.start, (-expression.end[0], -expression.end[1]))
+        )
+    )
 
 
-def _expression(
-    lines: Sequence[str], encoding: str, expression: Found, start: _Point, end: _Point, *, bare: bool
+def _build_expression(
+    lines: Sequence[str],
+    encoding: str,
+    expression: ExpressionInFunction,
+    start: _LineColumn,
+    end: _LineColumn,
+    *,
+    bare: bool,
 ) -> Expression:
     function, node, roles = expression
     one_line = start[0] == end[0]
     written = lines[start[0]][start[1] : end[1]] if one_line else roles[-1][1]
-    alone = isinstance(node, _ATOMS) or (
+    alone = isinstance(node, _UNSPLITTABLE_NODES) or (
         isinstance(node, ast.Tuple | ast.NamedExpr) and not (bare and one_line)
     )
     return Expression(
@@ -100,33 +114,33 @@ def _expression(
         start=(start[0], len(lines[start[0]][: start[1]].encode(encoding))),
         end=(end[0], len(lines[end[0]][: end[1]].encode(encoding))),
         roles=roles,
-        written=written if alone else f"({written})",
-        bare=bare,
+        one_line_source=written if alone else f"({written})",
+        is_bare=bare,
         node=node,
     )
 
 
-def _extent(lines: Sequence[str], node: ast.expr) -> tuple[_Point, _Point]:
+def _extent_of(lines: Sequence[str], node: ast.expr) -> tuple[_LineColumn, _LineColumn]:
     """Return where a node begins and ends: line and character column, from 0. `ast` counts UTF-8 bytes."""
     assert node.end_lineno is not None and node.end_col_offset is not None
 
-    def point(line: int, column: int) -> _Point:
+    def point(line: int, column: int) -> _LineColumn:
         text = lines[line - 1]
         return line - 1, column if text.isascii() else len(text.encode()[:column].decode())
 
     return point(node.lineno, node.col_offset), point(node.end_lineno, node.end_col_offset)
 
 
-def _known_by(node: ast.expr) -> Iterator[ast.expr]:
+def _nodes_to_confirm(node: ast.expr) -> Iterator[ast.expr]:
     """Yield the nodes that LibCST must also find: this node or, if it is a tuple, its elements."""
     if isinstance(node, ast.Tuple):
         for element in node.elts:
-            yield from _known_by(element)
+            yield from _nodes_to_confirm(element)
     else:
         yield node
 
 
-def _seen_by_libcst(positions: Positions) -> frozenset[tuple[_Point, _Point]]:
+def _libcst_extents(positions: Positions) -> frozenset[tuple[_LineColumn, _LineColumn]]:
     return frozenset(
         ((span.start.line - 1, span.start.column), (span.end.line - 1, span.end.column))
         for node, span in positions.items()
@@ -134,9 +148,9 @@ def _seen_by_libcst(positions: Positions) -> frozenset[tuple[_Point, _Point]]:
     )
 
 
-def _brackets(tokens: Iterable[tokenize.TokenInfo]) -> dict[_Point, _Point]:
+def _closing_brackets(tokens: Iterable[tokenize.TokenInfo]) -> dict[_LineColumn, _LineColumn]:
     """Map the position of each opening bracket to the end of its closing bracket; lines from 0."""
-    ends, starts = {}, list[_Point]()
+    ends, starts = {}, list[_LineColumn]()
     for token in tokens:
         if token.type == tokenize.OP and token.string in "([{":
             starts.append((token.start[0] - 1, token.start[1]))
@@ -145,7 +159,7 @@ def _brackets(tokens: Iterable[tokenize.TokenInfo]) -> dict[_Point, _Point]:
     return ends
 
 
-def _untaggable(data: bytes, tokens: Iterable[tokenize.TokenInfo]) -> frozenset[int]:
+def _untaggable_lines(data: bytes, tokens: Iterable[tokenize.TokenInfo]) -> frozenset[int]:
     """Return the lines (from 0) that cannot end in a comment."""
     lines = {i for i, line in enumerate(data.splitlines()) if line.endswith(b"\\")}
     starts: list[int] = []  # first lines of the f-strings that are still open
@@ -159,10 +173,10 @@ def _untaggable(data: bytes, tokens: Iterable[tokenize.TokenInfo]) -> frozenset[
     return frozenset(lines)
 
 
-NO_PARTS: dict[str, object] = {"left": None, "right": None, "called": None, "arguments": []}
+NO_TEMPLATE_PARTS: dict[str, object] = {"left": None, "right": None, "called": None, "arguments": []}
 
 
-def parts_of(expression: Expression) -> dict[str, object]:
+def template_parts(expression: Expression) -> dict[str, object]:
     """Return the parts of an expression that templates can use, None or empty if missing.
 
     `left` and `right` are operands, `called` is a call's function.
@@ -177,17 +191,17 @@ def parts_of(expression: Expression) -> dict[str, object]:
         left = before[0] if len(before) == 1 else ast.BoolOp(node.op, before)
     called, arguments = None, list[str]()
     if isinstance(node, ast.Call):
-        called = _enclosed(node.func)
+        called = _parenthesized(node.func)
         arguments = [ast.unparse(argument) for argument in (*node.args, *node.keywords)]
-    sides = [side and _enclosed(side) for side in (left, right)]
+    sides = [side and _parenthesized(side) for side in (left, right)]
     return {"left": sides[0], "right": sides[1], "called": called, "arguments": arguments}
 
 
-def enclosed(text: str) -> str:
+def parenthesized(text: str) -> str:
     """Return the source of an expression, in parentheses if an adjacent operator could split it."""
-    return text if isinstance(ast.parse(text, mode="eval").body, _ATOMS) else f"({text})"
+    return text if isinstance(ast.parse(text, mode="eval").body, _UNSPLITTABLE_NODES) else f"({text})"
 
 
-def _enclosed(node: ast.expr) -> str:
+def _parenthesized(node: ast.expr) -> str:
     text = ast.unparse(node)
-    return text if isinstance(node, _ATOMS) else f"({text})"
+    return text if isinstance(node, _UNSPLITTABLE_NODES) else f"({text})"

@@ -9,25 +9,31 @@ from mutator.config.location_syntax import base_name
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel, FaultModels, Needs, SnippetKind
 from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS, AnchorKind, Injection
-from mutator.mutants.anchors import ParsedFile, Site, parsed
+from mutator.mutants.anchors import ParsedFile, ResolvedAnchor, parsed_file
 from mutator.mutants.changed_file_reuse import reuse_key
-from mutator.mutants.constant_imports import importers
-from mutator.mutants.expressions import NO_PARTS, Expression, parts_of
-from mutator.mutants.injected_lines import ORIGINAL, asks, asks_for, set_constant, set_default
-from mutator.mutants.name_scopes import as_compiled, moved_names
+from mutator.mutants.constant_imports import imports_of_constant
+from mutator.mutants.expressions import NO_TEMPLATE_PARTS, Expression, template_parts
+from mutator.mutants.injected_lines import (
+    ORIGINAL_VALUE_NAME,
+    activation_condition,
+    active_check,
+    constant_setting_line,
+    default_setting_line,
+)
+from mutator.mutants.name_scopes import moved_names, normalize_identifier
 from mutator.mutants.probe import injection_id
 from mutator.mutants.splicing import (
     Edit,
     ValueEdit,
     apply_edits,
-    guard,
-    insertion,
-    joined,
-    setting,
-    value_change,
+    guard_edit,
+    insertion_edit,
+    join_pieces,
+    setting_edit,
+    value_edit,
 )
-from mutator.mutants.statement_texts import written_out
-from mutator.mutants.template_rendering import changed_value, snippet
+from mutator.mutants.statement_texts import one_line_texts
+from mutator.mutants.template_rendering import render_changed_value, render_snippet
 from mutator.targets.allowed_locations import check_location
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.source_tree import SourceTree
@@ -52,7 +58,7 @@ def edits_of(
     edits = []
     for index, injection in enumerate(injections):
         check_location(manifest, injection.location)
-        name, file = injection_id(index, injection), parsed(manifest.tree, injection.location.path)
+        name, file = injection_id(index, injection), parsed_file(manifest.tree, injection.location.path)
         edit = injection_edit(file, models, injection, name, manifest.tree)
         edits.append(InjectionEdit(id=name, file=file, edit=edit))
     return edits
@@ -74,58 +80,62 @@ def injection_edit(
     if injection.location.anchor.kind in VALUE_ANCHORS:
         return _value_edit(file, model, injection, name)
     if injection.location.anchor.kind in FIXED_ANCHORS:
-        return _setting(file, model, injection, name, tree)
-    site = file.resolve(injection.location)
-    variables = _variables(file, site.names, site.first, model, injection)
+        return _setting_edit(file, model, injection, name, tree)
+    site = file.resolve_statement(injection.location)
+    variables = _checked_variables(file, site.names_in_function, site.first_line, model, injection)
     texts: dict[str, str] = {}
     if model.needs is Needs.CALL:
-        raise _needs_more(file, model, site.first)
+        raise _misfit_error(file, model, site.first_line)
     if model.needs is not None:
-        site, texts = written_out(file, site, model.needs)
-    _check_instance(file, site.names, site.first, injection)
-    code = _limited(snippet(model, dict(injection.params), name, texts), injection, name, model)
-    make_edit = guard if model.kind is SnippetKind.GUARD else insertion
+        site, texts = one_line_texts(file, site, model.needs)
+    _check_instance(file, site.names_in_function, site.first_line, injection)
+    code = _limited_snippet(
+        render_snippet(model, dict(injection.params), name, texts), injection, name, model
+    )
+    make_edit = guard_edit if model.kind is SnippetKind.GUARD else insertion_edit
     edit = make_edit(file, site, code, name)
     key = (variables, reuse_key(file, [edit], [name]))
-    if key not in file.sound:
-        _check_own_names(file, site, model, code, variables.union(*map(_bound, texts.values())))
+    if key not in file.verified_edits:
+        _check_bound_names(file, site, model, code, variables.union(*map(_bound_names, texts.values())))
         _check_scopes(file, site, edit)
-        file.sound.add(key)
+        file.verified_edits.add(key)
     return edit
 
 
 def _value_edit(file: ParsedFile, model: FaultModel, injection: Injection, name: str) -> ValueEdit:
-    expression = file.resolve_value(injection.location)
-    params, parts = dict(injection.params), parts_of(expression)
+    expression = file.resolve_expression(injection.location)
+    params, parts = dict(injection.params), template_parts(expression)
     if model.needs is Needs.CALL and not parts["called"]:
-        raise _needs_more(file, model, expression.start[0])
-    changed = changed_value(model, params, name, expression.written, parts)
-    names = file.names(injection.location)
-    _variables(file, names, expression.start[0], model, injection)
+        raise _misfit_error(file, model, expression.start[0])
+    changed = render_changed_value(model, params, name, expression.one_line_source, parts)
+    names = file.names_in_function_at(injection.location)
+    _checked_variables(file, names, expression.start[0], model, injection)
     _check_instance(file, names, expression.start[0], injection)
     _check_sets_nothing(file, model, expression, changed)
-    return value_change(file, expression, changed, name, asks_for(name, injection))
+    return value_edit(file, expression, changed, name, activation_condition(name, injection))
 
 
 def _check_sets_nothing(file: ParsedFile, model: FaultModel, expression: Expression, changed: str) -> None:
     new_names = (
-        _set_within(ast.parse(changed, mode="eval")) - _set_within(expression.node) if ":=" in changed else ()
+        _names_set_in(ast.parse(changed, mode="eval")) - _names_set_in(expression.node)
+        if ":=" in changed
+        else ()
     )
     if new_names:
         raise MutatorError(
             f"the template sets '{min(new_names)}': {changed}",
-            where=file.where,
+            where=file.full_path,
             line=expression.start[0] + 1,
             expected="an expression that sets no name",
             remedy=f"correct {model.template_path.name}",
         )
 
 
-def _set_within(node: ast.AST) -> set[str]:
+def _names_set_in(node: ast.AST) -> set[str]:
     return {part.target.id for part in ast.walk(node) if isinstance(part, ast.NamedExpr)}
 
 
-def _needs_more(file: ParsedFile, model: FaultModel, line: int) -> MutatorError:
+def _misfit_error(file: ParsedFile, model: FaultModel, line: int) -> MutatorError:
     expected_by_need = {
         None: f"an expression with these parts: {', '.join(sorted(model.parts))}",
         Needs.CALL: "a call: an anchor `result`, or another anchor whose expression is a call",
@@ -134,40 +144,40 @@ def _needs_more(file: ParsedFile, model: FaultModel, line: int) -> MutatorError:
     }
     return MutatorError(
         f"model {model.name} does not fit this anchor",
-        where=file.where,
+        where=file.full_path,
         line=line + 1,
         expected=expected_by_need[model.needs],
         remedy="anchor elsewhere, or use another model",
     )
 
 
-def _setting(
+def _setting_edit(
     file: ParsedFile, model: FaultModel, injection: Injection, name: str, tree: SourceTree | None
 ) -> Edit:
-    value, params = file.resolve_fixed(injection.location), dict(injection.params)
+    value, params = file.resolve_constant_or_default(injection.location), dict(injection.params)
     if model.needs is Needs.CALL or model.parts:
-        raise _needs_more(file, model, value.first)
+        raise _misfit_error(file, model, value.first_line)
     for param in model.params:
         if param.type == "variable" and params.get(param.name) is not None:
             raise MutatorError(
                 f"`{param.name}` is '{params[param.name]}', but the anchor is a {value.kind.value}",
-                where=file.where,
-                line=value.first + 1,
+                where=file.full_path,
+                line=value.first_line + 1,
                 expected="no variable, because a constant or default is set outside functions",
                 remedy=f"leave `{param.name}` out, or anchor in a function",
             )
-    changed = changed_value(model, params, name, ORIGINAL, NO_PARTS)
+    changed = render_changed_value(model, params, name, ORIGINAL_VALUE_NAME, NO_TEMPLATE_PARTS)
     if value.kind is AnchorKind.CONSTANT:
         of_module = "." not in value.name
-        imported = importers(tree, file.path, value.name) if tree and of_module else ()
-        code = set_constant(name, value.path, changed, imported)
+        imported = imports_of_constant(tree, file.path, value.name) if tree and of_module else ()
+        code = constant_setting_line(name, value.dotted_path, changed, imported)
     else:
-        function, _, parameter = value.path.rpartition(".")
-        code = set_default(name, function, parameter, changed)
-    return setting(file, value, code, name)
+        function, _, parameter = value.dotted_path.rpartition(".")
+        code = default_setting_line(name, function, parameter, changed)
+    return setting_edit(file, value, code, name)
 
 
-def _variables(
+def _checked_variables(
     file: ParsedFile, names: frozenset[str], first: int, model: FaultModel, injection: Injection
 ) -> frozenset[str]:
     params = dict(injection.params)
@@ -175,11 +185,11 @@ def _variables(
     for param in model.params:
         value = params.get(param.name)
         if param.type == "variable" and isinstance(value, str):
-            variable = as_compiled(base_name(value))
+            variable = normalize_identifier(base_name(value))
             if variable not in names:
                 raise MutatorError(
                     f"'{value}' is not known in {injection.location.function}",
-                    where=file.where,
+                    where=file.full_path,
                     line=first + 1,
                     expected=f"a name used there: {', '.join(sorted(names))}",
                     remedy=f"correct `{param.name}`",
@@ -193,16 +203,18 @@ def _check_instance(file: ParsedFile, names: frozenset[str], first: int, injecti
     if unknown:
         raise MutatorError(
             f"'{min(unknown)}' in `where` is not known in {injection.location.function}",
-            where=file.where,
+            where=file.full_path,
             line=first + 1,
             expected=f"names used there: {', '.join(sorted(names))}",
             remedy="correct `where`",
         )
 
 
-def _limited(code: tuple[str, ...], injection: Injection, name: str, model: FaultModel) -> tuple[str, ...]:
+def _limited_snippet(
+    code: tuple[str, ...], injection: Injection, name: str, model: FaultModel
+) -> tuple[str, ...]:
     """Add to the snippet a check for the instance or executions that the injection selects, if any."""
-    check, condition = asks(name), asks_for(name, injection)
+    check, condition = active_check(name), activation_condition(name, injection)
     if condition == check:
         return code
     limited_lines = {f"if {check}:": f"if {condition}:", f"if not {check}:": f"if not ({condition}):"}
@@ -216,22 +228,24 @@ def _limited(code: tuple[str, ...], injection: Injection, name: str, model: Faul
     return tuple(limited_lines.get(line, line) for line in code)
 
 
-def _check_own_names(
-    file: ParsedFile, site: Site, model: FaultModel, code: Sequence[str], variables: frozenset[str]
+def _check_bound_names(
+    file: ParsedFile, site: ResolvedAnchor, model: FaultModel, code: Sequence[str], variables: frozenset[str]
 ) -> None:
     block = [*code, "    pass"] if model.kind is SnippetKind.GUARD else code
-    clashes = ({as_compiled(name) for name in _bound("\n".join(block))} - variables) & site.names
+    clashes = (
+        {normalize_identifier(name) for name in _bound_names("\n".join(block))} - variables
+    ) & site.names_in_function
     if clashes:
         raise MutatorError(
             f"the injected lines set '{min(clashes)}', a name that the function uses itself",
-            where=file.where,
-            line=site.first + 1,
+            where=file.full_path,
+            line=site.first_line + 1,
             expected="lines that set only parameters and names that the function does not use",
             remedy=f"rename it in {model.template_path.name}, or make it a parameter",
         )
 
 
-def _bound(code: str) -> Iterator[str]:
+def _bound_names(code: str) -> Iterator[str]:
     """Yield the names that code binds or deletes, including those inside comprehensions and functions."""
     for node in ast.walk(ast.parse(code)):
         match node:
@@ -247,17 +261,17 @@ def _bound(code: str) -> Iterator[str]:
                 yield name
 
 
-def _check_scopes(file: ParsedFile, site: Site, edit: Edit) -> None:
+def _check_scopes(file: ParsedFile, site: ResolvedAnchor, edit: Edit) -> None:
     inserted = range(edit.index + 1, edit.index + 1 + len(edit.lines))
     try:
-        moved = next(moved_names(file.data, joined(apply_edits(file, [edit])), inserted), None)
+        moved = next(moved_names(file.data, join_pieces(apply_edits(file, [edit])), inserted), None)
     except SyntaxError:
         return  # the mutant does not compile, which building reports
     if moved:
         raise MutatorError(
             f"the lines would make '{moved.name}' {moved.after} in {moved.scope}, where it is {moved.before}",
-            where=file.where,
-            line=site.first + 1,
+            where=file.full_path,
+            line=site.first_line + 1,
             expected="a variable that the function sets itself, or declares `global` or `nonlocal`",
             remedy="inject where the variable is set, or into another variable that is computed from it",
         )

@@ -11,29 +11,29 @@ from mutator.errors import InvalidMutant, MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.faults.probe_templates import CODE as PROBE_CODE
 from mutator.model import FIXED_ANCHORS, Fault, Hold, Trigger
-from mutator.mutants.anchors import ParsedFile, parsed
+from mutator.mutants.anchors import ParsedFile, parsed_file
 from mutator.mutants.changed_file_reuse import (
-    Change,
-    ReusableChange,
+    ChangedFile,
+    ReusableChangedFile,
     always_compiles,
     inserted_lines,
-    known_changes,
+    reuse_cache,
     reuse_key,
 )
-from mutator.mutants.compile_check import compile_changed
+from mutator.mutants.compile_check import certainly_compiles
 from mutator.mutants.injected_lines import OBSERVE_TAG, observe_call
 from mutator.mutants.injection_edits import InjectionEdit, edits_of
 from mutator.mutants.normalized_source import compiles, normalized
-from mutator.mutants.patch_rendering import changed_file, new_file
-from mutator.mutants.probe import Probe, probe_of, probe_path, settings_of
+from mutator.mutants.patch_rendering import render_changed_file, render_new_file
+from mutator.mutants.probe import Probe, build_probe_settings, probe_path, render_probe
 from mutator.mutants.splicing import (
     Edit,
     ValueEdit,
     apply_edits,
-    in_lines,
-    insertion,
-    joined,
-    probe_import,
+    as_line_edits,
+    insertion_edit,
+    join_pieces,
+    probe_import_edit,
     unsplice,
 )
 from mutator.targets.manifest import TargetManifest
@@ -52,7 +52,7 @@ class Mutant:
     patch: str  # git style, a/ and b/ prefixes; applies with `patch -p1` at the root
     tree_digest: str  # of the whole mutated tree
     probe: Probe
-    injections: tuple[str, ...]  # ids used in tags and in the probe's report, in the fault's order
+    injection_ids: tuple[str, ...]  # ids used in tags and in the probe's report, in the fault's order
 
     @cached_property
     def patch_bytes(self) -> bytes:
@@ -66,17 +66,17 @@ def build(manifest: TargetManifest, models: FaultModels, fault: Fault | None, tr
     `fault.hold` overrides `trigger.hold`. MutatorError with candidates if an anchor is missing or ambiguous,
     InvalidMutant if the result does not compile.
     """
-    return _build(manifest, models, fault, trigger, _ReusingSplicer(manifest.tree))
+    return _build_with(manifest, models, fault, trigger, _ReusingSplicer(manifest.tree))
 
 
-def build_directly(
+def build_without_reuse(
     manifest: TargetManifest, models: FaultModels, fault: Fault | None, trigger: Trigger
 ) -> Mutant:
     """Like `build`, but splice and compile every file without reuse; `build` must return the same bytes."""
-    return _build(manifest, models, fault, trigger, _Splicer())
+    return _build_with(manifest, models, fault, trigger, _Splicer())
 
 
-def _build(
+def _build_with(
     manifest: TargetManifest, models: FaultModels, fault: Fault | None, trigger: Trigger, splicer: "_Splicer"
 ) -> Mutant:
     injections = fault.injections if fault else ()
@@ -84,17 +84,17 @@ def _build(
     ids = tuple(change.id for change in changes)
     hold = fault.hold if fault and fault.hold else trigger.hold
     mutant_id = content_id([manifest.tree.digest, models.digest, fault.id if fault else None, trigger])
-    edits = _edits(manifest, changes)
+    edits = _edits_by_path(manifest, changes)
     probe_file = probe_path(manifest.package)
     sets = any(injection.location.anchor.kind in FIXED_ANCHORS for injection in injections)
-    probe = _probe(manifest, models, mutant_id, trigger, hold, ids, sets)
+    probe = _build_probe(manifest, models, mutant_id, trigger, hold, ids, sets)
     text = probe.text
     splicer.check_probe(text, (mutant_id, *ids), models.folder / PROBE_CODE)
     files = {probe_file: text.encode()}
-    patches = {probe_file: new_file(probe_file, text)}
+    patches = {probe_file: render_new_file(probe_file, text)}
     for path, file_edits in edits.items():
-        file = parsed(manifest.tree, path)
-        change = splicer.change(file, [probe_import(file, manifest.package), *file_edits], ids)
+        file = parsed_file(manifest.tree, path)
+        change = splicer.checked_change(file, [probe_import_edit(file, manifest.package), *file_edits], ids)
         files[path], patches[path] = change.data, change.patch
     return Mutant(
         id=mutant_id,
@@ -102,25 +102,30 @@ def _build(
         patch="".join(text for _, text in sorted(patches.items())),
         tree_digest=manifest.tree.digest_with(files),
         probe=probe,
-        injections=ids,
+        injection_ids=ids,
     )
 
 
-def _edits(manifest: TargetManifest, changes: Sequence[InjectionEdit]) -> dict[str, list[Edit]]:
-    edits: dict[str, list[Edit | ValueEdit]] = {manifest.observation.location.path: [_observation(manifest)]}
+def _edits_by_path(manifest: TargetManifest, changes: Sequence[InjectionEdit]) -> dict[str, list[Edit]]:
+    edits: dict[str, list[Edit | ValueEdit]] = {
+        manifest.observation.location.path: [_observation_edit(manifest)]
+    }
     for change in changes:
         edits.setdefault(change.file.path, []).append(change.edit)
-    return {path: in_lines(parsed(manifest.tree, path), file_edits) for path, file_edits in edits.items()}
+    return {
+        path: as_line_edits(parsed_file(manifest.tree, path), file_edits)
+        for path, file_edits in edits.items()
+    }
 
 
-def _observation(manifest: TargetManifest) -> Edit:
+def _observation_edit(manifest: TargetManifest) -> Edit:
     observation = manifest.observation
-    file = parsed(manifest.tree, observation.location.path)
-    site = file.resolve(observation.location)
-    return insertion(file, site, [observe_call(observation.expressions)], OBSERVE_TAG)
+    file = parsed_file(manifest.tree, observation.location.path)
+    site = file.resolve_statement(observation.location)
+    return insertion_edit(file, site, [observe_call(observation.expressions)], OBSERVE_TAG)
 
 
-def _probe(
+def _build_probe(
     manifest: TargetManifest,
     models: FaultModels,
     mutant_id: str,
@@ -140,11 +145,11 @@ def _probe(
             remedy="rename the target's file, or point the manifest at the original tree",
         )
     observation, step_s = manifest.observation, manifest.step_s
-    settings = settings_of(mutant_id, trigger, hold, ids, observation, step_s, sets=sets)
-    return probe_of(models.probe, settings)
+    settings = build_probe_settings(mutant_id, trigger, hold, ids, observation, step_s, sets=sets)
+    return render_probe(models.probe, settings)
 
 
-def _compile(data: bytes, where: Path) -> None:
+def _check_compiles(data: bytes, where: Path) -> None:
     try:
         compile(data, str(where), "exec", dont_inherit=True)
     except (SyntaxError, ValueError, RecursionError) as error:
@@ -161,23 +166,23 @@ class _Splicer:
     """Splices and compiles every file. `ids` are the ids in the injected lines."""
 
     def check_probe(self, text: str, ids: Sequence[str], where: Path) -> None:
-        _compile(text.encode(), where)
+        _check_compiles(text.encode(), where)
 
-    def change(self, file: ParsedFile, edits: Sequence[Edit], ids: Sequence[str]) -> Change:
-        change = self.spliced(file, edits)
-        _compile(change.data, file.where)
+    def checked_change(self, file: ParsedFile, edits: Sequence[Edit], ids: Sequence[str]) -> ChangedFile:
+        change = self.splice(file, edits)
+        _check_compiles(change.data, file.full_path)
         return change
 
-    def spliced(self, file: ParsedFile, edits: Sequence[Edit]) -> Change:
+    def splice(self, file: ParsedFile, edits: Sequence[Edit]) -> ChangedFile:
         pieces = apply_edits(file, edits)
-        data = joined(pieces)
+        data = join_pieces(pieces)
         if unsplice(data) != file.data:
             raise InvalidMutant(
                 "removing the injected lines from the mutated file does not restore the original",
-                where=file.where,
+                where=file.full_path,
                 remedy="anchor at another statement",
             )
-        return Change(data=data, patch=changed_file(file.path, pieces))
+        return ChangedFile(data=data, patch=render_changed_file(file.path, pieces))
 
 
 class _ReusingSplicer(_Splicer):
@@ -190,19 +195,19 @@ class _ReusingSplicer(_Splicer):
         if not compiles(normalized(text, ids).encode()):
             super().check_probe(text, ids, where)
 
-    def change(self, file: ParsedFile, edits: Sequence[Edit], ids: Sequence[str]) -> Change:
-        cache = known_changes(self._tree, file.path)
+    def change(self, file: ParsedFile, edits: Sequence[Edit], ids: Sequence[str]) -> ChangedFile:
+        cache = reuse_cache(self._tree, file.path)
         key = reuse_key(file, edits, ids)
         if key in cache:
             cached = cache[key]
-            if isinstance(cached, Change):  # only on reuse: most changes of values are used once
-                cached = cache[key] = ReusableChange.of(cached)
+            if isinstance(cached, ChangedFile):  # only on reuse: most changes of values are used once
+                cached = cache[key] = ReusableChangedFile.of(cached)
             return cached.filled(inserted_lines(edits))
-        if compile_changed(file, edits, key):
-            cache[key] = change = self.spliced(file, edits)
+        if certainly_compiles(file, edits, key):
+            cache[key] = change = self.splice(file, edits)
             return change
-        change = super().change(file, edits, ids)
-        reusable = ReusableChange.of(change)
+        change = super().checked_change(file, edits, ids)
+        reusable = ReusableChangedFile.of(change)
         if always_compiles(file, reusable, key):
             cache[key] = reusable
         return change

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from functools import lru_cache
 from symtable import Symbol, SymbolTable, symtable
 
-FunctionNames = Mapping[tuple[int, str], frozenset[str]]
+NamesByFunction = Mapping[tuple[int, str], frozenset[str]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Moved:
+class MovedName:
     """A name whose meaning has changed in a function or class."""
 
     name: str
@@ -22,72 +22,78 @@ class Moved:
     after: str
 
 
-def function_names(data: bytes) -> FunctionNames:
+def names_by_function(data: bytes) -> NamesByFunction:
     """Return the names that each function knows and uses, by the function's line (from 1) and name."""
-    return dict(_function_names(_table(data), ""))
+    return dict(_names_in_tables(_symbol_table(data), ""))
 
 
-def _function_names(table: SymbolTable, private: str) -> Iterator[tuple[tuple[int, str], frozenset[str]]]:
+def _names_in_tables(
+    table: SymbolTable, private_prefix: str
+) -> Iterator[tuple[tuple[int, str], frozenset[str]]]:
     """Like `function_names`; `private` is the compiler's prefix for private names (`__x`) in a class."""
     if table.get_type() == "class":
         name = table.get_name().lstrip("_")
-        private = f"_{name}__" if name else ""
+        private_prefix = f"_{name}__" if name else ""
     names = set(table.get_identifiers())
     if table.get_type() == "function" and ".0" not in names:  # a comprehension's argument
-        names |= {name[len(private) - 2 :] for name in names if private and name.startswith(private)}
+        names |= {
+            name[len(private_prefix) - 2 :]
+            for name in names
+            if private_prefix and name.startswith(private_prefix)
+        }
         yield (table.get_lineno(), table.get_name()), frozenset(names)
     for child in table.get_children():
-        yield from _function_names(child, private)
+        yield from _names_in_tables(child, private_prefix)
 
 
-def set_by_functions(data: bytes) -> frozenset[str]:
+def globals_set_in_functions(data: bytes) -> frozenset[str]:
     """Return a module's names that functions or classes bind after declaring them `global`."""
     return frozenset(
         symbol.get_name()
-        for table in _below(_table(data))
+        for table in _nested_tables(_symbol_table(data))
         for symbol in table.get_symbols()
         if symbol.is_declared_global() and (symbol.is_assigned() or symbol.is_imported())
     )
 
 
-def _below(table: SymbolTable) -> Iterator[SymbolTable]:
+def _nested_tables(table: SymbolTable) -> Iterator[SymbolTable]:
     for child in table.get_children():
         yield child
-        yield from _below(child)
+        yield from _nested_tables(child)
 
 
-def as_compiled(name: str) -> str:
+def normalize_identifier(name: str) -> str:
     """Normalize an identifier as the compiler does. For example, the two code points for `µ` become one."""
     return unicodedata.normalize("NFKC", name)
 
 
-def moved_names(before: bytes, after: bytes, inserted: Container[int]) -> Iterator[Moved]:
+def moved_names(before: bytes, after: bytes, inserted: Container[int]) -> Iterator[MovedName]:
     """Yield the names whose meaning changes with the inserted lines.
 
     `inserted` are the numbers of these lines in `after`, from 1. SyntaxError if `after` is not valid.
     """
-    return _moved(_table_of_target(before), _table(after), inserted)
+    return _moved_between(_cached_symbol_table(before), _symbol_table(after), inserted)
 
 
-def _moved(before: SymbolTable, after: SymbolTable, inserted: Container[int]) -> Iterator[Moved]:
-    homes = {symbol.get_name(): _home(symbol) for symbol in after.get_symbols()}
+def _moved_between(before: SymbolTable, after: SymbolTable, inserted: Container[int]) -> Iterator[MovedName]:
+    homes = {symbol.get_name(): _scope_kind(symbol) for symbol in after.get_symbols()}
     for symbol in before.get_symbols():
-        name, home = symbol.get_name(), _home(symbol)
+        name, home = symbol.get_name(), _scope_kind(symbol)
         if homes.get(name, "unknown") != home:
-            yield Moved(name=name, scope=before.get_name(), before=home, after=homes.get(name, "unknown"))
+            yield MovedName(name=name, scope=before.get_name(), before=home, after=homes.get(name, "unknown"))
     unchanged = [child for child in after.get_children() if child.get_lineno() not in inserted]
     for child_before, child_after in zip(before.get_children(), unchanged, strict=False):
-        yield from _moved(child_before, child_after, inserted)
+        yield from _moved_between(child_before, child_after, inserted)
 
 
-def _home(symbol: Symbol) -> str:
+def _scope_kind(symbol: Symbol) -> str:
     if symbol.is_local():
         return "local"
     return "nonlocal" if symbol.is_free() else "global or built-in"
 
 
-def _table(data: bytes) -> SymbolTable:
+def _symbol_table(data: bytes) -> SymbolTable:
     return symtable(data, "<source>", "exec")  # type: ignore[arg-type]  # bytes, as `compile`
 
 
-_table_of_target = lru_cache(maxsize=16)(_table)
+_cached_symbol_table = lru_cache(maxsize=16)(_symbol_table)

@@ -15,19 +15,19 @@ import re
 from collections.abc import Iterable
 from functools import lru_cache
 
-_PART = r"[\w.\\\x80-\U0010ffff]"  # next to these, digits are part of a longer token
-_NUMBER = re.compile(  # the digit precedes the lookbehind because searching for it is fast
-    rf"[0-9](?<!{_PART}[0-9])(?:(?<!0)[0-9]{{1,19}})?((?:\.[0-9]{{1,20}})?(?:e[+-]?[0-9]{{1,3}})?)(?!{_PART})"
+_TOKEN_PART_PATTERN = r"[\w.\\\x80-\U0010ffff]"  # next to these, digits are part of a longer token
+_NUMBER_PATTERN = re.compile(  # the digit precedes the lookbehind because searching for it is fast
+    rf"[0-9](?<!{_TOKEN_PART_PATTERN}[0-9])(?:(?<!0)[0-9]{{1,19}})?((?:\.[0-9]{{1,20}})?(?:e[+-]?[0-9]{{1,3}})?)(?!{_TOKEN_PART_PATTERN})"
 )
 
 
 def normalized(text: str, ids: Iterable[str]) -> str:
     for i, name in enumerate(ids):
         text = text.replace(name, f"0f0f{i:04x}")
-    return _NUMBER.sub(_zero, text)
+    return _NUMBER_PATTERN.sub(_zero_like, text)
 
 
-def _zero(number: re.Match[str]) -> str:
+def _zero_like(number: re.Match[str]) -> str:
     return "0.0" if number[1] else "0"
 
 

@@ -3,80 +3,80 @@
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
-from mutator.mutants.splicing import Piece
+from mutator.mutants.splicing import PatchPiece
 
-_CONTEXT = 3
-_NO_NEWLINE = "\\ No newline at end of file\n"
+_CONTEXT_LINES = 3
+_NO_NEWLINE_NOTE = "\\ No newline at end of file\n"
 
 
 @dataclass(slots=True)
 class _Hunk:
     """Pieces shown together, and the number of lines before them in the old and the new file."""
 
-    old: int
-    new: int
-    pieces: list[Piece] = field(default_factory=list)
+    old_lines_before: int
+    new_lines_before: int
+    pieces: list[PatchPiece] = field(default_factory=list)
 
-    def text(self) -> str:
-        old, new = _count(self.pieces, "-"), _count(self.pieces, "+")
-        body = "".join(_line(piece.sign, line) for piece in self.pieces for line in piece.lines)
-        return f"@@ -{_span(self.old, old)} +{_span(self.new, new)} @@\n{body}"
+    def render(self) -> str:
+        old, new = _count_lines(self.pieces, "-"), _count_lines(self.pieces, "+")
+        body = "".join(_render_line(piece.sign, line) for piece in self.pieces for line in piece.lines)
+        return f"@@ -{_render_span(self.old_lines_before, old)} +{_render_span(self.new_lines_before, new)} @@\n{body}"
 
 
-def changed_file(path: str, pieces: Iterable[Piece]) -> str:
+def render_changed_file(path: str, pieces: Iterable[PatchPiece]) -> str:
     """Return the patch of one changed file; bytes that are not UTF-8 become surrogate escapes."""
-    hunks = "".join(hunk.text() for hunk in _hunks([p for p in pieces if p.lines]))
-    return f"diff --git a/{path} b/{path}\n--- a/{_name(path)}\n+++ b/{_name(path)}\n{hunks}"
+    hunks = "".join(hunk.render() for hunk in _split_into_hunks([p for p in pieces if p.lines]))
+    return f"diff --git a/{path} b/{path}\n--- a/{_render_path(path)}\n+++ b/{_render_path(path)}\n{hunks}"
 
 
-def new_file(path: str, text: str) -> str:
+def render_new_file(path: str, text: str) -> str:
     """Return the patch that adds a file with this text, whose lines end with LF."""
-    lines, end = text.removesuffix("\n"), "" if text.endswith("\n") else _NO_NEWLINE
+    lines, end = text.removesuffix("\n"), "" if text.endswith("\n") else _NO_NEWLINE_NOTE
     body = "+" + lines.replace("\n", "\n+")
     return (
-        f"diff --git a/{path} b/{path}\nnew file mode 100644\n--- /dev/null\n+++ b/{_name(path)}\n"
+        f"diff --git a/{path} b/{path}\nnew file mode 100644\n--- /dev/null\n+++ b/{_render_path(path)}\n"
         f"@@ -0,0 +1,{lines.count(chr(10)) + 1} @@\n{body}\n{end}"
     )
 
 
-def _hunks(pieces: Sequence[Piece]) -> Iterator[_Hunk]:
+def _split_into_hunks(pieces: Sequence[PatchPiece]) -> Iterator[_Hunk]:
     """Yield changes with three lines of context; changes at most six lines apart share a hunk."""
     hunk = _Hunk(0, 0)
     old = new = 0
     for i, piece in enumerate(pieces):
         if piece.sign == " ":
             before, after = i > 0, i < len(pieces) - 1
-            if before and after and len(piece.lines) <= 2 * _CONTEXT:
+            if before and after and len(piece.lines) <= 2 * _CONTEXT_LINES:
                 hunk.pieces.append(piece)
             else:
                 if before:
-                    hunk.pieces.append(Piece(sign=" ", lines=piece.lines[:_CONTEXT]))
+                    hunk.pieces.append(PatchPiece(sign=" ", lines=piece.lines[:_CONTEXT_LINES]))
                     yield hunk
-                tail = piece.lines[-_CONTEXT:]
+                tail = piece.lines[-_CONTEXT_LINES:]
                 behind = len(piece.lines) - len(tail)
-                hunk = _Hunk(old + behind, new + behind, [Piece(sign=" ", lines=tail)])
+                hunk = _Hunk(old + behind, new + behind, [PatchPiece(sign=" ", lines=tail)])
         else:
             hunk.pieces.append(piece)
-        old += _count([piece], "-")
-        new += _count([piece], "+")
+        old += _count_lines([piece], "-")
+        new += _count_lines([piece], "+")
     if any(piece.sign != " " for piece in hunk.pieces):
         yield hunk
 
 
-def _count(pieces: Iterable[Piece], sign: str) -> int:
+def _count_lines(pieces: Iterable[PatchPiece], sign: str) -> int:
     return sum(len(piece.lines) for piece in pieces if piece.sign in (" ", sign))
 
 
-def _span(before: int, count: int) -> str:
+def _render_span(before: int, count: int) -> str:
     """Return `start,count` of one side of a hunk; `start` of an empty side is the line before it."""
     return f"{before + 1 if count else before},{count}"
 
 
-def _name(path: str) -> str:
+def _render_path(path: str) -> str:
     """End a name that has a space with a tab; otherwise `patch` reads the part after the space as a date."""
     return f"{path}\t" if " " in path else path
 
 
-def _line(sign: str, line: bytes) -> str:
+def _render_line(sign: str, line: bytes) -> str:
     text = sign + line.decode("utf-8", "surrogateescape")
-    return text if text.endswith("\n") else f"{text}\n{_NO_NEWLINE}"
+    return text if text.endswith("\n") else f"{text}\n{_NO_NEWLINE_NOTE}"

@@ -9,12 +9,12 @@ from mutator.config.location_syntax import as_written_at, assignable, dotted_nam
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel, FaultModels, Needs, SnippetKind
 from mutator.model import Anchor, AnchorKind, FaultLocation
-from mutator.mutants.anchors import ParsedFile, Site, functions_named, plain_name
-from mutator.mutants.expressions import NO_PARTS, Expression, parts_of
-from mutator.mutants.statement_texts import written_out
+from mutator.mutants.anchors import ParsedFile, ResolvedAnchor, functions_named, plain_function_name
+from mutator.mutants.expressions import NO_TEMPLATE_PARTS, Expression, template_parts
+from mutator.mutants.statement_texts import one_line_texts
 
-_OF_OPERATORS = "operator_"  # models of mutation operators, which find their own places
-_VERBS = {
+_OPERATOR_MODEL_PREFIX = "operator_"  # models of mutation operators, which find their own places
+_ANCHOR_KINDS_BY_VERB = {
     "assign": (AnchorKind.BEFORE_ASSIGN, AnchorKind.AFTER_ASSIGN),
     "call": (AnchorKind.BEFORE_CALL, AnchorKind.AFTER_CALL),
     "return": (AnchorKind.BEFORE_RETURN,),
@@ -40,27 +40,31 @@ def places_of(file: ParsedFile, models: FaultModels, function: str | None = None
     A statement is listed under each name that it assigns or calls, an expression under its most specific
     anchor. MutatorError with the file's functions if `function` is not one of them.
     """
-    lister = _Lister(file, [model for model in models if not model.name.startswith(_OF_OPERATORS)])
-    names = tuple(file.functions)
+    lister = _PlaceLister(
+        file, [model for model in models if not model.name.startswith(_OPERATOR_MODEL_PREFIX)]
+    )
+    names = tuple(file.functions_by_name)
     if function is not None:
         functions_named(file, function)  # raises if there is none
-        names = (plain_name(function),)
-    places = [place for name in names for place in lister.of_function(name)]
-    places += lister.fixed(None if function is None else names[0])
+        names = (plain_function_name(function),)
+    places = [place for name in names for place in lister.places_in_function(name)]
+    places += lister.constant_and_default_places(None if function is None else names[0])
     return sorted(places, key=lambda place: place.line)
 
 
-class _Lister:
+class _PlaceLister:
     def __init__(self, file: ParsedFile, models: Sequence[FaultModel]) -> None:
         self.file = file
         self.models = models
 
-    def of_function(self, name: str) -> Iterator[ListedPlace]:
-        functions = self.file.functions[name]
+    def places_in_function(self, name: str) -> Iterator[ListedPlace]:
+        functions = self.file.functions_by_name[name]
         for i, function in enumerate(functions):
             if function.entry is not None:
-                yield from self.statement(name, AnchorKind.ENTRY, "", i + 1 if len(functions) > 1 else None)
-        for verb, kinds in _VERBS.items():
+                yield from self.statement_places(
+                    name, AnchorKind.ENTRY, "", i + 1 if len(functions) > 1 else None
+                )
+        for verb, kinds in _ANCHOR_KINDS_BY_VERB.items():
             anchorable = (s for f in functions for s in f.statements if not s.reason)
             statements = sorted(anchorable, key=lambda s: s.opens is not None)  # in the order of `nth`
             totals, numbers = (Counter[str]() for _ in range(2))
@@ -68,72 +72,78 @@ class _Lister:
             for statement in statements:
                 names = statement.names(verb)
                 numbers.update(names)
-                usable_names = [one for one in names if writable(one)]
+                usable_names = [one for one in names if is_writable_in_spec(one)]
                 for one in usable_names[-1:] if verb == "return" else usable_names:
                     for kind in kinds:
-                        yield from self.statement(name, kind, one, numbers[one] if totals[one] > 1 else None)
-        yield from self.values(name)
+                        yield from self.statement_places(
+                            name, kind, one, numbers[one] if totals[one] > 1 else None
+                        )
+        yield from self.expression_places(name)
 
-    def statement(self, function: str, kind: AnchorKind, name: str, nth: int | None) -> Iterator[ListedPlace]:
-        location = self.location(function, Anchor(kind=kind, name=name, nth=nth))
+    def statement_places(
+        self, function: str, kind: AnchorKind, name: str, nth: int | None
+    ) -> Iterator[ListedPlace]:
+        location = self.location_at(function, Anchor(kind=kind, name=name, nth=nth))
         try:
-            site = self.file.resolve(location)
+            site = self.file.resolve_statement(location)
         except MutatorError:
             return  # for example, because the statement shares its line
-        models = tuple(model.name for model in self.models if self.fits(model, kind, site))
+        models = tuple(model.name for model in self.models if self.fits_statement(model, kind, site))
         if models:
             yield ListedPlace(
-                line=min(site.first, len(self.file.lines) - 1) + 1, location=location, models=models
+                line=min(site.first_line, len(self.file.lines) - 1) + 1, location=location, models=models
             )
 
-    def fits(self, model: FaultModel, kind: AnchorKind, site: Site) -> bool:
+    def fits_statement(self, model: FaultModel, kind: AnchorKind, site: ResolvedAnchor) -> bool:
         if model.needs is Needs.CALL or (
             model.kind is SnippetKind.VALUE and kind is not AnchorKind.AFTER_ASSIGN
         ):
             return False
         if model.kind is SnippetKind.VALUE and model.parts:
             return False
-        if model.kind is SnippetKind.GUARD and (site.first == site.last or not site.alone or site.after):
+        if model.kind is SnippetKind.GUARD and (
+            site.first_line == site.end_line or not site.is_alone or site.is_after
+        ):
             return False
         if model.needs is not None:
             try:
-                written_out(self.file, site, model.needs)
+                one_line_texts(self.file, site, model.needs)
             except MutatorError:
                 return False
         return True
 
-    def values(self, function: str) -> Iterator[ListedPlace]:
-        expressions = self.file.expressions.get(function, ())
+    def expression_places(self, function: str) -> Iterator[ListedPlace]:
+        expressions = self.file.expressions_by_function.get(function, ())
         totals = Counter(role for expression in expressions for role in dict.fromkeys(expression.roles))
         numbers = Counter[Any]()
         for one in expressions:
             kind, name, which = role = one.roles[0]
             numbers.update(dict.fromkeys(one.roles, 1))
             nth = numbers[role] if totals[role] > 1 else None
-            location = self.location(function, Anchor(kind=kind, name=name, which=which, nth=nth))
-            models = tuple(model.name for model in self.models if changes(model, one))
+            location = self.location_at(function, Anchor(kind=kind, name=name, which=which, nth=nth))
+            models = tuple(model.name for model in self.models if can_change(model, one))
             yield ListedPlace(line=one.start[0] + 1, location=location, models=models)
 
-    def fixed(self, function: str | None) -> Iterator[ListedPlace]:
-        models = tuple(model.name for model in self.models if changes(model, None))
-        for value in self.file.fixed:
-            if value.reason is None and function in (None, value.function):
-                location = self.location(value.function, Anchor(kind=value.kind, name=value.name))
-                yield ListedPlace(line=value.first + 1, location=location, models=models)
+    def constant_and_default_places(self, function: str | None) -> Iterator[ListedPlace]:
+        models = tuple(model.name for model in self.models if can_change(model, None))
+        for value in self.file.constants_and_defaults:
+            if value.unsettable_reason is None and function in (None, value.function):
+                location = self.location_at(value.function, Anchor(kind=value.kind, name=value.name))
+                yield ListedPlace(line=value.first_line + 1, location=location, models=models)
 
-    def location(self, function: str, anchor: Anchor) -> FaultLocation:
+    def location_at(self, function: str, anchor: Anchor) -> FaultLocation:
         return FaultLocation(path=self.file.path, function=function, anchor=anchor)
 
 
-def writable(name: str) -> bool:
+def is_writable_in_spec(name: str) -> bool:
     """Return whether a spec can use this name of a statement. `None`, as in `return None`, is not a name."""
     return not name or dotted_name(name) or assignable(name)
 
 
-def changes(model: FaultModel, expression: Expression | None) -> bool:
+def can_change(model: FaultModel, expression: Expression | None) -> bool:
     """Return whether a model can change this expression or, for None, a constant or default."""
     if model.expression is None:
         return False
-    parts = parts_of(expression) if expression else NO_PARTS
+    parts = template_parts(expression) if expression else NO_TEMPLATE_PARTS
     needed = {"called"} if model.needs is Needs.CALL else set()
     return all(parts[name] is not None and parts[name] != [] for name in needed | model.parts)

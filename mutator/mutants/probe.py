@@ -16,11 +16,11 @@ from mutator.config.location_syntax import PROBE_NAME
 from mutator.errors import MutatorError
 from mutator.faults.probe_templates import ProbeTemplates, TemplatePart
 from mutator.model import Activation, Hold, Injection, Trigger
-from mutator.mutants.template_rendering import render
+from mutator.mutants.template_rendering import render_template
 from mutator.targets.observed_values import Observation
 from mutator.triggers.conditions import TIME, check_condition, to_code
 
-_IN_CODE = ("observed", "values", "counted", "sets")  # settings that the template of the code uses
+_SETTINGS_IN_CODE = ("observed", "values", "counted", "sets")  # settings that the template of the code uses
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,28 +54,28 @@ class Probe:
     In its file, they alternate.
     """
 
-    own: tuple[str, ...]
-    shared: tuple[str, ...]
+    settings_parts: tuple[str, ...]
+    code_parts: tuple[str, ...]
     armed_after_s: float
 
     @property
     def text(self) -> str:
-        return "".join(chain.from_iterable(zip(self.own, self.shared, strict=True)))
+        return "".join(chain.from_iterable(zip(self.settings_parts, self.code_parts, strict=True)))
 
     @property
-    def in_two(self) -> tuple[str, str]:
+    def settings_and_code(self) -> tuple[str, str]:
         """Its own part, and the shared one. Run one after the other, they do the same as the whole.
 
         Blank lines keep the line numbers unchanged.
         """
-        pairs = list(zip(self.own, self.shared, strict=True))
-        own = (settings + "\n" * code.count("\n") for settings, code in pairs)
-        return "".join(own), "".join("\n" * one.count("\n") + other for one, other in pairs)
+        pairs = list(zip(self.settings_parts, self.code_parts, strict=True))
+        padded_settings = (settings + "\n" * code.count("\n") for settings, code in pairs)
+        return "".join(padded_settings), "".join("\n" * one.count("\n") + other for one, other in pairs)
 
     @property
-    def decision(self) -> tuple[float, str]:
+    def armed_condition(self) -> tuple[float, str]:
         """The time (s) from which it is armed, and the source of its condition on observed values."""
-        return self.armed_after_s - _tolerance_s(self.shared), self.own[-1]
+        return self.armed_after_s - _time_tolerance_s(self.code_parts), self.settings_parts[-1]
 
 
 def probe_path(package: str | None) -> str:
@@ -87,7 +87,7 @@ def probe_module(package: str | None) -> str:
     return f"{package}.{PROBE_NAME}" if package else PROBE_NAME
 
 
-def is_probe(path: str) -> bool:
+def is_probe_path(path: str) -> bool:
     return path.rpartition("/")[2] == f"{PROBE_NAME}.py"
 
 
@@ -96,7 +96,7 @@ def injection_id(index: int, injection: Injection) -> str:
     return content_id([index, injection])[:8]
 
 
-def settings_of(
+def build_probe_settings(
     mutant: str,
     trigger: Trigger,
     hold: Hold,
@@ -130,25 +130,25 @@ def settings_of(
     )
 
 
-def probe_of(templates: ProbeTemplates, settings: ProbeSettings) -> Probe:
+def render_probe(templates: ProbeTemplates, settings: ProbeSettings) -> Probe:
     """Render the templates with these settings."""
-    own = _rendered(templates.settings, vars(settings))
-    code = {name: getattr(settings, name) for name in _IN_CODE}
-    shared = _shared(templates.code, tuple(code.items()))
-    return Probe(own=own, shared=shared, armed_after_s=settings.armed_after_s)
+    settings_parts = _render_parts(templates.settings, vars(settings))
+    code = {name: getattr(settings, name) for name in _SETTINGS_IN_CODE}
+    code_parts = _render_code(templates.code, tuple(code.items()))
+    return Probe(settings_parts=settings_parts, code_parts=code_parts, armed_after_s=settings.armed_after_s)
 
 
 @lru_cache(maxsize=16)  # all mutants of a target share one or two
-def _shared(parts: tuple[TemplatePart, ...], names: tuple[tuple[str, object], ...]) -> tuple[str, ...]:
-    return _rendered(parts, dict(names))
+def _render_code(parts: tuple[TemplatePart, ...], names: tuple[tuple[str, object], ...]) -> tuple[str, ...]:
+    return _render_parts(parts, dict(names))
 
 
-def _rendered(parts: Sequence[TemplatePart], names: Mapping[str, object]) -> tuple[str, ...]:
-    return tuple(render(part.text, names, part.path, part.line) for part in parts)
+def _render_parts(parts: Sequence[TemplatePart], names: Mapping[str, object]) -> tuple[str, ...]:
+    return tuple(render_template(part.text, names, part.path, part.line) for part in parts)
 
 
 @lru_cache(maxsize=16)
-def _tolerance_s(shared: tuple[str, ...]) -> float:
+def _time_tolerance_s(shared: tuple[str, ...]) -> float:
     """Return the tolerance of comparisons of times, which the template of the code sets."""
     for node in ast.walk(ast.parse("".join(shared))):
         if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "_TINY":
@@ -159,7 +159,7 @@ def _tolerance_s(shared: tuple[str, ...]) -> float:
 # A running probe
 
 
-def state_after(observed: int, began: float | None, t: float | None) -> tuple[str, dict[str, object]]:
+def probe_state_after(observed: int, began: float | None, t: float | None) -> tuple[str, dict[str, object]]:
     """Return the name of the object in which a probe keeps its observations, and that object's attributes.
 
     The first of `observed` observations was at time `began` (s), the last at `t`. A probe that replaces
@@ -171,7 +171,7 @@ def state_after(observed: int, began: float | None, t: float | None) -> tuple[st
 # What a probe reports
 
 
-def silent_report(mutant: str | None) -> dict[str, Any]:
+def untriggered_report(mutant: str | None) -> dict[str, Any]:
     """Return the report of a mutant whose trigger never holds, limited to the entries that are read."""
     return {"mutant": mutant, "triggered": None, "injections": {}}
 
@@ -188,14 +188,14 @@ def report_problem(report: object, mutant: str, injections: Sequence[str]) -> st
     triggered, entries = report.get("triggered"), report.get("injections")
     if not isinstance(entries, dict) or entries.keys() != set(injections):
         return "the injections in its probe's report are not its own"
-    if not all(_is_told(entry, "count") for entry in entries.values()):
+    if not all(_is_valid_entry(entry, "count") for entry in entries.values()):
         return "its probe's report of the injections is damaged"
-    if not (triggered is None or (_is_told(triggered, "steps") and triggered["steps"])):
+    if not (triggered is None or (_is_valid_entry(triggered, "steps") and triggered["steps"])):
         return "its probe's report of the trigger is damaged"
     return "" if triggered or not activation_of(report) else "an injection was active and its trigger was not"
 
 
-def _is_told(entry: object, count_key: str) -> bool:
+def _is_valid_entry(entry: object, count_key: str) -> bool:
     """Return whether an entry is valid: a first time, a last time and a count, or None, None and 0."""
     if not isinstance(entry, dict) or entry.keys() != {"first", "last", count_key}:
         return False

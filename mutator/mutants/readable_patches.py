@@ -3,13 +3,13 @@
 import re
 from collections.abc import Iterator
 
-_NEW_NAME = re.compile(r"^\+\+\+ b/(.+?)\t?$", re.MULTILINE)
+_NEW_PATH_PATTERN = re.compile(r"^\+\+\+ b/(.+?)\t?$", re.MULTILINE)
 
 
-def readable(patch: str) -> tuple[str, str]:
+def readable_patch(patch: str) -> tuple[str, str]:
     """Return the patch without its new files, and a sentence that names them (empty if there are none)."""
     sections = list(file_patches(patch))
-    left_out = [m[1] for s in sections if adds_file(s) and (m := _NEW_NAME.search(s))]
+    left_out = [m[1] for s in sections if adds_file(s) and (m := _NEW_PATH_PATTERN.search(s))]
     note = f"not shown: {', '.join(left_out)}, the probe, which evaluates the trigger" if left_out else ""
     return "".join(s for s in sections if not adds_file(s)), note
 

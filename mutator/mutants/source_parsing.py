@@ -11,16 +11,16 @@ import libcst as cst
 from libcst.metadata import MetadataWrapper, PositionProvider
 
 from mutator.errors import MutatorError
-from mutator.mutants.injected_lines import instrumented_line
-from mutator.mutants.node_positions import Positions, line_after
+from mutator.mutants.injected_lines import find_instrumented_line
+from mutator.mutants.node_positions import Positions, line_after_statements
 
 MOST_NODES = 50_000  # of a file's syntax tree; LibCST takes about 0.1 ms and 4 kB for each
-MOST_LINKS = 500
-_LONE_CR = re.compile(rb"\r(?!\n)")
+MOST_CHAIN_LINKS = 500
+_LONE_CR_PATTERN = re.compile(rb"\r(?!\n)")
 
 
-def refuse_unfit(data: bytes, where: Path) -> None:
-    if match := _LONE_CR.search(data):
+def check_uninstrumented(data: bytes, where: Path) -> None:
+    if match := _LONE_CR_PATTERN.search(data):
         raise MutatorError(
             "a line ends in CR alone",
             where=where,
@@ -28,7 +28,7 @@ def refuse_unfit(data: bytes, where: Path) -> None:
             expected="LF or CRLF",
             remedy="convert the file's line ends",
         )
-    line = instrumented_line(data)
+    line = find_instrumented_line(data)
     if line is not None:
         raise MutatorError(
             "the target uses the name `_fi` or a `# fi:` tag",
@@ -39,7 +39,7 @@ def refuse_unfit(data: bytes, where: Path) -> None:
         )
 
 
-def python_tree(data: bytes, where: Path) -> ast.Module:
+def parse_with_python(data: bytes, where: Path) -> ast.Module:
     try:
         compile(data, str(where), "exec", dont_inherit=True)
         tree = ast.parse(data)
@@ -51,30 +51,32 @@ def python_tree(data: bytes, where: Path) -> ast.Module:
             line=line,
             remedy="correct the target's source",
         ) from None
-    _check_size(tree, where)
+    _check_tree_size(tree, where)
     return tree
 
 
-def _check_size(tree: ast.Module, where: Path) -> None:
+def _check_tree_size(tree: ast.Module, where: Path) -> None:
     """Refuse what would take LibCST long, or end the process: it recurses along chains."""
     for number, node in enumerate(ast.walk(tree), start=1):
         links = len(node.values) if isinstance(node, ast.BoolOp) else 0
         if isinstance(node, ast.Import | ast.ImportFrom):
             names = [alias.name for alias in node.names] + [getattr(node, "module", None) or ""]
             links = max(name.count(".") for name in names)
-        if number > MOST_NODES or links > MOST_LINKS:
-            long = f"`and`, `or` or a dotted name with {links} parts" if links > MOST_LINKS else "its size"
+        if number > MOST_NODES or links > MOST_CHAIN_LINKS:
+            long = (
+                f"`and`, `or` or a dotted name with {links} parts" if links > MOST_CHAIN_LINKS else "its size"
+            )
             raise MutatorError(
                 f"too large to be changed: {long}",
                 where=where,
-                line=getattr(node, "lineno", None) if links > MOST_LINKS else None,
-                expected=f"at most {MOST_NODES:,} nodes in its syntax tree, and chains of {MOST_LINKS}",
+                line=getattr(node, "lineno", None) if links > MOST_CHAIN_LINKS else None,
+                expected=f"at most {MOST_NODES:,} nodes in its syntax tree, and chains of {MOST_CHAIN_LINKS}",
                 remedy="split the file, or inject into another one",
             )
 
 
 @contextmanager
-def reading(where: Path) -> Iterator[None]:
+def translate_libcst_errors(where: Path) -> Iterator[None]:
     """Turn the errors of LibCST on valid Python into MutatorError."""
     try:
         yield
@@ -93,7 +95,7 @@ def reading(where: Path) -> Iterator[None]:
         ) from None
 
 
-def libcst_module(data: bytes, where: Path) -> tuple[cst.Module, Positions]:
+def parse_with_libcst(data: bytes, where: Path) -> tuple[cst.Module, Positions]:
     """Parse the file with LibCST; MutatorError unless LibCST reproduces the file's bytes."""
     module = cst.parse_module(data)
     written = module.bytes
@@ -113,7 +115,7 @@ def libcst_module(data: bytes, where: Path) -> tuple[cst.Module, Positions]:
     return module, MetadataWrapper(module, unsafe_skip_copy=True).resolve(PositionProvider)
 
 
-def import_line(module: cst.Module, positions: Positions) -> int:
+def import_insertion_line(module: cst.Module, positions: Positions) -> int:
     """Return the index of the line before which to insert imports: after docstring and `__future__`."""
     after = None
     for i, node in enumerate(module.body):
@@ -132,7 +134,7 @@ def import_line(module: cst.Module, positions: Positions) -> int:
         )
         if not (docstring or future):
             break
-        after = line_after(node, positions)
+        after = line_after_statements(node, positions)
     if after is not None:
         return after
     return _first_line(module.body[0], positions) if module.body else len(module.header)

@@ -15,7 +15,7 @@ def outer_functions(tree: ast.AST) -> Iterator[range]:
             yield from outer_functions(node)
 
 
-def compiled_alone(lines: Sequence[bytes], encoding: str) -> CodeType | None:
+def compile_standalone(lines: Sequence[bytes], encoding: str) -> CodeType | None:
     """Return the code of a module that contains only these lines, or None if they do not compile.
 
     An outermost function compiles alone if and only if it compiles in its file.

@@ -7,8 +7,14 @@ from dataclasses import dataclass
 import libcst as cst
 
 from mutator.config.location_syntax import assignable
-from mutator.mutants.name_scopes import FunctionNames, as_compiled
-from mutator.mutants.node_positions import Place, Positions, function_place, line_after, statement_place
+from mutator.mutants.name_scopes import NamesByFunction, normalize_identifier
+from mutator.mutants.node_positions import (
+    NodePosition,
+    Positions,
+    function_position,
+    line_after_statements,
+    statement_position,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,7 +27,7 @@ class Statement:
 
     first: int
     last: int
-    place: Place | None = None
+    place: NodePosition | None = None
     assigns: tuple[str, ...] = ()
     calls: tuple[str, ...] = ()
     returns: tuple[str, ...] = ()
@@ -53,39 +59,39 @@ class Function:
     """
 
     line: int
-    place: Place
+    place: NodePosition
     statements: tuple[Statement, ...]
     names: frozenset[str]
     entry: tuple[int, int] | None
 
 
-def collect(
-    module: cst.Module, positions: Positions, names: FunctionNames
+def collect_functions(
+    module: cst.Module, positions: Positions, names: NamesByFunction
 ) -> dict[str, tuple[Function, ...]]:
     """Return all functions by qualified name (`Class.method`, `outer.inner`), in source order."""
-    collector = _Collector(positions, names)
+    collector = _FunctionCollector(positions, names)
     module.visit(collector)
     return {name: tuple(functions) for name, functions in collector.functions.items()}
 
 
-def dotted(node: cst.CSTNode | None) -> str | None:
+def dotted_name_of(node: cst.CSTNode | None) -> str | None:
     """Return `a.b.c` for a chain of names, None for anything else."""
     if isinstance(node, cst.Name):
-        return as_compiled(node.value)
+        return normalize_identifier(node.value)
     if isinstance(node, cst.Attribute):
-        base = dotted(node.value)
-        return f"{base}.{as_compiled(node.attr.value)}" if base else None
+        base = dotted_name_of(node.value)
+        return f"{base}.{normalize_identifier(node.attr.value)}" if base else None
     return None
 
 
-def item(node: cst.Subscript) -> str | None:
+def item_name_of(node: cst.Subscript) -> str | None:
     """Return `a['b']`, as anchors name it; None if it has a computed part, which could change."""
     text = ast.unparse(ast.parse(cst.Module([]).code_for_node(node), mode="eval"))
     return text if assignable(text) else None
 
 
-class _Collector(cst.CSTVisitor):
-    def __init__(self, positions: Positions, names: FunctionNames) -> None:
+class _FunctionCollector(cst.CSTVisitor):
+    def __init__(self, positions: Positions, names: NamesByFunction) -> None:
         super().__init__()
         self.positions = positions
         self.names = names
@@ -95,7 +101,7 @@ class _Collector(cst.CSTVisitor):
         self.heads: set[int] = set()  # ids of targets in heads of blocks
 
     def visit_ClassDef(self, node: cst.ClassDef) -> None:  # noqa: N802
-        self.scope.append(as_compiled(node.name.value))
+        self.scope.append(normalize_identifier(node.name.value))
         self.open.append(None)
 
     def leave_ClassDef(self, original_node: cst.ClassDef) -> None:  # noqa: N802
@@ -103,7 +109,7 @@ class _Collector(cst.CSTVisitor):
         self.open.pop()
 
     def visit_FunctionDef(self, node: cst.FunctionDef) -> None:  # noqa: N802
-        self.scope.append(as_compiled(node.name.value))
+        self.scope.append(normalize_identifier(node.name.value))
         self.open.append([])
 
     def leave_FunctionDef(self, original_node: cst.FunctionDef) -> None:  # noqa: N802
@@ -112,85 +118,89 @@ class _Collector(cst.CSTVisitor):
         line = self.positions[original_node].start.line
         function = Function(
             line=line - 1,
-            place=function_place(original_node, self.positions),
+            place=function_position(original_node, self.positions),
             statements=tuple(sorted(statements, key=lambda s: s.first)),
             names=self.names.get((line, self.scope[-1]), frozenset()),
-            entry=_entry(original_node, self.positions),
+            entry=_entry_lines(original_node, self.positions),
         )
         self.functions.setdefault(".".join(self.scope), []).append(function)
         self.scope.pop()
 
     def visit_SimpleStatementLine(self, node: cst.SimpleStatementLine) -> None:  # noqa: N802
-        self._add(node, one_line_suite=False)
+        self._add_small_statements(node, one_line_suite=False)
 
     def visit_SimpleStatementSuite(self, node: cst.SimpleStatementSuite) -> None:  # noqa: N802
-        self._add(node, one_line_suite=True)
+        self._add_small_statements(node, one_line_suite=True)
 
     def visit_For(self, node: cst.For) -> None:  # noqa: N802
-        self._add_head(node.target, node.body, "it is the target of a `for`")
+        self._add_head_binding(node.target, node.body, "it is the target of a `for`")
 
     def visit_With(self, node: cst.With) -> None:  # noqa: N802
         for item in node.items:
             if item.asname:
-                self._add_head(item.asname.name, node.body, "it is bound by `as`")
+                self._add_head_binding(item.asname.name, node.body, "it is bound by `as`")
 
     def visit_ExceptHandler(self, node: cst.ExceptHandler) -> None:  # noqa: N802
         if node.name:
-            self._add_head(node.name.name, node.body, "it is bound by `as`")
+            self._add_head_binding(node.name.name, node.body, "it is bound by `as`")
 
     def visit_AsName(self, node: cst.AsName) -> None:  # noqa: N802
         if id(node.name) not in self.heads:
-            self._add_other(node, _targets(node.name), "it is bound by `as`")
+            self._add_unanchorable(node, _target_names(node.name), "it is bound by `as`")
 
     def visit_NamedExpr(self, node: cst.NamedExpr) -> None:  # noqa: N802
-        self._add_other(node, _targets(node.target), "it is bound by `:=` inside an expression")
+        self._add_unanchorable(node, _target_names(node.target), "it is bound by `:=` inside an expression")
 
-    def _add(self, node: cst.SimpleStatementLine | cst.SimpleStatementSuite, one_line_suite: bool) -> None:
+    def _add_small_statements(
+        self, node: cst.SimpleStatementLine | cst.SimpleStatementSuite, one_line_suite: bool
+    ) -> None:
         statements = self.open[-1] if self.open else None
         if statements is None:
             return
         span = self.positions[node]
-        last = line_after(node, self.positions)
+        last = line_after_statements(node, self.positions)
         for i, small in enumerate(node.body):
             outer = _outer_call(small)
             for call in _inner_calls(small, outer):
-                self._add_other(
-                    call, [dotted(call.func) or ""], "the call is part of an expression", calls=True
+                self._add_unanchorable(
+                    call, [dotted_name_of(call.func) or ""], "the call is part of an expression", calls=True
                 )
-            assigns, calls, returns = _effects(small, outer)
+            assigns, calls, returns = _assigned_called_and_returned(small, outer)
             if not (assigns or calls or returns):
                 continue
             statements.append(
                 Statement(
                     first=span.start.line - 1,
                     last=last,
-                    place=statement_place(small, self.positions),
+                    place=statement_position(small, self.positions),
                     assigns=assigns,
                     calls=calls,
                     returns=returns,
                     first_in_line=i == 0,
                     last_in_line=i == len(node.body) - 1,
                     one_line_suite=one_line_suite,
-                    spanning_string=_spanning_string(small, self.positions),
+                    spanning_string=_has_multiline_string(small, self.positions),
                 )
             )
 
-    def _add_head(self, target: cst.CSTNode, body: cst.BaseSuite, reason: str) -> None:
+    def _add_head_binding(self, target: cst.CSTNode, body: cst.BaseSuite, reason: str) -> None:
         """Add what the head of a block binds. Snippets go into the block, if the block has its own lines."""
         self.heads.add(id(target))
-        statements, names = self.open[-1] if self.open else None, _targets(target)
+        statements, names = self.open[-1] if self.open else None, _target_names(target)
         if statements is None or not names:
             return
         if not isinstance(body, cst.IndentedBlock):
-            self._add_other(target, names, reason)
+            self._add_unanchorable(target, names, reason)
             return
         first = body.body[0]
         decorators = first.decorators if isinstance(first, cst.FunctionDef | cst.ClassDef) else ()
         opens = min(self.positions[node].start.line for node in (first, *decorators)) - 1
         line = self.positions[target].start.line - 1
-        statements.append(Statement(first=line, last=opens, assigns=tuple(_that_stay(names)), opens=opens))
+        statements.append(Statement(first=line, last=opens, assigns=tuple(_stable_names(names)), opens=opens))
 
-    def _add_other(self, node: cst.CSTNode, names: list[str], reason: str, calls: bool = False) -> None:
+    def _add_unanchorable(
+        self, node: cst.CSTNode, names: list[str], reason: str, calls: bool = False
+    ) -> None:
         statements = self.open[-1] if self.open else None
         if statements is not None and names and all(names):
             span = self.positions[node]
@@ -206,55 +216,55 @@ class _Collector(cst.CSTVisitor):
             )
 
 
-def _value(small: cst.BaseSmallStatement) -> cst.BaseExpression | None:
+def _value_of(small: cst.BaseSmallStatement) -> cst.BaseExpression | None:
     if isinstance(small, cst.Expr | cst.Assign | cst.AugAssign | cst.AnnAssign | cst.Return):
         return small.value
     return None
 
 
 def _outer_call(small: cst.BaseSmallStatement) -> cst.Call | None:
-    value = _value(small)
+    value = _value_of(small)
     if isinstance(value, cst.Await):
         value = value.expression
     return value if isinstance(value, cst.Call) else None
 
 
-def _effects(
+def _assigned_called_and_returned(
     small: cst.BaseSmallStatement, call: cst.Call | None
 ) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
     assigns: list[str] = []
     if isinstance(small, cst.Assign):
-        assigns = [name for target in small.targets for name in _targets(target.target)]
+        assigns = [name for target in small.targets for name in _target_names(target.target)]
     elif isinstance(small, cst.AugAssign) or (isinstance(small, cst.AnnAssign) and small.value is not None):
-        assigns = _targets(small.target)
-    called = dotted(call.func) if call else None
+        assigns = _target_names(small.target)
+    called = dotted_name_of(call.func) if call else None
     returns: list[str] = []
     if isinstance(small, cst.Return):
-        returned = called or dotted(small.value)
+        returned = called or dotted_name_of(small.value)
         returns = ["", returned] if returned else [""]
-    unique = tuple(_that_stay(assigns))
+    unique = tuple(_stable_names(assigns))
     return unique, (called,) if called else (), tuple(returns)
 
 
-def _that_stay(names: Sequence[str]) -> Iterator[str]:
+def _stable_names(names: Sequence[str]) -> Iterator[str]:
     """Yield the assigned names without duplicates, and without items whose index is assigned later.
 
     After `a[i], i = 1, 2`, `a[i]` names a different item.
     """
     unique = list(dict.fromkeys(names))
-    for place, name in enumerate(unique, 1):
+    for number, name in enumerate(unique, 1):
         parts = ast.walk(ast.parse(name, mode="eval")) if "[" in name else ()
         within = {ast.unparse(part) for part in parts if isinstance(part, ast.expr)}
-        if within.isdisjoint(unique[place:]):
+        if within.isdisjoint(unique[number:]):
             yield name
 
 
-def _targets(node: cst.CSTNode) -> list[str]:
+def _target_names(node: cst.CSTNode) -> list[str]:
     if isinstance(node, cst.Tuple | cst.List):
-        return [name for element in node.elements for name in _targets(element.value)]
+        return [name for element in node.elements for name in _target_names(element.value)]
     if isinstance(node, cst.StarredElement):
-        return _targets(node.value)
-    name = item(node) if isinstance(node, cst.Subscript) else dotted(node)
+        return _target_names(node.value)
+    name = item_name_of(node) if isinstance(node, cst.Subscript) else dotted_name_of(node)
     return [name] if name else []
 
 
@@ -267,7 +277,7 @@ def _inner_calls(small: cst.BaseSmallStatement, outer: cst.Call | None) -> Itera
         stack += node.children
 
 
-def _spanning_string(small: cst.BaseSmallStatement, positions: Positions) -> bool:
+def _has_multiline_string(small: cst.BaseSmallStatement, positions: Positions) -> bool:
     """Return whether a string literal spans several lines, which must then not be indented."""
     stack: list[cst.CSTNode] = [small]
     while stack:
@@ -280,7 +290,7 @@ def _spanning_string(small: cst.BaseSmallStatement, positions: Positions) -> boo
     return False
 
 
-def _entry(node: cst.FunctionDef, positions: Positions) -> tuple[int, int] | None:
+def _entry_lines(node: cst.FunctionDef, positions: Positions) -> tuple[int, int] | None:
     body = node.body
     if not isinstance(body, cst.IndentedBlock):
         return None
@@ -291,4 +301,4 @@ def _entry(node: cst.FunctionDef, positions: Positions) -> tuple[int, int] | Non
         return line, line
     if not isinstance(first, cst.SimpleStatementLine) or len(first.body) > 1:
         return None
-    return line_after(first, positions), positions[first].start.line - 1
+    return line_after_statements(first, positions), positions[first].start.line - 1

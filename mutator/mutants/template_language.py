@@ -15,11 +15,11 @@ from jinja2.runtime import Context as _Context
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 
 MOST_CHARACTERS = 50_000  # of a template, and of its result
-MOST_NODES = 1000  # names, constants, operators, tags and pieces of text
-MOST_DEPTH = 30  # nodes in nodes
-MOST_WORK = 200_000  # loop turns times the nodes in the loop, and characters that are processed
-_LONGEST_NUMBER = 2048  # bits
-_NODES = (
+MOST_TEMPLATE_NODES = 1000  # names, constants, operators, tags and pieces of text
+MOST_NESTING = 30  # nodes in nodes
+MOST_WORK_STEPS = 200_000  # loop turns times the nodes in the loop, and characters that are processed
+_MOST_NUMBER_BITS = 2048  # bits
+_ALLOWED_NODES = (
     nodes.Template,
     nodes.Output,
     nodes.TemplateData,
@@ -51,7 +51,7 @@ _NODES = (
     nodes.Tuple,
     nodes.List,
 )
-_METHODS = (
+_ALLOWED_METHODS = (
     "endswith",
     "partition",
     "removeprefix",
@@ -61,7 +61,7 @@ _METHODS = (
     "startswith",
     "strip",
 )
-_TESTS = (
+_ALLOWED_TESTS = (
     "boolean",
     "defined",
     "even",
@@ -75,12 +75,20 @@ _TESTS = (
     "string",
     "true",
 )
-_LOOP = ("first", "index", "index0", "last", "length", "revindex", "revindex0")  # attributes of `loop`
-_KEPT_FILTERS = ("abs", "default", "float", "int", "length")  # of Jinja2's
-_TURNS, _READ = "turns", "read"  # filters that count; no template can name them
+_ALLOWED_LOOP_ATTRIBUTES = (
+    "first",
+    "index",
+    "index0",
+    "last",
+    "length",
+    "revindex",
+    "revindex0",
+)  # attributes of `loop`
+_JINJA_FILTERS = ("abs", "default", "float", "int", "length")  # of Jinja2's
+_TURN_COUNTER, _READ_COUNTER = "turns", "read"  # filters that count; no template can name them
 
 
-class Context(_Context):
+class CountingContext(_Context):
     """The names of one rendering, and how much work it has done."""
 
     work = 0
@@ -88,14 +96,14 @@ class Context(_Context):
     def add(self, work: int) -> None:
         """Count work; SecurityError if it is too much."""
         self.work += work
-        if self.work > MOST_WORK:
-            raise SecurityError(f"it does more than {MOST_WORK} steps of work")
+        if self.work > MOST_WORK_STEPS:
+            raise SecurityError(f"it does more than {MOST_WORK_STEPS} steps of work")
 
 
 class TemplateEnvironment(ImmutableSandboxedEnvironment):
     """Compiles templates that use only the allowed constructs, `functions` and `filters`."""
 
-    context_class = Context
+    context_class = CountingContext
     intercepted_binops = frozenset({"+", "-", "*", "/", "//", "%"})
 
     def __init__(
@@ -112,51 +120,53 @@ class TemplateEnvironment(ImmutableSandboxedEnvironment):
             keep_trailing_newline=True,
             finalize=finalize,
         )
-        jinja_filters = {name: self.filters[name] for name in _KEPT_FILTERS}
-        self.filters = {name: _counting(function) for name, function in {**jinja_filters, **filters}.items()}
+        jinja_filters = {name: self.filters[name] for name in _JINJA_FILTERS}
+        self.filters = {
+            name: _counting_filter(function) for name, function in {**jinja_filters, **filters}.items()
+        }
         self.filter_names = frozenset(self.filters)
-        self.filters |= {_TURNS: _turns, _READ: _counting(lambda value: value)}
+        self.filters |= {_TURN_COUNTER: _count_turns, _READ_COUNTER: _counting_filter(lambda value: value)}
         self.globals = dict(functions)
-        self.compiled = lru_cache(maxsize=256)(self._compiled)
+        self.compiled = lru_cache(maxsize=256)(self._compile_template)
 
-    def _compiled(self, text: str) -> Template:
+    def _compile_template(self, text: str) -> Template:
         """Return the template; TemplateSyntaxError with the line of a construct that is not allowed."""
         if len(text) > MOST_CHARACTERS:
             raise TemplateSyntaxError(f"{len(text)} characters instead of at most {MOST_CHARACTERS}", 1)
         tree = self.parse(text)
-        self._check(tree)
+        self._check_nodes(tree)
         for loop in tree.find_all(nodes.For):
-            size = nodes.Const(_size_of(loop))
-            loop.iter = _filtered(loop.iter, _TURNS, size)
-        _count_readers(tree)
+            size = nodes.Const(_count_nodes(loop))
+            loop.iter = _with_filter(loop.iter, _TURN_COUNTER, size)
+        _count_reads(tree)
         return Template.from_code(self, self.compile(tree), self.make_globals(None))
 
-    def _check(self, tree: nodes.Template) -> None:
+    def _check_nodes(self, tree: nodes.Template) -> None:
         """Reject what is not allowed, before any part of it is evaluated; loops stand beside each other."""
         queue: deque[tuple[nodes.Node, int, bool]] = deque([(tree, 0, False)])
         node_count = 0
         while queue:
             node, depth, in_loop = queue.popleft()
             node_count += 1
-            if why := self._problem(node, depth, node_count, in_loop):
+            if why := self._problem_of_node(node, depth, node_count, in_loop):
                 raise TemplateSyntaxError(why, node.lineno)
             in_loop = in_loop or isinstance(node, nodes.For)
             queue.extend((child, depth + 1, in_loop) for child in node.iter_child_nodes())
 
-    def _problem(self, node: nodes.Node, depth: int, node_count: int, in_loop: bool) -> str:
-        if depth > MOST_DEPTH or node_count > MOST_NODES:
-            return f"more than {MOST_NODES} parts, or nested more than {MOST_DEPTH} deep"
-        if not isinstance(node, _NODES):
+    def _problem_of_node(self, node: nodes.Node, depth: int, node_count: int, in_loop: bool) -> str:
+        if depth > MOST_NESTING or node_count > MOST_TEMPLATE_NODES:
+            return f"more than {MOST_TEMPLATE_NODES} parts, or nested more than {MOST_NESTING} deep"
+        if not isinstance(node, _ALLOWED_NODES):
             return f"`{getattr(node, 'operator', None) or type(node).__name__.lower()}` is not allowed"
         if isinstance(node, nodes.For) and (in_loop or node.recursive):
             return "a loop in a loop"
         if isinstance(node, nodes.Filter) and node.name not in self.filter_names:
             return f"no filter named '{node.name}'"
-        if isinstance(node, nodes.Test) and node.name not in _TESTS:
+        if isinstance(node, nodes.Test) and node.name not in _ALLOWED_TESTS:
             return f"no test named '{node.name}'"
         if isinstance(node, nodes.Call):
             return self._problem_of_call(node)
-        if isinstance(node, nodes.Getattr) and not _is_allowed(node):
+        if isinstance(node, nodes.Getattr) and not _is_allowed_attribute(node):
             return f"`.{node.attr}` is not allowed"
         if isinstance(node, nodes.List) or (isinstance(node, nodes.Tuple) and node.ctx == "load"):
             return (
@@ -170,7 +180,7 @@ class TemplateEnvironment(ImmutableSandboxedEnvironment):
             return "a call with keywords or stars"
         if isinstance(called, nodes.Name) and called.name in self.globals:
             return ""
-        if isinstance(called, nodes.Getattr) and called.attr in _METHODS:
+        if isinstance(called, nodes.Getattr) and called.attr in _ALLOWED_METHODS:
             return ""
         return f"a call of `{getattr(called, 'name', None) or getattr(called, 'attr', 'an expression')}`"
 
@@ -184,32 +194,32 @@ class TemplateEnvironment(ImmutableSandboxedEnvironment):
         return super().call_binop(context, operator, left, right)
 
     def call(__self, __context: Any, __function: Any, *args: Any, **kwargs: Any) -> Any:  # noqa: N805 (Jinja2's)
-        __context.add(_length(getattr(__function, "__self__", None)))
+        __context.add(_count_characters(getattr(__function, "__self__", None)))
         return super().call(__context, __function, *args, **kwargs)
 
     @staticmethod
     def concat(pieces: Iterable[str]) -> str:
         """Join the pieces of a result."""
-        return "".join(_limited(pieces))
+        return "".join(_limit_pieces(pieces))
 
 
-def _filtered(node: nodes.Node, name: str, *args: nodes.Expr) -> nodes.Filter:
+def _with_filter(node: nodes.Node, name: str, *args: nodes.Expr) -> nodes.Filter:
     return nodes.Filter(node, name, list(args), [], None, None, lineno=node.lineno)
 
 
-def _count_readers(tree: nodes.Template) -> None:
+def _count_reads(tree: nodes.Template) -> None:
     """Count what comparisons, the test `in` and slices read, each time they are evaluated."""
     for node in list(tree.find_all((nodes.Compare, nodes.Operand, nodes.Test, nodes.Getitem))):
         if isinstance(node, nodes.Compare | nodes.Operand):
-            node.expr = _filtered(node.expr, _READ)
+            node.expr = _with_filter(node.expr, _READ_COUNTER)
         elif isinstance(node, nodes.Test) and node.name == "in":
-            node.node = _filtered(node.node, _READ)
-            node.args = [_filtered(value, _READ) for value in node.args]
+            node.node = _with_filter(node.node, _READ_COUNTER)
+            node.args = [_with_filter(value, _READ_COUNTER) for value in node.args]
         elif isinstance(node, nodes.Getitem) and isinstance(node.arg, nodes.Slice):
-            node.node = _filtered(node.node, _READ)
+            node.node = _with_filter(node.node, _READ_COUNTER)
 
 
-def _limited(pieces: Iterable[str]) -> Iterator[str]:
+def _limit_pieces(pieces: Iterable[str]) -> Iterator[str]:
     total = 0
     for piece in pieces:
         total += len(piece)
@@ -218,44 +228,44 @@ def _limited(pieces: Iterable[str]) -> Iterator[str]:
         yield piece
 
 
-def _counting(function: Callable[..., Any]) -> Callable[..., Any]:
+def _counting_filter(function: Callable[..., Any]) -> Callable[..., Any]:
     """Let a filter count the characters of its value, and `join` also those of its separators."""
 
     @pass_context
     @wraps(function)
-    def counted(context: Context, value: Any, *args: Any) -> Any:
+    def counted(context: CountingContext, value: Any, *args: Any) -> Any:
         times = len(value) if isinstance(value, list | tuple) else 1
-        context.add(_length(value) + times * sum(map(_length, args)))
+        context.add(_count_characters(value) + times * sum(map(_count_characters, args)))
         return function(value, *args)
 
     return counted
 
 
 @pass_context
-def _turns(context: Context, value: Any, size: int) -> Any:
+def _count_turns(context: CountingContext, value: Any, size: int) -> Any:
     if not isinstance(value, list | tuple):
         raise SecurityError(f"a loop over a {type(value).__name__}")
     context.add(len(value) * size)
     return value
 
 
-def _is_allowed(node: nodes.Getattr) -> bool:
+def _is_allowed_attribute(node: nodes.Getattr) -> bool:
     is_loop = isinstance(node.node, nodes.Name) and node.node.name == "loop"
-    return node.attr in (_LOOP if is_loop else _METHODS)
+    return node.attr in (_ALLOWED_LOOP_ATTRIBUTES if is_loop else _ALLOWED_METHODS)
 
 
-def _size_of(node: nodes.Node) -> int:
+def _count_nodes(node: nodes.Node) -> int:
     return 1 + sum(1 for _ in node.find_all(nodes.Node))
 
 
-def _length(value: object) -> int:
+def _count_characters(value: object) -> int:
     """Return the number of characters in a text or a list of texts; 1 for other values."""
     if isinstance(value, str):
         return len(value)
-    return sum(map(_length, value)) if isinstance(value, list | tuple) else 1
+    return sum(map(_count_characters, value)) if isinstance(value, list | tuple) else 1
 
 
 def _is_number(value: object) -> bool:
     if isinstance(value, int):
-        return value.bit_length() <= _LONGEST_NUMBER
+        return value.bit_length() <= _MOST_NUMBER_BITS
     return isinstance(value, float)

@@ -24,16 +24,16 @@ from mutator.model import Value
 from mutator.mutants.normalized_source import normalized
 from mutator.mutants.template_language import TemplateEnvironment
 
-_EXACT = 2.0**53  # every integer up to this is exact as a double
-_EXPECTED = {  # by parameter type
+_MOST_EXACT_INTEGER = 2.0**53  # every integer up to this is exact as a double
+_EXPECTED_BY_PARAM_TYPE = {  # by parameter type
     "variable": "the name of a variable",
     "import": "a dotted name to import",
     "integer": "an integer",
 }
-_ARGUMENT = re.compile(r"(?P<keyword>\w+=)?(?P<value>.*)", re.DOTALL)  # as `ast.unparse` writes it
+_ARGUMENT_PATTERN = re.compile(r"(?P<keyword>\w+=)?(?P<value>.*)", re.DOTALL)  # as `ast.unparse` writes it
 
 
-def literal(value: object) -> str:
+def python_literal(value: object) -> str:
     """Return a value as Python source. Numbers keep their exact value; names are unchanged."""
     if value is None or isinstance(value, bool):
         return repr(value)
@@ -46,20 +46,20 @@ def literal(value: object) -> str:
     raise MutatorError(f"a {type(value).__name__} in a template", expected="a number or a name")
 
 
-def signed(value: int | float) -> str:
+def signed_term(value: int | float) -> str:
     """Return a term to add in an expression: `+ 3` or `- 2.5`.
 
     A whole number is written without a point, so that an integer stays an integer.
     """
     negative = math.copysign(1.0, value) < 0.0 and not math.isnan(value)
     size = -value if negative else value
-    whole = isinstance(size, float) and size <= _EXACT and size.is_integer()
-    return f"{'-' if negative else '+'} {literal(int(size) if whole else size)}"
+    whole = isinstance(size, float) and size <= _MOST_EXACT_INTEGER and size.is_integer()
+    return f"{'-' if negative else '+'} {python_literal(int(size) if whole else size)}"
 
 
-def exchanged(arguments: Sequence[str], first: int, second: int) -> list[str]:
+def exchange_arguments(arguments: Sequence[str], first: int, second: int) -> list[str]:
     """Exchange the values of two arguments of a call, counted from 1; keywords stay in place."""
-    parts = [_ARGUMENT.fullmatch(text) for text in arguments]
+    parts = [_ARGUMENT_PATTERN.fullmatch(text) for text in arguments]
     for number in (first, second):
         part = parts[number - 1] if 0 < number <= len(parts) else None
         if part is None or first == second or part["value"].startswith("*"):
@@ -73,7 +73,7 @@ def exchanged(arguments: Sequence[str], first: int, second: int) -> list[str]:
     return [(part["keyword"] or "") + value for part, value in zip(parts, values, strict=True) if part]
 
 
-def taken_for(written: str, read: str) -> float:
+def unit_mixup_factor(written: str, read: str) -> float:
     """Return the factor by which a quantity changes if it is written in one unit and read in another."""
     written_unit, read_unit = units.UNITS[written], units.UNITS[read]
     if written_unit.dimension != read_unit.dimension or written_unit == read_unit:
@@ -85,27 +85,43 @@ def taken_for(written: str, read: str) -> float:
     return units.convert(1.0, read_unit, written_unit)
 
 
-def refuse(why: str) -> NoReturn:
+def refuse_params(why: str) -> NoReturn:
     """Reject a combination of parameters; called from templates."""
     raise MutatorError(why, remedy="correct the parameters, or anchor elsewhere")
 
 
-def joined(items: Sequence[object], between: str = "") -> str:
+def join_literals(items: Sequence[object], between: str = "") -> str:
     """Join names, texts and numbers."""
-    return between.join(map(literal, items))
+    return between.join(map(python_literal, items))
 
 
 _ENVIRONMENT = TemplateEnvironment(
-    functions={"refuse": refuse},
-    filters={"signed": signed, "exchanged": exchanged, "taken_for": taken_for, "join": joined},
-    finalize=literal,
+    functions={"refuse": refuse_params},
+    filters={
+        "signed": signed_term,
+        "exchanged": exchange_arguments,
+        "taken_for": unit_mixup_factor,
+        "join": join_literals,
+    },
+    finalize=python_literal,
 )
-_NOT_PYTHON = (SyntaxError, ValueError, RecursionError, MemoryError)  # what Python's parser raises
-_FAILURES = (TypeError, ValueError, ArithmeticError, AttributeError, LookupError, RecursionError, MemoryError)
+_PARSER_ERRORS = (SyntaxError, ValueError, RecursionError, MemoryError)  # what Python's parser raises
+_RENDERING_ERRORS = (
+    TypeError,
+    ValueError,
+    ArithmeticError,
+    AttributeError,
+    LookupError,
+    RecursionError,
+    MemoryError,
+)
 
 
-def snippet(
-    model: FaultModel, params: Mapping[str, Value], fi: str, statements: Mapping[str, str] | None = None
+def render_snippet(
+    model: FaultModel,
+    params: Mapping[str, Value],
+    injection_id: str,
+    statements: Mapping[str, str] | None = None,
 ) -> tuple[str, ...]:
     """Return the model's lines for these parameters, untagged, indented by 4 spaces a level.
 
@@ -113,23 +129,25 @@ def snippet(
     template fails or its result does not consist of whole lines of Python.
     """
     if model.kind is SnippetKind.VALUE:
-        target = str(_checked(next(param for param in model.params if param.name == "target"), params))
+        target = str(_checked_param(next(param for param in model.params if param.name == "target"), params))
         return (
-            f'if {PROBE_NAME}.active("{fi}"):',
-            f"    {target} = {changed_value(model, params, fi, target)}",
+            f'if {PROBE_NAME}.active("{injection_id}"):',
+            f"    {target} = {render_changed_value(model, params, injection_id, target)}",
         )
-    names = {param.name: _checked(param, params) for param in model.params}
-    text = render(model.template, {"fi": fi, **names, **(statements or {})}, model.template_path)
+    names = {param.name: _checked_param(param, params) for param in model.params}
+    text = render_template(
+        model.template, {"fi": injection_id, **names, **(statements or {})}, model.template_path
+    )
     text = text.removesuffix("\n")
-    if not _are_lines(normalized(text, (fi,)), model.kind):
-        _check_lines(text, model.kind, model.template_path)
+    if not _is_valid_snippet(normalized(text, (injection_id,)), model.kind):
+        _check_snippet(text, model.kind, model.template_path)
     return tuple(text.split("\n"))
 
 
-def changed_value(
+def render_changed_value(
     model: FaultModel,
     params: Mapping[str, Value],
-    fi: str,
+    injection_id: str,
     original: str,
     parts: Mapping[str, object] | None = None,
 ) -> str:
@@ -146,11 +164,11 @@ def changed_value(
             remedy="anchor at a statement, or use another model",
         )
     names: dict[str, object] = {
-        param.name: _checked(param, params) for param in model.params if param.name != "target"
+        param.name: _checked_param(param, params) for param in model.params if param.name != "target"
     }
-    names |= {"fi": fi, "original": original, **(parts or {})}
-    text = render(model.expression, names, model.template_path)
-    plain = normalized(text, (fi,))
+    names |= {"fi": injection_id, "original": original, **(parts or {})}
+    text = render_template(model.expression, names, model.template_path)
+    plain = normalized(text, (injection_id,))
     if not _is_expression(plain):
         raise MutatorError(
             f"the template gives {text!r}",
@@ -158,7 +176,7 @@ def changed_value(
             expected="one expression on one line, no comment, no `yield`",
             remedy="correct the template, or anchor at an expression that does not yield",
         )
-    return text if _holds_together(plain) else f"({text})"
+    return text if _binds_tighter_than_if(plain) else f"({text})"
 
 
 @lru_cache(maxsize=1024)
@@ -167,13 +185,13 @@ def _is_expression(text: str) -> bool:
     try:
         tree = ast.parse(text, mode="eval")
         ast.parse(f"({text})", mode="eval")  # a comment would hide the bracket
-    except _NOT_PYTHON:
+    except _PARSER_ERRORS:
         return False
     return "\n" not in text and not any(isinstance(n, ast.Yield | ast.YieldFrom) for n in ast.walk(tree))
 
 
 @lru_cache(maxsize=1024)
-def _holds_together(text: str) -> bool:
+def _binds_tighter_than_if(text: str) -> bool:
     """Return whether an expression binds tighter than a following `if`. A tuple or lambda does not."""
     whole = ast.parse(f"{text} if 0 else 0", mode="eval").body
     return isinstance(whole, ast.IfExp) and ast.dump(whole.body) == ast.dump(
@@ -181,7 +199,7 @@ def _holds_together(text: str) -> bool:
     )
 
 
-def _checked(param: ParamSchema, params: Mapping[str, Value]) -> Value:
+def _checked_param(param: ParamSchema, params: Mapping[str, Value]) -> Value:
     """Return the value that the template gets for this parameter; MutatorError if its type is wrong.
 
     A constant that is not a number is passed as Python source, so that None differs from a missing value.
@@ -199,22 +217,25 @@ def _checked(param: ParamSchema, params: Mapping[str, Value]) -> Value:
     is_name = isinstance(value, str) and fits(value)
     if is_name != (param.type in NAMES) or (isinstance(value, str) and not is_name):
         raise MutatorError(
-            f"{value!r} for '{param.name}'", expected=_EXPECTED.get(param.type, f"a {param.type}")
+            f"{value!r} for '{param.name}'",
+            expected=_EXPECTED_BY_PARAM_TYPE.get(param.type, f"a {param.type}"),
         )
     return value
 
 
-def render(template: str, names: Mapping[str, object], where: Path, first_line: int = 1) -> str:
+def render_template(template: str, names: Mapping[str, object], where: Path, first_line: int = 1) -> str:
     """Render a template, or its part from `first_line` on; MutatorError with the line, if known."""
     try:
         return _ENVIRONMENT.compiled(template).render(names)
     except TemplateSyntaxError as error:
         raise _template_error(str(error.message), where, error.lineno, first_line) from None
     except TemplateError as error:
-        raise _template_error(str(error.message or error), where, _line_in(error), first_line) from None
-    except _FAILURES as error:
         raise _template_error(
-            f"{type(error).__name__}: {error}", where, _line_in(error), first_line
+            str(error.message or error), where, _template_line_of(error), first_line
+        ) from None
+    except _RENDERING_ERRORS as error:
+        raise _template_error(
+            f"{type(error).__name__}: {error}", where, _template_line_of(error), first_line
         ) from None
 
 
@@ -229,7 +250,7 @@ def _template_error(what: str, where: Path, line: int | None, first_line: int) -
     )
 
 
-def _line_in(error: BaseException) -> int | None:
+def _template_line_of(error: BaseException) -> int | None:
     """Return the template's line in a traceback. Jinja2 maps its frames back to template lines."""
     line = None
     trace = error.__traceback__
@@ -241,16 +262,16 @@ def _line_in(error: BaseException) -> int | None:
 
 
 @lru_cache(maxsize=1024)
-def _are_lines(text: str, kind: SnippetKind) -> bool:
+def _is_valid_snippet(text: str, kind: SnippetKind) -> bool:
     """Return whether normalized source, and so all source that it covers, passes `_check_lines`."""
     try:
-        _check_lines(text, kind, Path())
+        _check_snippet(text, kind, Path())
     except MutatorError:
         return False
     return True
 
 
-def _check_lines(text: str, kind: SnippetKind, where: Path) -> None:
+def _check_snippet(text: str, kind: SnippetKind, where: Path) -> None:
     """Check that every line ends a statement or opens a block, so that each can carry its tag."""
     text += "\n"
     whole = text + "    pass\n" if kind is SnippetKind.GUARD else text
@@ -261,7 +282,7 @@ def _check_lines(text: str, kind: SnippetKind, where: Path) -> None:
             for token in tokenize.generate_tokens(io.StringIO(text).readline)
             if token.type == tokenize.NEWLINE
         ]
-    except (*_NOT_PYTHON, tokenize.TokenError) as error:
+    except (*_PARSER_ERRORS, tokenize.TokenError) as error:
         problem = str(error.args[0]) if error.args else "too many nested operations"
         if isinstance(error, SyntaxError) and kind is SnippetKind.GUARD:
             problem = f"{error.msg} (a guard's last line must open a block)"

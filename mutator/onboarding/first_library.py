@@ -13,13 +13,13 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from mutator._common.message_text import counted
 from mutator._common.shipped_files import make_empty
 from mutator.errors import MutatorWarning
-from mutator.onboarding.source_survey import Survey
-from mutator.onboarding.step_candidates import LoopCandidate, loop_candidates
-from mutator.onboarding.todo_marks import MARK
+from mutator.onboarding.source_survey import SourceSurvey
+from mutator.onboarding.step_candidates import StepCandidate, list_step_candidates
+from mutator.onboarding.todo_marks import TODO_MARK
 
-MOST_SHOWN = 5  # maximum number of candidates for the step, and of values of each
-_TIME_STEPS = ("dt", "delta_t", "time_step", "timestep")
-_FILES = {
+MOST_LISTED_CANDIDATES = 5  # maximum number of candidates for the step, and of values of each
+_TIME_STEP_NAMES = ("dt", "delta_t", "time_step", "timestep")
+_PATH_BY_TEMPLATE = {
     "README.md": "README.md",
     "manifest.yaml": "fault_library/targets/{name}.yaml",
     "drive.py": "fault_library/overlays/{name}/{entry}.py",
@@ -29,13 +29,13 @@ _FILES = {
 }
 
 
-def write_library_for(found: Survey, folder: Path) -> None:
+def write_first_library(survey: SourceSurvey, folder: Path) -> None:
     """Write the files into a new or empty folder. MutatorError if the folder is not empty.
 
     MutatorWarning if no function in the source looks like a controller's step.
     """
     make_empty(folder)
-    words = _words(found, folder.resolve())
+    variables = _template_variables(survey, folder.resolve())
     templates = Environment(
         loader=PackageLoader("mutator.onboarding", "files"),
         undefined=StrictUndefined,
@@ -44,57 +44,61 @@ def write_library_for(found: Survey, folder: Path) -> None:
         keep_trailing_newline=True,
         autoescape=False,  # output is YAML, Python and Markdown
     )
-    templates.filters["yaml"] = _as_yaml
-    for template, place in _FILES.items():
-        path = folder / place.format(name=words["name"], entry=words["entry"])
+    templates.filters["yaml"] = _yaml_scalar
+    for template, path_pattern in _PATH_BY_TEMPLATE.items():
+        path = folder / path_pattern.format(name=variables["name"], entry=variables["entry"])
         path.parent.mkdir(parents=True, exist_ok=True)
-        text = templates.get_template(f"{template}.j2").render(words)
+        text = templates.get_template(f"{template}.j2").render(variables)
         path.write_text(re.sub(r"\n{4,}", "\n\n\n", text), encoding="utf-8")
-    if not words["candidates"]:
-        warnings.warn(_nothing_found(found), MutatorWarning, stacklevel=3)
+    if not variables["candidates"]:
+        warnings.warn(_describe_no_controller(survey), MutatorWarning, stacklevel=3)
 
 
-def _nothing_found(found: Survey) -> str:
-    why = [f"{place} cannot be read: {problem}" for place, problem in found.unread[:MOST_SHOWN]]
-    if found.modules:
-        why.insert(0, f"no function in {counted(len(found.modules), 'file')} looks like a step")
-    reasons = "; ".join(why) or "no Python files apart from tests, docs and scripts"
-    return f"{found.installed or found.root}: no controller found: {reasons}; fill in the files by hand"
+def _describe_no_controller(survey: SourceSurvey) -> str:
+    problems = [
+        f"{place} cannot be read: {problem}" for place, problem in survey.unread[:MOST_LISTED_CANDIDATES]
+    ]
+    if survey.modules:
+        problems.insert(0, f"no function in {counted(len(survey.modules), 'file')} looks like a step")
+    reasons = "; ".join(problems) or "no Python files apart from tests, docs and scripts"
+    return f"{survey.installed or survey.root}: no controller found: {reasons}; fill in the files by hand"
 
 
-def _as_yaml(text: str) -> str:
+def _yaml_scalar(text: str) -> str:
     plain = re.fullmatch(r"[\w./][\w./ -]*", text) and yaml.safe_load(text) == text
     return text if plain else json.dumps(text, ensure_ascii=False)
 
 
-def _words(found: Survey, folder: Path) -> dict[str, Any]:
-    candidates = loop_candidates(found)[:MOST_SHOWN]
-    title = found.installed or (found.packages[0] if len(found.packages) == 1 else found.root.name)
+def _template_variables(survey: SourceSurvey, folder: Path) -> dict[str, Any]:
+    candidates = list_step_candidates(survey)[:MOST_LISTED_CANDIDATES]
+    title = survey.installed or (survey.packages[0] if len(survey.packages) == 1 else survey.root.name)
     name = re.sub(r"\W+", "_", title.removesuffix(".py")).strip("_").lower()
     name = name if name[:1].isalpha() else f"controller_{name}".strip("_")
-    taken = {package.removesuffix(".py") for package in found.packages}
-    only = found.packages[0] if len(found.packages) == 1 else ""
-    manifest = folder / "fault_library" / "targets"
+    package_names = {package.removesuffix(".py") for package in survey.packages}
+    only_package = survey.packages[0] if len(survey.packages) == 1 else ""
+    manifest_folder = folder / "fault_library" / "targets"
     return {
         "name": name,
-        "title": f"The controller in {found.root.name}",
-        "entry": next(name for name in ("drive", "drive_loop", "drive_closed_loop") if name not in taken),
-        "installed": found.installed,
-        "requires": found.requires,
-        "root": os.path.relpath(found.root, manifest),
-        "root_shown": found.installed or found.root.name,
-        "where": f"the installed package {found.installed}" if found.installed else f"`{found.root.name}`",
-        "package": only if not only.endswith(".py") else "",
-        "packages": found.packages,
-        "count": counted(len(found.modules), "Python file"),
-        "unread": found.unread[:MOST_SHOWN],
-        "mark": MARK,
+        "title": f"The controller in {survey.root.name}",
+        "entry": next(
+            name for name in ("drive", "drive_loop", "drive_closed_loop") if name not in package_names
+        ),
+        "installed": survey.installed,
+        "requires": survey.requires,
+        "root": os.path.relpath(survey.root, manifest_folder),
+        "root_shown": survey.installed or survey.root.name,
+        "where": f"the installed package {survey.installed}" if survey.installed else f"`{survey.root.name}`",
+        "package": only_package if not only_package.endswith(".py") else "",
+        "packages": survey.packages,
+        "count": counted(len(survey.modules), "Python file"),
+        "unread": survey.unread[:MOST_LISTED_CANDIDATES],
+        "mark": TODO_MARK,
         "candidates": candidates,
-        **_of_loop(candidates[0] if candidates else None),
+        **_step_variables(candidates[0] if candidates else None),
     }
 
 
-def _of_loop(best: LoopCandidate | None) -> dict[str, Any]:
+def _step_variables(best: StepCandidate | None) -> dict[str, Any]:
     """Return the template variables that depend on the likeliest step of the loop."""
     if best is None:
         return dict.fromkeys(
@@ -109,7 +113,7 @@ def _of_loop(best: LoopCandidate | None) -> dict[str, Any]:
     if best.owner and best.function != "__call__":
         called += f".{best.function}"
     first, *rest = best.values or (None,)
-    places = ", ".join(f"{value.name} (line {value.line})" for value in rest[:MOST_SHOWN])
+    places = ", ".join(f"{value.name} (line {value.line})" for value in rest[:MOST_LISTED_CANDIDATES])
     return {
         "module": best.module,
         "imported": best.owner or best.function,
@@ -118,7 +122,7 @@ def _of_loop(best: LoopCandidate | None) -> dict[str, Any]:
         "builder": best.owner or "",
         "builds": best.builds,
         "build_arguments": ", ".join(f"{argument}=..." for argument in best.builds),
-        "call": f"{called}({_arguments(best)})",
+        "call": f"{called}({_call_arguments(best)})",
         "path": best.path,
         "function": best.name,
         "value": first,
@@ -128,8 +132,8 @@ def _of_loop(best: LoopCandidate | None) -> dict[str, Any]:
     }
 
 
-def _arguments(best: LoopCandidate) -> str:
+def _call_arguments(best: StepCandidate) -> str:
     """Return call arguments: the state first, then the time step, and `...` for all others."""
     first, *others = best.needs or ("",)
-    texts = [f"{name}={'self.step_s' if name in _TIME_STEPS else '...'}" for name in others]
+    texts = [f"{name}={'self.step_s' if name in _TIME_STEP_NAMES else '...'}" for name in others]
     return ", ".join(["state", *texts]) if first else ""

@@ -16,15 +16,15 @@ from mutator.targets.roots import INSTALLED, installed_at
 from mutator.targets.source_tree import MOST_SOURCE
 
 _MOST_FILES = 5000
-_NOT_THE_CONTROLLER = {
+_SKIPPED_FOLDERS_AND_MODULES = {
     *("test", "tests", "testing", "doc", "docs", "example", "examples", "benchmark", "benchmarks", "scripts"),
     *("build", "dist", "node_modules", "site-packages", "venv", "env", "__pycache__"),
 }
-_NO_MODULES = {"setup.py", "conftest.py", "noxfile.py", "__init__.py", "__main__.py"}
+_SKIPPED_FILES = {"setup.py", "conftest.py", "noxfile.py", "__init__.py", "__main__.py"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Module:
+class SourceModule:
     """A Python file. The path is relative to the root."""
 
     path: str
@@ -36,21 +36,21 @@ class Module:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Survey:
+class SourceSurvey:
     """A source tree, described in the terms of a manifest."""
 
     root: Path  # the folder for `sys.path`
     packages: tuple[str, ...]  # import packages and flat modules (`drive.py`)
-    modules: tuple[Module, ...]  # the files that were read
+    modules: tuple[SourceModule, ...]  # the files that were read
     unread: tuple[tuple[str, str], ...] = ()  # `path:line` and reason of each file that cannot be read
     installed: str | None = None
     requires: str | None = None  # requirement for the installed distribution
 
 
-def look_at(target: str) -> Survey:
+def survey_source(target: str) -> SourceSurvey:
     """Survey a folder, or the package `installed:NAME`. MutatorError if it does not exist."""
     if target.startswith(INSTALLED):
-        return _installed(target.removeprefix(INSTALLED))
+        return _survey_installed(target.removeprefix(INSTALLED))
     folder = Path(target).resolve()
     if not folder.is_dir():
         raise MutatorError(
@@ -60,26 +60,26 @@ def look_at(target: str) -> Survey:
             remedy="correct `target`",
         )
     if (folder / "__init__.py").exists():
-        return _of(folder.parent, (folder.name,))
+        return _survey_packages(folder.parent, (folder.name,))
     if [*_packages_in(folder)] == ["src"] and not (folder / "src" / "__init__.py").exists():
         folder /= "src"
-    return _of(folder, tuple(_packages_in(folder)))
+    return _survey_packages(folder, tuple(_packages_in(folder)))
 
 
-def _installed(name: str) -> Survey:
-    place = installed_at(name) if name.isidentifier() else None
-    if place is None:
+def _survey_installed(name: str) -> SourceSurvey:
+    package_path = installed_at(name) if name.isidentifier() else None
+    if package_path is None:
         raise MutatorError(
             f"no installed package '{name}'",
             argument="target",
             expected="the import name of a package",
             remedy="install it in mutator's environment, or correct the name",
         )
-    found = _of(place.parent, (place.name,), any_links=True)
-    return replace(found, installed=name, requires=_distribution(name))
+    survey = _survey_packages(package_path.parent, (package_path.name,), any_links=True)
+    return replace(survey, installed=name, requires=_distribution_requirement(name))
 
 
-def _distribution(name: str) -> str | None:
+def _distribution_requirement(name: str) -> str | None:
     owners = metadata.packages_distributions().get(name)
     return f"{owners[0]}>={metadata.version(owners[0])}" if owners else None
 
@@ -94,19 +94,19 @@ def _packages_in(folder: Path) -> Iterator[str]:
         ) from None
     for path in entries:
         stem = path.name.removesuffix(".py")
-        if not _importable(stem) or stem in _NOT_THE_CONTROLLER:
+        if not _is_importable(stem) or stem in _SKIPPED_FOLDERS_AND_MODULES:
             continue
         if path.is_dir():
-            if any(_files(path)):
+            if any(_python_files(path)):
                 yield path.name
-        elif _is_module(path) and path.name not in _NO_MODULES and not stem.startswith("test_"):
+        elif _is_module(path) and path.name not in _SKIPPED_FILES and not stem.startswith("test_"):
             yield path.name
 
 
-def _files(folder: Path) -> Iterator[Path]:
+def _python_files(folder: Path) -> Iterator[Path]:
     """Yield Python files below a folder, except in tests, hidden folders and virtual environments."""
     for place, folders, names in os.walk(folder):
-        folders[:] = sorted(n for n in folders if _importable(n) and n not in _NOT_THE_CONTROLLER)
+        folders[:] = sorted(n for n in folders if _is_importable(n) and n not in _SKIPPED_FOLDERS_AND_MODULES)
         if "pyvenv.cfg" in names:
             folders.clear()
             continue
@@ -114,25 +114,25 @@ def _files(folder: Path) -> Iterator[Path]:
 
 
 def _is_module(path: Path) -> bool:
-    return path.suffix == ".py" and _importable(path.stem) and path.is_file()
+    return path.suffix == ".py" and _is_importable(path.stem) and path.is_file()
 
 
-def _importable(name: str) -> bool:
+def _is_importable(name: str) -> bool:
     return name.isidentifier() and not keyword.iskeyword(name)
 
 
-def _parsed(path: Path) -> ast.Module:
+def _parse(path: Path) -> ast.Module:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # warnings concern the controller's code
         return ast.parse(read_bounded(path, MOST_SOURCE))
 
 
-def _of(root: Path, packages: tuple[str, ...], *, any_links: bool = False) -> Survey:
+def _survey_packages(root: Path, packages: tuple[str, ...], *, any_links: bool = False) -> SourceSurvey:
     """Read the modules of packages; with `any_links`, links may point out of the root."""
-    modules: list[Module] = []
+    modules: list[SourceModule] = []
     unread: list[tuple[str, str]] = []
     for name in packages:
-        for path in [root / name] if name.endswith(".py") else _files(root / name):
+        for path in [root / name] if name.endswith(".py") else _python_files(root / name):
             if len(modules) + len(unread) == _MOST_FILES:
                 raise MutatorError(
                     f"more than {_MOST_FILES} Python files",
@@ -144,10 +144,10 @@ def _of(root: Path, packages: tuple[str, ...], *, any_links: bool = False) -> Su
             try:
                 if not any_links:
                     check_inside(root, path)
-                modules.append(Module(path=relative, tree=_parsed(path)))
+                modules.append(SourceModule(path=relative, tree=_parse(path)))
             except Outside as err:
                 unread.append((f"{relative}:1", err.got))
             except (SyntaxError, ValueError, RecursionError, MemoryError, OSError) as err:
                 line = getattr(err, "lineno", None) or 1
                 unread.append((f"{relative}:{line}", getattr(err, "msg", None) or str(err)))
-    return Survey(root=root, packages=packages, modules=tuple(modules), unread=tuple(unread))
+    return SourceSurvey(root=root, packages=packages, modules=tuple(modules), unread=tuple(unread))

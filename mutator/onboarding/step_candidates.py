@@ -6,24 +6,26 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from mutator.onboarding.source_survey import Module, Survey
+from mutator.onboarding.source_survey import SourceModule, SourceSurvey
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 
-_WORDS = {  # names of step functions; a higher number is more certain
+_STEP_WORDS_BY_SCORE = {  # names of step functions; a higher number is more certain
     6: "step update control compute_control run_step",
     5: "act compute compute_command drive get_control",
     4: "__call__ tick calculate decide iterate acceleration steering",
     3: "plan sense solve track",
     2: "apply forward predict process run",
 }
-_STEP = {word: score for score, words in _WORDS.items() for word in words.split()}
-_CONTROLLER = re.compile("control|pid|pilot|planner|agent|driver|regulator|tracker|cruise|mpc")
-_WORLD = re.compile("env|sim|plant|world|render|viewer|logger|graphics|mixin|wrapper|test")
-_MOST_STATE = _MOST_VALUES = 6  # further attributes or values do not add points
-_IN_CONTROLLER = 3  # points if the file name suggests a controller
-_NO_HINT = -6  # points if neither the name nor calls suggest a step
-_NUMBERS = re.compile("abs|min|max|float|int|round|clip|interp|hypot|sum|dot|norm")  # these return numbers
+_SCORE_BY_STEP_WORD = {word: score for score, words in _STEP_WORDS_BY_SCORE.items() for word in words.split()}
+_CONTROLLER_PATTERN = re.compile("control|pid|pilot|planner|agent|driver|regulator|tracker|cruise|mpc")
+_WORLD_PATTERN = re.compile("env|sim|plant|world|render|viewer|logger|graphics|mixin|wrapper|test")
+_MOST_STATE_POINTS = _MOST_VALUE_POINTS = 6  # further attributes or values do not add points
+_CONTROLLER_FILE_POINTS = 3  # points if the file name suggests a controller
+_NO_HINT_POINTS = -6  # points if neither the name nor calls suggest a step
+_NUMBER_FUNCTION_PATTERN = re.compile(
+    "abs|min|max|float|int|round|clip|interp|hypot|sum|dot|norm"
+)  # these return numbers
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,7 +39,7 @@ class ValueCandidate:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LoopCandidate:
+class StepCandidate:
     """A function that might be the step of a loop, and the values that it computes, likeliest first."""
 
     module: str
@@ -56,27 +58,33 @@ class LoopCandidate:
         return f"{self.owner}.{self.function}" if self.owner else self.function
 
 
-def loop_candidates(found: Survey) -> tuple[LoopCandidate, ...]:
+def list_step_candidates(survey: SourceSurvey) -> tuple[StepCandidate, ...]:
     """Return public functions that might be the step of a loop, likeliest first."""
-    looped = Counter(name for module in found.modules for name in _called_in_loops(module.tree))
-    candidates = [one for module in found.modules for one in _of_module(module, looped)]
-    return tuple(sorted(candidates, key=lambda one: (-one.score, one.path, one.line)))
+    loop_call_counts = Counter(
+        name for module in survey.modules for name in _names_called_in_loops(module.tree)
+    )
+    candidates = [
+        candidate
+        for module in survey.modules
+        for candidate in _candidates_in_module(module, loop_call_counts)
+    ]
+    return tuple(sorted(candidates, key=lambda candidate: (-candidate.score, candidate.path, candidate.line)))
 
 
-def _of_module(module: Module, looped: Counter[str]) -> Iterator[LoopCandidate]:
+def _candidates_in_module(module: SourceModule, looped: Counter[str]) -> Iterator[StepCandidate]:
     for node in module.tree.body:
         if isinstance(node, ast.ClassDef):
             for function in node.body:
-                if isinstance(function, Function) and _may_step(function):
-                    yield _candidate(module, node, function, looped)
-        elif isinstance(node, Function) and _may_step(node):
-            yield _candidate(module, None, node, looped)
+                if isinstance(function, Function) and _can_be_step(function):
+                    yield _build_candidate(module, node, function, looped)
+        elif isinstance(node, Function) and _can_be_step(node):
+            yield _build_candidate(module, None, node, looped)
 
 
-def _may_step(function: Function) -> bool:
+def _can_be_step(function: Function) -> bool:
     if isinstance(function, ast.AsyncFunctionDef):
         return False
-    if function.name.startswith("_") and function.name not in _STEP:
+    if function.name.startswith("_") and function.name not in _SCORE_BY_STEP_WORD:
         return False
     hidden = {"property", "classmethod", "abstractmethod", "overload"}
     if any(
@@ -88,71 +96,75 @@ def _may_step(function: Function) -> bool:
     return bool(body)
 
 
-def _candidate(
-    module: Module, owner: ast.ClassDef | None, function: Function, looped: Counter[str]
-) -> LoopCandidate:
-    values = tuple(_values(function))
+def _build_candidate(
+    module: SourceModule, owner: ast.ClassDef | None, function: Function, looped: Counter[str]
+) -> StepCandidate:
+    values = tuple(_value_candidates(function))
     hints = _name_score(function.name) + 2 * min(looped[function.name], 3)
-    score = min(len(values), _MOST_VALUES) + (hints or _NO_HINT)
+    score = min(len(values), _MOST_VALUE_POINTS) + (hints or _NO_HINT_POINTS)
     if owner is not None:
-        score += min(len(_state(owner)), _MOST_STATE) + _class_score(owner.name)
-    score += _IN_CONTROLLER * bool(_CONTROLLER.search(module.path.lower()))
+        score += min(len(_state_attributes(owner)), _MOST_STATE_POINTS) + _class_score(owner.name)
+    score += _CONTROLLER_FILE_POINTS * bool(_CONTROLLER_PATTERN.search(module.path.lower()))
     init = (
         next((n for n in owner.body if isinstance(n, Function) and n.name == "__init__"), None)
         if owner
         else None
     )
-    return LoopCandidate(
+    return StepCandidate(
         module=module.name,
         path=module.path,
         line=function.lineno,
         owner=owner.name if owner else None,
         function=function.name,
-        needs=_needed(function, is_method=owner is not None),
-        builds=_needed(init, is_method=True) if init else (),
+        needs=_required_arguments(function, is_method=owner is not None),
+        builds=_required_arguments(init, is_method=True) if init else (),
         score=score,
         values=values,
     )
 
 
 def _name_score(name: str) -> int:
-    if name in _STEP:
-        return _STEP[name]
-    return max((score - 2 for word, score in _STEP.items() if word in name.split("_")), default=0)
+    if name in _SCORE_BY_STEP_WORD:
+        return _SCORE_BY_STEP_WORD[name]
+    return max(
+        (score - 2 for word, score in _SCORE_BY_STEP_WORD.items() if word in name.split("_")), default=0
+    )
 
 
 def _class_score(name: str) -> int:
     lower = name.lower()
-    return 5 * bool(_CONTROLLER.search(lower)) - 6 * bool(_WORLD.search(lower))
+    return 5 * bool(_CONTROLLER_PATTERN.search(lower)) - 6 * bool(_WORLD_PATTERN.search(lower))
 
 
-def _needed(function: Function, *, is_method: bool) -> tuple[str, ...]:
-    given = function.args
-    positional = [*given.posonlyargs, *given.args]
-    positional = positional[: len(positional) - len(given.defaults)]
+def _required_arguments(function: Function, *, is_method: bool) -> tuple[str, ...]:
+    arguments = function.args
+    positional = [*arguments.posonlyargs, *arguments.args]
+    positional = positional[: len(positional) - len(arguments.defaults)]
     static = any(isinstance(d, ast.Name) and d.id == "staticmethod" for d in function.decorator_list)
-    keyword = [a for a, default in zip(given.kwonlyargs, given.kw_defaults, strict=True) if default is None]
+    keyword = [
+        a for a, default in zip(arguments.kwonlyargs, arguments.kw_defaults, strict=True) if default is None
+    ]
     return tuple(argument.arg for argument in (*positional[is_method and not static :], *keyword))
 
 
-def _state(owner: ast.ClassDef) -> set[str]:
+def _state_attributes(owner: ast.ClassDef) -> set[str]:
     return {
         target.attr
         for node in ast.walk(owner)
-        for target in _targets(node)
+        for target in _assignment_targets(node)
         if isinstance(target, ast.Attribute)
         and isinstance(target.value, ast.Name)
         and target.value.id == "self"
     }
 
 
-def _targets(node: ast.AST) -> Iterable[ast.expr]:
+def _assignment_targets(node: ast.AST) -> Iterable[ast.expr]:
     if isinstance(node, ast.Assign):
         return node.targets
     return (node.target,) if isinstance(node, ast.AugAssign | ast.AnnAssign) else ()
 
 
-def _called_in_loops(tree: ast.Module) -> Iterator[str]:
+def _names_called_in_loops(tree: ast.Module) -> Iterator[str]:
     for loop in ast.walk(tree):
         if isinstance(loop, ast.For | ast.While):
             for node in ast.walk(loop):
@@ -161,11 +173,13 @@ def _called_in_loops(tree: ast.Module) -> Iterator[str]:
                     yield called.attr if isinstance(called, ast.Attribute) else getattr(called, "id", "")
 
 
-def _values(function: Function) -> Iterator[ValueCandidate]:
+def _value_candidates(function: Function) -> Iterator[ValueCandidate]:
     """Yield the names to which a function assigns numbers, likeliest first."""
-    assigned = [(node, target) for node in _statements(function.body) for target in _targets(node)]
+    assigned = [
+        (node, target) for node in _statements_in(function.body) for target in _assignment_targets(node)
+    ]
     names = [ast.unparse(target) for _, target in assigned]
-    found = []
+    candidates = []
     for i, ((node, _), name) in enumerate(zip(assigned, names, strict=True)):
         likely = _number_score(getattr(node, "value", None))
         plain = all(part.isidentifier() for part in name.split("."))
@@ -173,31 +187,31 @@ def _values(function: Function) -> Iterator[ValueCandidate]:
             continue
         times = names.count(name)
         nth = names[: i + 1].count(name) if times > 1 else None
-        found.append(ValueCandidate(name=name, line=node.lineno, nth=nth, score=likely - (times > 1)))
-    yield from sorted(found, key=lambda one: (-one.score, one.line))
+        candidates.append(ValueCandidate(name=name, line=node.lineno, nth=nth, score=likely - (times > 1)))
+    yield from sorted(candidates, key=lambda candidate: (-candidate.score, candidate.line))
 
 
-def _statements(body: Iterable[ast.stmt]) -> Iterator[ast.stmt]:
+def _statements_in(body: Iterable[ast.stmt]) -> Iterator[ast.stmt]:
     """Yield the statements in order, without those of nested functions and classes."""
     for node in body:
         yield node
         if isinstance(node, Function | ast.ClassDef):
             continue
         for name in ("body", "orelse", "finalbody"):
-            yield from _statements(getattr(node, name, ()))
+            yield from _statements_in(getattr(node, name, ()))
         for part in (*getattr(node, "handlers", ()), *getattr(node, "cases", ())):
-            yield from _statements(part.body)
+            yield from _statements_in(part.body)
 
 
 def _number_score(value: ast.expr | None) -> int:
     """Score how likely an expression is to be a computed number; 0: impossible."""
     if isinstance(value, ast.BinOp):
-        return 0 if any(isinstance(n, ast.JoinedStr) or _is_text(n) for n in ast.walk(value)) else 4
+        return 0 if any(isinstance(n, ast.JoinedStr) or _is_text_constant(n) for n in ast.walk(value)) else 4
     if isinstance(value, ast.UnaryOp):
         return _number_score(value.operand) if not isinstance(value.op, ast.Not) else 0
     if isinstance(value, ast.Call):
         called = value.func.attr if isinstance(value.func, ast.Attribute) else getattr(value.func, "id", "")
-        return 3 if _NUMBERS.fullmatch(called) else 2
+        return 3 if _NUMBER_FUNCTION_PATTERN.fullmatch(called) else 2
     if isinstance(value, ast.IfExp):
         return min(_number_score(value.body), _number_score(value.orelse))
     if isinstance(value, ast.Name | ast.Attribute | ast.Subscript):
@@ -205,5 +219,5 @@ def _number_score(value: ast.expr | None) -> int:
     return int(isinstance(value, ast.Constant) and type(value.value) in (int, float))
 
 
-def _is_text(node: ast.AST) -> bool:
+def _is_text_constant(node: ast.AST) -> bool:
     return isinstance(node, ast.Constant) and isinstance(node.value, str | bytes)

@@ -8,31 +8,31 @@ from mutator._common.confined_files import files_inside
 from mutator.config.yaml_files import MAX_BYTES
 from mutator.errors import MutatorError
 
-MARK = "TODO(init)"
+TODO_MARK = "TODO(init)"
 
 
-def unfilled(library: Path) -> Iterator[MutatorError]:
+def unfilled_mark_errors(library: Path) -> Iterator[MutatorError]:
     """Yield an error for each mark in the library's YAML and Python files, in file order."""
     for path in files_inside(library, "", "*"):
         if path.suffix not in (".yaml", ".py") or not path.is_file():
             continue
         lines = read_bounded(path, MAX_BYTES).decode(errors="replace").splitlines()
         for number, line in enumerate(lines, 1):
-            _, mark, text = line.partition(f"# {MARK}:")
+            _, mark, text = line.partition(f"# {TODO_MARK}:")
             if mark:
                 yield MutatorError(
-                    f"not filled in: {_whole(text, lines[number:])}",
+                    f"not filled in: {_join_comment_lines(text, lines[number:])}",
                     where=path,
                     line=number,
-                    remedy=f"fill it in, and delete the comment with {MARK}",
+                    remedy=f"fill it in, and delete the comment with {TODO_MARK}",
                 )
 
 
-def _whole(text: str, following: list[str]) -> str:
+def _join_comment_lines(text: str, following: list[str]) -> str:
     """Join a comment with the comments on the lines directly below it."""
     words = [text.strip()]
     for line in map(str.strip, following):
-        if not line.startswith("# ") or MARK in line:
+        if not line.startswith("# ") or TODO_MARK in line:
             break
         words.append(line.removeprefix("# "))
     return " ".join(words)

@@ -13,7 +13,7 @@ from mutator.model import Value
 if TYPE_CHECKING:
     from mutator.mutants.expressions import Expression
     from mutator.mutants.statements import Statement
-    from mutator.operators.statement_facts import Facts
+    from mutator.operators.statement_facts import StatementFacts
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,5 +42,5 @@ class Operator:
     about: str
     replacements: tuple[tuple[str, str], ...]
     examples: Mapping[str, Sequence[str]]
-    rules: "Callable[[Expression, Facts], Iterable[Rule]] | None" = None
-    omits: "Callable[[Statement, Facts], bool] | None" = None
+    rules: "Callable[[Expression, StatementFacts], Iterable[Rule]] | None" = None
+    omits: "Callable[[Statement, StatementFacts], bool] | None" = None

@@ -22,11 +22,11 @@ from mutator.model import Limits, Status
 from mutator.targets.manifest import TargetManifest
 
 _SCHEMA = "lines/1"
-Executed = dict[str, frozenset[int]]  # lines (from 1) by file
+ExecutedLines = dict[str, frozenset[int]]  # lines (from 1) by file
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class GoldenDrive:
+class GoldenRunInputs:
     """The inputs that determine a golden run."""
 
     scenario: Path
@@ -34,26 +34,34 @@ class GoldenDrive:
     seed: int
 
 
-def lines_of(manifest: TargetManifest, drives: Sequence[GoldenDrive], limits: Limits) -> list[Executed]:
+def measure_executed_lines(
+    manifest: TargetManifest, golden_runs: Sequence[GoldenRunInputs], limits: Limits
+) -> list[ExecutedLines]:
     """Return the lines that each golden run executes, measured unless cached. MutatorError if a run fails."""
-    found = [_recalled(_key(manifest, drive)) for drive in drives]
-    if any(lines is None for lines in found):
+    lines_by_run = [_load_cached(_cache_key(manifest, golden_run)) for golden_run in golden_runs]
+    if any(lines is None for lines in lines_by_run):
         with ScratchFolder("mutator-lines-") as scratch:
             (scratch / "work").mkdir()
             engine = ReferenceEngine(manifest, scratch / "work", limits)
-            for i, drive in enumerate(drives):
-                if found[i] is None:
-                    found[i] = _measured(engine, drive, scratch / "work" / f"lines-{i}")
-                    _remember(_key(manifest, drive), found[i] or {})
-    return [lines or {} for lines in found]
+            for i, golden_run in enumerate(golden_runs):
+                if lines_by_run[i] is None:
+                    lines_by_run[i] = _measure(engine, golden_run, scratch / "work" / f"lines-{i}")
+                    _save_cached(_cache_key(manifest, golden_run), lines_by_run[i] or {})
+    return [lines or {} for lines in lines_by_run]
 
 
-def _measured(engine: ReferenceEngine, drive: GoldenDrive, folder: Path) -> Executed:
-    job = Job(name=folder.name, scenario=drive.scenario, seed=drive.seed, changes=drive.changes, lines=True)
+def _measure(engine: ReferenceEngine, golden_run: GoldenRunInputs, folder: Path) -> ExecutedLines:
+    job = Job(
+        name=folder.name,
+        scenario=golden_run.scenario,
+        seed=golden_run.seed,
+        changes=golden_run.changes,
+        lines=True,
+    )
     execution = engine.execute(job, folder)
     if execution.status is not Status.OK:
         raise MutatorError(
-            f"cannot find executed lines: the golden run of {drive.scenario.stem} failed: {execution.detail}",
+            f"cannot find executed lines: the golden run of {golden_run.scenario.stem} failed: {execution.detail}",
             where=engine.manifest.path,
             expected="a fault-free run that succeeds",
             remedy="run `mutator check --drive`",
@@ -61,17 +69,19 @@ def _measured(engine: ReferenceEngine, drive: GoldenDrive, folder: Path) -> Exec
     return {file: frozenset(lines) for file, lines in execution.lines.items()}
 
 
-def _key(manifest: TargetManifest, drive: GoldenDrive) -> str:
+def _cache_key(manifest: TargetManifest, golden_run: GoldenRunInputs) -> str:
     arguments = manifest.arguments(
-        scenario=Path("scenario"), seed=drive.seed, out=Path("out"), changes=drive.changes
+        scenario=Path("scenario"), seed=golden_run.seed, out=Path("out"), changes=golden_run.changes
     )
     at = manifest.observation.location
     entry = [manifest.entry_module, arguments, sorted(manifest.env.items()), at]
-    scenario = digest(read_bounded(drive.scenario))
-    return digest([_SCHEMA, platform.python_version(), manifest.tree.digest, scenario, drive.seed, entry])
+    scenario = digest(read_bounded(golden_run.scenario))
+    return digest(
+        [_SCHEMA, platform.python_version(), manifest.tree.digest, scenario, golden_run.seed, entry]
+    )
 
 
-def _recalled(key: str) -> Executed | None:
+def _load_cached(key: str) -> ExecutedLines | None:
     path = shared_cache.of_lines() / f"{key}.json"
     try:
         data: dict[str, Any] = json.loads(read_bounded(path))
@@ -83,7 +93,7 @@ def _recalled(key: str) -> Executed | None:
     return None
 
 
-def _remember(key: str, executed: Executed) -> None:
+def _save_cached(key: str, executed: ExecutedLines) -> None:
     lines = {file: sorted(numbers) for file, numbers in executed.items()}
     path = shared_cache.of_lines() / f"{key}.json"
     try:

@@ -9,48 +9,48 @@ from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Anchor, AnchorKind, FaultLocation
 from mutator.mutants.anchors import ParsedFile
-from mutator.mutants.expressions import Expression, parts_of
+from mutator.mutants.expressions import Expression, template_parts
 from mutator.mutants.statements import Statement
-from mutator.mutants.template_rendering import changed_value
+from mutator.mutants.template_rendering import render_changed_value
 from mutator.operators import Operator, Rule
 from mutator.operators.mutations import Mutation
 from mutator.operators.operator_lookup import find_operator
-from mutator.operators.statement_facts import Facts
+from mutator.operators.statement_facts import StatementFacts
 
-_Operators = Mapping[str, Operator]
-LEFT_OUT = "left out"
-_ID = "ffffffff"  # an id that no operator template writes
-_UNCALCULATED = (ast.Yield, ast.YieldFrom)
+_OperatorByName = Mapping[str, Operator]
+LEFT_OUT_TEXT = "left out"
+_PLACEHOLDER_ID = "ffffffff"  # an id that no operator template writes
+_YIELD_NODES = (ast.Yield, ast.YieldFrom)
 
 
 def mutations_of(
-    file: ParsedFile, facts: Facts, function: str, models: FaultModels, operators: Collection[str]
+    file: ParsedFile, facts: StatementFacts, function: str, models: FaultModels, operators: Collection[str]
 ) -> list[Mutation]:
     """Return the mutations of all functions with that qualified name, by line, then by operator."""
-    chosen = {name: find_operator(name) for name in operators}
-    found = list(_of_values(file, facts, function, models, chosen))
-    if any(operator.omits for operator in chosen.values()):
-        found += _omissions(file, facts, function, chosen)
-    return sorted(found, key=lambda one: (one.line, OPERATORS.place(one.operator)))
+    operator_by_name = {name: find_operator(name) for name in operators}
+    mutations = list(_expression_mutations(file, facts, function, models, operator_by_name))
+    if any(operator.omits for operator in operator_by_name.values()):
+        mutations += _omission_mutations(file, facts, function, operator_by_name)
+    return sorted(mutations, key=lambda one: (one.line, OPERATORS.place(one.operator)))
 
 
-def _of_values(
-    file: ParsedFile, facts: Facts, function: str, models: FaultModels, operators: _Operators
+def _expression_mutations(
+    file: ParsedFile, facts: StatementFacts, function: str, models: FaultModels, operators: _OperatorByName
 ) -> Iterator[Mutation]:
-    expressions = file.expressions.get(function, ())
-    total = Counter(one.text for one in expressions)
-    seen: Counter[str] = Counter()
+    expressions = file.expressions_by_function.get(function, ())
+    totals = Counter(one.text for one in expressions)
+    numbers: Counter[str] = Counter()
     for expression in expressions:
         text = expression.text
-        seen[text] += 1
-        nth = seen[text] if total[text] > 1 else None
+        numbers[text] += 1
+        nth = numbers[text] if totals[text] > 1 else None
         anchor = Anchor(kind=AnchorKind.VALUE, name=text, nth=nth)
         location = FaultLocation(path=file.path, function=function, anchor=anchor)
-        if any(isinstance(inner, _UNCALCULATED) for inner in ast.walk(expression.node)):
+        if any(isinstance(inner, _YIELD_NODES) for inner in ast.walk(expression.node)):
             continue  # templates refuse `yield`
         parts = None
-        for name, rule in _rules(operators, expression, facts):
-            parts = parts_of(expression) if parts is None else parts
+        for name, rule in _rules_for(operators, expression, facts):
+            parts = template_parts(expression) if parts is None else parts
             model = models.get(rule.model)
             yield Mutation(
                 operator=name,
@@ -59,11 +59,15 @@ def _of_values(
                 params=rule.params,
                 place=expression,
                 was=text,
-                now=changed_value(model, dict(rule.params), _ID, expression.written, parts),
+                now=render_changed_value(
+                    model, dict(rule.params), _PLACEHOLDER_ID, expression.one_line_source, parts
+                ),
             )
 
 
-def _rules(operators: _Operators, expression: Expression, facts: Facts) -> Iterator[tuple[str, Rule]]:
+def _rules_for(
+    operators: _OperatorByName, expression: Expression, facts: StatementFacts
+) -> Iterator[tuple[str, Rule]]:
     for name, operator in operators.items():
         if operator.rules:
             with OPERATORS.running(name):
@@ -73,28 +77,30 @@ def _rules(operators: _Operators, expression: Expression, facts: Facts) -> Itera
                     yield name, rule
 
 
-def _omissions(file: ParsedFile, facts: Facts, function: str, operators: _Operators) -> Iterator[Mutation]:
-    every = ((f.line + 1, one) for f in file.functions.get(function, ()) for one in f.statements)
-    found = [(line, one) for line, one in every if one.reason is None and one.opens is None]
-    seen: Counter[tuple[str, str]] = Counter()
-    for line, statement in found:
-        anchored = None
+def _omission_mutations(
+    file: ParsedFile, facts: StatementFacts, function: str, operators: _OperatorByName
+) -> Iterator[Mutation]:
+    every = ((f.line + 1, one) for f in file.functions_by_name.get(function, ()) for one in f.statements)
+    anchorable = [(line, one) for line, one in every if one.reason is None and one.opens is None]
+    numbers: Counter[tuple[str, str]] = Counter()
+    for line, statement in anchorable:
+        numbered_anchor = None
         for verb in ("assign", "call"):
             for name in statement.names(verb):
-                seen[verb, name] += 1
-                anchored = anchored or (verb, name, seen[verb, name])
-        if anchored is None or not _can_be_left_out(statement, facts, line):
+                numbers[verb, name] += 1
+                numbered_anchor = numbered_anchor or (verb, name, numbers[verb, name])
+        if numbered_anchor is None or not _can_be_omitted(statement, facts, line):
             continue
-        omitting = [name for name, one in operators.items() if _omits(name, one, statement, facts)]
+        omitting = [name for name, one in operators.items() if _does_omit(name, one, statement, facts)]
         if not omitting:
             continue
-        verb, name, number = anchored
-        several = sum(name in one.names(verb) for _, one in found) > 1
+        verb, name, number = numbered_anchor
+        is_ambiguous = sum(name in one.names(verb) for _, one in anchorable) > 1
         kind = AnchorKind.BEFORE_ASSIGN if verb == "assign" else AnchorKind.BEFORE_CALL
-        anchor = Anchor(kind=kind, name=name, nth=number if several else None)
+        anchor = Anchor(kind=kind, name=name, nth=number if is_ambiguous else None)
         location = FaultLocation(path=file.path, function=function, anchor=anchor)
         try:
-            file.resolve(location)
+            file.resolve_statement(location)
         except MutatorError:
             continue  # LibCST and `ast` disagree on the place
         for operator in omitting:
@@ -105,20 +111,20 @@ def _omissions(file: ParsedFile, facts: Facts, function: str, operators: _Operat
                 params=(),
                 place=statement,
                 was=facts.texts.get(statement.first + 1, name),
-                now=LEFT_OUT,
+                now=LEFT_OUT_TEXT,
             )
 
 
-def _omits(name: str, operator: Operator, statement: Statement, facts: Facts) -> bool:
+def _does_omit(name: str, operator: Operator, statement: Statement, facts: StatementFacts) -> bool:
     with OPERATORS.running(name):
         return bool(operator.omits and operator.omits(statement, facts))
 
 
-def _can_be_left_out(statement: Statement, facts: Facts, function: int) -> bool:
+def _can_be_omitted(statement: Statement, facts: StatementFacts, def_line: int) -> bool:
     """Return whether a statement can be omitted. The first binding of a local name cannot, because later
     uses of the name would fail.
     """
     if not statement.alone:
         return False
     names = [name for name in statement.assigns if name.isidentifier()]
-    return all(facts.bound.get((function, name), 0) < statement.first + 1 for name in names)
+    return all(facts.bound.get((def_line, name), 0) < statement.first + 1 for name in names)

@@ -9,8 +9,8 @@ from mutator._common.message_text import counted, suggestion
 from mutator._common.random_streams import generator
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
-from mutator.mutants.anchors import parsed
-from mutator.operators.equal_code_filter import distinct
+from mutator.mutants.anchors import parsed_file
+from mutator.operators.equal_code_filter import drop_equal_code
 from mutator.operators.mutation_listing import mutations_of
 from mutator.operators.mutations import Mutation
 from mutator.operators.statement_facts import facts_of
@@ -18,12 +18,12 @@ from mutator.targets.allowed_locations import check_file
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.source_tree import matches
 
-Lines = Mapping[str, Collection[int]]  # by file, from 1
-_GLOB = "*?["
+LinesByFile = Mapping[str, Collection[int]]  # by file, from 1
+_WILDCARDS = "*?["
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Found:
+class SelectedMutations:
     """The selected mutations, and the numbers of those left out, by reason."""
 
     mutations: tuple[Mutation, ...] = ()
@@ -46,87 +46,95 @@ class Found:
         return counted(len(self.mutations), "mutant of operators", "mutants of operators") + rest
 
 
-def find_mutations(
+def select_mutations(
     manifest: TargetManifest,
     models: FaultModels,
     operators: Collection[str],
     places: Sequence[str],
-    executed: Lines | None = None,
-) -> Found:
+    executed: LinesByFile | None = None,
+) -> SelectedMutations:
     """Return the operators' mutations at these places, sorted by file and line.
 
     A place is `PATH` or `PATH::FUNCTION`; `*` is a wildcard, and `**` also matches across folders. `executed`
     limits the mutations to these lines. MutatorError if a place matches nothing.
     """
-    wanted: dict[str, dict[str, None]] = {}
+    functions_by_path: dict[str, dict[str, None]] = {}
     for place in places:
-        for path, function in _functions(manifest, place):
-            wanted.setdefault(path, {})[function] = None
-    found = Found()
-    for path in sorted(wanted):
-        found = _added(found, _in_file(manifest, models, operators, path, wanted[path], executed))
-    return found
+        for path, function in _functions_at(manifest, place):
+            functions_by_path.setdefault(path, {})[function] = None
+    selected = SelectedMutations()
+    for path in sorted(functions_by_path):
+        selected = _merge(
+            selected, _select_in_file(manifest, models, operators, path, functions_by_path[path], executed)
+        )
+    return selected
 
 
-def _in_file(
+def _select_in_file(
     manifest: TargetManifest,
     models: FaultModels,
     operators: Collection[str],
     path: str,
     functions: Collection[str],
-    executed: Lines | None,
-) -> Found:
-    file, facts = parsed(manifest.tree, path), facts_of(manifest.tree, path)
-    made = [one for name in functions for one in mutations_of(file, facts, name, models, operators)]
+    executed: LinesByFile | None,
+) -> SelectedMutations:
+    file, facts = parsed_file(manifest.tree, path), facts_of(manifest.tree, path)
+    mutations = [
+        mutation for name in functions for mutation in mutations_of(file, facts, name, models, operators)
+    ]
     lines = None if executed is None else facts.executed(executed.get(path, ()))
-    ran = made if lines is None else [one for one in made if one.line + 1 in lines]
-    kept = distinct(file, ran)
-    return Found(
-        mutations=kept.mutations,
-        unexecuted=len(made) - len(ran),
-        equal=kept.equal,
-        twins=kept.twins,
-        invalid=kept.invalid,
+    executed_mutations = (
+        mutations if lines is None else [mutation for mutation in mutations if mutation.line + 1 in lines]
+    )
+    distinct_mutations = drop_equal_code(file, executed_mutations)
+    return SelectedMutations(
+        mutations=distinct_mutations.mutations,
+        unexecuted=len(mutations) - len(executed_mutations),
+        equal=distinct_mutations.equal,
+        twins=distinct_mutations.twins,
+        invalid=distinct_mutations.invalid,
     )
 
 
-def _added(one: Found, other: Found) -> Found:
-    return Found(
-        mutations=one.mutations + other.mutations,
-        unexecuted=one.unexecuted + other.unexecuted,
-        equal=one.equal + other.equal,
-        twins=one.twins + other.twins,
-        invalid=one.invalid + other.invalid,
+def _merge(first: SelectedMutations, second: SelectedMutations) -> SelectedMutations:
+    return SelectedMutations(
+        mutations=first.mutations + second.mutations,
+        unexecuted=first.unexecuted + second.unexecuted,
+        equal=first.equal + second.equal,
+        twins=first.twins + second.twins,
+        invalid=first.invalid + second.invalid,
     )
 
 
-def _functions(manifest: TargetManifest, place: str) -> Iterator[tuple[str, str]]:
+def _functions_at(manifest: TargetManifest, place: str) -> Iterator[tuple[str, str]]:
     """Yield path and qualified name of each function that a place names; MutatorError if there is none."""
     path, _, function = place.partition("::")
-    paths = _paths(manifest, path)
-    hits = [
+    paths = _paths_at(manifest, path)
+    matching = [
         (path, name)
         for path in paths
-        for name in parsed(manifest.tree, path).functions
+        for name in parsed_file(manifest.tree, path).functions_by_name
         if fnmatchcase(name, function.replace(".<locals>", "") or "*")
     ]
-    if not hits:
-        known = [name for path in paths[:1] for name in parsed(manifest.tree, path).functions]
+    if not matching:
+        names = [name for path in paths[:1] for name in parsed_file(manifest.tree, path).functions_by_name]
         raise MutatorError(
             f"no function '{function}' in {path}" if function else f"no function in {path}",
             argument="in",
-            expected=f"one of {', '.join(known)}" if function and known else "a file with functions",
-            remedy="correct the place" + suggestion(function, known),
+            expected=f"one of {', '.join(names)}" if function and names else "a file with functions",
+            remedy="correct the place" + suggestion(function, names),
         )
-    yield from hits
+    yield from matching
 
 
-def _paths(manifest: TargetManifest, path: str) -> list[str]:
-    if not any(c in path for c in _GLOB):
+def _paths_at(manifest: TargetManifest, path: str) -> list[str]:
+    if not any(c in path for c in _WILDCARDS):
         check_file(manifest, path)
         return [path]
-    hits = [one for one in manifest.tree.files if matches(one, [path]) and _may_be_mutated(manifest, one)]
-    if not hits:
+    matching = [
+        file for file in manifest.tree.files if matches(file, [path]) and _can_be_mutated(manifest, file)
+    ]
+    if not matching:
         raise MutatorError(
             f"no file of target {manifest.name} matches '{path}'",
             argument="in",
@@ -134,10 +142,10 @@ def _paths(manifest: TargetManifest, path: str) -> list[str]:
             "matches across folders",
             remedy="correct the place",
         )
-    return sorted(hits)
+    return sorted(matching)
 
 
-def _may_be_mutated(manifest: TargetManifest, path: str) -> bool:
+def _can_be_mutated(manifest: TargetManifest, path: str) -> bool:
     try:
         check_file(manifest, path)
     except MutatorError:
@@ -145,18 +153,18 @@ def _may_be_mutated(manifest: TargetManifest, path: str) -> bool:
     return True
 
 
-def sampled(found: Found, count: int | None, seed: int) -> tuple[Mutation, ...]:
+def sample_mutations(selected: SelectedMutations, count: int | None, seed: int) -> tuple[Mutation, ...]:
     """Sample `count` mutations, stratified by operator and function. They keep their order.
 
     The sample is systematic over a seeded order, so each mutation has the same chance.
     """
-    total = len(found.mutations)
+    total = len(selected.mutations)
     if count is None or count >= total:
-        return found.mutations
-    places = sorted(range(total), key=lambda i: _stratum(found.mutations[i], seed))
+        return selected.mutations
+    strata_order = sorted(range(total), key=lambda i: _stratum(selected.mutations[i], seed))
     start = float(generator(seed, "operators").random())
-    chosen = {places[int((k + start) * total / count)] for k in range(count)}
-    return tuple(found.mutations[i] for i in sorted(chosen))
+    chosen = {strata_order[int((k + start) * total / count)] for k in range(count)}
+    return tuple(selected.mutations[i] for i in sorted(chosen))
 
 
 def _stratum(mutation: Mutation, seed: int) -> tuple[str, ...]:

@@ -6,8 +6,8 @@ from mutator.model import OPERATORS, Fault, FaultLocation, Injection, Value
 from mutator.mutants.expressions import Expression
 from mutator.mutants.statements import Statement
 
-_LONGEST = 60  # characters; longer texts are abbreviated
-_AROUND = 20  # unchanged characters kept before and after the change
+_MOST_CHARACTERS = 60  # characters; longer texts are abbreviated
+_CONTEXT_CHARACTERS = 20  # unchanged characters kept before and after the change
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,11 +34,11 @@ class Mutation:
     def text(self) -> str:
         """The change, abbreviated: `a + b -> a - b`."""
         was, now = " ".join(self.was.split()), " ".join(self.now.split())
-        if max(len(was), len(now)) <= _LONGEST:
+        if max(len(was), len(now)) <= _MOST_CHARACTERS:
             return f"{was} -> {now}"
-        before = max(0, _in_common(was, now) - _AROUND)
-        after = max(0, _in_common(was[before:][::-1], now[before:][::-1]) - _AROUND)
-        return " -> ".join(_part(text, before, after) for text in (was, now))
+        before = max(0, _common_prefix_length(was, now) - _CONTEXT_CHARACTERS)
+        after = max(0, _common_prefix_length(was[before:][::-1], now[before:][::-1]) - _CONTEXT_CHARACTERS)
+        return " -> ".join(_abbreviate(text, before, after) for text in (was, now))
 
     def fault(self, reading: str) -> Fault:
         injection = Injection(location=self.location, model=self.model, params=self.params)
@@ -54,16 +54,16 @@ class Mutation:
         )
 
 
-def _in_common(one: str, other: str) -> int:
+def _common_prefix_length(first: str, second: str) -> int:
     same = 0
-    while same < min(len(one), len(other)) and one[same] == other[same]:
+    while same < min(len(first), len(second)) and first[same] == second[same]:
         same += 1
     return same
 
 
-def _part(text: str, before: int, after: int) -> str:
+def _abbreviate(text: str, before: int, after: int) -> str:
     part = text[before : len(text) - after]
-    half = _LONGEST // 2
-    if len(part) > _LONGEST + 4:
+    half = _MOST_CHARACTERS // 2
+    if len(part) > _MOST_CHARACTERS + 4:
         part = f"{part[:half]} .. {part[-half:]}"
     return f"{'.. ' if before else ''}{part}{' ..' if after else ''}"

@@ -5,16 +5,16 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from mutator.mutants.expression_roles import blocks
+from mutator.mutants.expression_roles import blocks_of
 from mutator.targets.source_tree import SourceTree
 
-Extent = tuple[int, int, int | None, int | None]
+NodeExtent = tuple[int, int, int | None, int | None]
 
-_OWN_NAMES: dict[type[ast.AST], str] = {ast.comprehension: "target", ast.Lambda: "body"}
+_LOCAL_NAME_FIELDS: dict[type[ast.AST], str] = {ast.comprehension: "target", ast.Lambda: "body"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Facts:
+class StatementFacts:
     """Facts about the statements of a file's functions. Line numbers start at 1.
 
     * `augmented`: the operator of an augmented assignment, by the extent of its right-hand side
@@ -24,76 +24,78 @@ class Facts:
     * `own`: the lines of each statement without those of nested statements
     """
 
-    augmented: dict[Extent, ast.operator] = field(default_factory=dict)
+    augmented: dict[NodeExtent, ast.operator] = field(default_factory=dict)
     texts: dict[int, str] = field(default_factory=dict)
     bound: dict[tuple[int, str], int] = field(default_factory=dict)
     own: list[range] = field(default_factory=list)
 
     def executed(self, lines: Collection[int]) -> frozenset[int]:
         """Extend the lines to whole statements."""
-        ran = [own for own in self.own if any(line in lines for line in own)]
-        return frozenset(lines).union(*ran)
+        executed_statements = [
+            statement for statement in self.own if any(line in lines for line in statement)
+        ]
+        return frozenset(lines).union(*executed_statements)
 
 
-def extent(node: ast.expr) -> Extent:
+def extent_of(node: ast.expr) -> NodeExtent:
     return node.lineno, node.col_offset, node.end_lineno, node.end_col_offset
 
 
-def facts_of(tree: SourceTree, path: str) -> Facts:
-    return tree.derived(path, _facts)
+def facts_of(tree: SourceTree, path: str) -> StatementFacts:
+    return tree.derived(path, _collect_facts)
 
 
-def _facts(path: str, data: bytes, root: Path) -> Facts:
-    facts = Facts()
-    _block(ast.parse(data).body, None, facts)
+def _collect_facts(path: str, data: bytes, root: Path) -> StatementFacts:
+    facts = StatementFacts()
+    _collect_block(ast.parse(data).body, None, facts)
     return facts
 
 
-def _block(body: list[ast.stmt], function: int | None, facts: Facts) -> None:
+def _collect_block(body: list[ast.stmt], def_line: int | None, facts: StatementFacts) -> None:
     for statement in body:
-        if function is not None:
-            _statement(statement, function, facts)
+        if def_line is not None:
+            _collect_statement(statement, def_line, facts)
         if isinstance(statement, ast.FunctionDef | ast.AsyncFunctionDef):
-            for argument in _arguments(statement.args):
+            for argument in _all_arguments(statement.args):
                 facts.bound.setdefault((statement.lineno, argument.arg), statement.lineno)
-            _block(statement.body, statement.lineno, facts)
+            _collect_block(statement.body, statement.lineno, facts)
         elif isinstance(statement, ast.ClassDef):
-            _block(statement.body, None, facts)
+            _collect_block(statement.body, None, facts)
         else:
-            for block in blocks(statement):
-                _block(block, function, facts)
+            for block in blocks_of(statement):
+                _collect_block(block, def_line, facts)
 
 
-def _arguments(arguments: ast.arguments) -> Iterator[ast.arg]:
+def _all_arguments(arguments: ast.arguments) -> Iterator[ast.arg]:
     yield from (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs)
-    yield from (one for one in (arguments.vararg, arguments.kwarg) if one)
+    yield from (argument for argument in (arguments.vararg, arguments.kwarg) if argument)
 
 
-def _statement(statement: ast.stmt, function: int, facts: Facts) -> None:
-    inner = [block[0].lineno for block in blocks(statement) if block]
+def _collect_statement(statement: ast.stmt, def_line: int, facts: StatementFacts) -> None:
+    inner = [block[0].lineno for block in blocks_of(statement) if block]
     last = statement.end_lineno or statement.lineno
     facts.own.append(range(statement.lineno, max(statement.lineno, min([last, *(n - 1 for n in inner)])) + 1))
     if not inner:
         facts.texts.setdefault(statement.lineno, ast.unparse(statement))
     if isinstance(statement, ast.AugAssign):
-        facts.augmented[extent(statement.value)] = statement.op
+        facts.augmented[extent_of(statement.value)] = statement.op
     if isinstance(statement, ast.Global | ast.Nonlocal):
         for name in statement.names:
-            facts.bound[function, name] = 0
-    for node in _own_nodes(statement):
+            facts.bound[def_line, name] = 0
+    for node in _nodes_in_scope(statement):
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
-            facts.bound.setdefault((function, node.id), statement.lineno)
+            facts.bound.setdefault((def_line, node.id), statement.lineno)
 
 
-def _own_nodes(statement: ast.stmt) -> Iterator[ast.AST]:
+def _nodes_in_scope(statement: ast.stmt) -> Iterator[ast.AST]:
     """Yield a statement's nodes, except nested statements and names local to comprehensions and lambdas."""
-    todo: list[ast.AST] = [statement]
-    while todo:
-        node = todo.pop()
+    stack: list[ast.AST] = [statement]
+    while stack:
+        node = stack.pop()
         yield node
-        own = _OWN_NAMES.get(type(node))
-        hidden = getattr(node, own) if own else None
-        todo += [
+        local_field = _LOCAL_NAME_FIELDS.get(type(node))
+        hidden = getattr(node, local_field) if local_field else None
+        stack += [
             child
             for child in ast.iter_child_nodes(node)
             if child is not hidden and not isinstance(child, ast.stmt)

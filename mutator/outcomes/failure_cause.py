@@ -11,8 +11,8 @@ from itertools import dropwhile
 
 from mutator.engines.engine_jobs import Execution, Raised, Stack
 from mutator.model import RunError, Status
-from mutator.mutants.injected_lines import Tag, changed_parts, tag_of
-from mutator.mutants.probe import is_probe
+from mutator.mutants.injected_lines import Tag, changed_value_positions, tag_of
+from mutator.mutants.probe import is_probe_path
 
 _At = tuple[str, int, int]  # file, line, column
 
@@ -41,10 +41,10 @@ class _Files:
         """Return the ids of the injections whose code is at this position. There can be none, because a
         changed line also has unchanged parts.
         """
-        if tag.was is None:
-            return tag.ids if tag.of_fault and not (in_probe and tag.asks_probe) else ()
+        if tag.replaced_line is None:
+            return tag.ids if tag.is_of_fault and not (in_probe and tag.is_guard) else ()
         file, line, column = at
-        parts = changed_parts(self._files[file])
+        parts = changed_value_positions(self._files[file])
         return [name for name, there, begin, end in parts if there == line and begin <= column < end]
 
 
@@ -76,7 +76,7 @@ def error_of(raised: Raised | None) -> RunError | None:
 def _source(raised: Raised, files: _Files) -> _Source | None:
     own, *others = raised.stacks
     if raised.kind == RecursionError.__name__:  # any call can be the one that exceeds the limit
-        own = tuple(dropwhile(lambda at: is_probe(at[0]) or files.tag_at(at) is not None, own))
+        own = tuple(dropwhile(lambda at: is_probe_path(at[0]) or files.tag_at(at) is not None, own))
     found = [source for stack in (own, *others) if (source := _on_stack(stack, files))]
     return min(found, key=lambda source: source.tag is not None, default=None)  # prefer the probe
 
@@ -91,13 +91,13 @@ def _on_stack(stack: Stack, files: _Files) -> _Source | None:
     in_probe = in_target = False
     for at in stack:
         place, tag = f"{at[0]}:{at[1]}", files.tag_at(at)
-        if is_probe(at[0]):
+        if is_probe_path(at[0]):
             in_probe = True
-        elif tag and tag.was is not None and in_target:
+        elif tag and tag.replaced_line is not None and in_target:
             continue
         elif tag and (ids := files.injected_at(at, tag, in_probe)):
             return _Source(place=place, tag=tag, ids=ids)
-        elif in_probe or (tag and tag.was is None):
+        elif in_probe or (tag and tag.replaced_line is None):
             return _Source(place=place)
-        in_target = in_target or (tag is None and not is_probe(at[0]))
+        in_target = in_target or (tag is None and not is_probe_path(at[0]))
     return _Source(place="") if in_probe else None

@@ -15,33 +15,37 @@ from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 
 
-def tries(workspace: Workspace, manifest: TargetManifest, canary: Experiment) -> Iterator[Experiment]:
+def experiments_to_try(
+    workspace: Workspace, manifest: TargetManifest, canary: Experiment
+) -> Iterator[Experiment]:
     """Yield the canary, then the same fault with each other value of its variant, largest first."""
     yield canary
-    models, known = workspace.fault_models(), canary.fault
+    models, canary_fault = workspace.fault_models(), canary.fault
     others: dict[str, Fault] = {}
     for spec in workspace.specs():
-        if known.spec.startswith(f"{spec.name}/") and known.reading in spec.readings.names:
-            faults = expand(spec, canary.seed, known.reading, models=models, manifest=manifest)
-            others |= {one.id: one for one in faults if one.spec == known.spec and one.id != known.id}
+        if canary_fault.spec.startswith(f"{spec.name}/") and canary_fault.reading in spec.readings.names:
+            faults = expand(spec, canary.seed, canary_fault.reading, models=models, manifest=manifest)
+            others |= {
+                one.id: one for one in faults if one.spec == canary_fault.spec and one.id != canary_fault.id
+            }
     for fault in sorted(others.values(), key=lambda one: one.size, reverse=True):
         yield replace(canary, fault=fault)
 
 
-def job(workspace: Workspace, manifest: TargetManifest, experiment: Experiment) -> Job:
-    built = build(manifest, workspace.fault_models(), experiment.fault, experiment.trigger)
+def build_job(workspace: Workspace, manifest: TargetManifest, experiment: Experiment) -> Job:
+    mutant = build(manifest, workspace.fault_models(), experiment.fault, experiment.trigger)
     return Job(
         name=f"canary-{experiment.id}",
         scenario=workspace.scenario(experiment.scenario),
         seed=experiment.seed,
         changes=experiment.changes,
-        files=built.files,
-        mutant=built.id,
-        injections=built.injections,
+        files=mutant.files,
+        mutant=mutant.id,
+        injections=mutant.injection_ids,
     )
 
 
-def judge(
+def run_until_hazard(
     experiments: Iterable[Experiment], run: Callable[[Experiment], CheckRun], hazard: str
 ) -> tuple[str, str]:
     """Run experiments until one causes `hazard`; return the problem ('': none) and the success message."""

@@ -23,13 +23,13 @@ from mutator.store import file_digests, plan_file
 from mutator.store.records import PROOF_FOLDER, endings_of
 from mutator.store.run_folder import RunFolder
 
-FOLDER = PROOF_FOLDER
-_LEAST = 20
-_SHARE = 100  # one experiment in this many
+PROOF_FOLDER = PROOF_FOLDER
+_MIN_SAMPLE = 20
+_EXPERIMENTS_PER_SAMPLED_ONE = 100  # one experiment in this many
 
 
 @dataclass(frozen=True, slots=True)
-class Sample:
+class SampledExperiment:
     """An experiment of the sample that has not run yet."""
 
     number: int
@@ -37,7 +37,7 @@ class Sample:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Proof:
+class EquivalenceResult:
     """The state of a run's equivalence check: the number of experiments in the sample, the number with the
     same result, and the harness errors of the check's own runs (experiment id, detail).
     """
@@ -55,123 +55,127 @@ class Proof:
         return f"{self.same} of {sampled} came out the same on the reference engine"
 
 
-def begin(run: Path) -> None:
+def mark_as_needed(run: Path) -> None:
     """Record that the run has results that need an equivalence check."""
     with raising_disk_full(run):
-        (run / FOLDER).mkdir(exist_ok=True)
+        (run / PROOF_FOLDER).mkdir(exist_ok=True)
 
 
-def sample(experiments: Sequence[Experiment], seed: int) -> tuple[Experiment, ...]:
+def choose_sample(experiments: Sequence[Experiment], seed: int) -> tuple[Experiment, ...]:
     """Choose one experiment in a hundred, at least 20, with every fault type and every scenario."""
-    count = max(_LEAST, -(-len(experiments) // _SHARE))
+    count = max(_MIN_SAMPLE, -(-len(experiments) // _EXPERIMENTS_PER_SAMPLED_ONE))
     chosen = list(pick(experiments, count, seed))
-    seen = {mark for experiment in chosen for mark in _marks(experiment)}
+    covered = {mark for experiment in chosen for mark in _traits_to_cover(experiment)}
     for experiment in sorted(experiments, key=lambda e: digest([seed, e.id])):
-        if not seen.issuperset(_marks(experiment)):
+        if not covered.issuperset(_traits_to_cover(experiment)):
             chosen.append(experiment)
-            seen.update(_marks(experiment))
+            covered.update(_traits_to_cover(experiment))
     return tuple(chosen)
 
 
-def _sample_of(folder: RunFolder) -> set[str]:
+def _whole_sample_ids(folder: RunFolder) -> set[str]:
     """Ids of a plan's sample. For several seeds, each seed after the first adds one experiment in a
     hundred.
     """
-    return set(_sampled_ids(folder.path, folder.head.plan, len(folder.seeds)))
+    return set(_cached_sample_ids(folder.path, folder.head.plan, len(folder.seeds)))
 
 
 @lru_cache(maxsize=4)  # a session asks several times
-def _sampled_ids(run: Path, plan: str, seeds: int) -> tuple[str, ...]:
+def _cached_sample_ids(run: Path, plan: str, seeds: int) -> tuple[str, ...]:
     if seeds == 1:
         head = RunFolder.open_unverified(run).head
-        return tuple(e.id for e in sample(plan_file.load_experiments(run), head.seed))
-    found: list[str] = []
+        return tuple(e.id for e in choose_sample(plan_file.load_experiments(run), head.seed))
+    ids: list[str] = []
     for seed, group in groupby(plan_file.iterate_experiments(run), key=lambda experiment: experiment.seed):
-        some = tuple(group)
-        more = pick(some, -(-len(some) // _SHARE), seed) if found else sample(some, seed)
-        found += [experiment.id for experiment in more]
-    return tuple(found)
+        experiments = tuple(group)
+        sampled_experiments = (
+            pick(experiments, -(-len(experiments) // _EXPERIMENTS_PER_SAMPLED_ONE), seed)
+            if ids
+            else choose_sample(experiments, seed)
+        )
+        ids += [experiment.id for experiment in sampled_experiments]
+    return tuple(ids)
 
 
-def _marks(experiment: Experiment) -> Iterator[tuple[str, ...]]:
+def _traits_to_cover(experiment: Experiment) -> Iterator[tuple[str, ...]]:
     yield (experiment.fault.module, experiment.fault.fault_type)
     yield (experiment.scenario,)
 
 
-def needless(folder: RunFolder) -> str | None:
+def reason_not_needed(folder: RunFolder) -> str | None:
     """Return the most frequent reason why no experiment was forked; None if one was forked or still can be.
 
     Always None for a shard, because merged shards must all have a proof or none.
     """
     if folder.shard is not None:
         return None
-    told = folder.timings()
-    done = {one.experiment_id for one in endings_of(folder.records()) if one.is_final}
+    timings = folder.timings()
+    finished_ids = {ending.experiment_id for ending in endings_of(folder.records()) if ending.is_final}
     reasons = Counter[str]()
     for name in folder.planned_positions():
-        if name not in done:  # not run yet; any timing is from an earlier session
+        if name not in finished_ids:  # not run yet; any timing is from an earlier session
             return None
-        line = told.get(name, {})
-        if line.get("engine", "unknown") not in (RunMode.REFERENCE.value, None):
+        timing = timings.get(name, {})
+        if timing.get("engine", "unknown") not in (RunMode.REFERENCE.value, None):
             return None
-        reasons[str(line.get("why", ""))] += 1
+        reasons[str(timing.get("why", ""))] += 1
     return next((why for why, _ in reasons.most_common() if why), "the reference engine ran them all")
 
 
-def drop(folder: RunFolder) -> None:
+def remove_proof(folder: RunFolder) -> None:
     """Remove a proof that is no longer needed."""
-    gone = {name: None for name in file_digests.list_segments(folder.path) if name.startswith(f"{FOLDER}/")}
-    with file_digests.rewriting_files(folder.path, gone):
-        remove_folder(folder.path / FOLDER)
+    removed = {name: None for name in file_digests.list_segments(folder.path) if name.startswith(f"{PROOF_FOLDER}/")}
+    with file_digests.rewriting_files(folder.path, removed):
+        remove_folder(folder.path / PROOF_FOLDER)
 
 
-def left(folder: RunFolder) -> tuple[Sample, ...]:
+def remaining_sample(folder: RunFolder) -> tuple[SampledExperiment, ...]:
     """Return the part of the sample without a valid record in `proof/`; empty if no check is needed."""
-    if not (folder.path / FOLDER).is_dir():
+    if not (folder.path / PROOF_FOLDER).is_dir():
         return ()
-    found = folder.records(FOLDER)
-    ids = [name for name in sampled(folder) if name not in found or not _counts(found[name])]
-    if ids and needless(folder) is not None:
+    records = folder.records(PROOF_FOLDER)
+    ids = [name for name in sample_ids(folder) if name not in records or not _is_result(records[name])]
+    if ids and reason_not_needed(folder) is not None:
         return ()
-    return tuple(Sample(number, name) for number, name in enumerate(ids))
+    return tuple(SampledExperiment(number, name) for number, name in enumerate(ids))
 
 
-def sampled(folder: RunFolder) -> list[str]:
+def sample_ids(folder: RunFolder) -> list[str]:
     """Ids of the sample in this folder's share, in plan order."""
-    wanted = _sample_of(folder)
-    return [name for name in folder.planned_positions() if name in wanted]
+    sampled_ids = _whole_sample_ids(folder)
+    return [name for name in folder.planned_positions() if name in sampled_ids]
 
 
-def judge(folder: RunFolder, records: Mapping[str, Record]) -> Proof | None:
+def compare_sample(folder: RunFolder, records: Mapping[str, Record]) -> EquivalenceResult | None:
     """Return the state of the check; None if none is needed. CheckFailed if a record differs on the reference
     engine.
     """
-    if not (folder.path / FOLDER).is_dir():
+    if not (folder.path / PROOF_FOLDER).is_dir():
         return None
-    found = folder.records(FOLDER)
+    reference_records = folder.records(PROOF_FOLDER)
     same, errors = 0, []
-    for name, truth in found.items():
+    for name, reference_record in reference_records.items():
         record = records.get(name)
-        if record is None or not _counts(record):
+        if record is None or not _is_result(record):
             continue
-        if not _counts(truth):
-            errors.append((name, f"in the proof: {truth.detail}"))
+        if not _is_result(reference_record):
+            errors.append((name, f"in the proof: {reference_record.detail}"))
             continue
-        if record != truth:
+        if record != reference_record:
             raise CheckFailed(
-                f"experiment {name} differs on the reference engine: {difference(record, truth)}",
+                f"experiment {name} differs on the reference engine: {describe_difference(record, reference_record)}",
                 where=folder.path,
                 expected="the same record from every engine",
                 remedy="do not trust this run: rerun it with --engine reference, and report the problem",
             )
         same += 1
-    return Proof(sampled=len(sampled(folder)), same=same, errors=tuple(sorted(errors)))
+    return EquivalenceResult(sampled=len(sample_ids(folder)), same=same, errors=tuple(sorted(errors)))
 
 
-def difference(record: Record, truth: Record) -> str:
-    names = [name for name in Record.__slots__ if getattr(record, name) != getattr(truth, name)]
-    return f"{names[0]} {getattr(record, names[0])!r} instead of {getattr(truth, names[0])!r}"
+def describe_difference(record: Record, reference_record: Record) -> str:
+    names = [name for name in Record.__slots__ if getattr(record, name) != getattr(reference_record, name)]
+    return f"{names[0]} {getattr(record, names[0])!r} instead of {getattr(reference_record, names[0])!r}"
 
 
-def _counts(record: Record) -> bool:
+def _is_result(record: Record) -> bool:
     return record.status is not Status.HARNESS_ERROR

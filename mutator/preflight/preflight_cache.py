@@ -7,25 +7,25 @@ from pathlib import Path
 from mutator._common import cached_folders, shared_cache
 from mutator._common.confined_files import inside
 from mutator._common.hashing import digest
-from mutator.preflight.unreached_triggers import FOLDER
+from mutator.preflight.unreached_triggers import OBSERVATIONS_FOLDER
 
 
-def entry(key: str) -> Path:
+def entry_path(key: str) -> Path:
     """Return the path for checks with this digest. Machines with a shared home folder have separate entries,
     because the digest might not cover everything that changes last digits.
     """
     return inside(shared_cache.of_checks(), digest([key, platform.node()]))
 
 
-def store(place: Path, run: Path, file: str, observed: Path) -> None:
+def store_checks(entry: Path, run: Path, file: str, observation_folder: Path) -> None:
     """Store a run folder's golden runs, check results (`file`) and observations at `place`, if the cache is
     writable.
     """
 
-    def fill(made: Path) -> None:
-        shutil.copytree(run / "golden", made / "golden")
-        shutil.copy(inside(run, file), inside(made, file))
-        if (observed / FOLDER).is_dir():
-            shutil.copytree(observed / FOLDER, made / FOLDER)
+    def fill(entry_folder: Path) -> None:
+        shutil.copytree(run / "golden", entry_folder / "golden")
+        shutil.copy(inside(run, file), inside(entry_folder, file))
+        if (observation_folder / OBSERVATIONS_FOLDER).is_dir():
+            shutil.copytree(observation_folder / OBSERVATIONS_FOLDER, entry_folder / OBSERVATIONS_FOLDER)
 
-    cached_folders.store(place, fill)
+    cached_folders.store(entry, fill)

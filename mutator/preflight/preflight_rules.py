@@ -32,7 +32,7 @@ class CheckRun:
     modules: tuple[str, ...] = ()
 
 
-def look(manifest: TargetManifest, execution: Execution) -> CheckRun:
+def read_check_run(manifest: TargetManifest, execution: Execution) -> CheckRun:
     if execution.status is not Status.OK:
         log = execution.log.strip()
         # the last printed line explains why a run was killed; an exception has its own message
@@ -44,7 +44,7 @@ def look(manifest: TargetManifest, execution: Execution) -> CheckRun:
         return CheckRun(problem=f"{Path(err.where or '').name}: {err.got}")
     return CheckRun(
         problem="",
-        digest=digest_of(manifest, execution.out),
+        digest=output_digest_of(manifest, execution.out),
         trace=golden_comparison.trace_digest(manifest, execution.out),
         alerts=judged.alerts,
         hazards=judged.hazards,
@@ -54,7 +54,7 @@ def look(manifest: TargetManifest, execution: Execution) -> CheckRun:
     )
 
 
-def digest_of(manifest: TargetManifest, out: Path) -> str:
+def output_digest_of(manifest: TargetManifest, out: Path) -> str:
     """Digest of trace and record in an output folder; empty if they are missing."""
     try:
         return digest([digest(read_bounded(inside(out, name))) for name in manifest.outputs])
@@ -62,7 +62,7 @@ def digest_of(manifest: TargetManifest, out: Path) -> str:
         return ""
 
 
-def judge_golden(first: CheckRun, again: CheckRun) -> str:
+def golden_problem(first: CheckRun, again: CheckRun) -> str:
     """Return the problem of a pair of golden runs; empty if there is none."""
     if first.problem or again.problem:
         return first.problem or again.problem
@@ -74,7 +74,7 @@ def judge_golden(first: CheckRun, again: CheckRun) -> str:
     return ""
 
 
-def judge_null(first: CheckRun, null: CheckRun) -> str:
+def null_mutant_problem(first: CheckRun, null: CheckRun) -> str:
     if null.problem:
         return null.problem
     if null.digest != first.digest:
@@ -82,7 +82,7 @@ def judge_null(first: CheckRun, null: CheckRun) -> str:
     return "" if null.triggered else "its trigger never fired: the observation statement is not executed"
 
 
-def judge_same(goldens: Mapping[str, CheckRun]) -> str:
+def equal_scenarios_problem(goldens: Mapping[str, CheckRun]) -> str:
     """Return the problem of golden runs (by scenario) that are equal according to the manifest; empty if
     there is none.
     """

@@ -15,23 +15,23 @@ from mutator.engines.reference_engine import ReferenceEngine
 from mutator.model import Experiment
 from mutator.mutants.mutant_building import build
 from mutator.preflight import canary, unreached_triggers
-from mutator.preflight.preflight_rules import CheckRun, look
+from mutator.preflight.preflight_rules import CheckRun, read_check_run
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_progress import Progress, StagePace
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import always
 from mutator.workspace import Workspace
 
-GOLDEN, AGAIN, NULL = "golden", "golden again", "null mutant"
+GOLDEN, GOLDEN_AGAIN, NULL_MUTANT = "golden", "golden again", "null mutant"
 _CANARY = "canary"
 _OTHER_HASH_SEED = 4242
 
-Notify = Callable[[Progress], None]
-Runs = dict[tuple[str, Any], CheckRun]  # kind of run, and `GoldenRun`
+OnProgress = Callable[[Progress], None]
+CheckRunByName = dict[tuple[str, Any], CheckRun]  # kind of run, and `GoldenRun`
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CheckDriver:
+class CheckRunner:
     """Executes the runs that the checks judge. Golden runs and their observations stay in `kept`."""
 
     workspace: Workspace
@@ -39,27 +39,34 @@ class CheckDriver:
     manifest: TargetManifest
     kept: Path
 
-    def drive(self, workers: int, notify: Notify) -> tuple[Runs, tuple[str, str]]:
+    def drive(self, workers: int, notify: OnProgress) -> tuple[CheckRunByName, tuple[str, str]]:
         """Do all runs of all checks, `workers` at a time. Return them with the result of `canary.judge`."""
-        with self._working(workers) as (engine, pool):
+        with self._engine_and_pool(workers) as (engine, pool):
             judged = pool.submit(self._judge_canary, engine)
-            futures = {name: pool.submit(self._run, engine, name, job) for name, job in self._jobs().items()}
-            nulls = [future for name, future in futures.items() if name[0] == NULL]
-            _follow("checks", [judged, *nulls], notify)
-            _follow("golden", [future for name, future in futures.items() if name[0] != NULL], notify)
+            futures = {
+                name: pool.submit(self._run_job, engine, name, job)
+                for name, job in self._jobs_by_name().items()
+            }
+            nulls = [future for name, future in futures.items() if name[0] == NULL_MUTANT]
+            _report_progress("checks", [judged, *nulls], notify)
+            _report_progress(
+                "golden", [future for name, future in futures.items() if name[0] != NULL_MUTANT], notify
+            )
             canary_verdict = judged.result()
             return {name: future.result() for name, future in futures.items()}, canary_verdict
 
-    def drive_goldens(self, workers: int, notify: Notify) -> dict[str, str]:
+    def drive_goldens(self, workers: int, notify: OnProgress) -> dict[str, str]:
         """Do each golden run once; return the digests by key."""
-        jobs = {name: job for name, job in self._jobs().items() if name[0] == GOLDEN}
-        with self._working(workers) as (engine, pool):
-            futures = {name[1].key: pool.submit(self._run, engine, name, job) for name, job in jobs.items()}
-            _follow("golden", [*futures.values()], notify)
+        jobs = {name: job for name, job in self._jobs_by_name().items() if name[0] == GOLDEN}
+        with self._engine_and_pool(workers) as (engine, pool):
+            futures = {
+                name[1].key: pool.submit(self._run_job, engine, name, job) for name, job in jobs.items()
+            }
+            _report_progress("golden", [*futures.values()], notify)
             return {key: future.result().digest for key, future in futures.items()}
 
     @contextmanager
-    def _working(self, workers: int) -> Iterator[tuple[ReferenceEngine, ThreadPoolExecutor]]:
+    def _engine_and_pool(self, workers: int) -> Iterator[tuple[ReferenceEngine, ThreadPoolExecutor]]:
         work = self.folder.scratch_folder / "checks"
         for scratch in (work, self.kept):
             remove_folder(scratch)
@@ -74,12 +81,16 @@ class CheckDriver:
     def _judge_canary(self, engine: ReferenceEngine) -> tuple[str, str]:
 
         def run(experiment: Experiment) -> CheckRun:
-            return self._run(engine, (_CANARY, None), canary.job(self.workspace, self.manifest, experiment))
+            return self._run_job(
+                engine, (_CANARY, None), canary.build_job(self.workspace, self.manifest, experiment)
+            )
 
         hazard = self.folder.head.canary_hazard
-        return canary.judge(canary.tries(self.workspace, self.manifest, self.folder.canary), run, hazard)
+        return canary.run_until_hazard(
+            canary.experiments_to_try(self.workspace, self.manifest, self.folder.canary), run, hazard
+        )
 
-    def _jobs(self) -> dict[tuple[str, Any], Job]:
+    def _jobs_by_name(self) -> dict[tuple[str, Any], Job]:
         jobs: dict[tuple[str, Any], Job] = {}
         null = build(self.manifest, self.workspace.fault_models(), None, always())
         for key in self.folder.golden_runs:
@@ -89,32 +100,36 @@ class CheckDriver:
                 "changes": key.changes,
             }
             name = key.key
-            jobs[NULL, key] = Job(name=f"n-{name}", files=null.files, mutant=null.id, observe=True, **common)
+            jobs[NULL_MUTANT, key] = Job(
+                name=f"n-{name}", files=null.files, mutant=null.id, observe=True, **common
+            )
             jobs[GOLDEN, key] = Job(name=f"a-{name}", **common)
-            jobs[AGAIN, key] = Job(name=f"b-{name}", hash_seed=_OTHER_HASH_SEED, **common)
-        return dict(sorted(jobs.items(), key=lambda one: one[0][0] != NULL))  # null mutants last
+            jobs[GOLDEN_AGAIN, key] = Job(name=f"b-{name}", hash_seed=_OTHER_HASH_SEED, **common)
+        return dict(sorted(jobs.items(), key=lambda entry: entry[0][0] != NULL_MUTANT))  # null mutants last
 
-    def _run(self, engine: ReferenceEngine, name: tuple[str, Any], job: Job) -> CheckRun:
+    def _run_job(self, engine: ReferenceEngine, name: tuple[str, Any], job: Job) -> CheckRun:
         scratch = inside(engine.work, job.name)
         try:
             execution = engine.execute(job, scratch)
-            run = look(self.manifest, execution)
+            run = read_check_run(self.manifest, execution)
             if name[0] == GOLDEN and name[1].seed is not None:
                 shared_cache.make_room(self.manifest.cache_name)
-            if name[0] == NULL:
-                unreached_triggers.write_observed(self.kept, name[1].key, execution.watched.get("seen", ()))
+            if name[0] == NULL_MUTANT:
+                unreached_triggers.save_observations(
+                    self.kept, name[1].key, execution.watched.get("seen", ())
+                )
             if name[0] == GOLDEN and not run.problem:
-                place = inside(self.kept / "golden", name[1].key)
-                place.parent.mkdir(parents=True, exist_ok=True)
-                execution.out.rename(place)
+                golden_folder = inside(self.kept / "golden", name[1].key)
+                golden_folder.parent.mkdir(parents=True, exist_ok=True)
+                execution.out.rename(golden_folder)
             return run
         finally:
             remove_folder(scratch)
 
 
-def _follow(stage: str, futures: Collection[Future[Any]], notify: Notify) -> None:
+def _report_progress(stage: str, futures: Collection[Future[Any]], notify: OnProgress) -> None:
     pace = StagePace(stage, len(futures))
     notify(pace.progress_at(0))
-    for done, future in enumerate(as_completed(futures), 1):
+    for finished_count, future in enumerate(as_completed(futures), 1):
         future.result()
-        notify(pace.progress_at(done))
+        notify(pace.progress_at(finished_count))

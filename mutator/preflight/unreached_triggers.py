@@ -22,46 +22,47 @@ from mutator.targets.manifest import TargetManifest
 from mutator.triggers.trigger_kinds import time_of
 from mutator.workspace import Workspace
 
-FOLDER = "observed"
-_NAMED = 4  # triggers that a warning names
+OBSERVATIONS_FOLDER = "observed"
+_MOST_NAMED_TRIGGERS = 4  # triggers that a warning names
 
 # a row for each observation: the time (s), then the values
-Observed: TypeAlias = "np.ndarray[Any, np.dtype[np.float64]]"
-Decision = tuple[float, str]  # of a trigger's probe
+Observations: TypeAlias = "np.ndarray[Any, np.dtype[np.float64]]"
+ArmedCondition = tuple[float, str]  # of a trigger's probe
 
 
-def write_observed(folder: Path, key: str, seen: Iterable[Sequence[float]]) -> None:
-    path = inside(folder / FOLDER, f"{key}.npy")
+def save_observations(folder: Path, key: str, observations: Iterable[Sequence[float]]) -> None:
+    path = inside(folder / OBSERVATIONS_FOLDER, f"{key}.npy")
     path.parent.mkdir(parents=True, exist_ok=True)  # scenario names can contain folders
-    np.save(path, np.array(list(seen), dtype=float))
+    np.save(path, np.array(list(observations), dtype=float))
 
 
-def read_observed(folder: Path) -> dict[str, Observed]:
-    base = folder / FOLDER
-    found = {path.relative_to(base).as_posix(): path for path in base.rglob("*.npy")}
+def load_observations(folder: Path) -> dict[str, Observations]:
+    base = folder / OBSERVATIONS_FOLDER
+    path_by_name = {path.relative_to(base).as_posix(): path for path in base.rglob("*.npy")}
     return {
-        name.removesuffix(".npy"): np.load(io.BytesIO(read_bounded(path))) for name, path in found.items()
+        name.removesuffix(".npy"): np.load(io.BytesIO(read_bounded(path)))
+        for name, path in path_by_name.items()
     }
 
 
-def decision_of(workspace: Workspace, manifest: TargetManifest, trigger: Trigger) -> Decision:
-    return build(manifest, workspace.fault_models(), None, trigger).probe.decision
+def armed_condition_of(workspace: Workspace, manifest: TargetManifest, trigger: Trigger) -> ArmedCondition:
+    return build(manifest, workspace.fault_models(), None, trigger).probe.armed_condition
 
 
-def holds(decision: Decision, observed: Observed) -> bool:
-    return bool(len(observed) and active_at(decision, observed.T).any())
+def is_ever_active(condition: ArmedCondition, observations: Observations) -> bool:
+    return bool(len(observations) and active_at(condition, observations.T).any())
 
 
-def remarks(
+def describe_unreached(
     workspace: Workspace,
     manifest: TargetManifest,
     experiments: Iterable[tuple[str, Experiment]],
-    observed: Mapping[str, Observed],
+    observed: Mapping[str, Observations],
 ) -> list[str]:
     """Remarks on triggers that never hold. Each experiment comes with its golden run's key."""
     late, never = Counter[str](), Counter[str]()
-    decisions: dict[Trigger, Decision] = {}
-    known: dict[tuple[str, Trigger], bool] = {}
+    condition_by_trigger: dict[Trigger, ArmedCondition] = {}
+    holds_by_run: dict[tuple[str, Trigger], bool] = {}
     total = 0
     for key, experiment in experiments:
         total += 1
@@ -72,22 +73,26 @@ def remarks(
             if time > (end := observed[key][:, 0].max()):
                 late[f"{experiment.scenario}, which ends at {end:g} s"] += 1
             continue
-        if (key, trigger) not in known:
-            if trigger not in decisions:
-                decisions[trigger] = decision_of(workspace, manifest, trigger)
-            known[key, trigger] = holds(decisions[trigger], observed[key])
-        if not known[key, trigger]:
+        if (key, trigger) not in holds_by_run:
+            if trigger not in condition_by_trigger:
+                condition_by_trigger[trigger] = armed_condition_of(workspace, manifest, trigger)
+            holds_by_run[key, trigger] = is_ever_active(condition_by_trigger[trigger], observed[key])
+        if not holds_by_run[key, trigger]:
             never[f"{trigger.name} in {experiment.scenario}"] += 1
-    return list(_sentences(total, late, never))
+    return list(_describe_counts(total, late, never))
 
 
-def _sentences(total: int, late: Counter[str], never: Counter[str]) -> Iterator[str]:
+def _describe_counts(total: int, late: Counter[str], never: Counter[str]) -> Iterator[str]:
     for counts, what in (
         (late, "the scenario ends before the time of"),
         (never, "no golden run reaches the trigger of"),
     ):
         if counts:
-            named = [f"{name}: {count}" for name, count in counts.most_common(_NAMED)]
-            more = [f"and {len(counts) - _NAMED} more"] if len(counts) > _NAMED else []
+            named = [f"{name}: {count}" for name, count in counts.most_common(_MOST_NAMED_TRIGGERS)]
+            more = (
+                [f"and {len(counts) - _MOST_NAMED_TRIGGERS} more"]
+                if len(counts) > _MOST_NAMED_TRIGGERS
+                else []
+            )
             count = f"{counts.total()} of {counted(total, 'experiment')}"
             yield f"{what} {count}, which will therefore be not_activated ({', '.join(named + more)})"

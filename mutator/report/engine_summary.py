@@ -41,7 +41,7 @@ def summarize_engines(
 ) -> EngineSummary | None:
     """Summarize a run's `timings` (as in `Seen`) and `proof/`. None without timings and without `proof/`."""
     ways = _ways(timings)
-    if not ways and not (folder.path / equivalence_check.FOLDER).is_dir():
+    if not ways and not (folder.path / equivalence_check.PROOF_FOLDER).is_dir():
         return None
     sentence, state, failed = _proof(folder, records)
     table = Table(heads=("how", "experiments"), rows=list(_lines(ways)))
@@ -67,7 +67,7 @@ def _lines(ways: Counter[tuple[str | None, str]]) -> Iterator[list[str]]:
 
 def _proof(folder: RunFolder, records: Mapping[str, Record]) -> tuple[str, str, bool]:
     try:
-        found = equivalence_check.judge(folder, records)
+        found = equivalence_check.compare_sample(folder, records)
     except CheckFailed as err:
         said = f"The equivalence check failed. Do not trust these results: {err.got}."
         return said, f"FAILED: {err.got}", True

@@ -17,7 +17,7 @@ from mutator._common.hashing import plain
 from mutator.config.location_syntax import as_written_at
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Fault
-from mutator.mutants.readable_patches import readable
+from mutator.mutants.readable_patches import readable_patch
 from mutator.report.answer_parts import warnings_of
 from mutator.report.experiment_facts import PLACE, UNTIMED_PATH
 from mutator.report.fault_path_data import RunPaths
@@ -265,7 +265,7 @@ def _patches(run: ReportedRun, ids: Iterable[str]) -> Iterator[tuple[str, str, s
     for name in ids:
         data = run.folder.read_patch(name, run.records.get(name))
         if data is not None:
-            yield name, "", readable(data.decode("utf-8", "replace"))[0]
+            yield name, "", readable_patch(data.decode("utf-8", "replace"))[0]
 
 
 def media(folder: RunFolder, seen_from: Path, budget: int) -> dict[str, dict[str, Any]]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from mutator._common.message_text import counted
 from mutator.model import Outcome
-from mutator.mutants.injected_lines import tag_words
+from mutator.mutants.injected_lines import tags_for_scripts
 from mutator.report.experiment_list import Browse
 from mutator.report.glossary import Words
 from mutator.report.panel import Panel, rendered
@@ -55,7 +55,7 @@ def page_html(content: Content) -> str:
     html = rendered(
         asset("report/report.html"),
         content=content,
-        tags=Markup(plainly_embedded(tag_words(), "tags")),
+        tags=Markup(plainly_embedded(tags_for_scripts(), "tags")),
         outcome_names=[outcome.value for outcome in Outcome],
         styles=[
             Markup(asset(name))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from mutator.errors import MutatorError
 from mutator.model import OPERATORS, Fault, Outcome, Status
-from mutator.mutants.anchors import ParsedFile, parsed
+from mutator.mutants.anchors import ParsedFile, parsed_file
 from mutator.results.outcome_counting import endings
 from mutator.statistics.mutation_score import PERMANENT, TRANSIENT
 from mutator.store.run_folder import RunFolder
@@ -112,7 +112,7 @@ class SourceLines:
         marks: dict[str, dict[int, dict[str, Mark]]] = {path: {} for path, _ in at.values()}
         for (path, line), lasting, mark in _marks(at, results):
             marks[path].setdefault(line, {})[lasting] = mark
-        files = (_file(parsed(manifest.tree, path), found) for path, found in marks.items() if found)
+        files = (_file(parsed_file(manifest.tree, path), found) for path, found in marks.items() if found)
         return cls(
             files=tuple(sorted(files, key=_badness)),
             places={name: f"{path}:{line}" for name, (path, line) in at.items()},
@@ -122,7 +122,7 @@ class SourceLines:
 
 def _place(manifest: TargetManifest, fault: Fault) -> tuple[str, int]:
     location = fault.injections[0].location
-    return location.path, parsed(manifest.tree, location.path).span(location)[0] + 1
+    return location.path, parsed_file(manifest.tree, location.path).line_span(location)[0] + 1
 
 
 def _marks(
@@ -154,7 +154,7 @@ def _file(file: ParsedFile, marks: Marks) -> MarkedFile:
 
 def _around(file: ParsedFile, line: int) -> range:
     """Return the outermost function around `line`; outside functions, a few lines."""
-    function = file.outer_function(line - 1)
+    function = file.outermost_function_at(line - 1)
     if function is not None:
         return range(function.start + 1, function.stop + 1)
     return range(max(1, line - _AROUND), min(len(file.lines), line + _AROUND) + 1)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from mutator.config.location_syntax import PROBE_NAME
-from mutator.mutants.injected_lines import changed_parts, tag_of
+from mutator.mutants.injected_lines import changed_value_positions, tag_of
 from mutator.review import source_names
 from mutator.review.source_names import SUPER, Import, Module, Use, uses_in
 from mutator.targets.source_tree import SourceTree
@@ -161,13 +161,13 @@ def _injected(data: bytes) -> Callable[[ast.expr], bool]:
     new parts of changed lines.
     """
     tags = {number: tag for number, line in enumerate(data.splitlines(), 1) if (tag := tag_of(line))}
-    changed = [(line, first, end) for _, line, first, end in changed_parts(data)]
+    changed = [(line, first, end) for _, line, first, end in changed_value_positions(data)]
 
     def is_injected(node: ast.expr) -> bool:
         tag = tags.get(node.lineno)
-        if tag is None or not tag.of_fault:
+        if tag is None or not tag.is_of_fault:
             return False
         within = (line == node.lineno and first <= node.col_offset < end for line, first, end in changed)
-        return tag.was is None or any(within)
+        return tag.replaced_line is None or any(within)
 
     return is_injected

@@ -31,7 +31,7 @@ from mutator.faults.fault_models import FaultModels
 from mutator.model import Fault, FaultLocation, Injection, Limits, Status
 from mutator.mutants.mutant_building import build
 from mutator.mutants.probe import probe_path
-from mutator.mutants.template_rendering import snippet
+from mutator.mutants.template_rendering import render_snippet
 from mutator.review.mutant_groups import Group
 from mutator.review.patch_shapes import parameter_values
 from mutator.targets.manifest import TargetManifest
@@ -153,7 +153,9 @@ def _place(fault: Fault) -> tuple[FaultLocation, str] | None:
 
 def _lines(models: FaultModels, fault: Fault) -> tuple[str, ...]:
     return tuple(
-        line for one in _effects(fault) for line in snippet(models.get(MODEL), dict(one.params), "picture")
+        line
+        for one in _effects(fault)
+        for line in render_snippet(models.get(MODEL), dict(one.params), "picture")
     )
 
 

@@ -19,10 +19,10 @@ from mutator.faults.fault_models import FaultModels
 from mutator.faults.fault_specs import FaultSpec
 from mutator.faults.spec_expansion import expand
 from mutator.model import Fault, Injection, Trigger
-from mutator.mutants.anchors import parsed
+from mutator.mutants.anchors import parsed_file
 from mutator.mutants.mutant_building import build
 from mutator.operators.mutation_listing import mutations_of
-from mutator.operators.operator_lookup import MODELS, operator_of
+from mutator.operators.operator_lookup import OPERATOR_MODELS, operator_name_of
 from mutator.operators.statement_facts import facts_of
 from mutator.review import patch_shapes
 from mutator.review.called_code import CalledCode
@@ -163,7 +163,7 @@ class _Catalogue:
         fault, _ = members[0]
         injections = tuple(dict.fromkeys(i for one in faults.values() for i in one.injections))
         models = tuple(dict.fromkeys(injection.model for injection in injections))
-        operator = operator_of(fault)
+        operator = operator_name_of(fault)
         values: Values = {}
         if operator:
             material = self._material_of_operator(fault, operator)
@@ -217,9 +217,9 @@ class _Catalogue:
     def _material_of_operator(self, fault: Fault, operator: str) -> Material:
         """Return the texts that determine all mutants of an operator in a function, selected or not."""
         at, tree = fault.injections[0].location, self.manifest.tree
-        file, facts = parsed(tree, at.path), facts_of(tree, at.path)
+        file, facts = parsed_file(tree, at.path), facts_of(tree, at.path)
         found = list(mutations_of(file, facts, at.function, self.models, [operator]))
-        models = {*MODELS, *(one.model for one in found)}
+        models = {*OPERATOR_MODELS, *(one.model for one in found)}
         return Material(
             diff=[[one.was, one.now] for one in found],
             functions=functions_of(tree, [at]),

@@ -13,9 +13,9 @@ from itertools import chain
 
 from mutator._common.hashing import content_id
 from mutator.model import Fault, FaultLocation, Hold, Injection, Trigger, Value
-from mutator.mutants.injected_lines import INJECTION_ID, settings, tagged_additions
+from mutator.mutants.injected_lines import INJECTION_ID_PATTERN, probe_setting_spans, tagged_addition_spans
 from mutator.mutants.readable_patches import adds_file, file_patches
-from mutator.operators.operator_lookup import operator_of
+from mutator.operators.operator_lookup import operator_name_of
 from mutator.triggers.conditions import TIME, names_in
 
 Span = tuple[int, int, str]  # position of a value in a patch: begin, end, name (empty: not yet known)
@@ -26,7 +26,7 @@ _NUMBER = (  # with its sign, and the operator of a sum: `- 3.0`
     rf"(?:[+-] ?){{0,2}}(?:(?<![{_WORD}])[0-9]+(?:\.[0-9]*)?(?:e[+-]?[0-9]+)?(?![{_WORD}])"
     r"|float\('-?(?:nan|inf)'\))|(?<![\w.])(?:True|False)(?!\w)"
 )
-_VALUE = re.compile(rf"(?P<id>{INJECTION_ID})|{_NUMBER}")
+_VALUE = re.compile(rf"(?P<id>{INJECTION_ID_PATTERN})|{_NUMBER}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,7 +101,7 @@ def group_label(fault: Fault) -> str:
     `pkg/sensor.py Sensor.measure after_assign gap: offset(by, target=gap)`. An operator's mutants share one
     label in each function: `pkg/sensor.py Sensor.measure: operator constant`.
     """
-    if operator := operator_of(fault):
+    if operator := operator_name_of(fault):
         location = fault.injections[0].location
         return f"{location.path} {location.function}: operator {operator}"
     return "; ".join(map(injection_label, fault.injections))
@@ -208,9 +208,9 @@ def _spans(patch: str) -> Iterator[Span]:
     for section in file_patches(patch):
         end = begin + len(section)
         if adds_file(section):
-            yield from settings(patch, begin, end)
+            yield from probe_setting_spans(patch, begin, end)
         else:
-            for start, stop in tagged_additions(patch, begin, end):
+            for start, stop in tagged_addition_spans(patch, begin, end):
                 yield from _values(patch, start, stop)
         begin = end
 

@@ -11,7 +11,7 @@ from markupsafe import Markup
 from mutator._common.files import write_atomic
 from mutator._common.hashing import content_id, plain
 from mutator.errors import MutatorError
-from mutator.mutants.injected_lines import tag_words
+from mutator.mutants.injected_lines import tags_for_scripts
 from mutator.review.decisions import Review, State
 from mutator.review.effect_pictures import has_pictures
 from mutator.review.mutant_groups import Group
@@ -57,7 +57,7 @@ def render_page(data: dict[str, Any]) -> str:
         count=len(data["groups"]),
         served=data.get("served") is not None,
         styles=[Markup(asset(name)) for name in load_order("review", ".css")],
-        tags=Markup(plainly_embedded(tag_words(), "tags")),
+        tags=Markup(plainly_embedded(tags_for_scripts(), "tags")),
         data=Markup(embedded(data, "review")),
         scripts=[Markup(asset(name)) for name in load_order("review", ".js")],
     )

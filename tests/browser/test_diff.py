@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from mutator.mutants.injected_lines import tag_words
+from mutator.mutants.injected_lines import tags_for_scripts
 from mutator.web import asset
 
 CHANGED = 'x = (1 if _fi.active("a0") else "a\u2028b")  '
@@ -17,7 +17,9 @@ def test_a_tag_extends_to_the_end_of_its_line(browser: Any, end: str) -> None:
     lines = ["+from car import _fi  # fi:probe", '-x = "a\u2028b" # c', f"+{CHANGED}{TAG}", "+y = 1  # fi:a0"]
     patch = "diff --git a/m.py b/m.py\n--- a/m.py\n+++ b/m.py\n@@ -1,1 +1,3 @@\n" + end.join([*lines, ""])
     page = browser.new_page()
-    page.set_content(f'<script type="application/json" id="tags">{json.dumps(tag_words())}</script><p></p>')
+    page.set_content(
+        f'<script type="application/json" id="tags">{json.dumps(tags_for_scripts())}</script><p></p>'
+    )
     page.add_script_tag(
         content=f"{asset('shared/dom.js')}\n{asset('shared/diff.js')}\nglobalThis.Diff = Diff;"
     )

@@ -13,7 +13,7 @@ import pytest
 
 from mutator._common.folder_locks import living_workers, wait_for_workers
 from mutator.execution.campaign_running import run_campaign
-from mutator.preflight.equivalence_check import Proof
+from mutator.preflight.equivalence_check import EquivalenceResult
 from mutator.store.records import load_records
 from mutator.workspace import Workspace
 
@@ -36,7 +36,7 @@ def test_every_engine_gives_the_same_tables(
 ) -> None:
     summary = run_campaign(toy, "toy", tmp_path / "run", engine=engine, workers=workers)
     assert (summary.exit_code, summary.problem) == (0, "")
-    assert summary.proof == Proof(sampled=20, same=20)
+    assert summary.proof == EquivalenceResult(sampled=20, same=20)
     assert {name: (tmp_path / "run" / name).read_bytes() for name in TABLES} == expected
 
 
@@ -78,7 +78,7 @@ def test_an_equivalence_check_resumes_after_kills(
         wait_for_workers(out, 15.0)
         proved = len(_proved(out))
     summary = run_campaign(toy, "toy", out, engine="fork")
-    assert summary.proof == Proof(sampled=20, same=20)
+    assert summary.proof == EquivalenceResult(sampled=20, same=20)
     assert len(_proved(out)) == 20
     assert {name: (out / name).read_bytes() for name in TABLES} == expected
 

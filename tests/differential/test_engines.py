@@ -24,7 +24,7 @@ from mutator.model import (
     Trigger,
     Value,
 )
-from mutator.mutants.anchors import parsed
+from mutator.mutants.anchors import parsed_file
 from mutator.mutants.mutant_building import build
 from mutator.triggers.trigger_kinds import always, at_time
 from mutator.workspace import Workspace
@@ -141,7 +141,7 @@ class Engines:
             files=built.files,
             mutant=built.id,
             probe=built.probe,
-            injections=built.injections,
+            injections=built.injection_ids,
             golden=self.golden(scenario),
         )
 
@@ -172,7 +172,7 @@ def three(
 
 def values(three: Engines, path: str) -> list[FaultLocation]:
     found, seen = [], Counter[tuple[str, AnchorKind, str, str | None]]()
-    for function, known in parsed(three.manifest.tree, path).expressions.items():
+    for function, known in parsed_file(three.manifest.tree, path).expressions_by_function.items():
         for kind, name, which in (role for one in known for role in dict.fromkeys(one.roles)):
             seen[function, kind, name, which] += 1
             anchor = Anchor(kind=kind, name=name, which=which, nth=seen[function, kind, name, which])

@@ -14,9 +14,9 @@ from mutator.errors import MutatorError
 from mutator.faults.fault_models import SnippetKind
 from mutator.model import AnchorKind, Injection
 from mutator.mutants import splicing
-from mutator.mutants.anchors import ParsedFile, Site, parse_file
+from mutator.mutants.anchors import ParsedFile, ResolvedAnchor, parse_file
 from mutator.mutants.injection_edits import injection_edit
-from mutator.mutants.template_rendering import snippet
+from mutator.mutants.template_rendering import render_snippet
 from mutator.workspace import Workspace
 
 from .anchors_by_ast import AFTER, BEFORE, Spot, spots
@@ -125,7 +125,7 @@ def _groups(file: ParsedFile, tree: ast.Module, figures: Figures) -> dict[str, l
     for i, spot in enumerate(spots(tree)):
         name = f"{i:08x}"
         try:
-            site = file.resolve(spot.location)
+            site = file.resolve_statement(spot.location)
         except MutatorError as error:
             _expect(error.line is not None and _crowded(file, spot), f"{spot}: {error}")
             figures.anchors[_reason(error)] += 1
@@ -133,7 +133,7 @@ def _groups(file: ParsedFile, tree: ast.Module, figures: Figures) -> dict[str, l
         _check_site(file, site, spot)
         figures.anchors[spot.kind.value] += 1
         code = (f'if _fi.active("{name}"):', f'    _fi.report("{name}")')
-        edit = splicing.insertion(file, site, code, name)
+        edit = splicing.insertion_edit(file, site, code, name)
         groups.setdefault(spot.kind.value, []).append(_Placed(spot, edit))
         if spot.kind in BEFORE:
             _add_guard(file, site, _Placed(spot, edit), groups, figures)
@@ -141,10 +141,14 @@ def _groups(file: ParsedFile, tree: ast.Module, figures: Figures) -> dict[str, l
 
 
 def _add_guard(
-    file: ParsedFile, site: Site, placed: _Placed, groups: dict[str, list[_Placed]], figures: Figures
+    file: ParsedFile,
+    site: ResolvedAnchor,
+    placed: _Placed,
+    groups: dict[str, list[_Placed]],
+    figures: Figures,
 ) -> None:
     try:
-        edit = splicing.guard(file, site, (f'if not _fi.active("{placed.name}"):',), placed.name)
+        edit = splicing.guard_edit(file, site, (f'if not _fi.active("{placed.name}"):',), placed.name)
     except MutatorError as error:
         _expect(error.line is not None and _crowded(file, placed.spot), f"{placed.spot}: {error}")
         figures.anchors[_reason(error)] += 1
@@ -175,20 +179,20 @@ def _line(file: ParsedFile, number: int) -> bytes:
     return file.lines[number - 1].decode(file.encoding).removeprefix("\ufeff").encode()
 
 
-def _check_site(file: ParsedFile, site: Site, spot: Spot) -> None:
+def _check_site(file: ParsedFile, site: ResolvedAnchor, spot: Spot) -> None:
     end = spot.node.end_lineno or 0
     if spot.kind in AFTER:
-        between = b"".join(file.lines[end : site.last]).strip(b" \t\f\r\n\\;")
-        _expect(site.last >= end and not between, f"{spot} ends before line {site.last}")
+        between = b"".join(file.lines[end : site.end_line]).strip(b" \t\f\r\n\\;")
+        _expect(site.end_line >= end and not between, f"{spot} ends before line {site.end_line}")
     elif spot.kind in BEFORE:
-        _expect(site.first == spot.node.lineno - 1, f"{spot} begins at line {site.first + 1}")
+        _expect(site.first_line == spot.node.lineno - 1, f"{spot} begins at line {site.first_line + 1}")
 
 
 def _spliced(file: ParsedFile, group: Sequence[_Placed]) -> bytes:
     edits = [placed.edit for placed in group]
     with contextlib.suppress(MutatorError):  # a byte order mark right before the first statement
-        edits.append(splicing.probe_import(file, "pack"))
-    mutant = splicing.joined(splicing.apply_edits(file, edits))
+        edits.append(splicing.probe_import_edit(file, "pack"))
+    mutant = splicing.join_pieces(splicing.apply_edits(file, edits))
     try:
         compile(mutant, "m.py", "exec", dont_inherit=True)
     except SyntaxError as error:
@@ -256,6 +260,6 @@ def _with_variable_set(file: ParsedFile, spot: Spot, figures: Figures) -> bytes:
 
 
 def _forced(file: ParsedFile, spot: Spot, model: str, params: dict[str, Any]) -> bytes:
-    site, code = file.resolve(spot.location), snippet(_MODELS.get(model), params, "abcd0123")
-    make = splicing.guard if _MODELS.get(model).kind is SnippetKind.GUARD else splicing.insertion
-    return splicing.joined(splicing.apply_edits(file, [make(file, site, code, "abcd0123")]))
+    site, code = file.resolve_statement(spot.location), render_snippet(_MODELS.get(model), params, "abcd0123")
+    make = splicing.guard_edit if _MODELS.get(model).kind is SnippetKind.GUARD else splicing.insertion_edit
+    return splicing.join_pieces(splicing.apply_edits(file, [make(file, site, code, "abcd0123")]))

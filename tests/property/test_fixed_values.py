@@ -12,10 +12,10 @@ import pytest
 
 from mutator.model import Anchor, AnchorKind, FaultLocation, Hold, Injection, Trigger
 from mutator.mutants.anchors import ParsedFile
-from mutator.mutants.constants_and_defaults import FixedValue
+from mutator.mutants.constants_and_defaults import ConstantOrDefault
 from mutator.mutants.injection_edits import injection_edit
-from mutator.mutants.probe import probe_of, settings_of
-from mutator.mutants.splicing import apply_edits, in_lines, joined, probe_import, unsplice
+from mutator.mutants.probe import build_probe_settings, render_probe
+from mutator.mutants.splicing import apply_edits, as_line_edits, join_pieces, probe_import_edit, unsplice
 from mutator.targets.observed_values import Observation
 
 from .test_value_anchors import MANY, models, module
@@ -26,22 +26,22 @@ MORE = ("imaplib", "logging", "logging.handlers", "pydoc", "shutil", "ssl", "sub
 MORE += ("tkinter.constants", "token", "xmlrpc.client")
 
 
-def locations(file: ParsedFile) -> list[tuple[FixedValue, FaultLocation]]:
+def locations(file: ParsedFile) -> list[tuple[ConstantOrDefault, FaultLocation]]:
     found = []
-    for one in file.fixed:
-        if one.reason is None:
+    for one in file.constants_and_defaults:
+        if one.unsettable_reason is None:
             anchor = Anchor(kind=one.kind, name=one.name)
             found.append((one, FaultLocation(path=file.path, function=one.function, anchor=anchor)))
     return found
 
 
-def mutant(file: ParsedFile, cases: Sequence[tuple[FixedValue, FaultLocation]]) -> bytes:
-    edits = [probe_import(file, None)]
+def mutant(file: ParsedFile, cases: Sequence[tuple[ConstantOrDefault, FaultLocation]]) -> bytes:
+    edits = [probe_import_edit(file, None)]
     for number, (one, location) in enumerate(cases):
-        assert file.resolve_fixed(location) is one
+        assert file.resolve_constant_or_default(location) is one
         injection = Injection(location=location, model="stuck", params=(("value", "another"),))
         edits.append(injection_edit(file, models(), injection, f"{number:08x}"))  # type: ignore[arg-type]
-    data = joined(apply_edits(file, in_lines(file, edits)))
+    data = join_pieces(apply_edits(file, as_line_edits(file, edits)))
     assert unsplice(data) == file.data, cases
     return data
 
@@ -58,15 +58,15 @@ def probe(ids: Sequence[str]) -> Any:
     nowhere = FaultLocation(path="", function="f", anchor=Anchor(kind=AnchorKind.ENTRY))
     observation = Observation(location=nowhere, time="t", values=(), derived=())
     trigger = Trigger(name="test", condition="t >= 1 and t < 2")
-    settings = settings_of("m", trigger, Hold.WHILE, ids, observation, 1.0, sets=True)
+    settings = build_probe_settings("m", trigger, Hold.WHILE, ids, observation, 1.0, sets=True)
     made = types.ModuleType("_fi")
-    exec(probe_of(models().probe, settings).text, vars(made))
+    exec(render_probe(models().probe, settings).text, vars(made))
     return made
 
 
-def read(names: types.ModuleType, one: FixedValue) -> Any:
+def read(names: types.ModuleType, one: ConstantOrDefault) -> Any:
     """Return a constant's value, or a default from the signature that Python reports."""
-    *path, last = one.path.split(".")
+    *path, last = one.dotted_path.split(".")
     found: Any = names
     for name in path:
         found = vars(found)[name]
@@ -77,8 +77,8 @@ def read(names: types.ModuleType, one: FixedValue) -> Any:
 
 
 def readable(
-    names: types.ModuleType, cases: Sequence[tuple[FixedValue, FaultLocation]]
-) -> Iterator[FixedValue]:
+    names: types.ModuleType, cases: Sequence[tuple[ConstantOrDefault, FaultLocation]]
+) -> Iterator[ConstantOrDefault]:
     """Yield the values that exist on this system. The library defines some only on other systems."""
     for one, _ in cases:
         try:
@@ -88,7 +88,7 @@ def readable(
         yield one
 
 
-def check(file: ParsedFile, cases: Sequence[tuple[FixedValue, FaultLocation]], *, run: bool) -> None:
+def check(file: ParsedFile, cases: Sequence[tuple[ConstantOrDefault, FaultLocation]], *, run: bool) -> None:
     """Check that a mutant compiles and equals the module except for the lines that set values. With `run`,
     each value must differ only in an active step and be restored afterwards."""
     data = mutant(file, cases)

@@ -18,7 +18,7 @@ from mutator.errors import MutatorError
 from mutator.faults.fault_specs import load_spec
 from mutator.faults.library_readings import UNDECLARED
 from mutator.mutants.anchors import parse_file
-from mutator.mutants.template_rendering import literal, signed
+from mutator.mutants.template_rendering import python_literal, signed_term
 from mutator.triggers.conditions import check_condition, evaluate
 
 QUIET = [HealthCheck.function_scoped_fixture]
@@ -98,16 +98,16 @@ def test_any_source_is_read_or_refused(data: bytes) -> None:
 
 @given(st.floats() | st.integers(-(10**30), 10**30))
 def test_rendered_numbers_are_exact(value: float) -> None:
-    assert repr(eval(literal(value))) == repr(value)
+    assert repr(eval(python_literal(value))) == repr(value)
     if value == value:
-        assert eval(f"0 {signed(value)}") == value
+        assert eval(f"0 {signed_term(value)}") == value
 
 
 @given(st.floats(), st.floats(allow_nan=False), st.sampled_from(["float", "np.float64", "np.float32"]))
 def test_adding_a_whole_number_equals_adding_a_float(variable: float, value: float, kind: str) -> None:
     sign = "-" if math.copysign(1.0, value) < 0 else "+"
     with np.errstate(all="ignore"):
-        texts = (f"{kind}(x) {signed(value)}", f"{kind}(x) {sign} {literal(abs(value))}")
+        texts = (f"{kind}(x) {signed_term(value)}", f"{kind}(x) {sign} {python_literal(abs(value))}")
         found, expected = (eval(text, {"x": variable, "np": np}) for text in texts)
     assert (type(found), repr(found)) == (type(expected), repr(expected))
 
@@ -115,7 +115,7 @@ def test_adding_a_whole_number_equals_adding_a_float(variable: float, value: flo
 @pytest.mark.parametrize("value", [[1], {"a": 1}, object()])
 def test_only_numbers_and_names_are_rendered(value: object) -> None:
     with pytest.raises(MutatorError):
-        literal(value)
+        python_literal(value)
 
 
 SHAPES = {

@@ -14,7 +14,7 @@ from mutator.model import Anchor, AnchorKind, FaultLocation, Injection
 from mutator.mutants.anchors import ParsedFile
 from mutator.mutants.injected_lines import tag_of
 from mutator.mutants.injection_edits import injection_edit
-from mutator.mutants.splicing import apply_edits, in_lines, joined, unsplice
+from mutator.mutants.splicing import apply_edits, as_line_edits, join_pieces, unsplice
 
 from .test_value_anchors import FEW, MANY, anchors, models, module
 
@@ -29,17 +29,17 @@ SHAPES = (
 
 
 def statements(file: ParsedFile) -> Iterator[FaultLocation]:
-    for function, known in file.functions.items():
+    for function, known in file.functions_by_name.items():
         seen = Counter(name for one in known for s in one.statements if not s.reason for name in s.assigns)
         for name, count in seen.items():
             for nth in range(1, count + 1):
                 anchor = Anchor(kind=AnchorKind.BEFORE_ASSIGN, name=name, nth=nth)
                 location = FaultLocation(path=file.path, function=function, anchor=anchor)
                 try:
-                    site = file.resolve(location)
+                    site = file.resolve_statement(location)
                 except MutatorError:
                     continue
-                if site.alone and site.first != site.last:
+                if site.is_alone and site.first_line != site.end_line:
                     yield location
 
 
@@ -70,7 +70,7 @@ def limited(random_: random.Random, file: ParsedFile, location: FaultLocation) -
         model="stuck" if value else "omission",
         params=(("value", 3.0),) if value else (),
     )
-    names = sorted(file.names(location))
+    names = sorted(file.names_in_function_at(location))
     if names and random_.random() < 0.8:
         text = random_.choice(SHAPES).format(random_.choice(names), random_.choice(names))
         made = replace(made, where=instance_condition(text))
@@ -82,14 +82,14 @@ def check(file: ParsedFile, injection: Injection) -> None:
     """Check that a mutant compiles, equals the module while its fault is inactive, and has a tag for its
     probe call."""
     edit = injection_edit(file, models(), injection, "0a1b2c3d")
-    data = joined(apply_edits(file, in_lines(file, [edit])))
+    data = join_pieces(apply_edits(file, as_line_edits(file, [edit])))
     assert unsplice(data) == file.data, injection
     tree, inactive = ast.parse(data), Inactive()
     compile(tree, "<mutant>", "exec", dont_inherit=True)
     assert ast.dump(inactive.visit(tree)) == ast.dump(ast.parse(file.data)), injection
     assert inactive.asked == 1
     (tag, *_) = [tag for line in data.splitlines() if (tag := tag_of(line))]
-    assert tag.asks_probe if tag.was is None else "_fi.active" in data.decode(file.encoding)
+    assert tag.is_guard if tag.replaced_line is None else "_fi.active" in data.decode(file.encoding)
 
 
 def checked(names: Sequence[str], count: int) -> int:

@@ -14,8 +14,8 @@ from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels, ParamSchema, SnippetKind
 from mutator.faults.spec_expansion import expand
 from mutator.model import AnchorKind, Fault, Hold, Injection, Trigger, Value
-from mutator.mutants.anchors import parsed
-from mutator.mutants.mutant_building import Mutant, build, build_directly
+from mutator.mutants.anchors import parsed_file
+from mutator.mutants.mutant_building import Mutant, build, build_without_reuse
 from mutator.store.plan_choices import Choices
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
@@ -84,7 +84,7 @@ def others(draw: st.DrawFn) -> Fault:
     if model.kind is SnippetKind.GUARD:
         kind = AnchorKind(location.anchor.kind.replace("after_", "before_"))
         location = replace(location, anchor=replace(location.anchor, kind=kind))
-    names = sorted(parsed(manifest.tree, location.path).names(location))
+    names = sorted(parsed_file(manifest.tree, location.path).names_in_function_at(location))
     given = [p for p in model.params if not (p.optional and draw(st.booleans()))]
     params = tuple((p.name, draw(values(p, names))) for p in given)
     return replace(fault, injections=(Injection(location=location, model=model.name, params=params),))
@@ -115,7 +115,7 @@ def made(way: object, fault: Fault, trigger: Trigger) -> Mutant | tuple[type, st
 @given(varied() | others(), triggers())
 def test_reused_changes_give_the_same_mutants_as_splicing(fault: Fault, trigger: Trigger) -> None:
     made(build, fault, trigger)  # leaves a reusable change if it is the first of its kind
-    assert made(build, fault, trigger) == made(build_directly, fault, trigger)
+    assert made(build, fault, trigger) == made(build_without_reuse, fault, trigger)
 
 
 @pytest.mark.slow
@@ -126,4 +126,4 @@ def test_mutants_of_the_papers_campaign_equal_spliced_ones(reading: str) -> None
     assert len(pairs) > 6000
     for experiment in pairs.values():
         key = experiment.fault, experiment.trigger
-        assert build(*paper(), *key) == build_directly(*paper(), *key)
+        assert build(*paper(), *key) == build_without_reuse(*paper(), *key)

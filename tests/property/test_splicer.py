@@ -106,15 +106,21 @@ class Direct(cst.CSTTransformer):
         return cst.FlattenSentinel(result)
 
 
-def mutate(data: bytes, after: Sequence[str], guarded: Sequence[str]) -> tuple[splicing.Piece, ...]:
+def mutate(data: bytes, after: Sequence[str], guarded: Sequence[str]) -> tuple[splicing.PatchPiece, ...]:
     file = parse_file("m.py", data, Path("root"))
-    edits = [splicing.probe_import(file, "pack")]
+    edits = [splicing.probe_import_edit(file, "pack")]
     for name in after:
         edits.append(
-            splicing.insertion(file, file.resolve(site(name, AnchorKind.AFTER_ASSIGN)), INSERTED, "ab12")
+            splicing.insertion_edit(
+                file, file.resolve_statement(site(name, AnchorKind.AFTER_ASSIGN)), INSERTED, "ab12"
+            )
         )
     for name in guarded:
-        edits.append(splicing.guard(file, file.resolve(site(name, AnchorKind.BEFORE_ASSIGN)), GUARD, "cd34"))
+        edits.append(
+            splicing.guard_edit(
+                file, file.resolve_statement(site(name, AnchorKind.BEFORE_ASSIGN)), GUARD, "cd34"
+            )
+        )
     return splicing.apply_edits(file, edits)
 
 
@@ -129,7 +135,7 @@ def test_unsplicing_restores_every_byte(data: st.DataObject) -> None:
     chosen = data.draw(st.lists(st.sampled_from(names), unique=True)) if names else []
     guarded = [n for n in data.draw(st.permutations(names))[: len(names) // 2] if can_guard(source, n)]
     pieces = mutate(source, chosen, guarded)
-    result = splicing.joined(pieces)
+    result = splicing.join_pieces(pieces)
     compile(result, "m.py", "exec")
     assert splicing.unsplice(result) == source
     assert b"".join(x for p in pieces if p.sign != "+" for x in p.lines) == source
@@ -145,7 +151,7 @@ def test_splicing_equals_inserting_into_the_tree(data: st.DataObject) -> None:
     source, names = data.draw(sources())
     chosen = data.draw(st.lists(st.sampled_from(names), unique=True)) if names else []
     guarded = [n for n in names if n not in chosen and can_guard(source, n)][:2]
-    result = splicing.joined(mutate(source, chosen, guarded))
+    result = splicing.join_pieces(mutate(source, chosen, guarded))
     without_import = b"".join(
         line for line in result.splitlines(keepends=True) if not line.rstrip().endswith(b"fi:probe")
     )

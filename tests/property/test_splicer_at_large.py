@@ -94,7 +94,7 @@ def test_a_broken_splicer_is_found(
         "_unit": lambda *given: b"",
     }
     monkeypatch.setattr(place, name, broken[name])
-    monkeypatch.setattr(anchors, "_check_place", lambda *given: None)
+    monkeypatch.setattr(anchors, "_check_position", lambda *given: None)
     assert proved([("", source)], behaviour, 20).wrong
 
 

@@ -11,7 +11,7 @@ from mutator.errors import MutatorError
 from mutator.model import Anchor, AnchorKind, FaultLocation, Injection
 from mutator.mutants.anchors import ParsedFile, parse_file
 from mutator.mutants.injection_edits import injection_edit
-from mutator.mutants.splicing import apply_edits, joined, unsplice
+from mutator.mutants.splicing import apply_edits, join_pieces, unsplice
 from mutator.workspace import Workspace
 
 CLONE = Path(__file__).parents[2]
@@ -36,7 +36,7 @@ class _Inactive(ast.NodeTransformer):
 
 
 def locations(file: ParsedFile) -> Iterator[FaultLocation]:
-    for function, found in file.functions.items():
+    for function, found in file.functions_by_name.items():
         seen: Counter[tuple[str, str]] = Counter()
         for statement in (s for one in found for s in one.statements if s.reason is None and s.opens is None):
             for verb in ("assign", "call", "return"):
@@ -65,7 +65,7 @@ def test_statements_of_the_controller_are_repeated_and_exchanged(
             except MutatorError as error:
                 assert any(excuse in error.got for excuse in EXCUSES), error
                 continue
-            data = joined(apply_edits(file, [edit]))  # type: ignore[list-item]
+            data = join_pieces(apply_edits(file, [edit]))  # type: ignore[list-item]
             compile(data, "m.py", "exec")
             assert unsplice(data) == file.data
             assert ast.dump(_Inactive().visit(ast.parse(data))) == whole

@@ -18,7 +18,7 @@ from mutator.model import Anchor, AnchorKind, FaultLocation, Injection
 from mutator.mutants.anchors import ParsedFile, parse_file
 from mutator.mutants.expressions import Expression
 from mutator.mutants.injection_edits import injection_edit
-from mutator.mutants.splicing import Edit, ValueEdit, apply_edits, in_lines, joined, unsplice
+from mutator.mutants.splicing import Edit, ValueEdit, apply_edits, as_line_edits, join_pieces, unsplice
 from mutator.operators.mutation_listing import mutations_of
 from mutator.operators.mutations import Mutation
 from mutator.operators.statement_facts import facts_of
@@ -67,7 +67,7 @@ def module(name: str) -> ParsedFile | None:
 
 
 def anchors(file: ParsedFile) -> Iterator[tuple[Expression, FaultLocation]]:
-    for function, known in file.expressions.items():
+    for function, known in file.expressions_by_function.items():
         seen = Counter[tuple[AnchorKind, str, str | None]]()
         for expression in known:
             for role in dict.fromkeys(expression.roles):
@@ -106,7 +106,7 @@ Case = tuple[Expression, FaultLocation]
 
 def edit_of(file: ParsedFile, case: Case, number: int) -> ValueEdit:
     expression, location = case
-    assert file.resolve_value(location) is expression, location
+    assert file.resolve_expression(location) is expression, location
     name, params = MODELS[number % len(MODELS)]
     injection = Injection(location=location, model=name, params=params)
     edit = injection_edit(file, models(), injection, f"{number:08x}")
@@ -136,7 +136,7 @@ def check(file: ParsedFile, cases: Sequence[Case]) -> None:
 
 
 def check_edits(file: ParsedFile, edits: Sequence[Edit | ValueEdit], cases: object) -> list[str]:
-    data = joined(apply_edits(file, in_lines(file, edits)))
+    data = join_pieces(apply_edits(file, as_line_edits(file, edits)))
     assert unsplice(data) == file.data, cases
     tree = ast.parse(data)
     compile(tree, "<mutant>", "exec", dont_inherit=True)
@@ -169,7 +169,7 @@ def test_20000_mutants_differ_only_in_their_changed_values() -> None:
 def mutations(file: ParsedFile) -> Iterator[Mutation]:
     tree = SourceTree(root=Path(), files={file.path: file.data}, digest="", _entries={})
     facts = facts_of(tree, file.path)
-    for function in file.functions:
+    for function in file.functions_by_name:
         yield from mutations_of(file, facts, function, models(), OPERATORS.shipped())
 
 
@@ -185,7 +185,7 @@ def checked_mutations(names: Sequence[str], count: int) -> int:
                 injection = mutation.fault("as_is").injections[0]
                 edit = injection_edit(file, models(), injection, f"{number:08x}")
                 try:
-                    apply_edits(file, in_lines(file, [*edits, edit]))
+                    apply_edits(file, as_line_edits(file, [*edits, edit]))
                 except MutatorError:  # one contains the other
                     check_edits(file, [edit], mutation)
                 else:

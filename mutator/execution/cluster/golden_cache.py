@@ -15,7 +15,7 @@ from mutator._common.hashing import digest
 from mutator._common.version import VERSION
 from mutator.campaigns import run_environment
 from mutator.execution.cluster.unpacked_bundle import Site
-from mutator.preflight.preflight_rules import digest_of
+from mutator.preflight.preflight_rules import output_digest_of
 from mutator.store.run_folder import GoldenRun
 from mutator.targets.manifest import TargetManifest
 
@@ -40,7 +40,7 @@ class DrivenGoldens:
         """Copy the golden run with the digest `known` to `to`; return False if it is not cached."""
         with suppress(OSError):
             cached_folders.fetch(self._entry(golden), to)
-            if digest_of(self._manifest, to) == known:
+            if output_digest_of(self._manifest, to) == known:
                 return True
         shutil.rmtree(to, ignore_errors=True)
         return False

@@ -35,7 +35,7 @@ from mutator.execution.cluster.unpacked_bundle import Site
 from mutator.execution.experiment_runner import Finished, Goldens, Runner
 from mutator.execution.worker import timing_of
 from mutator.model import Experiment
-from mutator.preflight.preflight_rules import look
+from mutator.preflight.preflight_rules import read_check_run
 from mutator.store.checksummed_blocks import block_bytes
 from mutator.store.patch_files import pack_patches
 from mutator.store.records import record_as_json
@@ -132,7 +132,7 @@ class PieceRunner:
             changes=golden.changes,
         )
         for _, execution in engine.run([job]):
-            found = look(self._manifest, execution)
+            found = read_check_run(self._manifest, execution)
             if found.problem or found.digest != known:
                 came = found.problem or f"has the digest {found.digest[:16]} here, not {known[:16]}"
                 raise GoldenRunsDiffer(f"golden run {golden.key} {came}")

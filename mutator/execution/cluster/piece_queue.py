@@ -14,7 +14,7 @@ from itertools import islice
 from mutator.campaigns.chunks import Pending
 from mutator.execution.cluster.pieces import Kind, Piece
 from mutator.execution.cluster.work_by_golden import Group, Run, faults_of, golden_of, groups_of
-from mutator.preflight.equivalence_check import Sample
+from mutator.preflight.equivalence_check import SampledExperiment
 from mutator.store import plan_file
 from mutator.store.plan_lines import id_on_line
 from mutator.store.run_folder import RunFolder
@@ -56,7 +56,7 @@ class Board:
         self,
         folder: RunFolder,
         pending: Sequence[Pending],
-        proof: Sequence[Sample],
+        proof: Sequence[SampledExperiment],
         now: Callable[[], float] = time.monotonic,
     ) -> None:
         self._now, self._folder = now, folder

@@ -171,7 +171,7 @@ class Deal:
     def _drop_needless_proof(self) -> None:
         if self._board.ran_all and self._session.proof and not self._forked:
             self._forked = True  # so that this is computed only once
-            if equivalence_check.needless(self._session.folder) is not None:
+            if equivalence_check.reason_not_needed(self._session.folder) is not None:
                 self._board.drop_proof()
 
     async def _tend(self, one: _Tended) -> None:

@@ -15,10 +15,10 @@ from mutator.execution import single_run
 from mutator.exports import Export, ExportRequest
 from mutator.faults.fault_models import FaultModels, SnippetKind
 from mutator.model import OPERATORS, Experiment, Fault, Injection, Outcome, Record, Status
-from mutator.mutants.anchors import ParsedFile, parsed
-from mutator.mutants.expressions import enclosed
+from mutator.mutants.anchors import ParsedFile, parsed_file
+from mutator.mutants.expressions import parenthesized
 from mutator.mutants.injection_edits import edits_of
-from mutator.mutants.splicing import Edit, Rank, ValueEdit, in_order
+from mutator.mutants.splicing import Edit, EditRank, ValueEdit, sort_edits
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
@@ -42,7 +42,7 @@ def report(folder: RunFolder, manifest: TargetManifest, models: FaultModels) -> 
     files: dict[str, dict[str, Any]] = {}
     for experiments in drives.values():
         fault = experiments[0].fault
-        file = parsed(manifest.tree, fault.injections[0].location.path)
+        file = parsed_file(manifest.tree, fault.injections[0].location.path)
         source = file.data.decode(file.encoding)
         entry = files.setdefault(file.path, {"language": "python", "source": source, "mutants": []})
         entry["mutants"].append(_mutant(manifest, models, fault, experiments, records))
@@ -87,16 +87,16 @@ def _mutant(
 
 
 def _line(manifest: TargetManifest, injection: Injection) -> int:
-    return parsed(manifest.tree, injection.location.path).span(injection.location)[0] + 1
+    return parsed_file(manifest.tree, injection.location.path).line_span(injection.location)[0] + 1
 
 
 def _change(manifest: TargetManifest, models: FaultModels, fault: Fault) -> dict[str, Any]:
     first = fault.injections[0]
-    file, model = parsed(manifest.tree, first.location.path), models.get(first.model)
-    edit, span = edits_of(manifest, models, [first])[0].edit, file.span(first.location)
+    file, model = parsed_file(manifest.tree, first.location.path), models.get(first.model)
+    edit, span = edits_of(manifest, models, [first])[0].edit, file.line_span(first.location)
     if isinstance(edit, ValueEdit):
-        # `enclosed` adds parentheses if an adjacent operator could bind more tightly
-        return _located(file, edit.start, edit.end, enclosed(edit.changed))
+        # `parenthesized` adds parentheses if an adjacent operator could bind more tightly
+        return _located(file, edit.start, edit.end, parenthesized(edit.changed))
     if fault.module == OPERATORS and model.kind is SnippetKind.GUARD:  # the mutant omits the statement
         line, last = file.lines[span[0]], file.lines[span[1] - 1].rstrip(b"\r\n")
         start = len(line) - len(line.lstrip())
@@ -122,9 +122,9 @@ def _splice(file: ParsedFile, span: tuple[int, int], edits: Sequence[Edit]) -> d
     first = min(span[0], *(edit.index for edit in edits), len(file.lines) - 1)
     last = max(span[1], first + 1)
     lines, new, done = file.lines[first:last], list[bytes](), 0
-    for edit in in_order(edits):
+    for edit in sort_edits(edits):
         at = edit.index - first
-        gone = at + (1 if edit.rank is Rank.INSTEAD else edit.reindent)
+        gone = at + (1 if edit.rank is EditRank.INSTEAD else edit.reindent)
         new += [*lines[done:at], *edit.lines, *(edit.unit + line for line in lines[at : at + edit.reindent])]
         done = gone
     new += lines[done:]

@@ -5,19 +5,19 @@ from collections.abc import Iterator
 
 from mutator.mutants.expressions import Expression
 from mutator.operators import Operator, Rule, rule
-from mutator.operators.statement_facts import Facts
+from mutator.operators.statement_facts import StatementFacts
 
 
-def _rules(expression: Expression, facts: Facts) -> Iterator[Rule]:
+def _rules(expression: Expression, facts: StatementFacts) -> Iterator[Rule]:
     node = expression.node
     if not isinstance(node, ast.Call):
         return
-    starred = (place for place, one in enumerate(node.args) if isinstance(one, ast.Starred))
+    starred = (number for number, argument in enumerate(node.args) if isinstance(argument, ast.Starred))
     for first in range(1, next(starred, len(node.args))):
         yield rule("operator_swap", first=first)
-    for place, keyword in enumerate(node.keywords, len(node.args) + 1):
+    for number, keyword in enumerate(node.keywords, len(node.args) + 1):
         if keyword.arg is not None:
-            yield rule("operator_drop", place=place)
+            yield rule("operator_drop", place=number)
 
 
 OPERATOR = Operator(

@@ -5,9 +5,9 @@ from collections.abc import Iterator
 
 from mutator.mutants.expressions import Expression
 from mutator.operators import Operator, Rule, rule
-from mutator.operators.statement_facts import Facts, extent
+from mutator.operators.statement_facts import StatementFacts, extent_of
 
-_OTHERS: dict[type[ast.operator], tuple[str, ...]] = {
+_REPLACEMENTS_BY_OPERATOR: dict[type[ast.operator], tuple[str, ...]] = {
     ast.Add: ("-", "*", "/"),
     ast.Sub: ("+", "*", "/"),
     ast.Mult: ("/", "+", "-"),
@@ -22,26 +22,31 @@ _OTHERS: dict[type[ast.operator], tuple[str, ...]] = {
     ast.LShift: (">>",),
     ast.RShift: ("<<",),
 }
-_AUGMENTED: dict[type[ast.operator], str] = {ast.Add: "-", ast.Sub: "-", ast.Mult: "1 /", ast.Div: "1 /"}
-_NO_NUMBERS = (ast.List, ast.ListComp, ast.Dict, ast.Set, ast.Tuple, ast.JoinedStr)
+_OPERAND_PREFIX_BY_OPERATOR: dict[type[ast.operator], str] = {
+    ast.Add: "-",
+    ast.Sub: "-",
+    ast.Mult: "1 /",
+    ast.Div: "1 /",
+}
+_NON_NUMBER_NODES = (ast.List, ast.ListComp, ast.Dict, ast.Set, ast.Tuple, ast.JoinedStr)
 
 
-def _rules(expression: Expression, facts: Facts) -> Iterator[Rule]:
+def _rules(expression: Expression, facts: StatementFacts) -> Iterator[Rule]:
     node = expression.node
-    if isinstance(node, ast.BinOp) and _is_number(node.left) and _is_number(node.right):
-        yield from (rule("operator_infix", to=to) for to in _OTHERS[type(node.op)])
+    if isinstance(node, ast.BinOp) and _can_be_number(node.left) and _can_be_number(node.right):
+        yield from (rule("operator_infix", to=to) for to in _REPLACEMENTS_BY_OPERATOR[type(node.op)])
     match node:
         case ast.UnaryOp(op=ast.USub(), operand=operand) if not isinstance(operand, ast.Constant):
             yield rule("operator_prefix", to="-")
-    augmented = facts.augmented.get(extent(node))
-    if augmented is not None and type(augmented) in _AUGMENTED and _is_number(node):
-        yield rule("operator_prefix", to=_AUGMENTED[type(augmented)])
+    augmented = facts.augmented.get(extent_of(node))
+    if augmented is not None and type(augmented) in _OPERAND_PREFIX_BY_OPERATOR and _can_be_number(node):
+        yield rule("operator_prefix", to=_OPERAND_PREFIX_BY_OPERATOR[type(augmented)])
 
 
-def _is_number(node: ast.expr) -> bool:
+def _can_be_number(node: ast.expr) -> bool:
     if isinstance(node, ast.Constant):
         return isinstance(node.value, int | float | complex)
-    return not isinstance(node, _NO_NUMBERS)
+    return not isinstance(node, _NON_NUMBER_NODES)
 
 
 OPERATOR = Operator(

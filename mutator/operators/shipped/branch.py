@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from mutator.model import AnchorKind
 from mutator.mutants.expressions import Expression
 from mutator.operators import Operator, Rule, rule
-from mutator.operators.statement_facts import Facts
+from mutator.operators.statement_facts import StatementFacts
 
 
-def _rules(expression: Expression, facts: Facts) -> Iterator[Rule]:
-    if not expression.answers(AnchorKind.CONDITION, "", None):
+def _rules(expression: Expression, facts: StatementFacts) -> Iterator[Rule]:
+    if not expression.matches_anchor(AnchorKind.CONDITION, "", None):
         return
     yield rule("operator_prefix", to="not")
     if not any(isinstance(inner, ast.NamedExpr) for inner in ast.walk(expression.node)):

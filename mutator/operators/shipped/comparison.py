@@ -5,9 +5,9 @@ from collections.abc import Iterator
 
 from mutator.mutants.expressions import Expression
 from mutator.operators import Operator, Rule, rule
-from mutator.operators.statement_facts import Facts
+from mutator.operators.statement_facts import StatementFacts
 
-_OTHERS: dict[type[ast.cmpop], tuple[str, ...]] = {
+_REPLACEMENTS_BY_OPERATOR: dict[type[ast.cmpop], tuple[str, ...]] = {
     ast.Lt: ("<=", ">", ">=", "==", "!="),
     ast.LtE: ("<", ">", ">=", "==", "!="),
     ast.Gt: (">=", "<", "<=", "==", "!="),
@@ -21,10 +21,10 @@ _OTHERS: dict[type[ast.cmpop], tuple[str, ...]] = {
 }
 
 
-def _rules(expression: Expression, facts: Facts) -> Iterator[Rule]:
+def _rules(expression: Expression, facts: StatementFacts) -> Iterator[Rule]:
     match expression.node:
         case ast.Compare(ops=[link]):
-            yield from (rule("operator_infix", to=to) for to in _OTHERS[type(link)])
+            yield from (rule("operator_infix", to=to) for to in _REPLACEMENTS_BY_OPERATOR[type(link)])
         case ast.BoolOp(op=link):
             yield rule("operator_infix", to="or" if isinstance(link, ast.And) else "and")
         case ast.UnaryOp(op=ast.Not()):

@@ -6,14 +6,14 @@ from collections.abc import Iterator
 from mutator.model import Value
 from mutator.mutants.expressions import Expression
 from mutator.operators import Operator, Rule, rule
-from mutator.operators.statement_facts import Facts
+from mutator.operators.statement_facts import StatementFacts
 
 
-def _rules(expression: Expression, facts: Facts) -> Iterator[Rule]:
-    yield from (rule("operator_constant", to=value) for value in _others(expression.node))
+def _rules(expression: Expression, facts: StatementFacts) -> Iterator[Rule]:
+    yield from (rule("operator_constant", to=value) for value in _replacements(expression.node))
 
 
-def _others(node: ast.expr) -> list[Value]:
+def _replacements(node: ast.expr) -> list[Value]:
     """Return distinct replacements of a constant: 0, 1, -1, one more, one less, negated."""
     sign = 1
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
@@ -25,8 +25,8 @@ def _others(node: ast.expr) -> list[Value]:
         return []
     number = sign * value
     kind = type(number)
-    others: list[Value] = [kind(0), kind(1), kind(-1), number + 1, number - 1, -number]
-    return [other for other in dict.fromkeys(others) if other != number]
+    values: list[Value] = [kind(0), kind(1), kind(-1), number + 1, number - 1, -number]
+    return [other for other in dict.fromkeys(values) if other != number]
 
 
 OPERATOR = Operator(

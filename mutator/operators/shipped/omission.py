@@ -2,10 +2,10 @@
 
 from mutator.mutants.statements import Statement
 from mutator.operators import Operator
-from mutator.operators.statement_facts import Facts
+from mutator.operators.statement_facts import StatementFacts
 
 
-def _omits(statement: Statement, facts: Facts) -> bool:
+def _omits(statement: Statement, facts: StatementFacts) -> bool:
     return not statement.is_return
 
 

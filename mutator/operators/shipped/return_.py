@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from mutator.model import AnchorKind
 from mutator.mutants.expressions import Expression
 from mutator.operators import Operator, Rule, rule
-from mutator.operators.statement_facts import Facts
+from mutator.operators.statement_facts import StatementFacts
 
-_EMPTY: tuple[tuple[tuple[type[ast.expr], ...], str], ...] = (
+_EMPTY_LITERAL_BY_NODES: tuple[tuple[tuple[type[ast.expr], ...], str], ...] = (
     ((ast.List, ast.ListComp), "[]"),
     ((ast.Dict, ast.DictComp), "{}"),
     ((ast.Set, ast.SetComp), "set()"),
@@ -16,12 +16,12 @@ _EMPTY: tuple[tuple[tuple[type[ast.expr], ...], str], ...] = (
 )
 
 
-def _rules(expression: Expression, facts: Facts) -> Iterator[Rule]:
+def _rules(expression: Expression, facts: StatementFacts) -> Iterator[Rule]:
     node = expression.node
-    if not expression.answers(AnchorKind.RETURN_VALUE, "", None) or _is_constant(node, type(None)):
+    if not expression.matches_anchor(AnchorKind.RETURN_VALUE, "", None) or _is_constant(node, type(None)):
         return
     yield rule("operator_constant", to=None)
-    for kinds, empty in _EMPTY:
+    for kinds, empty in _EMPTY_LITERAL_BY_NODES:
         if isinstance(node, kinds):
             yield rule("operator_empty", to=empty)
             return

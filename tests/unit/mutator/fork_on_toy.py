@@ -59,7 +59,7 @@ class Fork:
             files=built.files,
             mutant=built.id,
             probe=built.probe,
-            injections=built.injections,
+            injections=built.injection_ids,
             golden=self.golden,
         )
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from mutator.errors import MutatorError, Outside
-from mutator.onboarding.todo_marks import unfilled
+from mutator.onboarding.todo_marks import unfilled_mark_errors
 from mutator.workspace import Workspace
 
 CLONE = Path(__file__).parents[3]
@@ -152,7 +152,7 @@ READS = {  # a file of the library or its templates -> what reads it
     "references/paper_summary.yaml": lambda found: found.references,
     "severity/mine.yaml": lambda found: found._files("severity"),
     "readings.yaml": lambda found: found.readings(),
-    "notes/any.py": lambda found: list(unfilled(found.library)),
+    "notes/any.py": lambda found: list(unfilled_mark_errors(found.library)),
     "../templates/offset.yaml": lambda found: found.fault_models(),
     "../templates/offset.py.j2": lambda found: found.fault_models(),
 }

@@ -7,7 +7,7 @@ import pytest
 
 from mutator.campaigns.campaign_files import check_readings, load_campaign, load_study
 from mutator.campaigns.plan import make_plan
-from mutator.checks.library_check import check_library
+from mutator.checks.library_check import library_problems
 from mutator.errors import MutatorError
 from mutator.model import Method
 from mutator.store.plan_choices import Choices
@@ -151,7 +151,7 @@ def test_readings_must_be_those_of_the_library(
     with pytest.raises(MutatorError) as error:
         make_plan(toycar, path)
     assert f"{path}:{line}: {told}" in str(error.value)
-    assert any(told in str(problem) for problem in check_library(toycar, "toycar"))
+    assert any(told in str(problem) for problem in library_problems(toycar, "toycar"))
 
 
 def test_a_plan_looks_up_only_the_changes_of_its_reading(toycar: Workspace) -> None:

@@ -7,7 +7,7 @@ import pytest
 from mutator.api.mutant_files import MutantSet
 from mutator.api.selection import find_trigger
 from mutator.campaigns.plan import make_plan
-from mutator.checks.library_check import check_library
+from mutator.checks.library_check import library_problems
 from mutator.errors import MutatorError
 from mutator.model import Hold, Method
 from mutator.workspace import Workspace
@@ -91,9 +91,9 @@ def test_a_mistake_in_the_list_is_reported_at_its_line(
 
 
 def test_the_library_check_reports_invalid_conditions(pole: Workspace) -> None:
-    assert check_library(pole, "pole") == []
+    assert library_problems(pole, "pole") == []
     listed(pole, "triggers: [{when: speed > 1}]\n")
-    (problem,) = check_library(pole, "pole")
+    (problem,) = library_problems(pole, "pole")
     assert "unknown name 'speed'" in problem.got and problem.line == 9
 
 

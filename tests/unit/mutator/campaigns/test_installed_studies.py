@@ -11,7 +11,7 @@ from mutator._common.doors import STUDIES
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.installed_studies import find_study
 from mutator.campaigns.plan import load_plan, make_plan
-from mutator.checks.library_check import check_library
+from mutator.checks.library_check import library_problems
 from mutator.errors import MutatorError
 from mutator.report import report_builder
 from mutator.workspace import Workspace
@@ -129,7 +129,7 @@ def asking(toycar: Workspace, study: str) -> Path:
 def test_an_invalid_study_is_reported_at_its_line_in_the_campaign(
     strangers: None, toycar: Workspace, study: str
 ) -> None:
-    before = [str(problem) for problem in check_library(toycar, "toycar")]
+    before = [str(problem) for problem in library_problems(toycar, "toycar")]
     path = asking(toycar, study)
     line = len(path.read_text().splitlines())
     with pytest.raises(MutatorError) as error:
@@ -138,7 +138,7 @@ def test_an_invalid_study_is_reported_at_its_line_in_the_campaign(
     assert told.startswith(f"{path}:{line}: study '{study}' ")
     assert re.search(STRANGERS[study][1], told)
     assert "of package strange-studies 1 (" in told and "; correct, update or uninstall this package" in told
-    after = [str(problem) for problem in check_library(toycar, "toycar")]
+    after = [str(problem) for problem in library_problems(toycar, "toycar")]
     assert [problem for problem in after if problem not in before] == [told]
 
 
@@ -148,7 +148,7 @@ def test_an_error_in_a_studys_check_is_reported_as_a_problem(
 ) -> None:
     path = asking(toycar, study)
     line = len(path.read_text().splitlines())
-    problems = [str(problem) for problem in check_library(toycar, "toycar")]
+    problems = [str(problem) for problem in library_problems(toycar, "toycar")]
     said = f"{path}:{line}: the check of study '{study}' {BAD_CHECKS[study][1]}; correct the package"
     assert any(problem.startswith(said) for problem in problems)
 
@@ -164,7 +164,7 @@ def test_every_campaign_with_a_missing_study_is_reported(toycar: Workspace) -> N
     for name in ("small", "toy"):
         path = toycar.campaign(name)
         path.write_text(f"{path.read_text()}study: moon_landing\n")
-    found = [problem for problem in check_library(toycar, "toycar") if "moon_landing" in str(problem)]
+    found = [problem for problem in library_problems(toycar, "toycar") if "moon_landing" in str(problem)]
     assert [Path(str(problem.where)).name for problem in found] == ["small.yaml", "toy.yaml"]
 
 

@@ -13,7 +13,7 @@ from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import Plan, load_plan, make_plan
 from mutator.errors import MutatorError
 from mutator.model import Hold, Limits, Method
-from mutator.operators.executed_lines import Executed, GoldenDrive
+from mutator.operators.executed_lines import ExecutedLines, GoldenRunInputs
 from mutator.review.mutant_groups import of_plan
 from mutator.store.plan_choices import Choices
 from mutator.targets.manifest import TargetManifest
@@ -26,7 +26,9 @@ ENTRY = "  - {operators: [arithmetic, branch], in: ['toycar/driver.py::Driver.*'
 def lines(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pretend that golden runs execute lines 1 to 16 of the driver, instead of running them."""
 
-    def known(manifest: TargetManifest, drives: Sequence[GoldenDrive], limits: Limits) -> list[Executed]:
+    def known(
+        manifest: TargetManifest, drives: Sequence[GoldenRunInputs], limits: Limits
+    ) -> list[ExecutedLines]:
         return [{"toycar/driver.py": frozenset(range(1, 17))} for _ in drives]
 
     monkeypatch.setattr(operator_faults, "lines_of", known)

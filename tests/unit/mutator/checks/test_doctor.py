@@ -12,7 +12,7 @@ NO_LIBRARY = MutatorError("no fault library", remedy="say --root")
 
 
 def test_on_this_machine_only_the_library_fails() -> None:
-    findings = doctor.examine(NO_LIBRARY)
+    findings = doctor.examine_machine(NO_LIBRARY)
     failed = [f for f in findings if f.level is Level.FAIL]
     assert [(f.name, f.found, f.remedy) for f in failed] == [("library", "no fault library", "say --root")]
     assert {"python", "numpy", "cores", "child process"} <= {f.name for f in findings}
@@ -20,7 +20,7 @@ def test_on_this_machine_only_the_library_fails() -> None:
 
 def test_a_missing_package_fails_with_its_pip_line(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.metadata, "requires", lambda _: ["no-such-package>=2,<3"])
-    [finding] = [f for f in doctor.examine(NO_LIBRARY) if f.name == "no-such-package"]
+    [finding] = [f for f in doctor.examine_machine(NO_LIBRARY) if f.name == "no-such-package"]
     assert finding.level is Level.FAIL
     assert finding.remedy == "pip install 'no-such-package<3,>=2'"
 
@@ -28,7 +28,7 @@ def test_a_missing_package_fails_with_its_pip_line(monkeypatch: pytest.MonkeyPat
 def test_another_version_is_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
     """The package might still work."""
     monkeypatch.setattr(importlib.metadata, "requires", lambda _: ["numpy>=999"])
-    [finding] = [f for f in doctor.examine(NO_LIBRARY) if f.name == "numpy"]
+    [finding] = [f for f in doctor.examine_machine(NO_LIBRARY) if f.name == "numpy"]
     assert finding.level is Level.WARN
     assert finding.found.endswith("wanted >=999")
 
@@ -38,12 +38,12 @@ def test_a_folder_without_locks_is_a_warning(monkeypatch: pytest.MonkeyPatch) ->
         raise OSError(95, "Operation not supported")
 
     monkeypatch.setattr(doctor.fcntl, "flock", refuse)
-    [finding] = [f for f in doctor.examine(NO_LIBRARY) if f.name == "folder"]
+    [finding] = [f for f in doctor.examine_machine(NO_LIBRARY) if f.name == "folder"]
     assert (finding.level, finding.found.rpartition(": ")[2]) == (Level.WARN, "Operation not supported")
     assert "--out" in finding.remedy
 
 
 def test_a_child_process_that_cannot_start_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(doctor.sys, "executable", "/no/such/python")
-    [finding] = [f for f in doctor.examine(NO_LIBRARY) if f.name == "child process"]
+    [finding] = [f for f in doctor.examine_machine(NO_LIBRARY) if f.name == "child process"]
     assert finding.level is Level.FAIL

@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from mutator.checks import drive_check
-from mutator.checks.drive_check import check_drive
-from mutator.checks.findings import Finding, Level
-from mutator.checks.reachability import Reach
+from mutator.checks.drive_check import drive_findings
+from mutator.checks.findings import CheckState, Finding
+from mutator.checks.reachability import ReachTracker
 from mutator.errors import MutatorError
 from mutator.workspace import Workspace
 
@@ -36,13 +36,13 @@ def line_of(toy: Workspace, text: str, file: str = "driver.py") -> int:
 
 
 def findings(toy: Workspace) -> dict[str, Finding]:
-    return {finding.name: finding for finding in check_drive(toy, "toycar", SCENARIO)}
+    return {finding.name: finding for finding in drive_findings(toy, "toycar", SCENARIO)}
 
 
 def test_a_sound_target_passes_every_check(toy: Workspace) -> None:
     found = findings(toy)
     assert {name: one.level for name, one in found.items()} == dict.fromkeys(
-        ["golden A", "fast engines", "statements", "triggers", "canary small"], Level.OK
+        ["golden A", "fast engines", "statements", "triggers", "canary small"], CheckState.OK
     )
 
 
@@ -81,7 +81,7 @@ def test_a_nondeterministic_line_is_reported(
         change(toy, "driver.py", old, new)
     change(toy, "driver.py", "class Driver", f"{imports}\n\n\nclass Driver")
     found = findings(toy)["golden A"]
-    assert found.level is Level.FAIL
+    assert found.level is CheckState.FAIL
     assert "first differ in channel gas at step 0 (0 s): " in found.found
     assert ("but only if their hash seeds differ" in found.found) == ("set" in told)
     (place,) = found.places
@@ -128,11 +128,11 @@ def test_a_thread_pool_is_reported_with_its_line(
         "        wheel = self.pool.submit(float, wheel).result()\n        return gas, brake, wheel",
     )
     if long:
-        monkeypatch.setattr(drive_check, "_BRIEF_S", 0.0)
+        monkeypatch.setattr(drive_check, "_MOST_REPEATED_RUN_S", 0.0)
     found = findings(toy)
-    assert found["golden A"].level is Level.OK
+    assert found["golden A"].level is CheckState.OK
     fast = found["fast engines"]
-    assert fast.level is Level.WARN
+    assert fast.level is CheckState.WARN
     assert re.match(
         r"nothing can be forked: (at its end )?it has [23] threads, and only one can be forked", fast.found
     )
@@ -153,7 +153,7 @@ def test_reading_a_clock_without_effect_is_only_a_note(toy: Workspace) -> None:
         "        time.perf_counter()\n        return gas, brake",
     )
     found = findings(toy)
-    assert found["golden A"].level is found["clocks"].level is Level.OK
+    assert found["golden A"].level is found["clocks"].level is CheckState.OK
     assert [place.line for place in found["clocks"].places] == [line_of(toy, "time.perf_counter()")]
 
 
@@ -181,7 +181,7 @@ def test_an_anchor_that_no_run_executes_is_reported(toy: Workspace) -> None:
     change(toy, spec, "after_assign: offset}", "after_assign: offset, nth: 2}")
     found = findings(toy)["statements"]
     assert (found.level, found.found) == (
-        Level.WARN,
+        CheckState.WARN,
         "1 of 4 statements never reached in A, A+alone",
     )
     (place,) = found.places
@@ -211,7 +211,7 @@ def test_an_anchor_reached_only_without_the_faults_change_is_reported(toy: Works
     [(0, "none"), (1, "1 trigger, which is reached"), (2, "2 triggers, which are all reached")],
 )
 def test_the_wording_fits_the_number_of_places_reached(toy: Workspace, count: int, told: str) -> None:
-    finding = Reach(toy, toy.manifest("toycar"), [])._finding("trigger", count, [], "")
+    finding = ReachTracker(toy, toy.manifest("toycar"), [])._finding("trigger", count, [], "")
     assert (finding.name, finding.found) == ("triggers", told)
 
 
@@ -219,7 +219,7 @@ def test_a_trigger_that_no_scenario_reaches_is_reported(toy: Workspace) -> None:
     change(toy, "fault_library/stpa/contexts/near_far.yaml", "near_s: 2.0", "near_s: 0.01")
     change(toy, "fault_library/campaigns/small.yaml", "random_until_s: 5.5", "random_until_s: 9.0")
     found = findings(toy)["triggers"]
-    assert found.level is Level.WARN
+    assert found.level is CheckState.WARN
     assert found.found.endswith("never reached in A, A+alone")
     whats = {Path(place.file).name: place.what for place in found.places}
     assert whats == {
@@ -232,7 +232,7 @@ def test_a_harmless_canary_is_reported_with_all_values(toy: Workspace) -> None:
     change(toy, "fault_library/campaigns/small.yaml", "at_s: 1.0", "at_s: 5.9")
     toy.campaign("toy").unlink()
     found = findings(toy)["canary small"]
-    assert found.level is Level.FAIL
+    assert found.level is CheckState.FAIL
     assert "sensor/lane/shifted in A did not reach H3 with any of its values: 2." in found.found
     assert found.found.count(" m") == 4
 
@@ -240,7 +240,7 @@ def test_a_harmless_canary_is_reported_with_all_values(toy: Workspace) -> None:
 def test_a_crashing_or_hazardous_target_is_reported(toy: Workspace) -> None:
     change(toy, "driver.py", "        gap, closing", "        1 / 0\n        gap, closing")
     found = findings(toy)["golden A"]
-    assert (found.level, "crashed: ZeroDivisionError" in found.found) == (Level.FAIL, True)
+    assert (found.level, "crashed: ZeroDivisionError" in found.found) == (CheckState.FAIL, True)
 
 
 def test_a_nondeterministic_target_is_not_forked(toy: Workspace) -> None:
@@ -248,17 +248,17 @@ def test_a_nondeterministic_target_is_not_forked(toy: Workspace) -> None:
     change(toy, "driver.py", "class Driver", "import time\n\n\nclass Driver")
     change(toy, "driver.py", *CLOCK)
     fast = findings(toy)["fast engines"]
-    assert (fast.level, "not tried, because a golden run fails" in fast.found) == (Level.WARN, True)
+    assert (fast.level, "not tried, because a golden run fails" in fast.found) == (CheckState.WARN, True)
 
 
 def test_a_target_without_a_stepwise_entry_is_reported(toy: Workspace) -> None:
     change(toy, "fault_library/targets/toycar.yaml", "  stepwise: begin\n", "")
     found = findings(toy)
-    assert found["golden A"].level is Level.OK
+    assert found["golden A"].level is CheckState.OK
     assert "names no `entry.stepwise`" in found["fast engines"].found
     assert "toycar.yaml" in found["fast engines"].remedy
 
 
 def test_an_unknown_scenario_is_refused(toy: Workspace) -> None:
     with pytest.raises(MutatorError, match="nowhere"):
-        check_drive(toy, "toycar", ["nowhere"])
+        drive_findings(toy, "toycar", ["nowhere"])

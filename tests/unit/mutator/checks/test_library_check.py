@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.checks.library_check import check_library
+from mutator.checks.library_check import library_problems
 from mutator.faults.spec_expansion import expand
 from mutator.model import Fault, Hold
 from mutator.mutants.mutant_building import build
@@ -56,7 +56,7 @@ def faults(everything: dict[str, tuple[Fault, ...]]) -> dict[str, tuple[Fault, .
 
 
 def test_the_shipped_library_has_no_problem(clone: Workspace) -> None:
-    assert check_library(clone, "openpilot") == []
+    assert library_problems(clone, "openpilot") == []
 
 
 def test_published_fault_types_have_the_published_number_of_values(
@@ -180,7 +180,7 @@ def test_two_effects_act_in_the_order_of_the_spec(
     fault = next(f for f in everything["as_described"] if f.fault_type == "rain_and_fog")
     made = build(manifest, models, fault, always())
     text = made.files["selfdrive/sim/picture_camera.py"].decode()
-    assert 0 < text.index(f"import Fog  # fi:{made.injections[0]}") < text.index("lambda: Rain(5.0, ")
+    assert 0 < text.index(f"import Fog  # fi:{made.injection_ids[0]}") < text.index("lambda: Rain(5.0, ")
 
 
 def test_code_that_draws_or_reads_frames_cannot_have_faults(clone: Workspace) -> None:
@@ -228,7 +228,7 @@ def edited(toy: Workspace, file: str, old: str, new: str) -> list[str]:
     path = toy.library.parent / file
     assert old in path.read_text()
     path.write_text(path.read_text().replace(old, new, 1))
-    return [str(p).replace(f"{toy.library.parent}/", "") for p in check_library(toy, "toy")]
+    return [str(p).replace(f"{toy.library.parent}/", "") for p in library_problems(toy, "toy")]
 
 
 def test_each_variant_without_its_anchor_is_a_problem(toy: Workspace) -> None:
@@ -289,5 +289,5 @@ def test_a_problem_of_one_injection_is_reported_at_its_line(toycar: Workspace) -
     assert text.count(one) == 1
     path.write_text(text.replace(one, one + one.replace("after_assign: offset", "after_assign: nothing")))
     line = text[: text.index(one)].count("\n") + 5
-    (problem,) = [p for p in check_library(toycar, "toycar") if "sensor/lane/shifted" in str(p)]
+    (problem,) = [p for p in library_problems(toycar, "toycar") if "sensor/lane/shifted" in str(p)]
     assert (problem.where, problem.line) == (str(path), line)

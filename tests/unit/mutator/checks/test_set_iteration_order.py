@@ -2,7 +2,7 @@
 
 import pytest
 
-from mutator.checks.set_iteration_order import places
+from mutator.checks.set_iteration_order import list_set_order_uses
 
 
 @pytest.mark.parametrize(
@@ -25,7 +25,7 @@ from mutator.checks.set_iteration_order import places
     ],
 )
 def test_code_that_depends_on_the_order_of_a_set_is_found(line: str) -> None:
-    assert len(places(line.encode())) == 1
+    assert len(list_set_order_uses(line.encode())) == 1
 
 
 @pytest.mark.parametrize(
@@ -43,12 +43,12 @@ def test_code_that_depends_on_the_order_of_a_set_is_found(line: str) -> None:
     ],
 )
 def test_code_that_needs_no_order_is_not_reported(line: str) -> None:
-    assert places(line.encode()) == []
+    assert list_set_order_uses(line.encode()) == []
 
 
 def test_a_place_has_its_line_and_function() -> None:
     source = (
         b"class A:\n    def f(self):\n        names = {'a', 'b'}\n        for n in names:\n            g(n)\n"
     )
-    (place,) = places(source)
+    (place,) = list_set_order_uses(source)
     assert (place.line, place.function, place.what) == (4, "A.f", "names")

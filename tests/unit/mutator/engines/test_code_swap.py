@@ -11,7 +11,7 @@ from mutator.errors import NotSwappable
 from mutator.mutants.probe import Probe
 from mutator.targets.source_tree import SourceTree
 
-PROBE = Probe(own=("",), shared=("def observe(): pass\n",), armed_after_s=0.0)
+PROBE = Probe(settings_parts=("",), code_parts=("def observe(): pass\n",), armed_after_s=0.0)
 PRISTINE = """
 import math
 from functools import wraps

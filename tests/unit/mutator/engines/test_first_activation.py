@@ -9,7 +9,7 @@ import pytest
 from mutator.engines.first_activation import Observed, Start, first_active
 from mutator.model import Hold, Trigger
 from mutator.mutants.mutant_building import build
-from mutator.mutants.probe import Probe, state_after
+from mutator.mutants.probe import Probe, probe_state_after
 from mutator.triggers.trigger_kinds import always, at_time
 from mutator.workspace import Workspace
 
@@ -129,7 +129,7 @@ def test_a_probe_with_restored_state_equals_one_that_observed_the_steps(probe, t
         exec(probe(trigger).text, module)
     for values in SEEN.values[: start.observed]:
         saw["observe"](*values)
-    holder, state = state_after(start.observed, start.began, start.t)
+    holder, state = probe_state_after(start.observed, start.began, start.t)
     for name, value in state.items():
         setattr(given[holder], name, value)
     states = [

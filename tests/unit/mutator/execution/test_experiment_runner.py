@@ -15,7 +15,7 @@ from mutator.errors import MutatorError
 from mutator.execution.experiment_runner import Goldens, Runner
 from mutator.model import Activation, Experiment, Outcome, Record, Status
 from mutator.outcomes import trace_files
-from mutator.preflight.preflight_rules import digest_of
+from mutator.preflight.preflight_rules import output_digest_of
 from mutator.store.plan_choices import Choices
 from mutator.workspace import Workspace
 
@@ -261,7 +261,7 @@ def test_nothing_is_compared_with_a_changed_golden_run(
     place.mkdir(parents=True)
     write(place)
     (place / "said.json").write_text("{}")
-    digests = {place: digest_of(manifest, place)}
+    digests = {place: output_digest_of(manifest, place)}
     said: Outputs = {"said": {"hazards": {}, "alert_events": []}, "trace": {"gas": np.zeros(20)}, "ran": RAN}
 
     class Changing(PlayedEngine):

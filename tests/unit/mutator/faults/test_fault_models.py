@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.checks.library_check import check_examples, run_example
+from mutator.checks.library_check import apply_example, example_problems
 from mutator.errors import MutatorError
 from mutator.faults.fault_model_files import load_fault_models
 from mutator.faults.fault_models import SnippetKind
@@ -68,7 +68,7 @@ def test_the_examples_of_each_model_give_the_expected_code(clone: Workspace, nam
     models = clone.fault_models()
     model = models.get(name)
     for example in model.examples:
-        assert run_example(model, models, example) == example.after
+        assert apply_example(model, models, example) == example.after
 
 
 def test_the_digest_depends_on_which_models_raise_on_purpose(folder: Path, clone: Workspace) -> None:
@@ -87,14 +87,14 @@ def test_the_digest_depends_on_which_models_raise_on_purpose(folder: Path, clone
 def test_a_wrong_example_is_reported_with_its_line(folder: Path) -> None:
     path = folder / "scale.py.j2"
     path.write_text(path.read_text().replace(" * ", " / "))
-    (problem,) = check_examples(load_fault_models(folder))
+    (problem,) = example_problems(load_fault_models(folder))
     assert problem.where == str(folder / "scale.yaml") and problem.line == 11
     assert all(f"self.yaw_rate {sign} _fi.like(" in str(problem) for sign in "*/")
 
 
 def test_a_template_that_does_not_parse_is_reported(folder: Path) -> None:
     (folder / "scale.py.j2").write_text("if {{ target:\n")
-    (problem,) = check_examples(load_fault_models(folder))
+    (problem,) = example_problems(load_fault_models(folder))
     assert "scale.yaml:11: the example fails" in str(problem) and "scale.py.j2:1: the template fails" in str(
         problem
     )

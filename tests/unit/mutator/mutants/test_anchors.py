@@ -53,10 +53,10 @@ def parsed(text: str = SOURCE) -> ParsedFile:
 
 
 def lines(kind: AnchorKind, name: str, function: str = "A.run", nth: int | None = None) -> tuple[int, int]:
-    site = parsed().resolve(
+    site = parsed().resolve_statement(
         FaultLocation(path="m.py", function=function, anchor=Anchor(kind=kind, name=name, nth=nth))
     )
-    return site.first + 1, site.last
+    return site.first_line + 1, site.end_line
 
 
 @pytest.mark.parametrize(
@@ -101,7 +101,7 @@ def test_an_item_whose_index_the_statement_changes_has_no_name(targets: str, nam
         f"def f(self):\n    {targets} = g()\n",
         f"def f(self):\n    for {targets} in g():\n        h()\n",
     ):
-        (function,) = parsed(source).functions["f"]
+        (function,) = parsed(source).functions_by_name["f"]
         assert [name for one in function.statements for name in one.assigns] == named
 
 
@@ -112,7 +112,9 @@ def test_the_head_of_a_block_is_the_last_candidate() -> None:
 
     def line(name: str, nth: int | None = None) -> int:
         anchor = Anchor(kind=AnchorKind.AFTER_ASSIGN, name=name, nth=nth)
-        return parsed(source).resolve(FaultLocation(path="m.py", function="f", anchor=anchor)).last
+        return (
+            parsed(source).resolve_statement(FaultLocation(path="m.py", function="f", anchor=anchor)).end_line
+        )
 
     assert (line("x"), line("x", 1), line("x", 2)) == (4, 4, 2)
     assert (line("y", 1), line("y", 2), line("y", 3)) == (6, 7, 5)

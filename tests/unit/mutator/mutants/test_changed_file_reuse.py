@@ -10,15 +10,15 @@ from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection, V
 from mutator.mutants import splicing
 from mutator.mutants.anchors import parse_file
 from mutator.mutants.changed_file_reuse import (
-    Change,
-    ReusableChange,
+    ChangedFile,
+    ReusableChangedFile,
     always_compiles,
     inserted_lines,
-    known_changes,
+    reuse_cache,
     reuse_key,
 )
-from mutator.mutants.mutant_building import build, build_directly
-from mutator.mutants.patch_rendering import changed_file
+from mutator.mutants.mutant_building import build, build_without_reuse
+from mutator.mutants.patch_rendering import render_changed_file
 from mutator.triggers.trigger_kinds import always
 from mutator.workspace import Workspace
 
@@ -33,17 +33,21 @@ TEXTS = [
 SENSOR = "toycar/sensor.py"
 
 
-def change(text: str, code: str, name: str, guard: bool) -> tuple[ReusableChange, Change, list[bytes], bool]:
+def change(
+    text: str, code: str, name: str, guard: bool
+) -> tuple[ReusableChangedFile, ChangedFile, list[bytes], bool]:
     """Return the reusable change, the spliced change, the inserted lines, and whether all changes of this
     kind compile."""
     file = parse_file("m.py", text.encode("latin-1" if "latin" in text else "utf-8"), Path("root"))
     kind = AnchorKind.BEFORE_ASSIGN if guard else AnchorKind.AFTER_ASSIGN
-    site = file.resolve(FaultLocation(path="m.py", function="f", anchor=Anchor(kind=kind, name="x")))
-    make = splicing.guard if guard else splicing.insertion
-    edits = [make(file, site, [code], name), splicing.probe_import(file, "pack")]
+    site = file.resolve_statement(
+        FaultLocation(path="m.py", function="f", anchor=Anchor(kind=kind, name="x"))
+    )
+    make = splicing.guard_edit if guard else splicing.insertion_edit
+    edits = [make(file, site, [code], name), splicing.probe_import_edit(file, "pack")]
     pieces = splicing.apply_edits(file, edits)
-    made = Change(data=splicing.joined(pieces), patch=changed_file("m.py", pieces))
-    reusable = ReusableChange.of(made)
+    made = ChangedFile(data=splicing.join_pieces(pieces), patch=render_changed_file("m.py", pieces))
+    reusable = ReusableChangedFile.of(made)
     compiles = always_compiles(file, reusable, reuse_key(file, edits, [name]))
     return reusable, made, inserted_lines(edits), compiles
 
@@ -63,16 +67,16 @@ def test_a_reusable_change_equals_the_spliced_one(text: str, guard: bool) -> Non
 def test_a_change_of_a_value_and_inserted_lines_can_be_reused_together(text: str) -> None:
     file = parse_file("m.py", text.encode("latin-1" if "latin" in text else "utf-8"), Path("root"))
 
-    def changed(name: str, value: str) -> tuple[ReusableChange, Change, list[bytes]]:
+    def changed(name: str, value: str) -> tuple[ReusableChangedFile, ChangedFile, list[bytes]]:
         anchor = Anchor(kind=AnchorKind.ASSIGNED_VALUE, name="x")
-        value_at = file.resolve_value(FaultLocation(path="m.py", function="f", anchor=anchor))
+        value_at = file.resolve_expression(FaultLocation(path="m.py", function="f", anchor=anchor))
         after = Anchor(kind=AnchorKind.AFTER_ASSIGN, name="x")
-        site = file.resolve(FaultLocation(path="m.py", function="f", anchor=after))
-        observes = splicing.insertion(file, site, ["_fi.observe(t=x)"], "observe")
-        edits = splicing.in_lines(file, [observes, splicing.value_change(file, value_at, value, name)])
+        site = file.resolve_statement(FaultLocation(path="m.py", function="f", anchor=after))
+        observes = splicing.insertion_edit(file, site, ["_fi.observe(t=x)"], "observe")
+        edits = splicing.as_line_edits(file, [observes, splicing.value_edit(file, value_at, value, name)])
         pieces = splicing.apply_edits(file, edits)
-        made = Change(data=splicing.joined(pieces), patch=changed_file("m.py", pieces))
-        reusable = ReusableChange.of(made)
+        made = ChangedFile(data=splicing.join_pieces(pieces), patch=render_changed_file("m.py", pieces))
+        reusable = ReusableChangedFile.of(made)
         assert splicing.unsplice(made.data) == file.data
         assert always_compiles(file, reusable, reuse_key(file, edits, [name]))
         return reusable, made, inserted_lines(edits)
@@ -105,10 +109,10 @@ def fault(value: Value, **location: object) -> Fault:
 def test_a_change_is_reused_for_another_number(toy: Workspace) -> None:
     """A different sign, a different type or a non-finite value needs a new change."""
     manifest, models = toy.manifest("toy"), toy.fault_models()
-    known = known_changes(manifest.tree, SENSOR)
+    known = reuse_cache(manifest.tree, SENSOR)
     counts = []
     for value in (1.0, 2.5, 1e-9, -1.0, float("nan"), 3, None):
-        assert build(manifest, models, fault(value), always()) == build_directly(
+        assert build(manifest, models, fault(value), always()) == build_without_reuse(
             manifest, models, fault(value), always()
         )
         counts.append(len(known))
@@ -130,7 +134,7 @@ def test_a_reused_change_gives_the_same_errors(toy: Workspace, tmp_path: Path) -
         fault(2, path="../x"),
     ):
         said = []
-        for way in (build, build_directly):
+        for way in (build, build_without_reuse):
             with pytest.raises(MutatorError) as caught:
                 way(manifest, models, wrong, always())
             said.append((type(caught.value), str(caught.value)))

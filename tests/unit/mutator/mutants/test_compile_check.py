@@ -6,8 +6,8 @@ import pytest
 
 from mutator.mutants.anchors import ParsedFile, parse_file
 from mutator.mutants.changed_file_reuse import reuse_key
-from mutator.mutants.compile_check import compile_changed
-from mutator.mutants.splicing import Edit, Rank, probe_import
+from mutator.mutants.compile_check import certainly_compiles
+from mutator.mutants.splicing import Edit, EditRank, probe_import_edit
 
 SOURCE = b"""\
 LIMIT = 1
@@ -49,7 +49,7 @@ def test_compiling_a_changed_function_shows_whether_the_file_compiles(
     file: ParsedFile, line: int, text: bytes, known: bool
 ) -> None:
     edits = [
-        probe_import(file, None),
-        Edit(index=line, rank=Rank.INSTEAD, lines=(text,)),
+        probe_import_edit(file, None),
+        Edit(index=line, rank=EditRank.INSTEAD, lines=(text,)),
     ]
-    assert compile_changed(file, edits, reuse_key(file, edits, ["0a"])) is known
+    assert certainly_compiles(file, edits, reuse_key(file, edits, ["0a"])) is known

@@ -8,7 +8,7 @@ import pytest
 from mutator.errors import MutatorError
 from mutator.model import VALUE_ANCHORS, Anchor, AnchorKind, FaultLocation
 from mutator.mutants.anchors import ParsedFile, parse_file
-from mutator.mutants.splicing import apply_edits, in_lines, joined, unsplice, value_change
+from mutator.mutants.splicing import apply_edits, as_line_edits, join_pieces, unsplice, value_edit
 
 SOURCE = '''\
 LIMIT = 3
@@ -52,10 +52,10 @@ def location(
 def changed(source: str, *changes: tuple[FaultLocation, str]) -> str:
     file = parsed(source)
     edits = [
-        value_change(file, file.resolve_value(place), text, f"a{number}")
+        value_edit(file, file.resolve_expression(place), text, f"a{number}")
         for number, (place, text) in enumerate(changes)
     ]
-    data = joined(apply_edits(file, in_lines(file, edits)))
+    data = join_pieces(apply_edits(file, as_line_edits(file, edits)))
     assert unsplice(data) == file.data
     return data.decode()
 
@@ -66,7 +66,7 @@ def test_every_value_has_a_name_for_each_role() -> None:
     named = {
         kind: [
             (name, which) if which else name
-            for one in parsed().expressions["Control.update"]
+            for one in parsed().expressions_by_function["Control.update"]
             for own, name, which in one.roles
             if own is kind
         ]
@@ -109,7 +109,7 @@ def test_every_value_has_a_name_for_each_role() -> None:
     ],
 )
 def test_an_anchor_matches_regardless_of_spaces_and_quotes(place: FaultLocation, line: int) -> None:
-    assert parsed().span(place)[0] + 1 == line
+    assert parsed().line_span(place)[0] + 1 == line
 
 
 @pytest.mark.parametrize(
@@ -133,7 +133,7 @@ def test_an_anchor_matches_regardless_of_spaces_and_quotes(place: FaultLocation,
 )
 def test_an_anchor_with_no_match_or_several_is_an_error(place: FaultLocation, pieces: Iterable[str]) -> None:
     with pytest.raises(MutatorError) as caught:
-        parsed().resolve_value(place)
+        parsed().resolve_expression(place)
     assert all(piece in str(caught.value) for piece in pieces), str(caught.value)
 
 
@@ -185,7 +185,7 @@ def test_a_huge_number_has_no_anchor() -> None:
     assert 'return (0 if _fi.active("a0") else a)' in changed(
         source, (location("return_value", "a", function="f"), "0")
     )
-    assert [one.text for one in parsed(source).expressions["f"]] == ["a"]
+    assert [one.text for one in parsed(source).expressions_by_function["f"]] == ["a"]
 
 
 def test_two_injections_into_one_expression_are_refused() -> None:
@@ -198,15 +198,18 @@ def test_functions_with_the_same_name_have_separate_variables() -> None:
     source = "class A:\n    def x(self): return self.a\n    def x(self, value): return value + 1\n"
     file = parse_file("m.py", source.encode(), Path())
     first, second = (location("return_value", "", nth=nth, function="A.x") for nth in (1, 2))
-    assert (file.names(first), file.names(second)) == ({"self"}, {"self", "value"})
+    assert (file.names_in_function_at(first), file.names_in_function_at(second)) == (
+        {"self"},
+        {"self", "value"},
+    )
 
 
 def test_files_in_other_encodings_are_changed_at_the_right_column() -> None:
     source = '# coding: latin-1\ndef f(é):\n    return "ü" + é + 1\n'
     file = parse_file("m.py", source.encode("latin-1"), Path())
     place = location("value", "'ü' + é", function="f")
-    edit = value_change(file, file.resolve_value(place), "é", "a0")
-    data = joined(apply_edits(file, in_lines(file, [edit])))
+    edit = value_edit(file, file.resolve_expression(place), "é", "a0")
+    data = join_pieces(apply_edits(file, as_line_edits(file, [edit])))
     assert data.decode("latin-1").splitlines()[2] == (
         '    return (é if _fi.active("a0") else "ü" + é) + 1  # fi:a0 was:    return "ü" + é + 1'
     )
@@ -215,7 +218,7 @@ def test_files_in_other_encodings_are_changed_at_the_right_column() -> None:
 
 def test_an_f_string_is_changed_as_a_whole() -> None:
     source = b'def f(x):\n    return g(f"{x:.2f} m", f"{x}" "b")\n'
-    found = parse_file("m.py", source, Path()).expressions["f"]
+    found = parse_file("m.py", source, Path()).expressions_by_function["f"]
     assert [one.text for one in found if one.text.startswith("f")] == ["f'{x:.2f} m'", "f'{x}b'"]
 
 
@@ -226,7 +229,7 @@ def test_a_named_expression_as_a_condition_has_an_anchor() -> None:
         location("condition", "(m := n + 1)", function="f"),
         location("argument", "g", which="1", function="f"),
     ]
-    written = [parsed(source).resolve_value(place).written for place in places]
+    written = [parsed(source).resolve_expression(place).one_line_source for place in places]
     assert written == ["(n := a.pop())", "(m := n + 1)", "(k := m)"]
     asked = [
         f'if _fi.active("a{number}") else ({text}))'

@@ -6,7 +6,7 @@ import pytest
 
 from mutator.faults.fault_models import SnippetKind
 from mutator.mutants.template_language import MOST_CHARACTERS
-from mutator.mutants.template_rendering import render, snippet
+from mutator.mutants.template_rendering import render_snippet, render_template
 from tests.costs import is_cheap, is_refused
 from tests.unit.mutator.mutants.test_template_rendering import model
 
@@ -124,12 +124,12 @@ WRITTEN = {  # by a valid template, for Python's parser
 
 @pytest.mark.parametrize("template", HOSTILE.values(), ids=HOSTILE)
 def test_a_hostile_template_is_soon_refused(template: str) -> None:
-    assert is_refused(lambda: render(template, NAMES, Path("t.py.j2"))).startswith("t.py.j2")
+    assert is_refused(lambda: render_template(template, NAMES, Path("t.py.j2"))).startswith("t.py.j2")
 
 
 @pytest.mark.parametrize("text", WRITTEN.values(), ids=WRITTEN)
 def test_code_that_a_template_writes_is_soon_checked(text: str) -> None:
     target = {"target": "x", "by": 1.0}
-    is_cheap(lambda: snippet(model(f"x = {text}\n", SnippetKind.INSERT), target, "ab12"))
-    is_cheap(lambda: snippet(model(f"if {text}:\n", SnippetKind.GUARD), target, "ab12"))
-    is_cheap(lambda: snippet(model(text, SnippetKind.VALUE), target, "ab12"))
+    is_cheap(lambda: render_snippet(model(f"x = {text}\n", SnippetKind.INSERT), target, "ab12"))
+    is_cheap(lambda: render_snippet(model(f"if {text}:\n", SnippetKind.GUARD), target, "ab12"))
+    is_cheap(lambda: render_snippet(model(text, SnippetKind.VALUE), target, "ab12"))

@@ -9,26 +9,28 @@ from mutator.workspace import Workspace
 
 def test_injected_lines_are_recognized_by_their_tags(clone: Workspace) -> None:
     lines = {
-        injected_lines.import_statement("car"): ("probe", 0, False),
-        injected_lines.tagged(injected_lines.observe_call([("t", "now.time")]), injected_lines.OBSERVE_TAG): (
+        injected_lines.probe_import_line("car"): ("probe", 0, False),
+        injected_lines.tagged_line(
+            injected_lines.observe_call([("t", "now.time")]), injected_lines.OBSERVE_TAG
+        ): (
             "observe",
             0,
             False,
         ),
-        injected_lines.tagged('if _fi.active("0a1b2c3d"):', "0a1b2c3d"): ("0a1b2c3d", 0, True),
-        injected_lines.tagged('if not _fi.active("0a1b2c3d"):', "0a1b2c3d", 12): ("0a1b2c3d", 12, True),
-        injected_lines.tagged("    x = 1", "0a1b2c3d"): ("0a1b2c3d", 0, True),
+        injected_lines.tagged_line('if _fi.active("0a1b2c3d"):', "0a1b2c3d"): ("0a1b2c3d", 0, True),
+        injected_lines.tagged_line('if not _fi.active("0a1b2c3d"):', "0a1b2c3d", 12): ("0a1b2c3d", 12, True),
+        injected_lines.tagged_line("    x = 1", "0a1b2c3d"): ("0a1b2c3d", 0, True),
     }
     for line, (name, guarded, of_fault) in lines.items():
         for end in ("", "\n", "\r\n"):
             tag = injected_lines.tag_of((line + end).encode())
             assert tag is not None
-            assert (tag.id, tag.guarded, tag.of_fault) == (name, guarded, of_fault)
-            assert tag.asks_probe == ("if " in line)
+            assert (tag.id, tag.guarded_line_count, tag.is_of_fault) == (name, guarded, of_fault)
+            assert tag.is_guard == ("if " in line)
             assert tag.code.decode() == line.partition("  #")[0]
-        assert injected_lines.instrumented_line(f"x = 1\n{line}\n".encode()) == 1
+        assert injected_lines.find_instrumented_line(f"x = 1\n{line}\n".encode()) == 1
         assert injected_lines.adds_fault(f"+{line}") is of_fault
-        assert list(injected_lines.tagged_additions(f"+{line}\n", 0, 999)) == [(1, len(line) + 1)]
+        assert list(injected_lines.tagged_addition_spans(f"+{line}\n", 0, 999)) == [(1, len(line) + 1)]
 
 
 def test_a_similar_comment_is_not_a_tag(clone: Workspace) -> None:
@@ -42,13 +44,13 @@ def test_a_similar_comment_is_not_a_tag(clone: Workspace) -> None:
         b"y  # fi:a guard:",
     ):
         assert injected_lines.tag_of(line) is None
-    assert injected_lines.instrumented_line(b"wi_fi = 1\nx_fi = 2  # fi:A\n") is None
+    assert injected_lines.find_instrumented_line(b"wi_fi = 1\nx_fi = 2  # fi:A\n") is None
 
 
 def test_pages_use_the_tags_defined_in_python() -> None:
-    words = injected_lines.tag_words()
+    words = injected_lines.tags_for_scripts()
     for tag in words["probe"]:
-        assert injected_lines.tagged("x", tag) == f"x  {words['mark']}{tag}"
+        assert injected_lines.tagged_line("x", tag) == f"x  {words['mark']}{tag}"
     assert words["probe"] == [injected_lines.IMPORT_TAG, injected_lines.OBSERVE_TAG]
     assert "fi:" not in asset("shared/diff.js")
     assert not re.search("|".join(rf"{tag}\W*\|" for tag in words["probe"]), asset("shared/diff.js"))

@@ -16,7 +16,7 @@ from mutator.mutants import injected_lines
 from mutator.mutants import probe as contract
 from mutator.mutants.anchors import parse_file
 from mutator.mutants.injection_edits import injection_edit
-from mutator.mutants.splicing import apply_edits, in_lines, joined, probe_import, unsplice
+from mutator.mutants.splicing import apply_edits, as_line_edits, join_pieces, probe_import_edit, unsplice
 from mutator.targets.observed_values import Observation
 from mutator.workspace import Workspace
 
@@ -38,7 +38,7 @@ def mutant(clone: Workspace, anchor: Anchor, model: str = "offset", **given: Any
     location = FaultLocation(path="m.py", function="drive", anchor=anchor)
     file = parse_file("m.py", SOURCE.encode(), Path("x"))
     edit = injection_edit(file, clone.fault_models(), Injection(location=location, model=model, **given), "a")
-    data = joined(apply_edits(file, in_lines(file, [probe_import(file, None), edit])))
+    data = join_pieces(apply_edits(file, as_line_edits(file, [probe_import_edit(file, None), edit])))
     assert unsplice(data) == file.data
     return data
 
@@ -49,9 +49,9 @@ def drive(clone: Workspace, data: bytes, times: tuple[float, ...]) -> tuple[list
     nowhere = FaultLocation(path="", function="f", anchor=Anchor(kind=AnchorKind.ENTRY))
     observation = Observation(location=nowhere, time="t", values=(), derived=())
     trigger = Trigger(name="test", condition="t >= 1 and t < 3")
-    settings = contract.settings_of("m", trigger, Hold.WHILE, ("a",), observation, 1.0)
+    settings = contract.build_probe_settings("m", trigger, Hold.WHILE, ("a",), observation, 1.0)
     fi, models = types.ModuleType("_fi"), clone.fault_models()
-    exec(contract.probe_of(models.probe, settings).text, vars(fi))
+    exec(contract.render_probe(models.probe, settings).text, vars(fi))
     names: dict[str, Any] = {"_fi": fi}
     exec(data.replace(b"import _fi", b"pass"), names)
     seen = []
@@ -113,11 +113,13 @@ def test_lines_with_a_selection_are_recognized_as_checking_the_probe(clone: Work
     for anchor, model in ((AFTER, "offset"), (SENT, "omission")):
         data = mutant(clone, anchor, model, where="lane['gap'] == 2 or (index == 1)", call=2)
         tags = [tag for line in data.splitlines() if (tag := injected_lines.tag_of(line)) and tag.id == "a"]
-        assert tags[0].asks_probe
+        assert tags[0].is_guard
     data = mutant(clone, VALUE, where="lane['gap'] == 2", every=3)
-    (tag,) = [t for line in data.splitlines() if (t := injected_lines.tag_of(line)) and t.was is not None]
-    assert tag.asked_for == ["a"]
-    ((name, line, first, end),) = injected_lines.changed_parts(data)
+    (tag,) = [
+        t for line in data.splitlines() if (t := injected_lines.tag_of(line)) and t.replaced_line is not None
+    ]
+    assert tag.changed_value_ids == ["a"]
+    ((name, line, first, end),) = injected_lines.changed_value_positions(data)
     assert name == "a"
     assert data.splitlines()[line - 1][first:end].endswith(
         b"""lane["gap"] + 10 if _fi.on() and (lane['gap'] == 2) and """

@@ -11,8 +11,8 @@ from mutator.errors import MutatorError
 from mutator.model import Anchor, AnchorKind, FaultLocation, Hold, Injection, Trigger, Value
 from mutator.mutants.anchors import parse_file
 from mutator.mutants.injection_edits import injection_edit
-from mutator.mutants.probe import probe_of, settings_of
-from mutator.mutants.splicing import apply_edits, in_lines, joined, unsplice
+from mutator.mutants.probe import build_probe_settings, render_probe
+from mutator.mutants.splicing import apply_edits, as_line_edits, join_pieces, unsplice
 from mutator.triggers.conditions import check_condition
 from mutator.workspace import Workspace
 
@@ -28,14 +28,16 @@ class Toy:
         file = parse_file("m.py", source.encode(), Path("root"))
         place = FaultLocation(path="m.py", function="f", anchor=anchor)
         injection = Injection(location=place, model=model, params=tuple(sorted(params.items())))
-        data = joined(apply_edits(file, in_lines(file, [injection_edit(file, models, injection, "ab12")])))
+        data = join_pieces(
+            apply_edits(file, as_line_edits(file, [injection_edit(file, models, injection, "ab12")]))
+        )
         assert unsplice(data) == file.data
         trigger = Trigger(name="test", condition=check_condition("rs > 0"))
         observation = clone.manifest("openpilot").observation
-        settings = settings_of("m", trigger, Hold.WHILE, ("ab12",), observation, STEP_S)
+        settings = build_probe_settings("m", trigger, Hold.WHILE, ("ab12",), observation, STEP_S)
         self.text = data.decode()
         self.probe: Any = types.ModuleType("_fi")
-        exec(probe_of(models.probe, settings).text, vars(self.probe))
+        exec(render_probe(models.probe, settings).text, vars(self.probe))
         self.names: dict[str, Any] = {"_fi": self.probe}
         exec(self.text, self.names)
         self.steps = 0

@@ -149,7 +149,7 @@ def test_faults_are_active_once_their_trigger_fires(toy: Workspace, tmp_path: Pa
         assert gaps[:20] == golden[:20] and gaps != golden
         report = result["report"]
         assert report["mutant"] == made.id
-        assert set(report["injections"]) == set(made.injections)
+        assert set(report["injections"]) == set(made.injection_ids)
         assert all(i["first"] == 2.0 and i["count"] == 80 for i in report["injections"].values())
 
 

@@ -10,7 +10,7 @@ from libcst.metadata import MetadataWrapper, PositionProvider
 from mutator.errors import MutatorError
 from mutator.model import Anchor, AnchorKind, FaultLocation
 from mutator.mutants.anchors import ParsedFile, parse_file
-from mutator.mutants.node_positions import Place, line_after, places_by_ast
+from mutator.mutants.node_positions import NodePosition, line_after_statements, positions_by_ast
 
 SOURCE = '''\
 @deco
@@ -31,15 +31,22 @@ def parsed(source: str = SOURCE) -> ParsedFile:
 
 def test_both_parsers_agree_on_places() -> None:
     file = parsed()
-    told = [f.place for functions in file.functions.values() for f in functions]
+    told = [f.place for functions in file.functions_by_name.values() for f in functions]
     told += [
-        s.place for functions in file.functions.values() for f in functions for s in f.statements if s.place
+        s.place
+        for functions in file.functions_by_name.values()
+        for f in functions
+        for s in f.statements
+        if s.place
     ]
-    assert {place.in_bytes(file.lines, file.encoding) for place in told} == {
-        place for place in file.places if place.kind != "Expr" or place.start[0] != 3
+    assert {place.with_byte_columns(file.lines, file.encoding) for place in told} == {
+        place for place in file.ast_positions if place.node_class != "Expr" or place.start[0] != 3
     }
-    assert Place(kind="AsyncFunctionDef", start=(2, 0), to=(3, 4), docstring=True) in file.places
-    assert Place(kind="AnnAssign", start=(5, 14), to=(5, 24)) in file.places
+    assert (
+        NodePosition(node_class="AsyncFunctionDef", start=(2, 0), end=(3, 4), has_docstring=True)
+        in file.ast_positions
+    )
+    assert NodePosition(node_class="AnnAssign", start=(5, 14), end=(5, 24)) in file.ast_positions
 
 
 @pytest.mark.parametrize("kind", [AnchorKind.AFTER_ASSIGN, AnchorKind.BEFORE_RETURN, AnchorKind.ENTRY])
@@ -47,13 +54,13 @@ def test_a_statement_that_the_parsers_place_on_different_lines_is_refused(
     kind: AnchorKind, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The test makes `ast` find the anchored statement one line further down."""
-    later = places_by_ast(ast.parse("\ndef f(x):\n    x = 1\n    return x\n"))
+    later = positions_by_ast(ast.parse("\ndef f(x):\n    x = 1\n    return x\n"))
     monkeypatch.setattr("mutator.mutants.anchors.places_by_ast", lambda tree: later)
     file = parsed("def f(x):\n    x = 1\n    return x\n")
     name = "" if kind is AnchorKind.ENTRY else "x"
     location = FaultLocation(path="m.py", function="f", anchor=Anchor(kind=kind, name=name))
     with pytest.raises(MutatorError, match=r"root/m.py:\d: LibCST and Python's own parser") as caught:
-        file.resolve(location)
+        file.resolve_statement(location)
     assert caught.value.line == {"after_assign": 2, "before_return": 3, "entry": 1}[kind]
 
 
@@ -68,7 +75,7 @@ def test_comparing_places_detects_a_line_that_libcst_loses(monkeypatch: pytest.M
     file = parsed("x = 0\n\\\ndef f(x):\n    x = 1\n    y = 2\n")
     location = FaultLocation(path="m.py", function="f", anchor=Anchor(kind=AnchorKind.AFTER_ASSIGN, name="x"))
     with pytest.raises(MutatorError, match=r"LibCST and Python's own parser"):
-        file.resolve(location)
+        file.resolve_statement(location)
 
 
 @pytest.mark.parametrize(
@@ -87,4 +94,4 @@ def test_backslashes_extend_the_last_statement(line: str, after: int) -> None:
     positions = MetadataWrapper(module, unsafe_skip_copy=True).resolve(PositionProvider)
     first = module.body[0]
     assert isinstance(first, cst.SimpleStatementLine)
-    assert line_after(first, positions) == after
+    assert line_after_statements(first, positions) == after

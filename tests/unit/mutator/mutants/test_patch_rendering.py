@@ -16,16 +16,16 @@ BODY = "".join(f"    y{i} = {i}\n" for i in range(10))
 
 def make(data: bytes, names: list[str], guard: bool) -> tuple[str, bytes]:
     file = parse_file("pack/m.py", data, Path("root"))
-    edits = [splicing.probe_import(file, "pack")]
+    edits = [splicing.probe_import_edit(file, "pack")]
     for name in names:
         kind = AnchorKind.BEFORE_ASSIGN if guard else AnchorKind.AFTER_ASSIGN
-        site = file.resolve(
+        site = file.resolve_statement(
             FaultLocation(path="pack/m.py", function="f", anchor=Anchor(kind=kind, name=name))
         )
-        maker = splicing.guard if guard else splicing.insertion
+        maker = splicing.guard_edit if guard else splicing.insertion_edit
         edits.append(maker(file, site, ["if 1:"] if guard else ["x = 1"], "ab"))
     pieces = splicing.apply_edits(file, edits)
-    return patch_rendering.changed_file("pack/m.py", pieces), splicing.joined(pieces)
+    return patch_rendering.render_changed_file("pack/m.py", pieces), splicing.join_pieces(pieces)
 
 
 @pytest.mark.parametrize("guard", [False, True])
@@ -69,10 +69,12 @@ def test_close_changes_share_a_hunk() -> None:
 
 def test_a_tab_follows_a_file_name_with_a_space() -> None:
     """`patch` requires the tab."""
-    assert "+++ b/a file.py\t\n" in patch_rendering.new_file("a file.py", "x = 1\n")
+    assert "+++ b/a file.py\t\n" in patch_rendering.render_new_file("a file.py", "x = 1\n")
 
 
 @pytest.mark.parametrize(("end", "told"), [("\n", ""), ("", "\\ No newline at end of file\n")])
 def test_every_line_of_a_new_file_is_added(end: str, told: str) -> None:
     head = "diff --git a/m.py b/m.py\nnew file mode 100644\n--- /dev/null\n+++ b/m.py\n@@ -0,0 +1,3 @@\n"
-    assert patch_rendering.new_file("m.py", f"a = 1\n\nb = 2{end}") == f"{head}+a = 1\n+\n+b = 2\n{told}"
+    assert (
+        patch_rendering.render_new_file("m.py", f"a = 1\n\nb = 2{end}") == f"{head}+a = 1\n+\n+b = 2\n{told}"
+    )

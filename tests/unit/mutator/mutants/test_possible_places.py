@@ -95,7 +95,7 @@ def test_each_listed_anchor_finds_its_own_line(listed: list[ListedPlace]) -> Non
     assert [AtModel(**one.at).location(source, ()) for one in listed] == [one.location for one in listed]
     file = parse_file("m.py", SOURCE, Path("x"))
     for one in listed:
-        assert file.span(one.location)[0] + 1 == one.line or one.location.anchor.name == "value", one
+        assert file.line_span(one.location)[0] + 1 == one.line or one.location.anchor.name == "value", one
     assert max(Counter(one.location for one in listed).values()) == 1
 
 

@@ -24,10 +24,10 @@ def probe(
     """Return a new probe module with two injections, `a` and `b`."""
     observation = observation or clone.manifest("openpilot").observation
     trigger = Trigger(name="test", condition=check_condition(condition))
-    settings = contract.settings_of("m1", trigger, Hold.WHILE, ("a", "b"), observation, 0.1)
+    settings = contract.build_probe_settings("m1", trigger, Hold.WHILE, ("a", "b"), observation, 0.1)
     module = types.ModuleType("_fi")
     models = clone.fault_models()
-    exec(contract.probe_of(models.probe, replace(settings, **more)).text, module.__dict__)
+    exec(contract.render_probe(models.probe, replace(settings, **more)).text, module.__dict__)
     return module
 
 

@@ -17,9 +17,9 @@ from mutator.faults.fault_model_files import load_fault_models
 from mutator.faults.probe_templates import CODE, SETTINGS
 from mutator.model import Activation, Hold, Trigger
 from mutator.mutants import probe as contract
-from mutator.mutants.injected_lines import settings
+from mutator.mutants.injected_lines import probe_setting_spans
 from mutator.mutants.mutant_building import build
-from mutator.mutants.template_rendering import render
+from mutator.mutants.template_rendering import render_template
 from mutator.workspace import Workspace
 
 TRIGGER = Trigger(name="near", condition="hwt < 2.0 and rs > 0.0", armed_after_s=0.25)
@@ -30,8 +30,8 @@ MUTANT, IDS = "0123456789abcdef", ("0a1b2c3d", "4e5f6071")
 
 def probe(clone: Workspace, trigger: Trigger = TRIGGER) -> contract.Probe:
     models, observation = clone.fault_models(), clone.manifest("openpilot").observation
-    settings = contract.settings_of(MUTANT, trigger, trigger.hold, IDS, observation, 0.1)
-    return contract.probe_of(models.probe, settings)
+    settings = contract.build_probe_settings(MUTANT, trigger, trigger.hold, IDS, observation, 0.1)
+    return contract.render_probe(models.probe, settings)
 
 
 def module(clone: Workspace) -> Any:
@@ -53,7 +53,7 @@ def test_the_decision_of_the_harness_agrees_with_the_probe(clone: Workspace) -> 
     rows = [
         (draw.uniform(0.0, 0.5), draw.uniform(0.0, 50.0), draw.choice((0.0, 20.0)), 15.0) for _ in range(200)
     ]
-    for values, is_active in zip(rows, active_at(made.decision, np.array(rows).T), strict=True):
+    for values, is_active in zip(rows, active_at(made.armed_condition, np.array(rows).T), strict=True):
         module["_run"] = module["_Run"]()
         module["observe"](*values)
         assert module["_run"].active == is_active
@@ -73,8 +73,8 @@ def test_parts_rendered_alone_equal_the_whole_template_rendered(
     models, observation = clone.fault_models(), clone.manifest("openpilot").observation
     if counted:
         observation = replace(observation, time=None)
-    settings = contract.settings_of(MUTANT, TRIGGER, TRIGGER.hold, IDS, observation, 0.1, sets=sets)
-    assert contract.probe_of(models.probe, settings).text == render(
+    settings = contract.build_probe_settings(MUTANT, TRIGGER, TRIGGER.hold, IDS, observation, 0.1, sets=sets)
+    assert contract.render_probe(models.probe, settings).text == render_template(
         models.probe.text, vars(settings), models.folder
     )
 
@@ -102,7 +102,7 @@ def test_probes_of_two_triggers_differ_only_in_their_settings(clone: Workspace) 
     rests, found = [], []
     for trigger in (TRIGGER, other):
         patch = "".join(f"+{line}\n" for line in probe(clone, trigger).text.splitlines())
-        spans = list(settings(patch, 0, len(patch)))
+        spans = list(probe_setting_spans(patch, 0, len(patch)))
         found.append({name: patch[begin:end] for begin, end, name in spans})
         for begin, end, _ in reversed(spans):
             patch = patch[:begin] + patch[end:]
@@ -121,13 +121,15 @@ def test_probes_of_two_triggers_differ_only_in_their_settings(clone: Workspace) 
 def test_holding_a_fault_for_a_time_requires_a_duration(clone: Workspace) -> None:
     observation = clone.manifest("openpilot").observation
     with pytest.raises(MutatorError, match="without a time"):
-        contract.settings_of("m", Trigger(name="x", condition="True"), Hold.FOR, (), observation, 0.1)
+        contract.build_probe_settings(
+            "m", Trigger(name="x", condition="True"), Hold.FOR, (), observation, 0.1
+        )
 
 
 def test_a_condition_with_an_unknown_name_is_refused(clone: Workspace) -> None:
     observation, trigger = clone.manifest("openpilot").observation, Trigger(name="x", condition="speed > 1.0")
     with pytest.raises(MutatorError, match=r"unknown name 'speed' in 'speed > 1.0'; .* d_rel, v_ego, v_lead"):
-        contract.settings_of("m", trigger, Hold.WHILE, (), observation, 0.1)
+        contract.build_probe_settings("m", trigger, Hold.WHILE, (), observation, 0.1)
 
 
 NEVER = {"first": None, "last": None, "count": 0}
@@ -147,7 +149,7 @@ def test_activations_of_all_injections_are_added(clone: Workspace) -> None:
     assert contract.activation_of(report) == Activation(first=0.25, last=2.0, count=4)
     fi = module(clone)
     for read in (contract.was_triggered, contract.activation_of):
-        assert read(fi.report()) == read(contract.silent_report(MUTANT))  # type: ignore[operator]
+        assert read(fi.report()) == read(contract.untriggered_report(MUTANT))  # type: ignore[operator]
     see(fi, near=True)
     assert contract.was_triggered(fi.report())
     assert not contract.was_triggered(None)

@@ -14,8 +14,8 @@ from mutator.config.yaml_sources import Source
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel, ParamSchema, SnippetKind
 from mutator.model import Hold, Value
-from mutator.mutants.probe import probe_of, settings_of
-from mutator.mutants.template_rendering import changed_value, snippet
+from mutator.mutants.probe import build_probe_settings, render_probe
+from mutator.mutants.template_rendering import render_changed_value, render_snippet
 from mutator.triggers.trigger_kinds import always
 from mutator.workspace import Workspace
 
@@ -39,7 +39,7 @@ def model(template: str, kind: SnippetKind = SnippetKind.INSERT) -> FaultModel:
 
 
 def rendered(template: str, kind: SnippetKind = SnippetKind.INSERT, **params: Value) -> tuple[str, ...]:
-    return snippet(model(template, kind), {"target": "x", "by": 1.0, **params}, "ab12")
+    return render_snippet(model(template, kind), {"target": "x", "by": 1.0, **params}, "ab12")
 
 
 @pytest.mark.parametrize(
@@ -76,9 +76,9 @@ def test_a_variable_must_be_a_chain_of_identifiers(name: Value) -> None:
 def test_imported_names_are_checked(name: Value) -> None:
     imports = ParamSchema(name="what", type="import", about="")
     made = replace(model("from {{ what }} import x\n"), params=(imports,))
-    assert snippet(made, {"what": "a.b"}, "ab12") == ("from a.b import x",)
+    assert render_snippet(made, {"what": "a.b"}, "ab12") == ("from a.b import x",)
     with pytest.raises(MutatorError):
-        snippet(made, {"what": name}, "ab12")
+        render_snippet(made, {"what": name}, "ab12")
 
 
 def test_text_is_refused_as_a_number() -> None:
@@ -141,7 +141,7 @@ def test_a_guard_opens_a_block() -> None:
 )
 def test_an_expression_stays_one_operand(template: str, text: str) -> None:
     made = replace(model(template, SnippetKind.VALUE), expression=template)
-    assert changed_value(made, {"by": 1.0}, "ab12", "y") == text
+    assert render_changed_value(made, {"by": 1.0}, "ab12", "y") == text
 
 
 @pytest.mark.parametrize("template", ["{{ original }} # why", "1\n", "yield 1", "x = 1", ""])
@@ -149,7 +149,7 @@ def test_a_value_must_be_one_expression_without_a_comment(template: str) -> None
     """A comment would hide the rest of the line."""
     made = replace(model(template, SnippetKind.VALUE), expression=template)
     with pytest.raises(MutatorError, match="expected one expression on one line"):
-        changed_value(made, {"by": 1.0}, "ab12", "y")
+        render_changed_value(made, {"by": 1.0}, "ab12", "y")
 
 
 @pytest.mark.parametrize("target", ["x # why", "x\n", "x[\n0]", " x", None])
@@ -158,7 +158,7 @@ def test_a_target_must_be_a_plain_name(target: Value) -> None:
     made = replace(model("-{{ original }}", SnippetKind.VALUE), expression="-{{ original }}")
     for one in (made, model("{{ target }} = {{ target }} + 1")):
         with pytest.raises(MutatorError, match="for 'target'"):
-            snippet(one, {"target": target, "by": 1.0}, "ab12")
+            render_snippet(one, {"target": target, "by": 1.0}, "ab12")
 
 
 CONSTANT = ParamSchema(name="value", type="constant", about="", optional=True)
@@ -177,7 +177,7 @@ CONSTANT = ParamSchema(name="value", type="constant", about="", optional=True)
 )
 def test_constants_are_written_with_repr(given: dict[str, Value], line: str) -> None:
     template = "x = {% if value is none %}0{% else %}{{ value }}{% endif %}\n"
-    assert snippet(replace(model(template), params=(CONSTANT,)), given, "ab12") == (line,)
+    assert render_snippet(replace(model(template), params=(CONSTANT,)), given, "ab12") == (line,)
 
 
 @pytest.mark.parametrize(
@@ -253,11 +253,11 @@ def test_a_models_result_has_the_expected_value_and_type(
     given = {"target": "x", **{key: int(v) if key == "bit" else v for key, v in params.items()}}
     given = {key: v for key, v in given.items() if v is not None or key == "value"}
     before = copy.deepcopy(value)
-    lines = snippet(models.get(name), given, "ab12")
+    lines = render_snippet(models.get(name), given, "ab12")
     observation = clone.manifest("openpilot").observation
-    settings = settings_of("m", always(), Hold.WHILE, ("ab12",), observation, 0.1)
+    settings = build_probe_settings("m", always(), Hold.WHILE, ("ab12",), observation, 0.1)
     probe = types.ModuleType("_fi")
-    exec(probe_of(models.probe, settings).text, vars(probe))
+    exec(render_probe(models.probe, settings).text, vars(probe))
     probe.observe(t=0.0, d_rel=1.0, v_ego=1.0, v_lead=1.0)
     names = {"_fi": probe, "x": value}
     exec("\n".join(lines), names)

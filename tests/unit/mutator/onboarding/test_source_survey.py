@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.onboarding.source_survey import look_at
+from mutator.onboarding.source_survey import survey_source
 
 Tree = Callable[..., Path]
 
@@ -36,7 +36,7 @@ def test_packages_and_flat_modules_are_distinguished(tree: Tree) -> None:
         data__notes="",
         build__y_py="",
     )
-    found = look_at(str(folder))
+    found = survey_source(str(folder))
     assert found.root == folder
     assert found.packages == ("loose.py", "pkg")
     assert [module.name for module in found.modules] == ["loose", "pkg.a"]
@@ -45,25 +45,25 @@ def test_packages_and_flat_modules_are_distinguished(tree: Tree) -> None:
 def test_the_root_of_a_package_is_the_folder_above_it(tree: Tree) -> None:
     folder = tree(pkg__a_py="x = 1\n")
     (folder / "pkg" / "__init__.py").touch()
-    found = look_at(str(folder / "pkg"))
+    found = survey_source(str(folder / "pkg"))
     assert (found.root, found.packages) == (folder, ("pkg",))
     assert [module.name for module in found.modules] == ["pkg", "pkg.a"]
 
 
 def test_src_is_the_root_of_a_project_with_a_src_layout(tree: Tree) -> None:
     folder = tree(src__pkg__a_py="", setup_py="")
-    found = look_at(str(folder))
+    found = survey_source(str(folder))
     assert (found.root, found.packages) == (folder / "src", ("pkg",))
 
 
 def test_an_empty_folder_has_no_packages(tree: Tree) -> None:
-    assert look_at(str(tree())).packages == ()
+    assert survey_source(str(tree())).packages == ()
 
 
 def test_an_unreadable_file_is_listed_with_its_position(tree: Tree) -> None:
     folder = tree(bad_py="x = 1\ndef (:\n", good_py="")
     (folder / "binary.py").write_bytes(b"\0\xff")
-    found = look_at(str(folder))
+    found = survey_source(str(folder))
     assert [module.path for module in found.modules] == ["good.py"]
     assert [place for place, _ in found.unread] == ["bad.py:2", "binary.py:1"]
     assert all(why for _, why in found.unread)
@@ -71,7 +71,7 @@ def test_an_unreadable_file_is_listed_with_its_position(tree: Tree) -> None:
 
 def test_the_survey_imports_nothing(tree: Tree) -> None:
     tree(harm_py="raise SystemExit('imported')\n")
-    assert look_at(str(tree())).packages == ("harm.py",)
+    assert survey_source(str(tree())).packages == ("harm.py",)
     assert "harm" not in sys.modules
 
 
@@ -81,7 +81,7 @@ def test_files_that_cannot_be_imported_are_left_out(tree: Tree) -> None:
         (folder / "pkg" / name).touch()
     os.mkfifo(folder / "pkg" / "pipe.py")
     (folder / "gone.py").symlink_to(folder / "nowhere")
-    found = look_at(str(folder))
+    found = survey_source(str(folder))
     assert found.packages == ("pkg",)
     assert [module.path for module in found.modules] == ["pkg/a.py"]
 
@@ -89,7 +89,7 @@ def test_files_that_cannot_be_imported_are_left_out(tree: Tree) -> None:
 def test_warnings_about_the_controllers_code_are_not_shown(
     tree: Tree, recwarn: pytest.WarningsRecorder
 ) -> None:
-    look_at(str(tree(odd_py="x = '\\d'\ny = 1 is 1\n")))
+    survey_source(str(tree(odd_py="x = '\\d'\ny = 1 is 1\n")))
     assert not recwarn.list
 
 
@@ -98,11 +98,11 @@ def test_environments_and_hidden_folders_are_left_out(tree: Tree) -> None:
     (folder / "pkg" / "own" / "pyvenv.cfg").touch()
     (folder / "pkg" / ".hidden").mkdir()
     (folder / "pkg" / ".hidden" / "b.py").touch()
-    assert [module.path for module in look_at(str(folder)).modules] == ["pkg/a.py"]
+    assert [module.path for module in survey_source(str(folder)).modules] == ["pkg/a.py"]
 
 
 def test_an_installed_package_is_found_without_importing_it() -> None:
-    found = look_at("installed:typer")
+    found = survey_source("installed:typer")
     assert found.packages == ("typer",)
     assert found.requires and found.requires.startswith("typer>=")
     assert any(module.name == "typer.main" for module in found.modules)
@@ -119,7 +119,7 @@ def test_an_installed_package_is_found_without_importing_it() -> None:
 )
 def test_a_missing_folder_or_package_is_an_error_with_a_remedy(target: str, words: str) -> None:
     with pytest.raises(MutatorError, match=words) as told:
-        look_at(target)
+        survey_source(target)
     assert told.value.remedy
 
 
@@ -127,6 +127,6 @@ def test_a_link_out_of_the_tree_is_not_read(tree: Tree, tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text("class MySecret:\n    def update(self, state): ...\n")
     folder = tree(own_py="")
     (folder / "linked.py").symlink_to(tmp_path / "mine.py")
-    found = look_at(str(folder))
+    found = survey_source(str(folder))
     assert [module.path for module in found.modules] == ["own.py"]
     assert found.unread == (("linked.py:1", "a link that leads out of its folder"),)

@@ -4,8 +4,8 @@ import ast
 
 import pytest
 
-from mutator.onboarding.source_survey import Module, Survey
-from mutator.onboarding.step_candidates import LoopCandidate, loop_candidates
+from mutator.onboarding.source_survey import SourceModule, SourceSurvey
+from mutator.onboarding.step_candidates import StepCandidate, list_step_candidates
 
 CAR = '''
 class World:
@@ -54,9 +54,9 @@ def run(controller, world):
 '''
 
 
-def candidates(**sources: str) -> tuple[LoopCandidate, ...]:
-    modules = tuple(Module(path=f"{name}.py", tree=ast.parse(text)) for name, text in sources.items())
-    return loop_candidates(Survey(root=None, packages=(), modules=modules))  # type: ignore[arg-type]
+def candidates(**sources: str) -> tuple[StepCandidate, ...]:
+    modules = tuple(SourceModule(path=f"{name}.py", tree=ast.parse(text)) for name, text in sources.items())
+    return list_step_candidates(SourceSurvey(root=None, packages=(), modules=modules))  # type: ignore[arg-type]
 
 
 def test_the_controllers_step_ranks_first() -> None:

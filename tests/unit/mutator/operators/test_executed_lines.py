@@ -10,7 +10,7 @@ from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import MutatorError
 from mutator.model import Limits, Status
 from mutator.operators import executed_lines
-from mutator.operators.executed_lines import GoldenDrive, lines_of
+from mutator.operators.executed_lines import GoldenRunInputs, measure_executed_lines
 from mutator.workspace import Workspace
 
 LIMITS = Limits(cpu_s=20, wall_s=60, memory_mb=1024, steps=500)
@@ -44,16 +44,16 @@ def test_executed_lines_are_cached(
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     manifest = toycar.manifest("toycar")
-    drive = GoldenDrive(scenario=toycar.scenario("A"), changes=(), seed=7)
+    drive = GoldenRunInputs(scenario=toycar.scenario("A"), changes=(), seed=7)
     runs: list[str] = []
-    measured = executed_lines._measured
-    monkeypatch.setattr(executed_lines, "_measured", lambda *given: (runs.append("run"), measured(*given))[1])
-    [first] = lines_of(manifest, [drive], LIMITS)
-    assert [first] == lines_of(manifest, [drive], LIMITS) and len(runs) == 1
+    measured = executed_lines._measure
+    monkeypatch.setattr(executed_lines, "_measure", lambda *given: (runs.append("run"), measured(*given))[1])
+    [first] = measure_executed_lines(manifest, [drive], LIMITS)
+    assert [first] == measure_executed_lines(manifest, [drive], LIMITS) and len(runs) == 1
     [entry] = shared_cache.of_lines().iterdir()
     entry.write_text(entry.read_text().replace("[", "[1,", 1))
-    assert [first] == lines_of(manifest, [drive], LIMITS) and len(runs) == 2
+    assert [first] == measure_executed_lines(manifest, [drive], LIMITS) and len(runs) == 2
     broken = tmp_path / "broken.yaml"
     broken.write_text("steps: many\n")
     with pytest.raises(MutatorError, match="the golden run of broken"):
-        lines_of(manifest, [GoldenDrive(scenario=broken, changes=(), seed=7)], LIMITS)
+        measure_executed_lines(manifest, [GoldenRunInputs(scenario=broken, changes=(), seed=7)], LIMITS)

@@ -8,13 +8,13 @@ import pytest
 
 from mutator._common.doors import OPERATORS
 from mutator.errors import MutatorError
-from mutator.mutants.anchors import parsed
-from mutator.mutants.mutant_building import build, build_directly
-from mutator.operators.equal_code_filter import distinct
+from mutator.mutants.anchors import parsed_file
+from mutator.mutants.mutant_building import build, build_without_reuse
+from mutator.operators.equal_code_filter import drop_equal_code
 from mutator.operators.mutation_listing import mutations_of
-from mutator.operators.mutation_selection import Found, find_mutations, sampled
+from mutator.operators.mutation_selection import SelectedMutations, sample_mutations, select_mutations
 from mutator.operators.mutations import Mutation
-from mutator.operators.operator_lookup import find_operator, operators_named
+from mutator.operators.operator_lookup import find_operator, unique_operator_names
 from mutator.operators.statement_facts import facts_of
 from mutator.targets.source_tree import read_tree
 from mutator.triggers.trigger_kinds import always
@@ -31,8 +31,10 @@ def make(tmp_path: Path, clone: Workspace) -> Make:
     def made(body: str, *operators: str, head: str = "def f(self, a, b):") -> list[Mutation]:
         (tmp_path / "m.py").write_text(f"{head}\n    {body}\n")
         tree = read_tree(tmp_path, ["m.py"])
-        file, names = parsed(tree, "m.py"), operators_named(operators or OPERATORS.names())
-        return list(distinct(file, mutations_of(file, facts_of(tree, "m.py"), "f", models, names)).mutations)
+        file, names = parsed_file(tree, "m.py"), unique_operator_names(operators or OPERATORS.names())
+        return list(
+            drop_equal_code(file, mutations_of(file, facts_of(tree, "m.py"), "f", models, names)).mutations
+        )
 
     return made
 
@@ -52,7 +54,7 @@ def test_an_operator_of_another_package_is_used_like_the_others(
     both = make("return a(b, c)", "zero", "return")  # `return 0` is one change, made by the shipped one
     assert [one.operator for one in both] == ["return"] * 3
     manifest, models = toycar.manifest("toycar"), toycar.fault_models()
-    found = find_mutations(manifest, models, ["zero"], ["toycar/**"])
+    found = select_mutations(manifest, models, ["zero"], ["toycar/**"])
     fault = found.mutations[0].fault("as_described")
     assert fault.spec.startswith("operators/zero/") and str(fault.value).endswith(" -> 0")
     assert build(manifest, models, fault, always()).patch
@@ -85,9 +87,9 @@ def test_first_assignments_are_never_omitted_in_functions_with_the_same_name(mak
 def test_mutants_of_a_file_with_a_byte_order_mark_compile(tmp_path: Path, clone: Workspace) -> None:
     (tmp_path / "m.py").write_bytes("\ufeffdef f(a):\n    return a + 1\n".encode())
     tree = read_tree(tmp_path, ["m.py"])
-    file, models = parsed(tree, "m.py"), clone.fault_models()
+    file, models = parsed_file(tree, "m.py"), clone.fault_models()
     made = mutations_of(file, facts_of(tree, "m.py"), "f", models, ["arithmetic"])
-    assert made and not distinct(file, made).invalid
+    assert made and not drop_equal_code(file, made).invalid
 
 
 def test_a_long_change_is_shortened_to_the_part_that_differs(make: Make) -> None:
@@ -98,8 +100,8 @@ def test_a_long_change_is_shortened_to_the_part_that_differs(make: Make) -> None
 def test_places_can_be_files_functions_and_globs(toycar: Workspace) -> None:
     manifest, models = toycar.manifest("toycar"), toycar.fault_models()
 
-    def found(place: str, executed: dict[str, list[int]] | None = None) -> Found:
-        return find_mutations(manifest, models, OPERATORS.shipped(), [place], executed)
+    def found(place: str, executed: dict[str, list[int]] | None = None) -> SelectedMutations:
+        return select_mutations(manifest, models, OPERATORS.shipped(), [place], executed)
 
     whole, part = found("toycar/sensing.py"), found("toycar/sensing.py::Sensor.*")
     assert part.mutations and set(part.mutations) <= set(whole.mutations)
@@ -115,14 +117,18 @@ def test_places_can_be_files_functions_and_globs(toycar: Workspace) -> None:
         with pytest.raises(MutatorError, match=text):
             found(place)
     with pytest.raises(MutatorError, match="no operator 'arith'"):
-        operators_named(["arith"])
+        unique_operator_names(["arith"])
 
 
 def test_samples_are_stratified_and_reproducible(toycar: Workspace) -> None:
     manifest, models = toycar.manifest("toycar"), toycar.fault_models()
-    found = find_mutations(manifest, models, OPERATORS.shipped(), ["toycar/**"])
-    drawn = sampled(found, len(found.mutations) // 3, 4)
-    assert drawn == sampled(found, len(found.mutations) // 3, 4) != sampled(found, len(drawn), 5)
+    found = select_mutations(manifest, models, OPERATORS.shipped(), ["toycar/**"])
+    drawn = sample_mutations(found, len(found.mutations) // 3, 4)
+    assert (
+        drawn
+        == sample_mutations(found, len(found.mutations) // 3, 4)
+        != sample_mutations(found, len(drawn), 5)
+    )
     spec = Counter(one.fault("r").spec for one in found.mutations)
     taken = Counter(one.fault("r").spec for one in drawn)
     assert len(drawn) == len(found.mutations) // 3
@@ -131,9 +137,9 @@ def test_samples_are_stratified_and_reproducible(toycar: Workspace) -> None:
 
 def test_every_mutant_of_the_toy_can_be_built(toycar: Workspace) -> None:
     manifest, models = toycar.manifest("toycar"), toycar.fault_models()
-    found = find_mutations(manifest, models, OPERATORS.shipped(), ["toycar/sensing.py", "toycar/driver.py"])
+    found = select_mutations(manifest, models, OPERATORS.shipped(), ["toycar/sensing.py", "toycar/driver.py"])
     faults = [one.fault("as_described") for one in found.mutations]
     assert len({fault.id for fault in faults}) == len(faults)
     for fault in faults:
         mutant = build(manifest, models, fault, always())
-        assert mutant == build_directly(manifest, models, fault, always())
+        assert mutant == build_without_reuse(manifest, models, fault, always())

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator.checks.library_check import check_library
+from mutator.checks.library_check import library_problems
 from mutator.paper.published_numbers import FILE_NAMES
 from mutator.paper.published_numbers_check import check_published_numbers
 from mutator.workspace import Workspace
@@ -84,21 +84,21 @@ def test_a_missing_file_is_reported_if_a_campaign_requests_the_study(toycar: Wor
     references = toycar.library / "references"
     references.mkdir()
     shutil.copy(CLONE / "fault_library" / "references" / "paper_coverage.yaml", references)
-    told = [str(problem) for problem in check_library(toycar, "toycar")]
+    told = [str(problem) for problem in library_problems(toycar, "toycar")]
     assert not any("paper_summary.yaml" in problem for problem in told)
     campaign = toycar.library / "campaigns" / "small.yaml"
     campaign.write_text(f"{campaign.read_text()}study: driving_agent_resilience\n")
-    asked = [str(problem) for problem in check_library(toycar, "toycar")]
+    asked = [str(problem) for problem in library_problems(toycar, "toycar")]
     [new] = [problem for problem in asked if problem not in told]
     assert new.startswith(str(references))
     assert "no paper_summary.yaml, paper_times.yaml" in new
 
 
 def test_a_library_needs_no_numbers_if_no_campaign_requests_the_study(toycar: Workspace) -> None:
-    told = [str(problem) for problem in check_library(toycar, "toycar")]
+    told = [str(problem) for problem in library_problems(toycar, "toycar")]
     assert not any("references" in problem for problem in told)
     campaign = toycar.library / "campaigns" / "small.yaml"
     campaign.write_text(f"{campaign.read_text()}study: driving_agent_resilience\n")
-    asked = [str(problem) for problem in check_library(toycar, "toycar")]
+    asked = [str(problem) for problem in library_problems(toycar, "toycar")]
     [new] = [problem for problem in asked if problem not in told]
     assert new.startswith(f"{toycar.library / 'references'}: the published numbers are not in this library")

@@ -26,21 +26,21 @@ Reseal = Callable[..., None]
 def test_the_sample_has_every_fault_type_and_scenario(experiment: Callable[..., Experiment]) -> None:
     many = [experiment(value, f"S{value % 5:.0f}") for value in range(3000)]
     rare = experiment(1.0, "S9", spec="vision/rain/rate")
-    sample = equivalence_check.sample([*many, rare], 1)
+    sample = equivalence_check.choose_sample([*many, rare], 1)
     assert 31 <= len(sample) <= 32
     assert rare in sample
     assert {e.scenario for e in sample} == {"S0", "S1", "S2", "S3", "S4", "S9"}
-    assert sample == equivalence_check.sample([*many, rare], 1)
-    assert sample != equivalence_check.sample([*many, rare], 2)
-    assert len(equivalence_check.sample(many[:100], 1)) == 20
-    assert set(equivalence_check.sample(many[:7], 1)) == set(many[:7])
+    assert sample == equivalence_check.choose_sample([*many, rare], 1)
+    assert sample != equivalence_check.choose_sample([*many, rare], 2)
+    assert len(equivalence_check.choose_sample(many[:100], 1)) == 20
+    assert set(equivalence_check.choose_sample(many[:7], 1)) == set(many[:7])
 
 
 @pytest.fixture
 def proven(toycar: Workspace, tmp_path: Path) -> Path:
     """A run folder with two experiments from the fork engine and their equivalence check."""
     summary = run_campaign(toycar, "small", tmp_path / "run", engine="fork", choices=Choices(limit=2))
-    assert summary.proof == equivalence_check.Proof(sampled=2, same=2)
+    assert summary.proof == equivalence_check.EquivalenceResult(sampled=2, same=2)
     assert summary.exit_code == 0
     return tmp_path / "run"
 
@@ -62,16 +62,18 @@ def test_an_incomplete_check_is_resumed(toycar: Workspace, proven: Path, reseal:
     path.write_text(path.read_text().splitlines()[0] + "\n")
     reseal(proven, finished=False)
     folder = RunFolder.open(proven)
-    assert len(equivalence_check.left(folder)) == 2
+    assert len(equivalence_check.remaining_sample(folder)) == 2
     records = load_records(proven)
-    assert equivalence_check.judge(folder, records) == equivalence_check.Proof(sampled=2, same=0)
+    assert equivalence_check.compare_sample(folder, records) == equivalence_check.EquivalenceResult(
+        sampled=2, same=0
+    )
     summary = run_campaign(toycar, "small", proven, engine="reference")
     assert (summary.proof, summary.ran, summary.exit_code) == (
-        equivalence_check.Proof(sampled=2, same=2),
+        equivalence_check.EquivalenceResult(sampled=2, same=2),
         0,
         0,
     )
-    assert equivalence_check.left(folder) == ()
+    assert equivalence_check.remaining_sample(folder) == ()
 
 
 @pytest.mark.slow
@@ -195,7 +197,7 @@ def test_runs_of_an_unneeded_check_are_deleted(threaded: Workspace, tmp_path: Pa
         writer.append(line)
     writer.close()
     file_digests.close_segments(run)
-    assert equivalence_check.left(folder) == ()
+    assert equivalence_check.remaining_sample(folder) == ()
     summary = run_campaign(threaded, "small", run, engine="fork")
     assert (summary.proof, summary.seal) == (None, seal)
     assert not (run / "proof").exists()
@@ -206,7 +208,7 @@ def test_an_experiment_that_must_run_again_can_be_forked(toycar: Workspace, tmp_
     run = tmp_path / "run"
     run_campaign(toycar, "small", run, engine="reference", choices=Choices(limit=2))
     folder = RunFolder.open(run)
-    assert equivalence_check.needless(folder) is not None
+    assert equivalence_check.reason_not_needed(folder) is not None
     for path in (run / "records").iterdir():
         path.write_bytes(b"".join(path.read_bytes().splitlines(keepends=True)[:-1]))
-    assert equivalence_check.needless(RunFolder.open_unverified(run)) is None
+    assert equivalence_check.reason_not_needed(RunFolder.open_unverified(run)) is None

@@ -16,7 +16,7 @@ from mutator.engines.engine_jobs import Execution, Job
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.preflight import preflight_cache
 from mutator.preflight.preflight_checks import run_checks
-from mutator.preflight.preflight_rules import digest_of
+from mutator.preflight.preflight_rules import output_digest_of
 from mutator.store.plan_choices import Choices
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -138,7 +138,7 @@ def test_a_forged_golden_run_is_ignored(
     manifest, place = toy.manifest("toycar"), cache / "golden" / "A"
     (place / "said.json").write_text((place / "said.json").read_text() + " ")
     told = json.loads((cache / "checks.json").read_text())
-    told["goldens"]["A"] = digest_of(manifest, place)
+    told["goldens"]["A"] = output_digest_of(manifest, place)
     (cache / "checks.json").write_bytes(json_bytes(told))
     (cache / "sum").unlink()
     (cache / "sum").write_bytes(cached_folders._sum(cache))
@@ -150,7 +150,7 @@ def test_a_forged_golden_run_is_ignored(
 def test_a_damaged_entry_is_replaced(checked: tuple[Workspace, RunFolder], cache: Path) -> None:
     good = (cache / "checks.json").read_bytes()
     (cache / "checks.json").write_bytes(b"")
-    preflight_cache.store(cache, checked[1].path, "checks.json", checked[1].scratch_folder)
+    preflight_cache.store_checks(cache, checked[1].path, "checks.json", checked[1].scratch_folder)
     assert (cache / "checks.json").read_bytes() == good
     assert list(cache.parent.iterdir()) == [cache]
 
@@ -159,7 +159,7 @@ def test_a_cache_that_cannot_be_created_is_not_an_error(
     checked: tuple[Workspace, RunFolder], tmp_path: Path
 ) -> None:
     (tmp_path / "file").write_text("")
-    preflight_cache.store(
+    preflight_cache.store_checks(
         tmp_path / "file" / "entry", checked[1].path, "checks.json", checked[1].scratch_folder
     )
     assert (tmp_path / "file").read_text() == ""

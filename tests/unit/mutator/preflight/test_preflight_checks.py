@@ -11,7 +11,7 @@ from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import load_plan, make_plan
 from mutator.engines.reference_engine import ReferenceEngine
 from mutator.errors import CheckFailed
-from mutator.preflight.canary import judge
+from mutator.preflight.canary import run_until_hazard
 from mutator.preflight.preflight_checks import run_checks
 from mutator.preflight.preflight_rules import CheckRun
 from mutator.store.checksummed_lines import LineWriter
@@ -174,6 +174,6 @@ def test_a_canary_whose_run_was_killed_is_run_again_once(toycar: Workspace, tmp_
     canary = frozen(toycar, tmp_path).canary
     fine = CheckRun(problem="", hazards=(("H3", 1.0),))
     runs = iter([CheckRun(problem="crashed: killed by SIGHUP"), fine])
-    assert judge([canary], lambda _: next(runs), "H3") == ("", "reached H3")
+    assert run_until_hazard([canary], lambda _: next(runs), "H3") == ("", "reached H3")
     ended = iter([CheckRun(problem="crashed")] * 2)  # a third run is not allowed
-    assert "(crashed)" in judge([canary], lambda _: next(ended), "H3")[0]
+    assert "(crashed)" in run_until_hazard([canary], lambda _: next(ended), "H3")[0]

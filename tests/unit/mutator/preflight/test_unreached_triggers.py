@@ -11,7 +11,7 @@ from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import make_plan
 from mutator.model import Experiment, Trigger
 from mutator.preflight.preflight_checks import describe_unreached_triggers, run_checks
-from mutator.preflight.unreached_triggers import read_observed, remarks, write_observed
+from mutator.preflight.unreached_triggers import describe_unreached, load_observations, save_observations
 from mutator.triggers.trigger_kinds import at_time
 from mutator.workspace import Workspace
 
@@ -35,7 +35,7 @@ def test_triggers_that_never_hold_are_reported(
     toycar: Workspace, experiment: MakeExperiment, trigger: Trigger, said: list[str]
 ) -> None:
     waiting = [("S1", replace(experiment(value), trigger=trigger)) for value in (1.0, 2.0)]
-    told = remarks(
+    told = describe_unreached(
         toycar,
         toycar.manifest("toycar"),
         [*waiting, ("S2", replace(experiment(), trigger=trigger))],  # S2 is unknown
@@ -47,9 +47,9 @@ def test_triggers_that_never_hold_are_reported(
 
 
 def test_observations_are_read_for_each_golden_run(tmp_path: Path) -> None:
-    assert read_observed(tmp_path) == {}
-    write_observed(tmp_path, "town/A+alone", SEEN)
-    assert {key: rows.tolist() for key, rows in read_observed(tmp_path).items()} == {
+    assert load_observations(tmp_path) == {}
+    save_observations(tmp_path, "town/A+alone", SEEN)
+    assert {key: rows.tolist() for key, rows in load_observations(tmp_path).items()} == {
         "town/A+alone": [list(row) for row in SEEN]
     }
 

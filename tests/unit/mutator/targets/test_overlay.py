@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from mutator.api.trials import try_fault
-from mutator.checks.doctor import examine
+from mutator.checks.doctor import examine_machine
 from mutator.errors import MutatorError
 from mutator.faults.spec_expansion import expand
 from mutator.model import Outcome
@@ -120,7 +120,7 @@ def test_errors_name_the_file_of_the_overlay(pole: Workspace) -> None:
         build(pole.manifest("pole"), pole.fault_models(), None, always())
     assert caught.value.where == str(overlay / "drive.py")
     assert pole.manifest("pole").tree.named(caught.value.where) == "drive.py"
-    (found,) = [finding for finding in examine(pole) if finding.name == "target pole"]
+    (found,) = [finding for finding in examine_machine(pole) if finding.name == "target pole"]
     assert f"{pole.manifest('pole').root} and {overlay}: 6 files" in found.found
 
 

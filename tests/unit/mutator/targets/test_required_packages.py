@@ -10,8 +10,8 @@ from mutator.api.trials import try_fault
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import make_plan
 from mutator.campaigns.run_provenance import begin_stretch, check_versions
-from mutator.checks.doctor import Level, examine
-from mutator.checks.library_check import check_library
+from mutator.checks.doctor import Level, examine_machine
+from mutator.checks.library_check import library_problems
 from mutator.errors import MutatorError
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -46,10 +46,12 @@ def test_missing_packages_are_reported_before_anything_runs(
 
 
 def test_check_and_doctor_report_a_missing_package(toycar_without_packages: Workspace) -> None:
-    problem, *_ = check_library(toycar_without_packages, "toycar")
+    problem, *_ = library_problems(toycar_without_packages, "toycar")
     with pytest.raises(MutatorError, match=MESSAGE):
         raise problem
-    (found,) = [finding for finding in examine(toycar_without_packages) if finding.name == "target toycar"]
+    (found,) = [
+        finding for finding in examine_machine(toycar_without_packages) if finding.name == "target toycar"
+    ]
     assert found.level is Level.FAIL
     assert found.remedy == "pip install 'no-such-thing==1.0' 'numpy>=999'"
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from mutator.api.trials import try_fault
-from mutator.checks.library_check import check_library
+from mutator.checks.library_check import library_problems
 from mutator.errors import MutatorError
 from mutator.model import Outcome
 from mutator.workspace import Workspace
@@ -86,7 +86,7 @@ def test_an_invalid_installed_root_is_refused(
 
 def test_check_reports_a_missing_package_once(pole: Workspace) -> None:
     installed(pole, root="installed:none_of_poles", packages="[none_of_poles]", requires='["poles>=1"]')
-    (problem,) = check_library(pole, "pole")
+    (problem,) = library_problems(pole, "pole")
     assert problem.remedy == "pip install 'poles>=1'"
 
 

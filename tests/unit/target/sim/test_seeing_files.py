@@ -64,7 +64,7 @@ def drive(tmp_path: Path) -> Drive:
             seed=0,
             files=made.files,
             mutant=made.id,
-            injections=made.injections,
+            injections=made.injection_ids,
         )
         execution = engine.execute(job, work / str(next(numbers)))
         assert execution.status is Status.OK and execution.probe, execution.detail

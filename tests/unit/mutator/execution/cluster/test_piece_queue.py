@@ -12,7 +12,7 @@ from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import make_plan
 from mutator.execution.cluster.piece_queue import Board
 from mutator.execution.cluster.pieces import Kind, Piece
-from mutator.preflight.equivalence_check import Sample
+from mutator.preflight.equivalence_check import SampledExperiment
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
@@ -49,7 +49,7 @@ def ids(folder: RunFolder) -> list[str]:
 def board(folder: RunFolder, clock: Clock, proof: tuple[str, ...] = ()) -> Board:
     """Return a board for two workers, with the whole plan and a proof that reruns the experiments in
     `proof`."""
-    samples = [Sample(number, name) for number, name in enumerate(proof)]
+    samples = [SampledExperiment(number, name) for number, name in enumerate(proof)]
     made = Board(folder, pending(folder, {}), samples, now=clock)
     for name in ("alpha", "beta"):
         made.join(name, 1)
