@@ -195,7 +195,7 @@ class _ReusingSplicer(_Splicer):
         if not compiles(normalized(text, ids).encode()):
             super().check_probe(text, ids, where)
 
-    def change(self, file: ParsedFile, edits: Sequence[Edit], ids: Sequence[str]) -> ChangedFile:
+    def checked_change(self, file: ParsedFile, edits: Sequence[Edit], ids: Sequence[str]) -> ChangedFile:
         cache = reuse_cache(self._tree, file.path)
         key = reuse_key(file, edits, ids)
         if key in cache:

@@ -77,10 +77,10 @@ READS = b"def f(a):\n    b = T(1, abs(a) + max(a, 1))\n    return b\ncall(f, 2)\
 @pytest.mark.parametrize(
     ("place", "name", "source"),
     [
-        (anchors, "libcst_module", SHIFTED),
-        (statements, "line_after", CONTINUED),
+        (anchors, "parse_with_libcst", SHIFTED),
+        (statements, "line_after_statements", CONTINUED),
         (injection_edits, "_check_scopes", READS),
-        (splicing, "_unit", READS),
+        (splicing, "_indent_unit_of", READS),
     ],
 )
 def test_a_broken_splicer_is_found(
@@ -88,10 +88,10 @@ def test_a_broken_splicer_is_found(
 ) -> None:
     assert not proved([("", source)], behaviour, 20).wrong
     broken = {
-        "libcst_module": without_check_of_bytes,
-        "line_after": lambda node, positions: positions[node].end.line,
+        "parse_with_libcst": without_check_of_bytes,
+        "line_after_statements": lambda node, positions: positions[node].end.line,
         "_check_scopes": lambda *given: None,
-        "_unit": lambda *given: b"",
+        "_indent_unit_of": lambda *given: b"",
     }
     monkeypatch.setattr(place, name, broken[name])
     monkeypatch.setattr(anchors, "_check_position", lambda *given: None)

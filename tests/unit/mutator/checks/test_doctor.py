@@ -5,7 +5,7 @@ import importlib.metadata
 import pytest
 
 from mutator.checks import doctor
-from mutator.checks.doctor import Level
+from mutator.checks.doctor import CheckState
 from mutator.errors import MutatorError
 
 NO_LIBRARY = MutatorError("no fault library", remedy="say --root")
@@ -13,7 +13,7 @@ NO_LIBRARY = MutatorError("no fault library", remedy="say --root")
 
 def test_on_this_machine_only_the_library_fails() -> None:
     findings = doctor.examine_machine(NO_LIBRARY)
-    failed = [f for f in findings if f.level is Level.FAIL]
+    failed = [f for f in findings if f.level is CheckState.FAIL]
     assert [(f.name, f.found, f.remedy) for f in failed] == [("library", "no fault library", "say --root")]
     assert {"python", "numpy", "cores", "child process"} <= {f.name for f in findings}
 
@@ -21,7 +21,7 @@ def test_on_this_machine_only_the_library_fails() -> None:
 def test_a_missing_package_fails_with_its_pip_line(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.metadata, "requires", lambda _: ["no-such-package>=2,<3"])
     [finding] = [f for f in doctor.examine_machine(NO_LIBRARY) if f.name == "no-such-package"]
-    assert finding.level is Level.FAIL
+    assert finding.level is CheckState.FAIL
     assert finding.remedy == "pip install 'no-such-package<3,>=2'"
 
 
@@ -29,7 +29,7 @@ def test_another_version_is_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
     """The package might still work."""
     monkeypatch.setattr(importlib.metadata, "requires", lambda _: ["numpy>=999"])
     [finding] = [f for f in doctor.examine_machine(NO_LIBRARY) if f.name == "numpy"]
-    assert finding.level is Level.WARN
+    assert finding.level is CheckState.WARN
     assert finding.found.endswith("wanted >=999")
 
 
@@ -39,11 +39,11 @@ def test_a_folder_without_locks_is_a_warning(monkeypatch: pytest.MonkeyPatch) ->
 
     monkeypatch.setattr(doctor.fcntl, "flock", refuse)
     [finding] = [f for f in doctor.examine_machine(NO_LIBRARY) if f.name == "folder"]
-    assert (finding.level, finding.found.rpartition(": ")[2]) == (Level.WARN, "Operation not supported")
+    assert (finding.level, finding.found.rpartition(": ")[2]) == (CheckState.WARN, "Operation not supported")
     assert "--out" in finding.remedy
 
 
 def test_a_child_process_that_cannot_start_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(doctor.sys, "executable", "/no/such/python")
     [finding] = [f for f in doctor.examine_machine(NO_LIBRARY) if f.name == "child process"]
-    assert finding.level is Level.FAIL
+    assert finding.level is CheckState.FAIL
