@@ -33,7 +33,8 @@ def describe_first_difference(manifest: TargetManifest, first_folder: Path, seco
 def _describe_trace_difference(manifest: TargetManifest, first_folder: Path, second_folder: Path) -> str:
     try:
         first, second = (
-            golden_comparison.load_trace(manifest, out, manifest.channels) for out in (first_folder, second_folder)
+            golden_comparison.load_trace(manifest, out, manifest.channels)
+            for out in (first_folder, second_folder)
         )
     except BadOutput as error:
         return f"in a trace that cannot be compared ({error.got})"

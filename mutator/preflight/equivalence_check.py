@@ -124,7 +124,9 @@ def reason_not_needed(folder: RunFolder) -> str | None:
 
 def remove_proof(folder: RunFolder) -> None:
     """Remove a proof that is no longer needed."""
-    removed = {name: None for name in file_digests.list_segments(folder.path) if name.startswith(f"{PROOF_FOLDER}/")}
+    removed = {
+        name: None for name in file_digests.list_segments(folder.path) if name.startswith(f"{PROOF_FOLDER}/")
+    }
     with file_digests.rewriting_files(folder.path, removed):
         remove_folder(folder.path / PROOF_FOLDER)
 
