@@ -156,7 +156,8 @@ def constant_setting_line(tag: str, path: str, changed: str, imported: Iterable[
     `imported`: imports of the constant in other modules.
     """
     further = "".join(f', "{name}"' for name in imported)
-    return f'{PROBE_NAME}.constant("{tag}", globals(), "{path}", lambda {ORIGINAL_VALUE_NAME}: {changed}{further})'
+    new_value = f"lambda {ORIGINAL_VALUE_NAME}: {changed}"
+    return f'{PROBE_NAME}.constant("{tag}", globals(), "{path}", {new_value}{further})'
 
 
 def default_setting_line(tag: str, function: str, parameter: str, changed: str) -> str:

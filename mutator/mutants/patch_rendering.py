@@ -18,9 +18,10 @@ class _Hunk:
     pieces: list[PatchPiece] = field(default_factory=list)
 
     def render(self) -> str:
-        old, new = _count_lines(self.pieces, "-"), _count_lines(self.pieces, "+")
+        old = _render_span(self.old_lines_before, _count_lines(self.pieces, "-"))
+        new = _render_span(self.new_lines_before, _count_lines(self.pieces, "+"))
         body = "".join(_render_line(piece.sign, line) for piece in self.pieces for line in piece.lines)
-        return f"@@ -{_render_span(self.old_lines_before, old)} +{_render_span(self.new_lines_before, new)} @@\n{body}"
+        return f"@@ -{old} +{new} @@\n{body}"
 
 
 def render_changed_file(path: str, pieces: Iterable[PatchPiece]) -> str:

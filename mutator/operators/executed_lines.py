@@ -61,7 +61,8 @@ def _measure(engine: ReferenceEngine, golden_run: GoldenRunInputs, folder: Path)
     execution = engine.execute(job, folder)
     if execution.status is not Status.OK:
         raise MutatorError(
-            f"cannot find executed lines: the golden run of {golden_run.scenario.stem} failed: {execution.detail}",
+            f"cannot find executed lines: the golden run of {golden_run.scenario.stem} failed: "
+            f"{execution.detail}",
             where=engine.manifest.path,
             expected="a fault-free run that succeeds",
             remedy="run `mutator check --drive`",

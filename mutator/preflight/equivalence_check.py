@@ -165,7 +165,8 @@ def compare_sample(folder: RunFolder, records: Mapping[str, Record]) -> Equivale
             continue
         if record != reference_record:
             raise CheckFailed(
-                f"experiment {name} differs on the reference engine: {describe_difference(record, reference_record)}",
+                f"experiment {name} differs on the reference engine: "
+                f"{describe_difference(record, reference_record)}",
                 where=folder.path,
                 expected="the same record from every engine",
                 remedy="do not trust this run: rerun it with --engine reference, and report the problem",
