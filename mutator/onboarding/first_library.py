@@ -45,8 +45,8 @@ def write_first_library(survey: SourceSurvey, folder: Path) -> None:
         autoescape=False,  # output is YAML, Python and Markdown
     )
     templates.filters["yaml"] = _yaml_scalar
-    for template, path_pattern in _PATH_BY_TEMPLATE.items():
-        path = folder / path_pattern.format(name=variables["name"], entry=variables["entry"])
+    for template, form in _PATH_BY_TEMPLATE.items():
+        path = folder / form.format(name=variables["name"], entry=variables["entry"])
         path.parent.mkdir(parents=True, exist_ok=True)
         text = templates.get_template(f"{template}.j2").render(variables)
         path.write_text(re.sub(r"\n{4,}", "\n\n\n", text), encoding="utf-8")

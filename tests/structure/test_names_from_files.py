@@ -38,7 +38,7 @@ ALLOWED = {  # joins of names that no file contains
     "faults/injected_imports.py: root / path": "only shown",
     "mutants/anchors.py: root / path": "only shown",
     "mutants/constant_imports.py: tree.root / path": "only shown",
-    "onboarding/first_library.py: folder / path_pattern.format(name=variables['name'], entry=variables['entry'])": (
+    "onboarding/first_library.py: folder / form.format(name=variables['name'], entry=variables['entry'])": (
         "letters, digits and _"
     ),
     "onboarding/source_survey.py: Path(place, name)": "names from os.walk",
