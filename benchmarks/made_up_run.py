@@ -40,7 +40,7 @@ from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.checksummed_blocks import block_bytes
 from mutator.store.file_digests import FileDigest
 from mutator.store.patch_files import _PatchPacker
-from mutator.store.records import SCHEMA, record_as_json
+from mutator.store.records import PROOF_FOLDER, SCHEMA, record_as_json
 from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.store.series_folder import INDEX_NAME, SeriesIndex, save_index
 from mutator.store.series_format import encode_series
@@ -237,7 +237,7 @@ def write_proof(
     """Write the sample of the equivalence check with the experiments' records."""
     lines = _bodies(records, patches)
     proof = Lines(
-        folder.path / equivalence_check.PROOF_FOLDER / "0001-gw0.jsonl",
+        folder.path / PROOF_FOLDER / "0001-gw0.jsonl",
         {"plan": folder.head.plan, "schema": SCHEMA},
     )
     wanted = set(equivalence_check.sample_ids(folder))

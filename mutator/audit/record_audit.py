@@ -17,7 +17,7 @@ from mutator.outcomes.verdict_rules import Events, judge
 from mutator.preflight import equivalence_check
 from mutator.store import plan_file
 from mutator.store.checksummed_lines import read_segment
-from mutator.store.records import record_from_json
+from mutator.store.records import PROOF_FOLDER, record_from_json
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import RunHead
 from mutator.targets.manifest import TargetManifest
@@ -207,7 +207,7 @@ def proof(
     """Yield records of the proof that differ from those of the run or are not in the sample, and experiments
     of the sample that have no record.
     """
-    place = folder.path / equivalence_check.PROOF_FOLDER
+    place = folder.path / PROOF_FOLDER
     if not place.is_dir():
         modes = {str(line["engine"]) for line in folder.timings().values()}
         if forked := sorted(modes & FAST):

@@ -20,13 +20,12 @@ from mutator._common.confined_files import inside
 from mutator._common.files import read_json
 from mutator._common.hashing import canonical, digest
 from mutator.campaigns.freezing import CSV
-from mutator.preflight.equivalence_check import PROOF_FOLDER as PROOF
 from mutator.store import file_digests, plan_file
 from mutator.store.approvals import review_digest
 from mutator.store.check_results import FILE as CHECKS
 from mutator.store.check_results import SCHEMA as CHECKS_SCHEMA
 from mutator.store.checksummed_lines import bare_segment, intact_lines
-from mutator.store.records import parse_ending
+from mutator.store.records import PROOF_FOLDER, parse_ending
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_head import CAMPAIGN, HEAD
 from mutator.store.work_stretches import describe_stretches
@@ -84,7 +83,7 @@ def seals_of(folder: RunFolder) -> Seals:
         CHECKS: without(read_json(folder.path / CHECKS, CHECKS_SCHEMA), OUTSIDE[CHECKS]),
         "versions": _versions(folder),
         "files": _sha256(folder, _FILES),
-        PROOF: _records(folder, PROOF),
+        PROOF_FOLDER: _records(folder, PROOF_FOLDER),
     }
     return Seals(seal=digest([SCHEMA, runs, facts]), results_digest=results, review_digest=review)
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from mutator.execution.session import Session
 from mutator.preflight import equivalence_check
+from mutator.store.records import PROOF_FOLDER
 from mutator.store.run_progress import Progress, RecordTail
 
 _NOTIFY_S = 0.5
@@ -38,9 +39,7 @@ def _stages(session: Session) -> Iterator[Progress]:
     while (progress := experiments.poll()).done < progress.total:
         yield progress
     yield progress
-    proof = RecordTail(
-        "proof", folder.path / equivalence_check.PROOF_FOLDER, len(equivalence_check.sample_ids(folder))
-    )
+    proof = RecordTail("proof", folder.path / PROOF_FOLDER, len(equivalence_check.sample_ids(folder)))
     while session.proof:
         yield proof.poll()
     while True:

@@ -23,7 +23,6 @@ from mutator.store import file_digests, plan_file
 from mutator.store.records import PROOF_FOLDER, endings_of
 from mutator.store.run_folder import RunFolder
 
-PROOF_FOLDER = PROOF_FOLDER
 _MIN_SAMPLE = 20
 _EXPERIMENTS_PER_SAMPLED_ONE = 100  # one experiment in this many
 

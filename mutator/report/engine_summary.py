@@ -11,6 +11,7 @@ from mutator.engines.engine_jobs import RunMode
 from mutator.errors import CheckFailed
 from mutator.model import Record
 from mutator.preflight import equivalence_check
+from mutator.store.records import PROOF_FOLDER
 from mutator.store.run_folder import RunFolder
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ def summarize_engines(
 ) -> EngineSummary | None:
     """Summarize a run's `timings` (as in `Seen`) and `proof/`. None without timings and without `proof/`."""
     ways = _ways(timings)
-    if not ways and not (folder.path / equivalence_check.PROOF_FOLDER).is_dir():
+    if not ways and not (folder.path / PROOF_FOLDER).is_dir():
         return None
     sentence, state, failed = _proof(folder, records)
     table = Table(heads=("how", "experiments"), rows=list(_lines(ways)))
