@@ -30,7 +30,7 @@ from mutator.mutants.mutant_building import build  # noqa: E402
 from mutator.outcomes import golden_comparison  # noqa: E402
 from mutator.store.plan_choices import Choices  # noqa: E402
 from mutator.store.run_folder import GoldenRun  # noqa: E402
-from mutator.triggers.trigger_kinds import always  # noqa: E402
+from mutator.triggers.trigger_kinds import always_trigger  # noqa: E402
 from mutator.workspace import Workspace  # noqa: E402
 
 GOAL_OF_WARM = 1.15  # fork's CPU / (warm's CPU x share of time after activation)
@@ -55,7 +55,7 @@ class Bench:
         self.plan = plan
         work = folder / "work"
         work.mkdir()
-        null = build(self.manifest, self.models, None, always())
+        null = build(self.manifest, self.models, None, always_trigger())
         arguments = (self.manifest, work, plan.campaign.limits)
         self.engines: dict[str, Callable[[], Engine]] = {
             "reference": lambda: ReferenceEngine(*arguments),

@@ -21,7 +21,7 @@ from typing import BinaryIO
 import numpy as np
 from growth import record
 
-from mutator._common.hashing import canonical, digest
+from mutator._common.hashing import canonical_json, digest
 from mutator.audit.seal import seals_of
 from mutator.campaigns import run_environment
 from mutator.campaigns.freezing import freeze
@@ -171,7 +171,7 @@ class Lines:
         path.parent.mkdir(exist_ok=True)
         self._file: BinaryIO = path.open("wb", buffering=1 << 20)
         self._last = b""
-        self.write(canonical({**head, "file": f"{path.parent.name}/{path.name}"}).encode()[1:])
+        self.write(canonical_json({**head, "file": f"{path.parent.name}/{path.name}"}).encode()[1:])
 
     def write(self, body: bytes) -> None:
         self._last = sha256(self._last + body).hexdigest()[:16].encode()
@@ -223,7 +223,7 @@ def _bodies(records: Sequence[Record], patches: Sequence[bytes]) -> list[Callabl
     named = [digest(patch).encode() for patch in patches]
 
     def body(one: Record) -> Callable[[str, int], bytes]:
-        text = canonical(record_as_json(replace(one, patch="PATCH"))).encode()[1:]
+        text = canonical_json(record_as_json(replace(one, patch="PATCH"))).encode()[1:]
         before, after = text.split(_NO_ID.encode())
         between, end = after.split(b"PATCH")
         return lambda name, patch: b"".join((before, name.encode(), between, named[patch], end))

@@ -25,7 +25,7 @@ from mutator.mutants.anchors import parse_file
 from mutator.mutants.mutant_building import build, build_without_reuse
 from mutator.operators.mutation_selection import sample_mutations, select_mutations
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.trigger_kinds import always
+from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -47,7 +47,7 @@ def operators(manifest: TargetManifest, models: FaultModels, count: int) -> tupl
     found = select_mutations(manifest, models, OPERATORS.names(), PLACES)
     took = process_time() - start
     faults = [mutation.fault("as_described") for mutation in sample_mutations(found, count, 1)]
-    trigger = always()
+    trigger = always_trigger()
     build(manifest, models, faults[0], trigger)  # parses the file that observes
     start = process_time()
     for fault in faults:

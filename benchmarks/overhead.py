@@ -35,7 +35,7 @@ from mutator.mutants.mutant_building import build  # noqa: E402
 from mutator.store.checksummed_lines import LineWriter  # noqa: E402
 from mutator.store.plan_choices import Choices  # noqa: E402
 from mutator.store.records import SCHEMA, record_as_json  # noqa: E402
-from mutator.triggers.trigger_kinds import always  # noqa: E402
+from mutator.triggers.trigger_kinds import always_trigger  # noqa: E402
 from mutator.workspace import Workspace  # noqa: E402
 
 GOAL_MS = 5.0
@@ -87,7 +87,7 @@ class Bench:
 
     def cost(self, experiments: Sequence[Experiment]) -> Cost:
         """Return the cost of the experiments without the first `FEW`. All must be forked."""
-        null = build(self.manifest, self.models, None, always())
+        null = build(self.manifest, self.models, None, always_trigger())
         engine = ForkEngine(*self.common, null=null)
         goldens = Goldens(self.manifest, lambda experiment: self.folder / "golden" / "out")
         runner = Runner(self.manifest, self.models, engine, goldens, self.workspace.scenario)

@@ -19,7 +19,7 @@ sys.path.insert(0, str(ROOT))
 from mutator.engines.job_tree_pool import BaseTree  # noqa: E402
 from mutator.mutants.mutant_building import build  # noqa: E402
 from mutator.mutants.probe import probe_path  # noqa: E402
-from mutator.triggers.trigger_kinds import always  # noqa: E402
+from mutator.triggers.trigger_kinds import always_trigger  # noqa: E402
 from mutator.workspace import Workspace  # noqa: E402
 
 GOAL = 1.02
@@ -58,7 +58,7 @@ def main() -> int:
     options = parser.parse_args()
     workspace = Workspace.find(root=ROOT)
     manifest = workspace.manifest("openpilot")
-    null = build(manifest, workspace.fault_models(), None, always()).files
+    null = build(manifest, workspace.fault_models(), None, always_trigger()).files
     (changed,) = null.keys() - {probe_path(manifest.package)}
     with tempfile.TemporaryDirectory() as folder:
         base = BaseTree(manifest.tree, Path(folder))

@@ -1,6 +1,6 @@
 """The data passed from spec to verdict: immutable, comparable, identified by content.
 
-Declare new fields with `hashing.added`, so that existing ids do not change.
+Declare new fields with `hashing.added_field`, so that existing ids do not change.
 """
 
 from dataclasses import dataclass, field
@@ -8,8 +8,8 @@ from enum import StrEnum
 from functools import cached_property
 from typing import Any
 
-from mutator._common.hashing import added, added_values, content_id, plain
-from mutator._common.yaml_dataclasses import mapping, written
+from mutator._common.hashing import added_field, added_values, as_json_types, content_id
+from mutator._common.yaml_dataclasses import mapping_config, yaml_metadata
 
 Value = int | float | str | bool | None
 
@@ -106,7 +106,7 @@ class Anchor:
     kind: AnchorKind
     name: str = ""
     nth: int | None = None
-    which: str | None = added(None)
+    which: str | None = added_field(None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -132,9 +132,9 @@ class Injection:
     location: FaultLocation
     model: str
     params: tuple[tuple[str, Value], ...] = ()
-    where: str | None = added(None)
-    call: int | None = added(None)
-    every: int | None = added(None)
+    where: str | None = added_field(None)
+    call: int | None = added_field(None)
+    every: int | None = added_field(None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -202,7 +202,7 @@ class Experiment:
     seed: int  #: seed of the simulation
     setting: tuple[str, ...] = ()  #: changes of the scenario that the campaign makes for all its experiments
     #: whether the run continues after a terminal hazard: `go_on` or `stop`
-    after_hazard: AfterHazard = added(AfterHazard.GO_ON)
+    after_hazard: AfterHazard = added_field(AfterHazard.GO_ON)
 
     @cached_property
     def id(self) -> str:
@@ -216,7 +216,7 @@ class Experiment:
     @cached_property
     def plain_trigger(self) -> dict[str, Any]:
         """The trigger as JSON types."""
-        return dict(plain(self.trigger))
+        return dict(as_json_types(self.trigger))
 
     @property
     def label(self) -> str:
@@ -239,15 +239,15 @@ class Experiment:
 class Limits:
     """The resources that one run can use before it is stopped."""
 
-    __pydantic_config__ = mapping("Limits")
+    __pydantic_config__ = mapping_config("Limits")
 
-    cpu_s: int = field(default=60, metadata=written("CPU time in seconds.", ge=1, le=MOST))
-    wall_s: int = field(default=300, metadata=written("Wall time in seconds.", ge=1, le=MOST))
-    memory_mb: int = field(default=4096, metadata=written("Address space in MiB.", ge=256, le=MOST))
-    steps: int = field(default=20_000, metadata=written("Number of simulation steps.", ge=1, le=MOST))
-    disk_mb: int = added(
+    cpu_s: int = field(default=60, metadata=yaml_metadata("CPU time in seconds.", ge=1, le=MOST))
+    wall_s: int = field(default=300, metadata=yaml_metadata("Wall time in seconds.", ge=1, le=MOST))
+    memory_mb: int = field(default=4096, metadata=yaml_metadata("Address space in MiB.", ge=256, le=MOST))
+    steps: int = field(default=20_000, metadata=yaml_metadata("Number of simulation steps.", ge=1, le=MOST))
+    disk_mb: int = added_field(
         1024,
-        written(
+        yaml_metadata(
             "MiB in the run's output folder and TMPDIR together; also the limit for each file.", ge=1, le=MOST
         ),
     )
@@ -291,11 +291,13 @@ class Record:
     #: (name, first time in s) of each alert after the activation, sorted by time
     alerts: tuple[tuple[str, float], ...]
     trace_digest: str  #: digest of the trace
-    error: RunError | None = added(None)  #: the exception that ended the run: `kind`, `message`, `place`
+    error: RunError | None = added_field(
+        None
+    )  #: the exception that ended the run: `kind`, `message`, `place`
     patch: str = ""  #: digest of the stored patch; empty without a mutant, and in old records
-    t_end: float | None = added(None)  #: when a terminal hazard ended the drive, in s
-    dev: tuple[tuple[str, float], ...] = added(())  #: `max_dev` up to `t_end`; empty without `t_end`
+    t_end: float | None = added_field(None)  #: when a terminal hazard ended the drive, in s
+    dev: tuple[tuple[str, float], ...] = added_field(())  #: `max_dev` up to `t_end`; empty without `t_end`
     #: metrics of the manifest and margins of its hazards, if they have a value
-    metrics: tuple[tuple[str, float], ...] = added(())
+    metrics: tuple[tuple[str, float], ...] = added_field(())
     #: (channel, first time in s, largest deviation) of each channel that left its tolerance in the drive
-    left: tuple[tuple[str, float, float], ...] = added(())
+    left: tuple[tuple[str, float, float], ...] = added_field(())

@@ -7,14 +7,14 @@ from fnmatch import fnmatchcase
 from importlib import import_module
 from pathlib import Path
 
-from mutator._common.argument_checks import check_whole
-from mutator._common.bounded_reading import MOST_WHOLE, check_open, open_regular
+from mutator._common.argument_checks import check_whole_number
+from mutator._common.bounded_reading import MOST_FILE_BYTES, check_file_size, open_regular
 from mutator._common.confined_files import check_inside, files_inside
-from mutator._common.files import check_is_text
+from mutator._common.files import check_path_encodable
 from mutator._common.folder_search import environment_path, library_files, library_folder, templates_folder
-from mutator._common.message_text import counted, one_of, suggestion
+from mutator._common.message_text import counted, describe_choices, suggestion
 from mutator._common.shipped_files import shipped_folder
-from mutator._common.table_rendering import Table
+from mutator._common.table_rendering import TextTable
 from mutator.errors import MutatorError
 from mutator.faults.fault_model_files import load_fault_models
 from mutator.faults.fault_models import FaultModels
@@ -51,7 +51,7 @@ class Workspace:
         rows = [["library", str(self.library)], ["templates", str(self.templates)]]
         rows += [["target", str(self.target)]] if self.target else []
         rows += [[counted(len(names), what), ", ".join(names)] for what, names in self._contents()]
-        return str(Table(heads=("workspace", ""), rows=rows).as_html())
+        return str(TextTable(heads=("workspace", ""), rows=rows).as_html())
 
     def _contents(self) -> tuple[tuple[str, Collection[str]], ...]:
         base = self.library / "faults"
@@ -173,7 +173,7 @@ class Workspace:
         spec file. `target` names a manifest; default: the library's only target. MutatorError if nothing
         matches, and for a mistake in a spec.
         """
-        check_whole("seed", seed)
+        check_whole_number("seed", seed)
         if str(pattern).endswith((".yaml", ".yml")):
             specs: tuple[FaultSpec, ...] = (self.spec(pattern),)
             glob = "*"
@@ -273,7 +273,7 @@ class Workspace:
             if not Path(name).is_file():
                 raise MutatorError(
                     f"no file {name}",
-                    expected=f"a {what}: the path of a YAML file, or {one_of(known)}",
+                    expected=f"a {what}: the path of a YAML file, or {describe_choices(known)}",
                     remedy="correct the path" + suggestion(str(Path(name).with_suffix("")), list(known)),
                 )
             return _readable(Path(name))
@@ -282,17 +282,17 @@ class Workspace:
         raise MutatorError(
             f"no {what} '{name}'",
             where=self.library / folder,
-            expected=f"{one_of(known)}, or the path of a YAML file",
+            expected=f"{describe_choices(known)}, or the path of a YAML file",
             remedy="correct the name" + suggestion(str(name), list(known)),
         )
 
 
 def _readable(path: Path) -> Path:
     """Return the path of a file; MutatorError unless it is a regular file of a size to be read as a whole."""
-    check_is_text(path)
+    check_path_encodable(path)
     try:
         with open_regular(path) as file:
-            check_open(file, path, MOST_WHOLE)
+            check_file_size(file, path, MOST_FILE_BYTES)
     except OSError as error:
         raise MutatorError(
             f"cannot be read ({error.strerror})", where=path, expected="a file", remedy="put the file back"
@@ -312,5 +312,5 @@ def _folder(path: Path, what: str, argument: str) -> Path:
             expected=f"the {what} folder",
             remedy=f"correct `{argument}` or MUTATOR_{argument.upper()}, `root` or MUTATOR_ROOT",
         )
-    check_is_text(path.resolve())
+    check_path_encodable(path.resolve())
     return path.resolve()

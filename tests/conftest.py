@@ -40,7 +40,7 @@ from mutator.store.records import SCHEMA
 from mutator.store.run_folder import RunFolder
 from mutator.store.timings import TIMINGS_SCHEMA
 from mutator.store.work_stretches import Stretch
-from mutator.triggers.trigger_kinds import always
+from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
 
 from .parsed_once import parsed_once
@@ -329,7 +329,9 @@ def of_operators() -> Callable[[Workspace, str], Callable[[Plan], Plan]]:
             tree = workspace.manifest(plan.campaign.target).tree
             faults = list(operator_faults(parsed_file(tree, path)))
             some = [
-                dataclasses.replace(drive, fault=fault, **({"trigger": always()} if number == 1 else {}))
+                dataclasses.replace(
+                    drive, fault=fault, **({"trigger": always_trigger()} if number == 1 else {})
+                )
                 for fault in faults
                 for number, drive in enumerate(plan.experiments[:drives])
             ]

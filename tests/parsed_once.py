@@ -11,7 +11,7 @@ import pytest
 
 from mutator.checks import library_check
 from mutator.config import yaml_files
-from mutator.config.yaml_sources import Source
+from mutator.config.yaml_sources import YamlSource
 from mutator.errors import MutatorError
 from mutator.faults import fault_model_files
 from mutator.faults.fault_models import Example, FaultModel, FaultModels
@@ -28,7 +28,7 @@ def parsed_once() -> Iterator[None]:
 
     Each caller gets its own copy. A text with a mistake is parsed anew, so that the error names its file.
     """
-    parse_yaml, parse_python, load_model = yaml_files.parse, anchors.parse_file, fault_model_files._load
+    parse_yaml, parse_python, load_model = yaml_files.parse_yaml, anchors.parse_file, fault_model_files._load
     models: dict[tuple[str, bytes, bytes], FaultModel] = {}
     run_example, examples = library_check.apply_example, dict[str, str]()
 
@@ -41,12 +41,12 @@ def parsed_once() -> Iterator[None]:
     def python_of(path: str, data: bytes) -> ParsedFile:
         return parse_python(path, data, Path("a"))
 
-    def yaml(text: str, path: Path) -> Source:
+    def yaml(text: str, path: Path) -> YamlSource:
         try:
             data, lines = pickle.loads(yaml_of(text))
         except MutatorError:
             return parse_yaml(text, path)
-        return Source(path=path, data=data, lines=lines)
+        return YamlSource(path=path, data=data, lines=lines)
 
     def python(path: str, data: bytes, root: Path) -> ParsedFile:
         try:
@@ -69,7 +69,7 @@ def parsed_once() -> Iterator[None]:
         return examples.get(key) or examples.setdefault(key, run_example(model, models, example))
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(yaml_files, "parse", yaml)
+        patch.setattr(yaml_files, "parse_yaml", yaml)
         patch.setattr(anchors, "parse_file", python)
         patch.setattr(fault_model_files, "_load", model)
         patch.setattr(library_check, "apply_example", example_of)

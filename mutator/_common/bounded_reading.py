@@ -16,22 +16,22 @@ from typing import BinaryIO
 
 from mutator.errors import TooLarge
 
-MOST_WHOLE = 128_000_000  # bytes of a file that is read as a whole; a reader can have another limit
-MOST_JSON = 6_000_000  # bytes of a JSON object; as Python objects they can take 30 times as much memory
-MOST_DATA = 8_000_000_000  # bytes of a file that grows with the number of experiments
-MOST_LINE = 4_000_000  # bytes of a line
-_DENSE = 64_000_000  # from this size, a file must not have holes
-_PIECE = 1_000_000
-_GZIP = zlib.MAX_WBITS | 16
+MOST_FILE_BYTES = 128_000_000  # bytes of a file that is read as a whole; a reader can have another limit
+MOST_JSON_BYTES = 6_000_000  # bytes of a JSON object; as Python objects they can take 30 times as much memory
+MOST_DATA_BYTES = 8_000_000_000  # bytes of a file that grows with the number of experiments
+MOST_LINE_BYTES = 4_000_000  # bytes of a line
+_NO_HOLES_FROM_BYTES = 64_000_000  # from this size, a file must not have holes
+_FURTHER_READ_BYTES = 1_000_000
+_GZIP_WBITS = zlib.MAX_WBITS | 16
 
 
-def read_bounded(path: Path, most: int = MOST_WHOLE) -> bytes:
-    """Return the content of a regular file, following links; TooLarge if it has more than `most` bytes.
+def read_bounded(path: Path, most_bytes: int = MOST_FILE_BYTES) -> bytes:
+    """Return the content of a regular file, following links; TooLarge if it has more than `most_bytes`.
 
-    OSError as `Path.read_bytes`, and for a pipe, socket or device (`is_no_file`).
+    OSError as `Path.read_bytes`, and for a pipe, socket or device (`is_no_file_error`).
     """
     with open_regular(path) as file:
-        return read_open(file, path, most)
+        return read_open_file(file, path, most_bytes)
 
 
 def open_regular(path: Path) -> BufferedReader:
@@ -45,24 +45,26 @@ def open_regular(path: Path) -> BufferedReader:
     raise OSError(number, os.strerror(number), str(path))
 
 
-def read_open(file: BinaryIO, where: Path, most: int = MOST_WHOLE) -> bytes:
-    """Return the rest of an open file; TooLarge if it has more than `most` bytes."""
-    check_open(file, where, most)
-    left = os.fstat(file.fileno()).st_size - file.tell()
-    data = file.read(max(left, 0) + 1)  # not `most`, because that many bytes would be reserved
-    while len(data) <= most and (more := file.read(_PIECE)):  # it grows, or does not have a size
+def read_open_file(file: BinaryIO, where: Path, most_bytes: int = MOST_FILE_BYTES) -> bytes:
+    """Return the rest of an open file; TooLarge if it has more than `most_bytes`."""
+    check_file_size(file, where, most_bytes)
+    remaining = os.fstat(file.fileno()).st_size - file.tell()
+    data = file.read(max(remaining, 0) + 1)  # not `most_bytes`, because that many bytes would be reserved
+    while len(data) <= most_bytes and (
+        more := file.read(_FURTHER_READ_BYTES)
+    ):  # it grows, or does not have a size
         data += more
-    if len(data) > most:
-        raise _too_large(len(data), where, most)
+    if len(data) > most_bytes:
+        raise _too_large_error(len(data), where, most_bytes)
     return data
 
 
-def check_open(file: BinaryIO, where: Path, most: int = MOST_DATA) -> None:
-    """Raise TooLarge if an open file has more than `most` bytes, or if it is large and has holes."""
+def check_file_size(file: BinaryIO, where: Path, most_bytes: int = MOST_DATA_BYTES) -> None:
+    """Raise TooLarge if an open file has more than `most_bytes`, or if it is large and has holes."""
     size = os.fstat(file.fileno()).st_size
-    if size > most:
-        raise _too_large(size, where, most)
-    if size >= _DENSE and _has_hole(file.fileno(), size):
+    if size > most_bytes:
+        raise _too_large_error(size, where, most_bytes)
+    if size >= _NO_HOLES_FROM_BYTES and _has_hole(file.fileno(), size):
         raise TooLarge(
             f"{size:,} bytes with holes",
             where=where,
@@ -71,13 +73,13 @@ def check_open(file: BinaryIO, where: Path, most: int = MOST_DATA) -> None:
         )
 
 
-def bounded_lines(file: BinaryIO, where: Path, most: int = MOST_LINE) -> Iterator[bytes]:
-    """Yield the lines of an open file, with their newlines; TooLarge for a line of more than `most` bytes."""
-    check_open(file, where)
-    for number, line in enumerate(iter(partial(file.readline, most + 1), b""), start=1):
-        if len(line) > most:
+def read_bounded_lines(file: BinaryIO, where: Path, most_bytes: int = MOST_LINE_BYTES) -> Iterator[bytes]:
+    """Yield the lines of an open file, with their newlines; TooLarge for a line of more than `most_bytes`."""
+    check_file_size(file, where)
+    for number, line in enumerate(iter(partial(file.readline, most_bytes + 1), b""), start=1):
+        if len(line) > most_bytes:
             raise TooLarge(
-                f"a line of more than {most:,} bytes",
+                f"a line of more than {most_bytes:,} bytes",
                 where=where,
                 line=number,
                 expected="shorter lines",
@@ -86,35 +88,35 @@ def bounded_lines(file: BinaryIO, where: Path, most: int = MOST_LINE) -> Iterato
         yield line
 
 
-def unpacked(data: bytes, most: int, dictionary: bytes = b"", *, gzip: bool = False) -> bytes:
-    """Return what zlib (or gzip) data unpacks to. ValueError if that is more than `most` bytes.
+def unpack_bounded(data: bytes, most_bytes: int, dictionary: bytes = b"", *, gzip: bool = False) -> bytes:
+    """Return what zlib (or gzip) data unpacks to. ValueError if that is more than `most_bytes`.
 
     zlib.error for damaged or incomplete data.
     """
-    unpacker = zlib.decompressobj(_GZIP if gzip else zlib.MAX_WBITS, zdict=dictionary)
-    found = unpacker.decompress(data, most + 1)
-    if len(found) > most:
-        raise ValueError(f"unpacks to more than {most} bytes")
+    unpacker = zlib.decompressobj(_GZIP_WBITS if gzip else zlib.MAX_WBITS, zdict=dictionary)
+    content = unpacker.decompress(data, most_bytes + 1)
+    if len(content) > most_bytes:
+        raise ValueError(f"unpacks to more than {most_bytes} bytes")
     if not unpacker.eof or (gzip and unpacker.unused_data):
         raise zlib.error("incomplete data")
-    return found
+    return content
 
 
 def _has_hole(file: int, size: int) -> bool:
     """Return whether a file has a hole; file systems without holes report one at the end."""
-    at = os.lseek(file, 0, os.SEEK_CUR)
+    position = os.lseek(file, 0, os.SEEK_CUR)
     try:
         return os.lseek(file, 0, os.SEEK_HOLE) < size
     except OSError:
         return False
     finally:
-        os.lseek(file, at, os.SEEK_SET)
+        os.lseek(file, position, os.SEEK_SET)
 
 
-def _too_large(size: int, where: Path, most: int) -> TooLarge:
+def _too_large_error(size: int, where: Path, most_bytes: int) -> TooLarge:
     return TooLarge(
         f"{size:,} bytes",
         where=where,
-        expected=f"at most {most:,} bytes",
+        expected=f"at most {most_bytes:,} bytes",
         remedy="shorten or split it, or delete it if it does not belong here",
     )

@@ -19,15 +19,15 @@ from io import BufferedReader
 from pathlib import Path
 from typing import BinaryIO
 
-from mutator._common.bounded_reading import read_open
-from mutator._common.files import clear_place, let_in, raising_disk_full
+from mutator._common.bounded_reading import read_open_file
+from mutator._common.files import make_accessible, raising_disk_full, remove_anything_at
 from mutator.errors import MutatorError, Outside
 
-_FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
-_CAREFULLY = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
-_NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
-_DEEPEST, _DEEPEST_OUTPUT = 30, 20  # folders in each other; an output lies in a few others
-_LONGEST_NAME = 220  # bytes; Linux allows 255, and a half-written file has a longer name
+_OPEN_FOLDER_FLAGS = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
+_NO_LINK_NO_WAIT_FLAGS = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
+_NEW_FILE_FLAGS = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
+_MOST_DEPTH, _MOST_OUTPUT_DEPTH = 30, 20  # folders in each other; an output lies in a few others
+_MOST_NAME_BYTES = 220  # bytes; Linux allows 255, and a half-written file has a longer name
 
 
 def check_name(name: object, where: str | Path, *, folders: bool = True) -> str:
@@ -39,7 +39,7 @@ def check_name(name: object, where: str | Path, *, folders: bool = True) -> str:
     text = name if isinstance(name, str) else ""
     parts = text.split("/")
     if (folders or len(parts) == 1) and all(
-        part not in ("", ".", "..") and part.isprintable() and _fits(part) for part in parts
+        part not in ("", ".", "..") and part.isprintable() and _is_short_enough(part) for part in parts
     ):
         return text
     raise Outside(
@@ -62,7 +62,7 @@ def check_library_name(name: str, where: str | Path) -> str:
     )
 
 
-def inside(root: Path, name: object) -> Path:
+def path_below(root: Path, name: object) -> Path:
     """Join a name that is not a constant of the code to `root`; Outside as in `check_name`."""
     return root / check_name(name, root)
 
@@ -73,23 +73,23 @@ def open_below(root: Path, name: str) -> BufferedReader:
     FileNotFoundError if it is missing; Outside if it is a link or no regular file, or if a folder on the way
     is a link.
     """
-    file = open_descriptor(root, name, os.O_RDONLY)
+    file = open_descriptor_below(root, name, os.O_RDONLY)
     if not stat.S_ISREG(os.fstat(file).st_mode):
         os.close(file)
-        raise not_plain(root / name)
+        raise not_plain_error(root / name)
     return os.fdopen(file, "rb")
 
 
-def open_descriptor(root: Path, name: str, flags: int) -> int:
+def open_descriptor_below(root: Path, name: str, flags: int) -> int:
     """Return a descriptor of anything but a link, for the caller to check and close. Opening never blocks."""
-    with _parent(root, name) as (parent, last):
-        return os.open(last, flags | _CAREFULLY, 0o644, dir_fd=parent)
+    with _open_parent(root, name) as (parent, last_part):
+        return os.open(last_part, flags | _NO_LINK_NO_WAIT_FLAGS, 0o644, dir_fd=parent)
 
 
 def read_below(root: Path, name: str) -> bytes:
     """Return the content of a file; errors as in `open_below` and `read_open`."""
     with open_below(root, name) as file:
-        return read_open(file, root / name)
+        return read_open_file(file, root / name)
 
 
 def write_below(root: Path, name: str, data: bytes) -> None:
@@ -105,17 +105,17 @@ def writing_below(root: Path, name: str) -> Iterator[BinaryIO]:
     What stands in its place is replaced, never written to. Outside if a folder on the way is a link;
     MutatorError if a folder stands in its place.
     """
-    with raising_disk_full(root / name), _parent(root, name, make=True) as (parent, last):
-        temporary = f".{last}.{threading.get_native_id()}"  # `is_half_written`
+    with raising_disk_full(root / name), _open_parent(root, name, make=True) as (parent, last_part):
+        temporary = f".{last_part}.{threading.get_native_id()}"  # `is_half_written`
         with suppress(FileNotFoundError):
             os.unlink(temporary, dir_fd=parent)
-        file = os.open(temporary, _NEW, 0o644, dir_fd=parent)
+        file = os.open(temporary, _NEW_FILE_FLAGS, 0o644, dir_fd=parent)
         try:
             with os.fdopen(file, "wb") as writer:
                 yield writer
                 writer.flush()
                 os.fsync(file)
-            os.replace(temporary, last, src_dir_fd=parent, dst_dir_fd=parent)
+            os.replace(temporary, last_part, src_dir_fd=parent, dst_dir_fd=parent)
         except BaseException as err:
             with suppress(OSError):
                 os.unlink(temporary, dir_fd=parent)
@@ -127,21 +127,21 @@ def writing_below(root: Path, name: str) -> Iterator[BinaryIO]:
 
 def unlink_below(root: Path, name: str) -> None:
     """Delete a file or a link, which is not followed; a missing one is ignored."""
-    with suppress(FileNotFoundError), _parent(root, name) as (parent, last):
-        os.unlink(last, dir_fd=parent)
+    with suppress(FileNotFoundError), _open_parent(root, name) as (parent, last_part):
+        os.unlink(last_part, dir_fd=parent)
 
 
 def move_below(root: Path, name: str, to: str) -> None:
     """Rename a file, folder or link, which is not followed; make the folders of `to`."""
-    with _parent(root, name) as (parent, last), _parent(root, to, make=True) as (there, final):
+    with _open_parent(root, name) as (parent, last), _open_parent(root, to, make=True) as (there, final):
         os.rename(last, final, src_dir_fd=parent, dst_dir_fd=there)
 
 
-def check_plain(root: Path) -> None:
+def check_only_plain_files(root: Path) -> None:
     """Raise Outside if anything below `root` is neither a regular file nor a folder."""
     for _, entry in entries_below(root):
-        if not is_plain(entry):
-            raise not_plain(Path(entry.path))
+        if not is_file_or_folder(entry):
+            raise not_plain_error(Path(entry.path))
 
 
 def check_inside(root: Path, path: Path) -> Path:
@@ -176,11 +176,10 @@ def files_inside(root: Path, folder: str, pattern: str) -> list[Path]:
 
 
 def entries_below(
-    root: Path, closed: Callable[[str], bool] = lambda name: False
+    root: Path, is_closed: Callable[[str], bool] = lambda name: False
 ) -> Iterator[tuple[str, os.DirEntry[str]]]:
-    """Yield everything below `root` with its path from there, but nothing in links and `closed` folders.
-
-    What disappears meanwhile is left out.
+    """Yield everything below `root` with its path from there, but nothing in links, nor in folders
+    that `is_closed`. What disappears meanwhile is left out.
     """
     folders = [""]
     while folders:
@@ -189,63 +188,63 @@ def entries_below(
             for entry in entries:
                 name = f"{folder}{entry.name}"
                 yield name, entry
-                if entry.is_dir(follow_symlinks=False) and not closed(name):
+                if entry.is_dir(follow_symlinks=False) and not is_closed(name):
                     folders.append(f"{name}/")
 
 
-def move_plain(source: int, target: int, depth: int = 0) -> None:
+def move_plain_files(source: int, target: int, depth: int = 0) -> None:
     """Move regular files between open folders, whoever can change the first one meanwhile.
 
     Folders are made anew. Links, pipes and the like, unprintable names and deep folders stay behind.
     """
-    if depth >= _DEEPEST_OUTPUT:
+    if depth >= _MOST_OUTPUT_DEPTH:
         return
     with suppress(OSError):
         os.fchmod(source, stat.S_IRWXU)
     with os.scandir(source) as entries:
-        found = [entry.name for entry in entries if entry.name.isprintable()]
-    for name in sorted(found):
+        names = [entry.name for entry in entries if entry.name.isprintable()]
+    for name in sorted(names):
         with suppress(FileNotFoundError, NotADirectoryError):
-            kind = _kind(source, name)
+            kind = _file_type(source, name)
             if kind == stat.S_IFREG:
                 os.rename(name, name, src_dir_fd=source, dst_dir_fd=target)
-                if _kind(target, name) != stat.S_IFREG:  # exchanged between look and move
-                    clear_place(Path(f"/proc/self/fd/{target}", name))
+                if _file_type(target, name) != stat.S_IFREG:  # exchanged between look and move
+                    remove_anything_at(Path(f"/proc/self/fd/{target}", name))
             elif kind == stat.S_IFDIR:
                 os.mkdir(name, dir_fd=target)
                 with open_folder(name, source) as below, open_folder(name, target) as there:
-                    move_plain(below, there, depth + 1)
+                    move_plain_files(below, there, depth + 1)
 
 
 @contextmanager
 def open_folder(name: str | Path, parent: int | None = None) -> Iterator[int]:
     """Yield a descriptor of a folder; NotADirectoryError for anything else, also for a link."""
     with suppress(OSError):
-        let_in(name, parent)
-    handle = os.open(name, _FOLDER, dir_fd=parent)
+        make_accessible(name, parent)
+    handle = os.open(name, _OPEN_FOLDER_FLAGS, dir_fd=parent)
     try:
         yield handle
     finally:
         os.close(handle)
 
 
-def _kind(folder: int, name: str) -> int:
+def _file_type(folder: int, name: str) -> int:
     return stat.S_IFMT(os.stat(name, dir_fd=folder, follow_symlinks=False).st_mode)
 
 
-def is_deep(name: str) -> bool:
+def is_too_deep(name: str) -> bool:
     """Whether a path has more folders than anything that belongs there; readers would recurse too deeply."""
-    return name.count("/") >= _DEEPEST
+    return name.count("/") >= _MOST_DEPTH
 
 
-def is_plain(entry: os.DirEntry[str]) -> bool:
+def is_file_or_folder(entry: os.DirEntry[str]) -> bool:
     """Whether an entry is a regular file or a folder, or has disappeared."""
     kinds = entry.is_file(follow_symlinks=False), entry.is_dir(follow_symlinks=False)
     return any(kinds) or not os.path.lexists(entry.path)
 
 
 @contextmanager
-def _parent(root: Path, name: str, *, make: bool = False) -> Iterator[tuple[int, str]]:
+def _open_parent(root: Path, name: str, *, make: bool = False) -> Iterator[tuple[int, str]]:
     """Open the folder that contains `name`; yield its descriptor and the last part of the name."""
     *folders, last = check_name(name, root).split("/")
     handle = os.open(root, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
@@ -254,19 +253,19 @@ def _parent(root: Path, name: str, *, make: bool = False) -> Iterator[tuple[int,
             if make:
                 with suppress(FileExistsError):
                     os.mkdir(part, dir_fd=handle)
-            inner = os.open(part, _FOLDER, dir_fd=handle)
+            inner = os.open(part, _OPEN_FOLDER_FLAGS, dir_fd=handle)
             os.close(handle)
             handle = inner
         yield handle, last
     except OSError as err:
         if err.errno in (errno.ELOOP, errno.ENOTDIR, errno.ENXIO):
-            raise not_plain(root / name) from None
+            raise not_plain_error(root / name) from None
         raise
     finally:
         os.close(handle)
 
 
-def not_plain(path: Path) -> Outside:
+def not_plain_error(path: Path) -> Outside:
     """Return the error about a link, a pipe and the like, for the caller to raise."""
     return Outside(
         "a link, a pipe or something else that is not a plain file",
@@ -276,8 +275,8 @@ def not_plain(path: Path) -> Outside:
     )
 
 
-def _fits(part: str) -> bool:
+def _is_short_enough(part: str) -> bool:
     try:
-        return len(part.encode()) <= _LONGEST_NAME
+        return len(part.encode()) <= _MOST_NAME_BYTES
     except UnicodeEncodeError:
         return False

@@ -16,99 +16,104 @@ from pkgutil import iter_modules, resolve_name
 from traceback import walk_tb
 from typing import TYPE_CHECKING, Any
 
-from mutator._common.files import is_disk_full
+from mutator._common.files import is_disk_full_error
 from mutator._common.message_text import suggestion
-from mutator._common.resource_shortages import shortage
+from mutator._common.resource_shortages import find_shortage
 from mutator.errors import BadAddition, MutatorError, Signal
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint, EntryPoints
 
-_OWN = Path(__file__).parent.parent  # the harness
+_HARNESS_FOLDER = Path(__file__).parent.parent  # the harness
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Door:
-    """One kind of addition. `thing` is its name, `kind` (`module:class`) is what every object must be, and
-    `group` the group of entry points.
+    """One kind of addition. `addition` is its name, `type_path` the type of every object (`module:class`),
+    and `group` the group of entry points.
 
-    The modules of the package `folder` hold the shipped ones, each as an attribute named like `thing`, in
-    capitals. A module's name is the name of the object, with `_` for `-`, and after a keyword of Python.
+    The modules of the package `shipped_package` hold the shipped ones, each as an attribute named like
+    `addition`, in capitals. A module's name is the name of the object, with `_` for `-`, and after a keyword
+    of Python.
     """
 
-    thing: str
+    addition: str
     group: str
-    kind: str
-    folder: str | None = None
+    type_path: str
+    shipped_package: str | None = None
     argument: str | None = None  # the API's argument that names one; None if only files do
-    first: tuple[str, ...] = ()  # these come before all others, in this order
+    first_names: tuple[str, ...] = ()  # these come before all others, in this order
 
     @property
     def attribute(self) -> str:
         """The name of the object in a shipped module."""
-        return self.thing.upper()
+        return self.addition.upper()
 
-    def shipped(self) -> tuple[str, ...]:
+    def shipped_names(self) -> tuple[str, ...]:
         """Return the names of the shipped objects."""
-        return tuple(sorted(_shipped(self.folder), key=self.place)) if self.folder else ()
+        return (
+            tuple(sorted(_shipped_names(self.shipped_package), key=self.sort_key))
+            if self.shipped_package
+            else ()
+        )
 
-    def installed(self) -> tuple[str, ...]:
+    def installed_names(self) -> tuple[str, ...]:
         """Return the names that other packages add."""
         return tuple(sorted({point.name for point in _entry_points(self.group)}))
 
     def names(self) -> tuple[str, ...]:
-        return tuple(dict.fromkeys((*self.shipped(), *self.installed())))
+        return tuple(dict.fromkeys((*self.shipped_names(), *self.installed_names())))
 
-    def place(self, name: str) -> tuple[int, str]:
+    def sort_key(self, name: str) -> tuple[int, str]:
         """Return a key that sorts names."""
-        return self.first.index(name) if name in self.first else len(self.first), name
+        return self.first_names.index(name) if name in self.first_names else len(self.first_names), name
 
     def has(self, name: str) -> bool:
-        return name in self.shipped() or name in self.installed()
+        return name in self.shipped_names() or name in self.installed_names()
 
-    def find(self, name: str) -> Any:
+    def load(self, name: str) -> Any:
         """Return the object of that name.
 
         MutatorError for an unknown name, a name that two packages use, an entry point that cannot be loaded,
         or an object of another kind.
         """
         points = list(_entry_points(self.group).select(name=name))
-        is_shipped = name in self.shipped()
+        is_shipped = name in self.shipped_names()
         if len(points) + is_shipped > 1:
-            owners = ["mutator"] * is_shipped + [_package(point) for point in points]
-            raise self._refused(
-                name, f"{self.thing} '{name}' comes from {' and '.join(owners)}", "uninstall all but one"
+            owners = ["mutator"] * is_shipped + [_package_and_version(point) for point in points]
+            raise self._name_error(
+                name, f"{self.addition} '{name}' comes from {' and '.join(owners)}", "uninstall all but one"
             )
-        if self.folder and is_shipped:
-            return _load_shipped(self.folder, self.attribute, name)
+        if self.shipped_package and is_shipped:
+            return _load_shipped(self.shipped_package, self.attribute, name)
         if not points:
             remedy = "correct the name, or install the package that adds it"
-            raise self._refused(
-                name, f"no {self.thing} '{name}'", remedy + suggestion(name, list(self.names()))
+            raise self._name_error(
+                name, f"no {self.addition} '{name}'", remedy + suggestion(name, list(self.names()))
             )
-        return self._load(points[0])
+        return self._load_entry_point(points[0])
 
-    def _load(self, point: "EntryPoint") -> Any:
-        what = f"{self.thing} '{point.name}' of package {_package(point)} ({point.value})"
+    def _load_entry_point(self, point: "EntryPoint") -> Any:
+        what = f"{self.addition} '{point.name}' of package {_package_and_version(point)} ({point.value})"
         remedy = "correct, update or uninstall this package"
         try:
             loaded = point.load()
         except Exception as err:  # importing it runs the code of somebody else
             why = f"{type(err).__name__}: {err}"
             raise MutatorError(f"{what} cannot be loaded: {why}", remedy=remedy) from err
-        if not isinstance(loaded, resolve_name(self.kind)):
-            kind = self.kind.replace(":", ".")
+        if not isinstance(loaded, resolve_name(self.type_path)):
+            kind = self.type_path.replace(":", ".")
             raise MutatorError(
                 f"{what} is of type {type(loaded).__name__}", expected=f"a {kind}", remedy=remedy
             )
         return loaded
 
-    def package(self, name: str) -> str | None:
+    def package_of(self, name: str) -> str | None:
         """Return the package that adds that name; None if the harness does, or nobody."""
-        return next((point.dist.name for point in self._of_others(name) if point.dist), None)
+        return next((point.dist.name for point in self._entry_points_of_others(name) if point.dist), None)
 
     @contextmanager
-    def running(self, name: str) -> Iterator[None]:
+    def blaming_package(self, name: str) -> Iterator[None]:
         """Raise BadAddition for an exception in code of that name, if another package adds it. What the
         harness raises itself, and errors of a machine that is out of something, stay as they are.
         """
@@ -117,45 +122,49 @@ class Door:
         except (MutatorError, Signal):
             raise
         except Exception as err:
-            if shortage(err) or is_disk_full(err) or (failure := self.failure(name, err)) is None:
+            if (
+                find_shortage(err)
+                or is_disk_full_error(err)
+                or (failure := self.addition_error(name, err)) is None
+            ):
                 raise
             raise failure from err
 
-    def failure(self, name: str, err: Exception) -> BadAddition | None:
+    def addition_error(self, name: str, err: Exception) -> BadAddition | None:
         """Return the error that blames another package for an exception in what it adds under that name;
         None if the harness adds it.
         """
-        packages = [_package(point) for point in self._of_others(name)]
+        packages = [_package_and_version(point) for point in self._entry_points_of_others(name)]
         if not packages:
             return None
-        where, line = next(_places_of_others(err), (None, None))
+        where, line = next(_foreign_lines(err), (None, None))
         return BadAddition(
-            f"{self.thing} '{name}' of package {packages[0]} fails: {type(err).__name__}: {err}",
+            f"{self.addition} '{name}' of package {packages[0]} fails: {type(err).__name__}: {err}",
             where=where,
             line=line,
             remedy="correct or remove the package",
         )
 
-    def _of_others(self, name: str) -> "list[EntryPoint]":
+    def _entry_points_of_others(self, name: str) -> "list[EntryPoint]":
         points = _entry_points(self.group).select(name=name)
         return [point for point in points if not (point.dist and point.dist.name == "mutator")]
 
-    def _refused(self, name: str, got: str, remedy: str) -> MutatorError:
+    def _name_error(self, name: str, got: str, remedy: str) -> MutatorError:
         others = ", ".join(other for other in self.names() if other != name)
-        expected = f"one of {others}" if others else f"no {self.thing}, because none is installed"
+        expected = f"one of {others}" if others else f"no {self.addition}, because none is installed"
         return MutatorError(got, argument=self.argument, expected=expected, remedy=remedy)
 
 
 @cache
-def _shipped(folder: str) -> tuple[str, ...]:
-    path = _OWN.joinpath(*folder.split(".")[1:])  # without importing the package
+def _shipped_names(folder: str) -> tuple[str, ...]:
+    path = _HARNESS_FOLDER.joinpath(*folder.split(".")[1:])  # without importing the package
     return tuple(module.name.rstrip("_").replace("_", "-") for module in iter_modules([str(path)]))
 
 
 @cache
-def _load_shipped(folder: str, attribute: str, name: str) -> Any:
+def _load_shipped(package: str, attribute: str, name: str) -> Any:
     module = name.replace("-", "_") + "_" * iskeyword(name)
-    return getattr(import_module(f"{folder}.{module}"), attribute)
+    return getattr(import_module(f"{package}.{module}"), attribute)
 
 
 def _entry_points(group: str) -> "EntryPoints":
@@ -164,47 +173,49 @@ def _entry_points(group: str) -> "EntryPoints":
     return entry_points(group=group)
 
 
-def _places_of_others(err: Exception) -> Iterator[tuple[str, int]]:
+def _foreign_lines(err: Exception) -> Iterator[tuple[str, int]]:
     """Yield the files and lines of an exception that are not the harness's, from the outermost call."""
     for frame, line in walk_tb(err.__traceback__):
         file = frame.f_code.co_filename
-        if not Path(file).is_relative_to(_OWN):
+        if not Path(file).is_relative_to(_HARNESS_FOLDER):
             yield file, line
 
 
-def _package(point: "EntryPoint") -> str:
+def _package_and_version(point: "EntryPoint") -> str:
     return f"{point.dist.name} {point.dist.version}" if point.dist else "unknown"
 
 
 EXPORTS = Door(
-    thing="export",
+    addition="export",
     group="mutator.exports",
-    kind="mutator.exports:Export",
-    folder="mutator.exports.formats",
+    type_path="mutator.exports:Export",
+    shipped_package="mutator.exports.formats",
     argument="format",
 )
 IMPORTERS = Door(
-    thing="importer",
+    addition="importer",
     group="mutator.importers",
-    kind="mutator.outcomes.trace_files:Importer",
-    folder="mutator.outcomes.importers",
+    type_path="mutator.outcomes.trace_files:Importer",
+    shipped_package="mutator.outcomes.importers",
     argument="trace",
 )
 DISTRIBUTORS = Door(
-    thing="distributor",
+    addition="distributor",
     group="mutator.distributors",
-    kind="mutator.execution.distribution:DistributorKind",
-    folder="mutator.execution.distributors",
+    type_path="mutator.execution.distribution:DistributorKind",
+    shipped_package="mutator.execution.distributors",
     argument="cluster",
 )
 OPERATORS = Door(
-    thing="operator",
+    addition="operator",
     group="mutator.operators",
-    kind="mutator.operators:Operator",
-    folder="mutator.operators.shipped",
+    type_path="mutator.operators:Operator",
+    shipped_package="mutator.operators.shipped",
     argument="operators",
     # if two make the same change, it belongs to the first, so another order changes samples
-    first=("arithmetic", "comparison", "constant", "branch", "omission", "return", "argument"),
+    first_names=("arithmetic", "comparison", "constant", "branch", "omission", "return", "argument"),
 )
-STUDIES = Door(thing="study", group="mutator.studies", kind="mutator.report.reported_run:PublishedWork")
+STUDIES = Door(
+    addition="study", group="mutator.studies", type_path="mutator.report.reported_run:PublishedWork"
+)
 DOORS = (EXPORTS, IMPORTERS, DISTRIBUTORS, OPERATORS, STUDIES)

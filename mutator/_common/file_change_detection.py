@@ -3,8 +3,8 @@
 import os
 from collections.abc import Mapping
 
-_READ = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
-_State = tuple[int, int, int, int]
+_READ_FLAGS = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
+_FileState = tuple[int, int, int, int]
 
 
 class UnchangedFiles:
@@ -17,7 +17,7 @@ class UnchangedFiles:
 
     def __init__(self, files: Mapping[str, bytes]) -> None:
         self._files = files
-        self._states = {path: _found(path) for path in files}  # None for a file that is already missing
+        self._states = {path: _state_at(path) for path in files}  # None for a file that is already missing
 
     def first_changed(self) -> str:
         """Return the path of a file that was changed, replaced or removed; empty if there is none."""
@@ -25,24 +25,24 @@ class UnchangedFiles:
 
     def _is_unchanged(self, path: str) -> bool:
         try:
-            file = os.open(path, _READ)
+            file = os.open(path, _READ_FLAGS)
         except OSError:
             return False
         try:
             data = self._files[path]
-            return _state(os.fstat(file)) == self._states[path] and os.read(file, len(data) + 1) == data
+            return _file_state(os.fstat(file)) == self._states[path] and os.read(file, len(data) + 1) == data
         except OSError:
             return False
         finally:
             os.close(file)
 
 
-def _found(path: str) -> _State | None:
+def _state_at(path: str) -> _FileState | None:
     try:
-        return _state(os.lstat(path))
+        return _file_state(os.lstat(path))
     except OSError:
         return None
 
 
-def _state(state: os.stat_result) -> _State:
+def _file_state(state: os.stat_result) -> _FileState:
     return state.st_dev, state.st_ino, state.st_mode, state.st_ctime_ns

@@ -14,31 +14,33 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from mutator._common.bounded_reading import MOST_JSON, read_bounded
+from mutator._common.bounded_reading import MOST_JSON_BYTES, read_bounded
 from mutator.errors import DiskFull, MutatorError
 
-_NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
-_FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW
-_NO_FILE = (errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP, errno.ENXIO)
+_DISK_FULL_ERRNOS = (errno.ENOSPC, errno.EDQUOT)
+_OPEN_FOLDER_FLAGS = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW
+_NO_FILE_ERRNOS = (errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP, errno.ENXIO)
 
 
-def is_disk_full(err: BaseException | None) -> bool:
+def is_disk_full_error(err: BaseException | None) -> bool:
     """Whether a full disk or quota caused an error, even if a library wraps or rewords it."""
-    seen: list[BaseException] = []  # a chain of causes can be circular
-    while err is not None and not any(err is one for one in seen):
-        if getattr(err, "errno", None) in _NO_SPACE or any(os.strerror(n) in str(err) for n in _NO_SPACE):
+    visited: list[BaseException] = []  # a chain of causes can be circular
+    while err is not None and not any(err is cause for cause in visited):
+        if getattr(err, "errno", None) in _DISK_FULL_ERRNOS or any(
+            os.strerror(n) in str(err) for n in _DISK_FULL_ERRNOS
+        ):
             return True
-        seen.append(err)
+        visited.append(err)
         err = err.__cause__ or err.__context__
     return False
 
 
-def is_no_file(err: OSError) -> bool:
+def is_no_file_error(err: OSError) -> bool:
     """Whether an error means that a path holds no regular file."""
-    return err.errno in _NO_FILE
+    return err.errno in _NO_FILE_ERRNOS
 
 
-def disk_full(where: str | Path | None) -> DiskFull:
+def disk_full_error(where: str | Path | None) -> DiskFull:
     return DiskFull(
         "no space left on this disk",
         where=where,
@@ -54,12 +56,12 @@ def raising_disk_full(where: Path) -> Iterator[None]:
     except MutatorError:
         raise
     except Exception as err:
-        if is_disk_full(err):
-            raise disk_full(where) from err
+        if is_disk_full_error(err):
+            raise disk_full_error(where) from err
         raise
 
 
-def check_is_text(path: Path) -> None:
+def check_path_encodable(path: Path) -> None:
     """Raise MutatorError for a path that this environment cannot encode, because digests and tables contain
     paths.
     """
@@ -76,7 +78,7 @@ def check_is_text(path: Path) -> None:
 
 def make_folder(path: Path) -> None:
     """Make a writable folder and its parents; MutatorError if that fails."""
-    check_is_text(path.absolute())
+    check_path_encodable(path.absolute())
     try:
         with raising_disk_full(path):
             path.mkdir(parents=True, exist_ok=True)
@@ -102,21 +104,23 @@ def remove_folder(path: Path) -> None:
     if path.is_symlink():
         return
     with suppress(OSError):
-        here = _opened(str(path))
-        way = [("", _emptied(here), _identity(here))]  # folders on the way down, with remaining subfolders
+        here = _open_folder(str(path))
+        stack = [
+            ("", _delete_files_and_list_folders(here), _folder_identity(here))
+        ]  # folders on the way down, with remaining subfolders
         try:
-            while way:
-                name, left, _ = way[-1]
-                if left:
+            while stack:
+                name, subfolders, _ = stack[-1]
+                if subfolders:
                     with suppress(OSError):
-                        below = left.pop()
-                        here = _instead(here, _opened(below, here))
-                        way.append((below, _emptied(here), _identity(here)))
+                        below = subfolders.pop()
+                        here = _swap_descriptor(here, _open_folder(below, here))
+                        stack.append((below, _delete_files_and_list_folders(here), _folder_identity(here)))
                     continue
-                way.pop()
-                if way:
-                    here = _instead(here, os.open("..", _FOLDER, dir_fd=here))
-                    if _identity(here) != way[-1][2]:
+                stack.pop()
+                if stack:
+                    here = _swap_descriptor(here, os.open("..", _OPEN_FOLDER_FLAGS, dir_fd=here))
+                    if _folder_identity(here) != stack[-1][2]:
                         return  # the folder was moved, so its parent is another one
                     with suppress(OSError):
                         os.rmdir(name, dir_fd=here)
@@ -125,7 +129,7 @@ def remove_folder(path: Path) -> None:
         path.rmdir()
 
 
-def clear_place(path: Path) -> None:
+def remove_anything_at(path: Path) -> None:
     """Delete whatever is at this place: a folder with its content, or a file or link."""
     remove_folder(path)
     with suppress(FileNotFoundError, NotADirectoryError, IsADirectoryError, PermissionError):
@@ -146,13 +150,13 @@ class ScratchFolder:
         self._end()
 
 
-def _opened(name: str, parent: int | None = None) -> int:
+def _open_folder(name: str, parent: int | None = None) -> int:
     with suppress(OSError):
-        let_in(name, parent)
-    return os.open(name, _FOLDER, dir_fd=parent)
+        make_accessible(name, parent)
+    return os.open(name, _OPEN_FOLDER_FLAGS, dir_fd=parent)
 
 
-def let_in(name: str | Path, parent: int | None = None) -> None:
+def make_accessible(name: str | Path, parent: int | None = None) -> None:
     """Let this user list and change a folder; OSError for a link."""
     place = os.open(name, os.O_PATH | os.O_DIRECTORY | os.O_NOFOLLOW, dir_fd=parent)
     try:
@@ -161,37 +165,37 @@ def let_in(name: str | Path, parent: int | None = None) -> None:
         os.close(place)
 
 
-def _identity(folder: int) -> tuple[int, int]:
+def _folder_identity(folder: int) -> tuple[int, int]:
     state = os.fstat(folder)
     return state.st_dev, state.st_ino
 
 
-def _instead(old: int, new: int) -> int:
+def _swap_descriptor(old: int, new: int) -> int:
     os.close(old)
     return new
 
 
-def _emptied(folder: int) -> list[str]:
+def _delete_files_and_list_folders(folder: int) -> list[str]:
     """Delete everything in an open folder except subfolders; return their names."""
     with os.scandir(folder) as entries:
-        found = [(entry.name, entry.is_dir(follow_symlinks=False)) for entry in entries]
-    for name, is_folder in found:
+        children = [(entry.name, entry.is_dir(follow_symlinks=False)) for entry in entries]
+    for name, is_folder in children:
         with suppress(OSError):
             if not is_folder:
                 os.unlink(name, dir_fd=folder)
-    return [name for name, is_folder in found if is_folder]
+    return [name for name, is_folder in children if is_folder]
 
 
 def write_atomic(path: Path, data: bytes) -> None:
     """Write the whole file, or leave the old file unchanged; raise DiskFull if there is no room, MutatorError
     if the path is a folder.
     """
-    with half_written(path) as temporary:
+    with writing_temporary_path(path) as temporary:
         temporary.write_bytes(data)
 
 
 @contextmanager
-def half_written(path: Path) -> Iterator[Path]:
+def writing_temporary_path(path: Path) -> Iterator[Path]:
     """Yield a temporary path to write to. The file there is renamed to `path` unless the block raises."""
     if path.is_dir():
         raise MutatorError("a folder", where=path, expected="a file to write", remedy="name a file in it")
@@ -209,20 +213,20 @@ def half_written(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def writing_atomic(path: Path) -> Iterator[BinaryIO]:
-    """Like `half_written`, but yield a file opened for writing."""
-    with half_written(path) as temporary, temporary.open("wb") as file:
+    """Like `writing_temporary_path`, but yield a file opened for writing."""
+    with writing_temporary_path(path) as temporary, temporary.open("wb") as file:
         yield file
 
 
 def is_half_written(name: str) -> bool:
-    """Whether a file of this name is left over from a killed `write_atomic` or `half_written`."""
-    return complete(name) != name
+    """Whether a file of this name is left over from a killed `write_atomic` or `writing_temporary_path`."""
+    return final_name(name) != name
 
 
-def complete(name: str) -> str:
+def final_name(name: str) -> str:
     """Return the final name of a half-written file; any other name unchanged."""
-    found = re.fullmatch(r"\.(.+)\.\d+", name)
-    return found[1] if found else name
+    match = re.fullmatch(r"\.(.+)\.\d+", name)
+    return match[1] if match else name
 
 
 def write_json(path: Path, data: dict[str, Any]) -> None:
@@ -238,16 +242,16 @@ def json_bytes(data: dict[str, Any]) -> bytes:
 def read_json(path: Path, schema: str) -> dict[str, Any]:
     """Read a JSON object that has the schema `schema` (`name/version`)."""
     try:
-        data = read_bounded(path, MOST_JSON)
+        data = read_bounded(path, MOST_JSON_BYTES)
     except OSError as err:
-        if not is_no_file(err):
+        if not is_no_file_error(err):
             raise
         got = "no such file" if isinstance(err, FileNotFoundError) else f"not a file ({err.strerror})"
         raise MutatorError(got, where=path) from None
-    return json_object(data, path, schema)
+    return parse_json_object(data, path, schema)
 
 
-def json_object(text: bytes, where: Path, schema: str) -> dict[str, Any]:
+def parse_json_object(text: bytes, where: Path, schema: str) -> dict[str, Any]:
     """Parse the content of the file `where`, as `read_json` does."""
     try:
         data = json.loads(text)
@@ -260,20 +264,20 @@ def json_object(text: bytes, where: Path, schema: str) -> dict[str, Any]:
 
 
 def check_schema(
-    found: object, schema: str, where: str | Path, *, line: int | None = None, remedy: str | None = None
+    actual: object, schema: str, where: str | Path, *, line: int | None = None, remedy: str | None = None
 ) -> None:
-    """Raise MutatorError unless `found`, the schema of the file `where`, is `schema` (`name/version`).
+    """Raise MutatorError unless `actual`, the schema of the file `where`, is `schema` (`name/version`).
 
     `remedy` says what to do about another schema than that of a newer version.
     """
-    if found == schema:
+    if actual == schema:
         return
     name, _, version = schema.partition("/")
-    number = re.fullmatch(rf"{name}/(\d{{1,6}})", str(found))
+    number = re.fullmatch(rf"{name}/(\d{{1,6}})", str(actual))
     if number and int(number[1]) > int(version):
         remedy = "use a newer version of mutator"
     raise MutatorError(
-        "no schema" if found is None else f"schema {found!r}",
+        "no schema" if actual is None else f"schema {actual!r}",
         where=where,
         line=line,
         expected=schema,

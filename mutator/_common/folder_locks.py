@@ -10,20 +10,20 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from mutator._common.confined_files import open_descriptor, unlink_below
+from mutator._common.confined_files import open_descriptor_below, unlink_below
 from mutator._common.files import raising_disk_full
 from mutator.errors import MutatorError, Outside
 
-OWNER = "owner.lock"
-WORKERS = "workers"
-_PATIENCE_S = 15.0  # workers of a dead command exit well within this time
+OWNER_LOCK_FILE = "owner.lock"
+WORKERS_FOLDER = "workers"
+_WORKER_PATIENCE_S = 15.0  # workers of a dead command exit well within this time
 
 
 @contextmanager
-def owned(run: Path, patience_s: float = _PATIENCE_S) -> Iterator[None]:
+def owning_run_folder(run: Path, patience_s: float = _WORKER_PATIENCE_S) -> Iterator[None]:
     """Lock the existing folder `run`; MutatorError while another command or its workers use it."""
     with raising_disk_full(run):
-        fd = _opened(run, OWNER, os.O_CREAT)
+        fd = _open_lock_file(run, OWNER_LOCK_FILE, os.O_CREAT)
     try:
         if not _try_lock(fd):
             raise MutatorError(
@@ -45,15 +45,15 @@ def owned(run: Path, patience_s: float = _PATIENCE_S) -> Iterator[None]:
         try:
             yield
         finally:
-            living_workers(run)
+            living_worker_pids(run)
             with suppress(OSError):  # some workers are still ending, or there were none
-                (run / WORKERS).rmdir()  # never follows a link
+                (run / WORKERS_FOLDER).rmdir()  # never follows a link
     finally:
         os.close(fd)
 
 
 @contextmanager
-def alone_in(folder: Path) -> Iterator[None]:
+def locking_folder(folder: Path) -> Iterator[None]:
     """Wait for an exclusive lock on an existing folder. Nothing is written."""
     fd = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
@@ -66,24 +66,24 @@ def alone_in(folder: Path) -> Iterator[None]:
 def register_worker(run: Path) -> int:
     """Register this process as a worker in `run` until the returned descriptor is closed."""
     with raising_disk_full(run):
-        (run / WORKERS).mkdir(exist_ok=True)
-        fd = _opened(run, f"{WORKERS}/{os.getpid()}", os.O_CREAT)
+        (run / WORKERS_FOLDER).mkdir(exist_ok=True)
+        fd = _open_lock_file(run, f"{WORKERS_FOLDER}/{os.getpid()}", os.O_CREAT)
     fcntl.flock(fd, fcntl.LOCK_EX)
     return fd
 
 
-def living_workers(run: Path) -> list[int]:
+def living_worker_pids(run: Path) -> list[int]:
     """Return the process ids of the workers in `run`, and remove the entries of dead workers."""
     living = []
-    names = (path.name for path in (run / WORKERS).glob("[0-9]*"))
+    names = (path.name for path in (run / WORKERS_FOLDER).glob("[0-9]*"))
     for name in sorted(filter(str.isdecimal, names)):
         try:
-            fd = _opened(run, f"{WORKERS}/{name}")
+            fd = _open_lock_file(run, f"{WORKERS_FOLDER}/{name}")
         except FileNotFoundError:  # another process removed it
             continue
         try:
             if _try_lock(fd):
-                unlink_below(run, f"{WORKERS}/{name}")
+                unlink_below(run, f"{WORKERS_FOLDER}/{name}")
             else:
                 living.append(int(name))
         finally:
@@ -91,28 +91,28 @@ def living_workers(run: Path) -> list[int]:
     return living
 
 
-def wait_for_workers(run: Path, patience_s: float = _PATIENCE_S) -> list[int]:
+def wait_for_workers(run: Path, patience_s: float = _WORKER_PATIENCE_S) -> list[int]:
     """Wait until no worker is left in `run`; return the process ids of workers that outlive `patience_s`."""
     deadline = time.monotonic() + patience_s
-    while (living := living_workers(run)) and time.monotonic() <= deadline:
+    while (living := living_worker_pids(run)) and time.monotonic() <= deadline:
         time.sleep(0.1)
     return living
 
 
-def _opened(run: Path, name: str, more: int = 0) -> int:
+def _open_lock_file(run: Path, name: str, more_flags: int = 0) -> int:
     """Open a lock; MutatorError unless it is a file with no other name, because it is written in place."""
     try:
-        fd = open_descriptor(run, name, os.O_RDWR | more)
+        fd = open_descriptor_below(run, name, os.O_RDWR | more_flags)
     except (Outside, IsADirectoryError):
-        raise _no_lock(run / name) from None
-    found = os.fstat(fd)
-    if not stat.S_ISREG(found.st_mode) or found.st_nlink > 1:
+        raise _bad_lock_file_error(run / name) from None
+    state = os.fstat(fd)
+    if not stat.S_ISREG(state.st_mode) or state.st_nlink > 1:
         os.close(fd)
-        raise _no_lock(run / name)
+        raise _bad_lock_file_error(run / name)
     return fd
 
 
-def _no_lock(path: Path) -> MutatorError:
+def _bad_lock_file_error(path: Path) -> MutatorError:
     return MutatorError(
         "not a regular file with a single name",
         where=path,

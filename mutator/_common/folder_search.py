@@ -6,26 +6,29 @@ from pathlib import Path
 from mutator._common.confined_files import check_name, files_inside
 from mutator._common.shipped_files import shipped_folder
 
-RUNS = Path("runs")
-RUN_HEAD = "run.json"  # the file that identifies a run folder
-_LIBRARY = "fault_library"
-_TEMPLATES = "templates"
+RUNS_FOLDER = Path("runs")
+RUN_HEAD_FILE = "run.json"  # the file that identifies a run folder
+_LIBRARY_FOLDER = "fault_library"
+_TEMPLATES_FOLDER = "templates"
 
-_Given = str | Path | None
+_PathArgument = str | Path | None
 
 
-def library_folder(root: _Given = None, library: _Given = None) -> Path:
+def library_folder(root: _PathArgument = None, library: _PathArgument = None) -> Path:
     """Return the fault library: from an argument, the environment, the current folder or a parent, or the
     shipped library. It need not exist.
     """
-    named = _named(library, root, _LIBRARY, "MUTATOR_LIBRARY")
-    return named or (_upward(_LIBRARY) or shipped_folder()) / _LIBRARY
+    named = _configured_folder(library, root, _LIBRARY_FOLDER, "MUTATOR_LIBRARY")
+    return named or (_nearest_folder_with(_LIBRARY_FOLDER) or shipped_folder()) / _LIBRARY_FOLDER
 
 
-def templates_folder(root: _Given = None, templates: _Given = None) -> Path:
+def templates_folder(root: _PathArgument = None, templates: _PathArgument = None) -> Path:
     """Return the templates folder, found like `library_folder`. It need not exist."""
-    named = _named(templates, root, _TEMPLATES, "MUTATOR_TEMPLATES")
-    return named or (_upward(_LIBRARY, _TEMPLATES) or shipped_folder()) / _TEMPLATES
+    named = _configured_folder(templates, root, _TEMPLATES_FOLDER, "MUTATOR_TEMPLATES")
+    return (
+        named
+        or (_nearest_folder_with(_LIBRARY_FOLDER, _TEMPLATES_FOLDER) or shipped_folder()) / _TEMPLATES_FOLDER
+    )
 
 
 def environment_path(variable: str) -> Path | None:
@@ -43,23 +46,23 @@ def library_files(library: Path, folder: str) -> dict[str, Path]:
 
 def run_folders(root: Path) -> list[Path]:
     """Return the run folders in runs/ of the current folder and of `root`, the most recently used first."""
-    bases = {base.resolve() for base in (RUNS, root / RUNS)}
-    heads = [head for base in bases for head in base.glob(f"*/{RUN_HEAD}")]
+    bases = {base.resolve() for base in (RUNS_FOLDER, root / RUNS_FOLDER)}
+    heads = [head for base in bases for head in base.glob(f"*/{RUN_HEAD_FILE}")]
     heads.sort(key=lambda head: (head.stat().st_mtime_ns, str(head)), reverse=True)
     return [head.parent for head in heads]
 
 
-def _named(folder: _Given, root: _Given, name: str, variable: str) -> Path | None:
+def _configured_folder(folder: _PathArgument, root: _PathArgument, name: str, variable: str) -> Path | None:
     if folder or root:
         return Path(folder) if folder else Path(root or "") / name
     base = environment_path("MUTATOR_ROOT")
     return environment_path(variable) or (base / name if base else None)
 
 
-def _upward(*folders: str) -> Path | None:
+def _nearest_folder_with(*folders: str) -> Path | None:
     """Return the current folder or its nearest parent that contains fault_library/; None if it lacks one of
     `folders`.
     """
     here = Path.cwd()
-    nearest = next((p for p in (here, *here.parents) if (p / _LIBRARY).is_dir()), None)
+    nearest = next((p for p in (here, *here.parents) if (p / _LIBRARY_FOLDER).is_dir()), None)
     return nearest if nearest and all((nearest / name).is_dir() for name in folders) else None

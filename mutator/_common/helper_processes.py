@@ -13,53 +13,57 @@ from typing import Any, TypeVar
 from mutator._common.cpu_cores import usable_cores
 from mutator.errors import MutatorError
 
-_MOST = 2  # the maximum number of processes, because each needs memory
-_WORTH = 20_000  # the smallest number of experiments for which a second process is worth starting
+_MOST_PROCESSES = 2  # the maximum number of processes, because each needs memory
+_MIN_EXPERIMENTS = 20_000  # the smallest number of experiments for which a second process is worth starting
 
 T = TypeVar("T")
 R = TypeVar("R")
 
 
-def processes_for(experiments: int) -> int:
-    return min(_MOST, usable_cores()) if experiments >= _WORTH else 1
+def process_count_for(experiments: int) -> int:
+    return min(_MOST_PROCESSES, usable_cores()) if experiments >= _MIN_EXPERIMENTS else 1
 
 
-def shared(made: Callable[[T], R], items: Sequence[T], processes: int) -> Iterator[R]:
-    """Yield `made(item)` for each item, in order, computed by `processes` processes (with fewer than two: by
-    this process).
+def map_in_processes(compute: Callable[[T], R], items: Sequence[T], process_count: int) -> Iterator[R]:
+    """Yield `compute(item)` for each item, in order, computed by `process_count` processes (with fewer than
+    two: by this process).
 
-    Each process is at most one result ahead, which saves memory. Exceptions that `made` raises are raised
+    Each process is at most one result ahead, which saves memory. Exceptions that `compute` raises are raised
     again; MutatorError if a process dies.
     """
-    if processes < 2:
-        yield from map(made, items)
+    if process_count < 2:
+        yield from map(compute, items)
         return
-    with _workers(made, items, processes) as receivers:
+    with _started_workers(compute, items, process_count) as receivers:
         for number in range(len(items)):
-            yield _received(receivers[number % processes])
+            yield _receive_result(receivers[number % process_count])
 
 
 @contextmanager
-def beside(work: Callable[[], R], processes: int) -> Iterator[Callable[[], R]]:
-    """Run `work` in another process during the block. Yield a function that waits for its result.
+def computing_meanwhile(compute: Callable[[], R], process_count: int) -> Iterator[Callable[[], R]]:
+    """Run `compute` in another process during the block. Yield a function that waits for its result.
 
-    The function raises what `work` raised. With fewer than two processes, `work` itself is yielded.
+    The function raises what `compute` raised. With fewer than two processes, `compute` itself is yielded.
     """
-    if processes < 2:
-        yield work
+    if process_count < 2:
+        yield compute
         return
-    with _workers(lambda _: work(), [None], 1) as [receiver]:
-        yield lambda: _received(receiver)
+    with _started_workers(lambda _: compute(), [None], 1) as [receiver]:
+        yield lambda: _receive_result(receiver)
 
 
 @contextmanager
-def _workers(made: Callable[[T], R], items: Sequence[T], processes: int) -> Iterator[list[Connection]]:
+def _started_workers(
+    compute: Callable[[T], R], items: Sequence[T], process_count: int
+) -> Iterator[list[Connection]]:
     """Start worker processes, which end with the block, and yield the connections to their results."""
     context = get_context("fork")
-    pipes = [context.Pipe(duplex=False) for _ in range(processes)]
+    pipes = [context.Pipe(duplex=False) for _ in range(process_count)]
     workers = [
-        context.Process(target=_work, args=(made, items[number::processes], pipes, number), daemon=True)
-        for number in range(processes)
+        context.Process(
+            target=_send_results, args=(compute, items[number::process_count], pipes, number), daemon=True
+        )
+        for number in range(process_count)
     ]
     try:
         for worker in workers:
@@ -76,8 +80,8 @@ def _workers(made: Callable[[T], R], items: Sequence[T], processes: int) -> Iter
                 worker.join()
 
 
-def _work(
-    made: Callable[[T], Any],
+def _send_results(
+    compute: Callable[[T], Any],
     items: Sequence[T],
     pipes: Sequence[tuple[Connection, Connection]],
     number: int,
@@ -90,14 +94,14 @@ def _work(
     sender = pipes[number][1]
     try:
         for item in items:
-            sender.send_bytes(pickle.dumps((made(item), None), pickle.HIGHEST_PROTOCOL))
+            sender.send_bytes(pickle.dumps((compute(item), None), pickle.HIGHEST_PROTOCOL))
     except BrokenPipeError:
         os._exit(1)
     except BaseException as err:
         sender.send_bytes(pickle.dumps((None, err)))
 
 
-def _received(receiver: Connection) -> Any:
+def _receive_result(receiver: Connection) -> Any:
     try:
         result, error = pickle.loads(receiver.recv_bytes())
     except EOFError:

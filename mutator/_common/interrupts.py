@@ -7,53 +7,53 @@ from dataclasses import dataclass
 
 
 @dataclass(slots=True)
-class _State:
-    held: int = 0  # nesting depth of `held` blocks
-    asked: bool = False  # an interruption arrived in a `held` block
+class _InterruptState:
+    delay_depth: int = 0  # nesting depth of `delaying_interrupts` blocks
+    is_pending: bool = False  # an interruption arrived in such a block
 
 
-_state = _State()
+_state = _InterruptState()
 
 
 @contextmanager
-def terminable() -> Iterator[None]:
+def interruptible() -> Iterator[None]:
     """Raise KeyboardInterrupt on SIGINT and SIGTERM within the block, so that finished work is kept.
 
     A process that ignores SIGINT keeps ignoring it.
     """
 
     def interrupt(number: int, frame: object) -> None:
-        if _state.held:
-            _state.asked = True
+        if _state.delay_depth:
+            _state.is_pending = True
         else:
             raise KeyboardInterrupt
 
-    before = {}
+    previous_handlers = {}
     try:
         for number in (signal.SIGINT, signal.SIGTERM):
             if signal.getsignal(number) is not signal.SIG_IGN:
-                before[number] = signal.signal(number, interrupt)
+                previous_handlers[number] = signal.signal(number, interrupt)
     except ValueError:  # not the main thread, which cannot set handlers
         yield
         return
     try:
         yield
     finally:
-        for number, handler in before.items():
+        for number, handler in previous_handlers.items():
             signal.signal(number, handler)
 
 
 @contextmanager
-def held() -> Iterator[None]:
+def delaying_interrupts() -> Iterator[None]:
     """Delay an interruption until the end of the block.
 
     Native code that calls Python, such as a parser, would replace KeyboardInterrupt with another exception.
     """
-    _state.held += 1
+    _state.delay_depth += 1
     try:
         yield
     finally:
-        _state.held -= 1
-        if _state.asked and not _state.held:
-            _state.asked = False
+        _state.delay_depth -= 1
+        if _state.is_pending and not _state.delay_depth:
+            _state.is_pending = False
             raise KeyboardInterrupt

@@ -12,13 +12,13 @@ def counted(count: int, noun: str, plural: str = "") -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {plural or noun + 's'}"
 
 
-def one_of(names: Iterable[str]) -> str:
+def describe_choices(names: Iterable[str]) -> str:
     """Return what is expected of a name that must be one of these."""
-    known = ", ".join(names)
-    return f"one of {known}" if known else "a known name, but there is none"
+    listed = ", ".join(names)
+    return f"one of {listed}" if listed else "a known name, but there is none"
 
 
-def shown(value: Any) -> str:
+def describe_value(value: Any) -> str:
     """Return a value as errors show it: at most 60 characters; text is quoted, numbers are not."""
     if value is None:
         return "nothing"
@@ -28,45 +28,45 @@ def shown(value: Any) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def suggestion(word: str, known: list[str]) -> str:
-    """Return `; did you mean 'x'?` if one of `known` is close to `word`, else an empty text."""
-    close = difflib.get_close_matches(word, known, n=1)
+def suggestion(word: str, choices: list[str]) -> str:
+    """Return `; did you mean 'x'?` if one of `choices` is close to `word`, else an empty text."""
+    close = difflib.get_close_matches(word, choices, n=1)
     return f"; did you mean '{close[0]}'?" if close else ""
 
 
-_OPERATORS = {"&&": "and", "||": "or", "!": "not", "=": "=="}
-_WRONG = re.compile(r"&&|\|\||!(?!=)|(?<![<>=!])=(?!=)")
-_QUOTED = re.compile(r"\"[^\"]*\"|'[^']*'")
+_PYTHON_OPERATORS = {"&&": "and", "||": "or", "!": "not", "=": "=="}
+_FOREIGN_OPERATOR_PATTERN = re.compile(r"&&|\|\||!(?!=)|(?<![<>=!])=(?!=)")
+_QUOTED_PATTERN = re.compile(r"\"[^\"]*\"|'[^']*'")
 
 
 def operator_hint(text: str) -> str:
     """Return which Python operators to write for those of other languages, such as `&&`; '' without any."""
-    found = dict.fromkeys(_WRONG.findall(_QUOTED.sub("", text)))
-    return ", ".join(f"write '{_OPERATORS[one]}' for '{one}'" for one in found)
+    operators = dict.fromkeys(_FOREIGN_OPERATOR_PATTERN.findall(_QUOTED_PATTERN.sub("", text)))
+    return ", ".join(f"write '{_PYTHON_OPERATORS[operator]}' for '{operator}'" for operator in operators)
 
 
-_BEFORE_VALUE = re.compile(r"[^\s:]+(?: [^\s:]+)*  +")  # `name   ` before a value
-_COMMAND = re.compile(r"`[^`]*`")
-_NO_BREAK = "\0"
+_NAME_BEFORE_VALUE_PATTERN = re.compile(r"[^\s:]+(?: [^\s:]+)*  +")  # `name   ` before a value
+_COMMAND_PATTERN = re.compile(r"`[^`]*`")
+_UNBREAKABLE_SPACE = "\0"
 
 
-def folded(text: str, width: int) -> str:
+def wrap_text(text: str, width: int) -> str:
     """Break lines between words to at most `width` characters. Longer words and commands in backticks stay
     whole.
 
     Continuation lines are indented; in a line `name  value`, they align with the value.
     """
-    return "\n".join(_folded_line(line, width) if len(line) > width else line for line in text.split("\n"))
+    return "\n".join(_wrap_line(line, width) if len(line) > width else line for line in text.split("\n"))
 
 
-def _folded_line(line: str, width: int) -> str:
+def _wrap_line(line: str, width: int) -> str:
     if line.startswith("|"):  # a row of a Markdown table
         return line
-    start = _BEFORE_VALUE.match(line)
-    indent = len(start[0]) if start and len(start[0]) <= width // 2 else _indent(line) + 2
-    kept = _COMMAND.sub(lambda command: command[0].replace(" ", _NO_BREAK), line)
+    start = _NAME_BEFORE_VALUE_PATTERN.match(line)
+    indent = len(start[0]) if start and len(start[0]) <= width // 2 else _indentation(line) + 2
+    unbroken = _COMMAND_PATTERN.sub(lambda command: command[0].replace(" ", _UNBREAKABLE_SPACE), line)
     lines = textwrap.wrap(
-        kept,
+        unbroken,
         max(width, indent + 1),
         subsequent_indent=" " * indent,
         break_long_words=False,
@@ -74,12 +74,12 @@ def _folded_line(line: str, width: int) -> str:
         expand_tabs=False,
         replace_whitespace=False,
     )
-    return "\n".join(lines).replace(_NO_BREAK, " ")
+    return "\n".join(lines).replace(_UNBREAKABLE_SPACE, " ")
 
 
-def _indent(line: str) -> int:
+def _indentation(line: str) -> int:
     return len(line) - len(line.lstrip())
 
 
-def seeds_text(seeds: range) -> str:
+def describe_seeds(seeds: range) -> str:
     return f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {seeds[0]} to {seeds[-1]}"

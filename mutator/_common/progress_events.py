@@ -12,9 +12,9 @@ from pathlib import Path
 
 from mutator.errors import MutatorError
 
-EVENTS_FD = "MUTATOR_EVENTS_FD"
-LONGEST_TEXT = 500  # characters; so that a line is written in one piece (PIPE_BUF)
-_pipe: int | None = None
+EVENTS_FD_VARIABLE = "MUTATOR_EVENTS_FD"
+MOST_TEXT_LENGTH = 500  # characters; so that a line is written in one piece (PIPE_BUF)
+_events_pipe: int | None = None
 
 
 def open_events() -> None:
@@ -22,8 +22,8 @@ def open_events() -> None:
 
     MutatorError if the variable does not name an open pipe.
     """
-    global _pipe
-    text = os.environ.pop(EVENTS_FD, None)
+    global _events_pipe
+    text = os.environ.pop(EVENTS_FD_VARIABLE, None)
     if text is None:
         return
     try:
@@ -33,40 +33,44 @@ def open_events() -> None:
         os.set_inheritable(fd, False)
     except (ValueError, OverflowError, OSError):
         raise MutatorError(
-            f"'{text}'", where=EVENTS_FD, expected="the number of an open pipe", remedy="unset it"
+            f"'{text}'", where=EVENTS_FD_VARIABLE, expected="the number of an open pipe", remedy="unset it"
         ) from None
-    _pipe = fd
+    _events_pipe = fd
 
 
-def phase(name: str, done: int = 0, total: int = 0, outcomes: Mapping[str, int] | None = None) -> None:
+def report_phase(
+    name: str, finished: int = 0, total: int = 0, outcomes: Mapping[str, int] | None = None
+) -> None:
     """Report what the command is doing: `done` of `total` steps (0: nothing to count)."""
-    _send("phase", phase=name[:LONGEST_TEXT], done=done, total=total, outcomes=dict(outcomes or {}))
+    _send_event(
+        "phase", phase=name[:MOST_TEXT_LENGTH], done=finished, total=total, outcomes=dict(outcomes or {})
+    )
 
 
-def warning(text: str) -> None:
-    _send("warning", text=text[:LONGEST_TEXT])
+def report_warning(text: str) -> None:
+    _send_event("warning", text=text[:MOST_TEXT_LENGTH])
 
 
-def link(kind: str, path: Path) -> None:
+def report_link(kind: str, path: Path) -> None:
     """Report a written file, such as a plot."""
-    _send("link", kind=kind, path=str(path.absolute()))
+    _send_event("link", kind=kind, path=str(path.absolute()))
 
 
-def result(text: str) -> None:
+def report_result(text: str) -> None:
     """Report what came out, in one sentence. The last result counts."""
-    _send("result", text=text[:LONGEST_TEXT])
+    _send_event("result", text=text[:MOST_TEXT_LENGTH])
 
 
-def error(text: str) -> None:
-    _send("error", text=text[:LONGEST_TEXT])
+def report_error(text: str) -> None:
+    _send_event("error", text=text[:MOST_TEXT_LENGTH])
 
 
-def _send(event: str, **facts: object) -> None:
-    global _pipe
-    if _pipe is None:
+def _send_event(event: str, **facts: object) -> None:
+    global _events_pipe
+    if _events_pipe is None:
         return
     line = json.dumps({"event": event, **facts}, ensure_ascii=False) + "\n"
     try:
-        os.write(_pipe, line.encode("utf-8", "replace"))
+        os.write(_events_pipe, line.encode("utf-8", "replace"))
     except OSError:  # nobody reads any more
-        _pipe = None
+        _events_pipe = None

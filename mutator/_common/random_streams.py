@@ -6,13 +6,13 @@ import numpy as np
 
 from mutator.errors import MutatorError
 
-_WORD = 2**32
+_WORD_VALUES = 2**32
 
 
-def generator(seed: int, key: str) -> np.random.Generator:
+def random_generator(seed: int, key: str) -> np.random.Generator:
     if not 0 <= seed < 2**63:
         raise MutatorError(f"seed {seed}", expected="a number from 0 to 2**63 - 1")
-    words = np.frombuffer(hashlib.sha256(key.encode()).digest(), dtype=">u4")
+    key_words = np.frombuffer(hashlib.sha256(key.encode()).digest(), dtype=">u4")
     # the words that NumPy derives from [seed, *words], computed ten times as fast
-    own = [seed] if seed < _WORD else [seed % _WORD, seed // _WORD]
-    return np.random.Generator(np.random.PCG64(np.concatenate((own, words)).astype(np.uint32)))
+    seed_words = [seed] if seed < _WORD_VALUES else [seed % _WORD_VALUES, seed // _WORD_VALUES]
+    return np.random.Generator(np.random.PCG64(np.concatenate((seed_words, key_words)).astype(np.uint32)))

@@ -5,37 +5,41 @@ import os
 
 from mutator.errors import Shortage
 
-_FILES = (errno.EMFILE, errno.ENFILE)
-_PROCESSES = "can't start new thread"
-_LOADING = (
+_OPEN_FILES_ERRNOS = (errno.EMFILE, errno.ENFILE)
+_NO_THREAD_MESSAGE = "can't start new thread"
+_NO_MEMORY_TO_LOAD_MESSAGES = (
     "failed to map segment",
     "cannot allocate memory",
 )  # errors when there is too little memory to load a library
-_AGAIN = "run the same command again; finished experiments are kept and not repeated"
+_RUN_AGAIN = "run the same command again; finished experiments are kept and not repeated"
 
 
-def shortage(err: BaseException | None) -> Shortage | None:
+def find_shortage(err: BaseException | None) -> Shortage | None:
     """Return the shortage that an error or one of its causes reports; None if there is none."""
     while err is not None:
         number = getattr(err, "errno", None)
-        loading = isinstance(err, ImportError) and any(words in str(err) for words in _LOADING)
+        loading = isinstance(err, ImportError) and any(
+            words in str(err) for words in _NO_MEMORY_TO_LOAD_MESSAGES
+        )
         if isinstance(err, MemoryError) or number == errno.ENOMEM or loading:
             return Shortage(
                 "no memory left",
                 expected="more memory, or a higher limit (`ulimit -v`)",
-                remedy=f"end other programs, raise the limit, or use fewer workers; then {_AGAIN}",
+                remedy=f"end other programs, raise the limit, or use fewer workers; then {_RUN_AGAIN}",
             )
-        if number in _FILES or (isinstance(err, ImportError) and os.strerror(errno.EMFILE) in str(err)):
+        if number in _OPEN_FILES_ERRNOS or (
+            isinstance(err, ImportError) and os.strerror(errno.EMFILE) in str(err)
+        ):
             return Shortage(
                 "too many open files",
                 expected="a higher limit (`ulimit -n`)",
-                remedy=f"raise the limit, for example to 1024, then {_AGAIN}",
+                remedy=f"raise the limit, for example to 1024, then {_RUN_AGAIN}",
             )
-        if number == errno.EAGAIN or _PROCESSES in str(err):
+        if number == errno.EAGAIN or _NO_THREAD_MESSAGE in str(err):
             return Shortage(
                 "no more processes or threads can be started",
                 expected="fewer processes and threads on this machine, or a higher limit (`ulimit -u`)",
-                remedy=f"end other programs, raise the limit, or use fewer workers; then {_AGAIN}",
+                remedy=f"end other programs, raise the limit, or use fewer workers; then {_RUN_AGAIN}",
             )
         err = err.__cause__ or err.__context__
     return None

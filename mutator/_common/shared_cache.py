@@ -24,13 +24,13 @@ from mutator._common.hashing import content_id
 
 CHECKS, GOLDENS, RUNS = "checks", "goldens", "runs"
 LINES, PICTURES, PAGES, TARGETS = "lines", "pictures", "pages", "targets"
-_LONGEST_NAME = 200
-TARGET_BYTES = 4_000_000_000  # size limit for one target, enforced between seeds
-PAGES_BYTES = 500_000_000  # size limit for all reports that the server built
+_MOST_NAME_LENGTH = 200
+MOST_TARGET_BYTES = 4_000_000_000  # size limit for one target, enforced between seeds
+MOST_PAGES_BYTES = 500_000_000  # size limit for all reports that the server built
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Entry:
+class CacheEntry:
     """A cached item that is kept or deleted as a whole.
 
     `what` is the part of the cache: `checks`, `goldens`, `runs`, `lines`, `pictures`, `pages` or, for
@@ -51,7 +51,7 @@ class Entry:
             self.path.unlink(missing_ok=True)
 
 
-def folder() -> Path:
+def caches_folder() -> Path:
     """Return the folder of all caches, which need not exist."""
     named = Path(os.environ.get("XDG_CACHE_HOME", ""))
     if named.is_absolute():
@@ -62,73 +62,76 @@ def folder() -> Path:
         return Path(os.devnull) / "mutator"
 
 
-def of_checks() -> Path:
-    return folder() / CHECKS
+def checks_folder() -> Path:
+    return caches_folder() / CHECKS
 
 
-def of_goldens() -> Path:
-    return folder() / GOLDENS
+def goldens_folder() -> Path:
+    return caches_folder() / GOLDENS
 
 
-def of_runs() -> Path:
-    return folder() / RUNS
+def runs_folder() -> Path:
+    return caches_folder() / RUNS
 
 
-def of_lines() -> Path:
-    return folder() / LINES
+def lines_folder() -> Path:
+    return caches_folder() / LINES
 
 
-def of_pictures() -> Path:
-    return folder() / PICTURES
+def pictures_folder() -> Path:
+    return caches_folder() / PICTURES
 
 
-def of_pages() -> Path:
-    return folder() / PAGES
+def pages_folder() -> Path:
+    return caches_folder() / PAGES
 
 
-def of_target(name: str) -> Path:
+def target_folder(name: str) -> Path:
     """Return the folder that all runs of a target share."""
     quoted = quote(name, safe="").replace(".", "%2E")
-    return folder() / TARGETS / (quoted if len(quoted) <= _LONGEST_NAME else content_id(name))
+    return caches_folder() / TARGETS / (quoted if len(quoted) <= _MOST_NAME_LENGTH else content_id(name))
 
 
-def entries() -> list[Entry]:
+def list_entries() -> list[CacheEntry]:
     """List all cached entries. Each file that a target keeps is an entry."""
-    found = [_entry(CHECKS, path) for path in _children(of_checks())]
-    found += [_entry(GOLDENS, path) for path in _children(of_goldens())]
-    found += [_entry(RUNS, path) for path in _children(of_runs())]
-    found += [_entry(LINES, path) for path in _children(of_lines())]
-    found += [_entry(PICTURES, path) for path in _children(of_pictures())]
-    found += [_entry(PAGES, path) for path in _children(of_pages())]
-    for target in _children(folder() / TARGETS):
-        found += [_entry(f"target {target.name}", path) for path in _files(target)]
-    return sorted(found, key=lambda entry: (entry.what, entry.path))
+    listed = [_build_entry(CHECKS, path) for path in _children(checks_folder())]
+    listed += [_build_entry(GOLDENS, path) for path in _children(goldens_folder())]
+    listed += [_build_entry(RUNS, path) for path in _children(runs_folder())]
+    listed += [_build_entry(LINES, path) for path in _children(lines_folder())]
+    listed += [_build_entry(PICTURES, path) for path in _children(pictures_folder())]
+    listed += [_build_entry(PAGES, path) for path in _children(pages_folder())]
+    for target in _children(caches_folder() / TARGETS):
+        listed += [_build_entry(f"target {target.name}", path) for path in _files_below(target)]
+    return sorted(listed, key=lambda entry: (entry.what, entry.path))
 
 
-def prune(most: int) -> list[Entry]:
-    """Delete the least recently used entries until at most `most` bytes remain; return the deleted ones."""
-    return _pruned(entries(), most)
+def prune_cache(most_bytes: int) -> list[CacheEntry]:
+    """Delete the least recently used entries until at most `most_bytes` remain; return the deleted ones."""
+    return _prune_entries(list_entries(), most_bytes)
 
 
-def make_room(target: str) -> list[Entry]:
+def prune_target(target: str) -> list[CacheEntry]:
     """Delete the least recently used files of a target until at most TARGET_BYTES remain; return the deleted
     entries.
 
     A run calls it before each seed, because each seed has its own images.
     """
-    return _pruned([_entry(f"target {target}", path) for path in _files(of_target(target))], TARGET_BYTES)
+    return _prune_entries(
+        [_build_entry(f"target {target}", path) for path in _files_below(target_folder(target))],
+        MOST_TARGET_BYTES,
+    )
 
 
-def prune_pages() -> list[Entry]:
+def prune_pages() -> list[CacheEntry]:
     """Delete the least recently used reports of the server until at most PAGES_BYTES remain; return them."""
-    return _pruned([_entry(PAGES, path) for path in _children(of_pages())], PAGES_BYTES)
+    return _prune_entries([_build_entry(PAGES, path) for path in _children(pages_folder())], MOST_PAGES_BYTES)
 
 
-def _pruned(kept: list[Entry], most: int) -> list[Entry]:
-    total = sum(entry.size for entry in kept)
+def _prune_entries(entries: list[CacheEntry], most_bytes: int) -> list[CacheEntry]:
+    total = sum(entry.size for entry in entries)
     deleted = []
-    for entry in sorted(kept, key=lambda entry: entry.used):
-        if total <= most:
+    for entry in sorted(entries, key=lambda entry: entry.used):
+        if total <= most_bytes:
             break
         entry.delete()
         deleted.append(entry)
@@ -136,17 +139,17 @@ def _pruned(kept: list[Entry], most: int) -> list[Entry]:
     return deleted
 
 
-def clear() -> list[Entry]:
+def clear_cache() -> list[CacheEntry]:
     """Delete the whole cache; return the deleted entries."""
-    deleted = entries()
+    deleted = list_entries()
     for entry in deleted:
         entry.delete()
     return deleted
 
 
-def _entry(what: str, path: Path) -> Entry:
-    states = list(_states([path, *_files(path)] if path.is_dir() else [path]))
-    return Entry(
+def _build_entry(what: str, path: Path) -> CacheEntry:
+    states = list(_file_states([path, *_files_below(path)] if path.is_dir() else [path]))
+    return CacheEntry(
         what=what,
         path=path,
         size=sum(state.st_blocks * 512 for state in states),  # a sparse file takes less space than its size
@@ -154,7 +157,7 @@ def _entry(what: str, path: Path) -> Entry:
     )
 
 
-def _states(paths: Iterable[Path]) -> Iterator[os.stat_result]:
+def _file_states(paths: Iterable[Path]) -> Iterator[os.stat_result]:
     for path in paths:
         try:
             yield path.lstat()
@@ -162,12 +165,12 @@ def _states(paths: Iterable[Path]) -> Iterator[os.stat_result]:
             continue
 
 
-def _children(place: Path) -> list[Path]:
+def _children(folder: Path) -> list[Path]:
     try:
-        return sorted(place.iterdir())
+        return sorted(folder.iterdir())
     except OSError:  # missing, or owned by somebody else
         return []
 
 
-def _files(place: Path) -> list[Path]:
-    return [path for path in sorted(place.rglob("*")) if path.is_symlink() or not path.is_dir()]
+def _files_below(folder: Path) -> list[Path]:
+    return [path for path in sorted(folder.rglob("*")) if path.is_symlink() or not path.is_dir()]

@@ -14,12 +14,12 @@ from zipfile import ZipFile
 from mutator._common.hashing import digest
 from mutator.errors import MutatorError
 
-ARCHIVE = Path(__file__).with_name("shipped.zip")  # created by setup.py; not in a clone
-CLONE = Path(__file__).resolve().parents[2]
-SHIPPED_TARGET = "shipped:target"  # value of `root` in a manifest
-_README = Path(__file__).with_name("new_library.md")
-_ROOT_IN_CLONE = "root: ../../target\n"
-_SHOWN = 3  # the maximum number of changed files that an error names
+ARCHIVE_PATH = Path(__file__).with_name("shipped.zip")  # created by setup.py; not in a clone
+CLONE_FOLDER = Path(__file__).resolve().parents[2]
+SHIPPED_TARGET_ROOT = "shipped:target"  # value of `root` in a manifest
+_LIBRARY_README_PATH = Path(__file__).with_name("new_library.md")
+_ROOT_LINE_IN_CLONE = "root: ../../target\n"
+_MOST_NAMED_FILES = 3  # the maximum number of changed files that an error names
 
 
 def shipped_folder() -> Path:
@@ -28,12 +28,12 @@ def shipped_folder() -> Path:
     Once per process, the unpacked files are compared with the archive. MutatorError if they differ or cannot
     be unpacked.
     """
-    return _unpacked(ARCHIVE, _home()) if ARCHIVE.exists() else CLONE
+    return _unpacked_folder(ARCHIVE_PATH, _unpacking_folder()) if ARCHIVE_PATH.exists() else CLONE_FOLDER
 
 
-def refuse_shipped(path: Path) -> None:
+def check_not_shipped(path: Path) -> None:
     """Raise MutatorError if `path`, which is about to be written, is in the unpacked archive."""
-    if ARCHIVE.exists() and path.absolute().is_relative_to(_home()):
+    if ARCHIVE_PATH.exists() and path.absolute().is_relative_to(_unpacking_folder()):
         raise MutatorError(
             "part of the library that ships with mutator, which must not change",
             where=path,
@@ -42,22 +42,24 @@ def refuse_shipped(path: Path) -> None:
         )
 
 
-def write_library(folder: Path) -> None:
+def write_new_library(folder: Path) -> None:
     """Write an editable library, templates and a README into a new or empty `folder`; MutatorError otherwise.
 
     The library's manifest says `root: shipped:target`, so the library works in any folder.
     """
     shipped = shipped_folder()
-    make_empty(folder)
+    make_empty_folder(folder)
     for name in ("fault_library", "templates"):
         shutil.copytree(shipped / name, folder / name, ignore=shutil.ignore_patterns(".*"))
     for manifest in (folder / "fault_library" / "targets").glob("*.yaml"):
         text = manifest.read_text(encoding="utf-8")
-        manifest.write_text(text.replace(_ROOT_IN_CLONE, f"root: {SHIPPED_TARGET}\n"), encoding="utf-8")
-    shutil.copyfile(_README, folder / "README.md")
+        manifest.write_text(
+            text.replace(_ROOT_LINE_IN_CLONE, f"root: {SHIPPED_TARGET_ROOT}\n"), encoding="utf-8"
+        )
+    shutil.copyfile(_LIBRARY_README_PATH, folder / "README.md")
 
 
-def make_empty(folder: Path) -> None:
+def make_empty_folder(folder: Path) -> None:
     """Create a folder, or check that it is empty; MutatorError otherwise."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -73,21 +75,21 @@ def make_empty(folder: Path) -> None:
         )
 
 
-def _home() -> Path:
+def _unpacking_folder() -> Path:
     named = Path(os.environ.get("XDG_DATA_HOME", ""))
     base = named if named.is_absolute() else Path("~/.local/share").expanduser()
     return base / "mutator" / "shipped"
 
 
 @lru_cache(maxsize=1)
-def _unpacked(archive: Path, home: Path) -> Path:
+def _unpacked_folder(archive: Path, home: Path) -> Path:
     folder = home / digest(archive.read_bytes())[:16]
     if not folder.is_dir():
         _unpack(archive, folder)
-    if changed := _changed(archive, folder):
-        more = f" and {len(changed) - _SHOWN} more" if len(changed) > _SHOWN else ""
+    if changed := _changed_files(archive, folder):
+        more = f" and {len(changed) - _MOST_NAMED_FILES} more" if len(changed) > _MOST_NAMED_FILES else ""
         raise MutatorError(
-            f"changed since installation: {', '.join(changed[:_SHOWN])}{more}",
+            f"changed since installation: {', '.join(changed[:_MOST_NAMED_FILES])}{more}",
             where=folder,
             expected="the files that were installed with mutator, unedited",
             remedy="delete this folder to unpack it again; edit a library made by `mutator init DIR` instead",
@@ -114,10 +116,10 @@ def _unpack(archive: Path, folder: Path) -> None:
         ) from None
 
 
-def _changed(archive: Path, folder: Path) -> list[str]:
+def _changed_files(archive: Path, folder: Path) -> list[str]:
     files = (path for path in folder.rglob("*") if path.is_file() and path.parent.name != "__pycache__")
-    found = {path.relative_to(folder).as_posix(): path for path in files}
+    unpacked_files = {path.relative_to(folder).as_posix(): path for path in files}
     with ZipFile(archive) as file:
         names = set(file.namelist())
-        same = {n for n in names & found.keys() if found[n].read_bytes() == file.read(n)}
-    return sorted((names | found.keys()) - same)
+        same = {n for n in names & unpacked_files.keys() if unpacked_files[n].read_bytes() == file.read(n)}
+    return sorted((names | unpacked_files.keys()) - same)

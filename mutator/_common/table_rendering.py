@@ -9,20 +9,23 @@ if TYPE_CHECKING:
     from markupsafe import Markup
 
 # text that Markdown would read as an element, italics or bold; `code` is exempt
-_MARKUP = re.compile(r"`[^`]*`|<(?=[A-Za-z/!?])|\*(?=\S)|(?<=\S)\*|(?<![A-Za-z0-9])_+|_+(?![A-Za-z0-9])")
+_MARKUP_PATTERN = re.compile(
+    r"`[^`]*`|<(?=[A-Za-z/!?])|\*(?=\S)|(?<=\S)\*|(?<![A-Za-z0-9])_+|_+(?![A-Za-z0-9])"
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Table:
-    """A table of texts, with one cell per head in each row. Columns in `right` are right-aligned.
+class TextTable:
+    """A table of texts, with one cell per head in each row. Columns in `right_aligned` are right-aligned.
 
-    Markup in a cell, e.g. a link, is not escaped in HTML. With `named`, the first cell of a row is a heading.
+    Markup in a cell, e.g. a link, is not escaped in HTML. With `has_row_headings`, the first
+    cell of a row is a heading.
     """
 
     heads: Sequence[str]
     rows: Sequence[Sequence[str]]
-    right: Collection[int] = ()
-    named: bool = False
+    right_aligned: Collection[int] = ()
+    has_row_headings: bool = False
 
     def as_text(self) -> str:
         """Return the table as text, without trailing spaces."""
@@ -32,7 +35,9 @@ class Table:
 
     def _padded(self, cells: Sequence[str], widths: Sequence[int]) -> str:
         pairs = enumerate(zip(cells, widths, strict=True))
-        return "  ".join(c.rjust(w) if i in self.right else c.ljust(w) for i, (c, w) in pairs).rstrip()
+        return "  ".join(
+            c.rjust(w) if i in self.right_aligned else c.ljust(w) for i, (c, w) in pairs
+        ).rstrip()
 
     def as_markdown(self, *, escape: bool = True) -> str:
         """Return the table in Markdown; with `escape=False`, the cells are already Markdown."""
@@ -48,14 +53,14 @@ class Table:
         """Return a scrollable HTML table of class `style`, without a head row if all heads are empty.
 
         A row with an empty first cell continues the row above and has the class `group`; cells of columns in
-        `right` have the class `number`.
+        `right_aligned` have the class `number`.
         """
         from markupsafe import Markup
 
         cells = [Markup("<td>{}</td>").format] * len(self.heads)
-        for index in self.right:
+        for index in self.right_aligned:
             cells[index] = Markup('<td class="number">{}</td>').format
-        if self.named:
+        if self.has_row_headings:
             cells[0] = Markup('<th scope="row">{}</th>').format
         rows = [
             Markup("<tr{}>{}</tr>\n").format(
@@ -77,7 +82,7 @@ class Table:
         tags = ("<td>{1}</td>", '<th scope="col"{0}>{1}</th>')  # an empty head becomes a plain cell
         numbers = Markup(' class="number"')
         heads = [
-            Markup(tags[bool(head)]).format(numbers if i in self.right else "", head)
+            Markup(tags[bool(head)]).format(numbers if i in self.right_aligned else "", head)
             for i, head in enumerate(self.heads)
         ]
         return Markup("<thead><tr>{}</tr></thead>\n").format(Markup("").join(heads))
@@ -87,11 +92,11 @@ def markdown_line(text: str) -> str:
     """Convert text to one line of Markdown that shows every character, even in `<class 'float'>` and
     `__init__`.
     """
-    return _MARKUP.sub(_escaped, " ".join(text.splitlines()))
+    return _MARKUP_PATTERN.sub(_escape_match, " ".join(text.splitlines()))
 
 
-def _escaped(found: re.Match[str]) -> str:
-    text = found[0]
+def _escape_match(match: re.Match[str]) -> str:
+    text = match[0]
     if text[0] == "`":
         return text
     return "&lt;" if text == "<" else "".join("\\" + character for character in text)

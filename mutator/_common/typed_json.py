@@ -1,4 +1,4 @@
-"""Read values from the JSON types into which `hashing.plain` converts them.
+"""Read values from the JSON types into which `hashing.as_json_types` converts them.
 
 What fits follows from the annotations alone: a dataclass is an object, a named tuple the list of its values,
 another tuple a list, a mapping an object with any keys. Only the standard library is used, because workers
@@ -13,124 +13,134 @@ from functools import cache
 from types import NoneType, UnionType
 from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
-from mutator._common.hashing import is_added
+from mutator._common.hashing import is_added_field
 from mutator.errors import Misfit, MutatorError
 
 _T = TypeVar("_T")
 _Reader = Callable[[Any], Any]
-_WORDS = {str: "text", int: "a whole number", float: "a number", bool: "true or false", NoneType: "null"}
-_SURROGATE = re.compile("[\ud800-\udfff]")
-_LONGEST = 60  # of a value in a message, in characters
+_TYPE_DESCRIPTIONS = {
+    str: "text",
+    int: "a whole number",
+    float: "a number",
+    bool: "true or false",
+    NoneType: "null",
+}
+_SURROGATE_PATTERN = re.compile("[\ud800-\udfff]")
+_MOST_VALUE_LENGTH = 60  # of a value in a message, in characters
 
 
-def from_plain(kind: type[_T], data: object) -> _T:
+def from_json_types(kind: type[_T], data: object) -> _T:
     """Read a value of this type. Misfit for a value of another type, or a missing or unknown key.
 
     Only keys of `added` fields can be missing.
     """
-    return cast(_T, _reader(cast(Any, kind))(data))
+    return cast(_T, _reader_of(cast(Any, kind))(data))
 
 
 @cache
-def _reader(kind: Any) -> _Reader:
+def _reader_of(kind: Any) -> _Reader:
     origin, arguments = get_origin(kind), get_args(kind)
     if kind is Any:
         return lambda data: data
     if origin in (Union, UnionType):
-        return _either(kind, [_reader(one) for one in arguments])
+        return _union_reader(kind, [_reader_of(part) for part in arguments])
     if origin is Mapping:
-        return _by_name(_reader(arguments[1]))
+        return _mapping_reader(_reader_of(arguments[1]))
     if origin is tuple and arguments[-1] is Ellipsis:
-        return _each(_reader(arguments[0]))
+        return _tuple_reader(_reader_of(arguments[0]))
     if origin is tuple:
-        return _row([_reader(one) for one in arguments], tuple)
+        return _fixed_list_reader([_reader_of(one) for one in arguments], tuple)
     if dataclasses.is_dataclass(kind):
-        return _record(cast(type[Any], kind))
+        return _dataclass_reader(cast(type[Any], kind))
     if issubclass(kind, tuple):
-        values = [_reader(one) for one in get_type_hints(kind).values()]
-        return _row(values, lambda items: kind(*items))
-    return _member(kind) if issubclass(kind, Enum) else _scalar(kind)
+        values = [_reader_of(one) for one in get_type_hints(kind).values()]
+        return _fixed_list_reader(values, lambda items: kind(*items))
+    return _enum_reader(kind) if issubclass(kind, Enum) else _scalar_reader(kind)
 
 
-def _scalar(kind: type) -> _Reader:
+def _scalar_reader(kind: type) -> _Reader:
     kinds = (float, int) if kind is float else (kind,)
 
     def read(data: Any) -> Any:
-        if type(data) not in kinds or not _is_writable(data):  # a bool is no number
-            raise Misfit(_described(data), _WORDS[kind])
+        if type(data) not in kinds or not _is_encodable(data):  # a bool is no number
+            raise Misfit(_describe_misfit(data), _TYPE_DESCRIPTIONS[kind])
         return data
 
     return read
 
 
-def _is_writable(data: object) -> bool:
+def _is_encodable(data: object) -> bool:
     """Return whether a file can have this value: JSON can spell half of a character."""
-    return not isinstance(data, str) or data.isascii() or _SURROGATE.search(data) is None
+    return not isinstance(data, str) or data.isascii() or _SURROGATE_PATTERN.search(data) is None
 
 
-def _member(kind: type[Enum]) -> _Reader:
-    values = {one.value: one for one in kind}
+def _enum_reader(kind: type[Enum]) -> _Reader:
+    values = {member.value: member for member in kind}
 
     def read(data: Any) -> Any:
         if not isinstance(data, str) or data not in values:
-            raise Misfit(_described(data), f"one of {', '.join(values)}")
+            raise Misfit(_describe_misfit(data), f"one of {', '.join(values)}")
         return values[data]
 
     return read
 
 
-def _each(item: _Reader) -> _Reader:
+def _tuple_reader(item: _Reader) -> _Reader:
     def read(data: Any) -> Any:
-        return tuple(_within(place, item, one) for place, one in enumerate(_checked(data, list)))
+        return tuple(
+            _read_within(index, item, element) for index, element in enumerate(_checked_container(data, list))
+        )
 
     return read
 
 
-def _row(items: Sequence[_Reader], made: Callable[[list[Any]], Any]) -> _Reader:
+def _fixed_list_reader(items: Sequence[_Reader], build: Callable[[list[Any]], Any]) -> _Reader:
     def read(data: Any) -> Any:
-        if len(_checked(data, list)) != len(items):
+        if len(_checked_container(data, list)) != len(items):
             raise Misfit(f"a list of {len(data)}", f"a list of {len(items)}")
-        return made([_within(place, item, data[place]) for place, item in enumerate(items)])
+        return build([_read_within(place, item, data[place]) for place, item in enumerate(items)])
 
     return read
 
 
-def _by_name(item: _Reader) -> _Reader:
+def _mapping_reader(item: _Reader) -> _Reader:
     def read(data: Any) -> Any:
-        return {name: _within(name, item, one) for name, one in _checked(data, dict).items()}
+        return {
+            name: _read_within(name, item, value) for name, value in _checked_container(data, dict).items()
+        }
 
     return read
 
 
-def _either(kind: Any, readers: Sequence[_Reader]) -> _Reader:
+def _union_reader(kind: Any, readers: Sequence[_Reader]) -> _Reader:
     """Read with the first reader that fits. If none does, tell where the one that came farthest failed."""
-    expected = " or ".join(_WORDS.get(one, "an object or a list") for one in get_args(kind))
+    expected = " or ".join(_TYPE_DESCRIPTIONS.get(part, "an object or a list") for part in get_args(kind))
 
     def read(data: Any) -> Any:
         misfits = []
-        for one in readers:
+        for reader in readers:
             try:
-                return one(data)
+                return reader(data)
             except Misfit as err:
                 misfits.append(err)
         farthest = max(misfits, key=lambda err: len(err.path))
-        raise farthest if farthest.path else Misfit(_described(data), expected)
+        raise farthest if farthest.path else Misfit(_describe_misfit(data), expected)
 
     return read
 
 
-def _record(kind: type[Any]) -> _Reader:
+def _dataclass_reader(kind: type[Any]) -> _Reader:
     hints = get_type_hints(kind)
-    readers = {field.name: _reader(hints[field.name]) for field in dataclasses.fields(kind)}
-    needed = [field.name for field in dataclasses.fields(kind) if not is_added(field)]
+    readers = {field.name: _reader_of(hints[field.name]) for field in dataclasses.fields(kind)}
+    needed = [field.name for field in dataclasses.fields(kind) if not is_added_field(field)]
 
     def read(data: Any) -> Any:
-        _checked(data, dict)
+        _checked_container(data, dict)
         if missing := [name for name in needed if name not in data]:
             raise Misfit(f"no key '{missing[0]}'")
         if unknown := [name for name in data if name not in readers]:
-            raise Misfit(f"an unknown key {_described(unknown[0])}", f"only {', '.join(readers)}")
-        values = {name: _within(name, readers[name], one) for name, one in data.items()}
+            raise Misfit(f"an unknown key {_describe_misfit(unknown[0])}", f"only {', '.join(readers)}")
+        values = {name: _read_within(name, readers[name], value) for name, value in data.items()}
         try:
             return kind(**values)
         except (ValueError, MutatorError) as err:
@@ -139,7 +149,7 @@ def _record(kind: type[Any]) -> _Reader:
     return read
 
 
-def _within(key: str | int, read: _Reader, data: Any) -> Any:
+def _read_within(key: str | int, read: _Reader, data: Any) -> Any:
     try:
         return read(data)
     except Misfit as err:
@@ -147,14 +157,14 @@ def _within(key: str | int, read: _Reader, data: Any) -> Any:
         raise
 
 
-def _checked(data: Any, kind: type[list[Any]] | type[dict[str, Any]]) -> Any:
+def _checked_container(data: Any, kind: type[list[Any]] | type[dict[str, Any]]) -> Any:
     if type(data) is not kind:
-        raise Misfit(_described(data), "a list" if kind is list else "an object")
+        raise Misfit(_describe_misfit(data), "a list" if kind is list else "an object")
     return data
 
 
-def _described(data: Any) -> str:
+def _describe_misfit(data: Any) -> str:
     if isinstance(data, list | dict):
         return "a list" if isinstance(data, list) else "an object"
     text = ascii(data)
-    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
+    return text if len(text) <= _MOST_VALUE_LENGTH else f"{text[:_MOST_VALUE_LENGTH]}..."

@@ -3,7 +3,7 @@
 from typing import Any
 
 
-def mapping(title: str) -> dict[str, Any]:
+def mapping_config(title: str) -> dict[str, Any]:
     """Return the `__pydantic_config__` of a dataclass that is written as a mapping, as strict as its file.
 
     `title` is its heading on reference pages.
@@ -11,7 +11,7 @@ def mapping(title: str) -> dict[str, Any]:
     return {"title": title, "extra": "forbid", "strict": True}
 
 
-def written(about: str = "", **rules: Any) -> dict[str, Any]:
+def yaml_metadata(about: str = "", **rules: Any) -> dict[str, Any]:
     """Return the metadata of a field that is written in YAML.
 
     `about` describes it on reference pages. `rules` are other arguments of pydantic's `Field`: `alias`,

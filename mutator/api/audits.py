@@ -5,11 +5,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from mutator._common.argument_checks import check_type, check_whole
-from mutator._common.folder_locks import owned
+from mutator._common.argument_checks import check_type, check_whole_number
+from mutator._common.folder_locks import owning_run_folder
 from mutator._common.hashing import digest
 from mutator._common.message_text import counted
-from mutator._common.table_rendering import Table
+from mutator._common.table_rendering import TextTable
 from mutator.api.selection import WorkspaceLike, open_workspace
 from mutator.audit.run_audit import Check, audit_checks
 from mutator.audit.run_repair import repair as put_aside
@@ -49,7 +49,7 @@ class Audit:
     def __str__(self) -> str:
         width = max(map(len, (*self.facts, *self.not_sealed)))
         rows = [(check.what, str(check.count), str(len(check.differences))) for check in self.checks]
-        table = Table(heads=("checked", "count", "differences"), rows=rows, right=(1, 2))
+        table = TextTable(heads=("checked", "count", "differences"), rows=rows, right_aligned=(1, 2))
         found = [str(one).replace(f"{self.run}/", "") for one in self.differences[:SHOWN]]
         more = len(self.differences) - SHOWN
         listed = [*found, *([f"and {more} more"] if more > 0 else [])]
@@ -110,7 +110,7 @@ def verify(
 
     MutatorError if `run` is not a run folder, if its run.json cannot be read, or if `signed_by` is missing.
     """
-    check_whole("rerun", rerun)
+    check_whole_number("rerun", rerun)
     for name, value in (("expect", expect), ("expect_review", expect_review)):
         _check_digest(name, value)
     folder = RunFolder.open_unverified(Path(run))
@@ -158,7 +158,7 @@ def seal(run: str | Path, *, sign: str | Path | None = None) -> Seals:
     folder = RunFolder.open(Path(run))
     if sign is None:
         return seals_of(folder)
-    with owned(folder.path, patience_s=0.0):
+    with owning_run_folder(folder.path, patience_s=0.0):
         seals = seals_of(folder)
         write_signature(folder, seals, Path(sign))
     return seals

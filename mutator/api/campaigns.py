@@ -3,7 +3,7 @@
 import warnings
 from pathlib import Path
 
-from mutator._common.argument_checks import check_type, check_whole
+from mutator._common.argument_checks import check_type, check_whole_number
 from mutator.api.runs import Run
 from mutator.api.selection import WorkspaceLike, open_workspace
 from mutator.engines.engine_choice import check_offered
@@ -47,7 +47,7 @@ def run(
     warning is issued; the same call then resumes the run. MutatorError for invalid input; CheckFailed if an
     approval is missing, or if the checks before the campaign or the equivalence check fail.
     """
-    check_whole("workers", workers)
+    check_whole_number("workers", workers)
     check_offered(engine)
     if choices is not None:
         check_type("choices", choices, Choices, "mutator.Choices")

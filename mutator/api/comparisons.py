@@ -6,8 +6,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mutator._common.confined_files import inside
-from mutator._common.table_rendering import Table
+from mutator._common.confined_files import path_below
+from mutator._common.table_rendering import TextTable
 from mutator.api.html import text_html
 from mutator.api.runs import Run, known_alerts_note, load_run
 from mutator.comparison import comparison_files
@@ -37,7 +37,7 @@ class RunComparison:
     def _repr_html_(self) -> str:
         names = self.comparison.names
         differing = [[f.name, f.a, f.b] for f in self.comparison.facts if f.is_different]
-        facts = Table(heads=("what differs", names.a, names.b), rows=differing).as_html()
+        facts = TextTable(heads=("what differs", names.a, names.b), rows=differing).as_html()
         sheets = [text_html(s.title) + s.table().as_html() for s in self.comparison.sheets[:SHOWN]]
         remarks = "".join(map(text_html, self.comparison.remarks))
         return text_html(self.summary) + remarks + facts + "".join(sheets)
@@ -98,7 +98,7 @@ class RunComparison:
     def write(self, out: str | Path | None = None) -> comparison_files.ComparisonFiles:
         """Write HTML, Markdown and CSV to `out`; default: report/compare-<first run> in the second run."""
         a, b = self.comparison.a, self.comparison.b
-        default = inside(b.folder.path / "report", f"compare-{a.name}")
+        default = path_below(b.folder.path / "report", f"compare-{a.name}")
         return comparison_files.write_comparison(self.comparison, default if out is None else Path(out))
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from html import escape
 
-from mutator._common.table_rendering import Table
+from mutator._common.table_rendering import TextTable
 
 _COLOURS = {"+": "#116329", "-": "#a40e26", "@": "#0550ae"}
 
@@ -11,7 +11,7 @@ _COLOURS = {"+": "#116329", "-": "#a40e26", "@": "#0550ae"}
 def facts_html(facts: Iterable[tuple[str, object]]) -> str:
     """Return a table of names and values, without the values that are None."""
     rows = [[name, str(value)] for name, value in facts if value is not None]
-    return str(Table(heads=("", ""), rows=rows).as_html())
+    return str(TextTable(heads=("", ""), rows=rows).as_html())
 
 
 def text_html(text: str) -> str:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 
-from mutator._common.shipped_files import write_library
+from mutator._common.shipped_files import write_new_library
 from mutator.api.selection import WorkspaceLike, open_workspace
 from mutator.checks import fast_engine_check, library_check
 from mutator.checks.doctor import examine_machine
@@ -36,7 +36,7 @@ def init_library(folder: str | Path, *, target: str | PathLike[str] | None = Non
     target looks like a controller.
     """
     if target is None:
-        write_library(Path(folder))
+        write_new_library(Path(folder))
     else:
         write_first_library(survey_source(os.fspath(target)), Path(folder))
     return Path(folder)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from mutator._common.confined_files import inside
+from mutator._common.confined_files import path_below
 from mutator._common.files import make_folder
 from mutator._common.message_text import counted
 from mutator.api.mutants import BuiltMutant, built
@@ -17,7 +17,7 @@ from mutator.errors import MutatorError
 from mutator.model import Fault, Trigger
 from mutator.mutants.mutant_building import write_tree
 from mutator.store.plan_choices import Choices
-from mutator.triggers.trigger_kinds import always
+from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
 
 COLUMNS = (
@@ -55,7 +55,7 @@ def pairs_of_specs(
         armed_after_s = bench.manifest.armed_after_s
         tables = context_tables(bench.workspace)
         made = [trigger for table in tables for trigger in table.triggers(armed_after_s=armed_after_s)]
-        made = made or [always(armed_after_s=armed_after_s)]
+        made = made or [always_trigger(armed_after_s=armed_after_s)]
     pairs: list[Pair] = []
     for name in _spec_names(bench.workspace, specs):
         faults = bench.faults(FaultChoice(spec=name, seed=seed, reading=reading))
@@ -189,10 +189,10 @@ def _spec_names(workspace: Workspace, wanted: Iterable[str]) -> Iterator[str]:
 def _write(built_mutant: BuiltMutant, out: Path, *, trees: bool) -> dict[str, str]:
     mutant, fault, trigger = built_mutant.mutant, built_mutant.fault, built_mutant.trigger
     patch = Path("patches") / f"{mutant.id}.patch"
-    (inside(out, patch.as_posix())).write_bytes(mutant.patch_bytes)
+    (path_below(out, patch.as_posix())).write_bytes(mutant.patch_bytes)
     tree = Path("trees") / mutant.id
     if trees:
-        write_tree(built_mutant.manifest, mutant, inside(out, tree.as_posix()))
+        write_tree(built_mutant.manifest, mutant, path_below(out, tree.as_posix()))
     cells = (
         mutant.id,
         fault.id,

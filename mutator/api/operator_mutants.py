@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from mutator._common.argument_checks import check_whole
+from mutator._common.argument_checks import check_whole_number
 from mutator._common.message_text import counted
 from mutator.api.selection import Bench
 from mutator.errors import MutatorError
@@ -34,9 +34,9 @@ def operator_faults(bench: Bench, choice: OperatorChoice) -> tuple[tuple[Fault, 
 
     MutatorError for an unknown operator or place, and if no mutant is left.
     """
-    check_whole("seed", choice.seed)
+    check_whole_number("seed", choice.seed)
     if choice.sample is not None:
-        check_whole("sample", choice.sample, least=1)
+        check_whole_number("sample", choice.sample, least=1)
     executed = None
     if choice.scenario is not None:
         scenario = bench.workspace.scenario(choice.scenario)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from mutator._common.confined_files import inside
+from mutator._common.confined_files import path_below
 from mutator._common.files import make_folder, write_atomic
 from mutator.api.selection import WorkspaceLike, open_workspace
 from mutator.campaigns.filters import compile_filter
@@ -185,7 +185,7 @@ def write_pictures(
         shown = {"before": ("", pictures.before)}
         shown |= {level.name: (level.label, level.after) for level in pictures.levels}
         for level, (value, data) in shown.items():
-            path = inside(folder, f"{name}-{level}.jpg")
+            path = path_below(folder, f"{name}-{level}.jpg")
             write_atomic(path, data)
             written.setdefault(name, {})[level] = str(path)
             values[str(path)] = value

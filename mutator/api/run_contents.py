@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from mutator._common.hashing import plain
+from mutator._common.hashing import as_json_types
 from mutator.api.stored_experiments import StoredRun
 from mutator.campaigns.plan import Plan, load_plan
 from mutator.errors import MutatorError
@@ -32,8 +32,8 @@ class RunContents(StoredRun):
             "campaign": head.campaign,
             "target": head.target,
             "plan": head.plan,
-            "choices": plain(head.choices),
-            "limits": plain(head.limits),
+            "choices": as_json_types(head.choices),
+            "limits": as_json_types(head.limits),
             **self.folder.provenance,
         }
 

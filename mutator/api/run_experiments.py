@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from mutator._common.confined_files import inside
+from mutator._common.confined_files import path_below
 from mutator._common.files import ScratchFolder
 from mutator.api.experiment_results import TraceFrames, trace_frame
 from mutator.api.run_contents import RunContents
@@ -54,7 +54,7 @@ class RunExperiment(StoredExperiment):
         """
         run, folder = self.run, self.run.folder
         temporary = None if keep else ScratchFolder("mutator-rerun-")
-        out = inside(temporary.path, self.id) if temporary else None
+        out = path_below(temporary.path, self.id) if temporary else None
         single, same = rerun(run.workspace, folder.path, self.id, out=out)
         manifest = run.bench.manifest
         trial = trial_of(

@@ -6,8 +6,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mutator._common.message_text import one_of, seeds_text
-from mutator._common.table_rendering import Table
+from mutator._common.message_text import describe_choices, describe_seeds
+from mutator._common.table_rendering import TextTable
 from mutator.api.audits import Audit, verify
 from mutator.api.experiment_results import trace_frame
 from mutator.api.html import facts_html, text_html
@@ -91,7 +91,7 @@ class Run(RunContents):
         """The run's seal; None for a run that is unfinished."""
         return self.seals.seal
 
-    def counts(self) -> Table:
+    def counts(self) -> TextTable:
         """Count how the experiments of each fault type ended."""
         frame = self._frame
         hazards, counts = (
@@ -101,7 +101,7 @@ class Run(RunContents):
         heads, rows = outcome_counting.count_table(
             counts, "fault type", hazards, alerts=self.folder.has_alerts
         )
-        return Table(heads=heads, rows=rows, right=range(1, len(heads)))
+        return TextTable(heads=heads, rows=rows, right_aligned=range(1, len(heads)))
 
     def mutation_score(self) -> Sheet:
         """Return the mutation score: the shares of operator mutants that changed an actuator, raised a new
@@ -116,7 +116,7 @@ class Run(RunContents):
             alerts = None
         return mutation_score_sheet(prepare_results(frame), self.faults, alerts, self.folder.head.operators)
 
-    def mutation_totals(self) -> Table:
+    def mutation_totals(self) -> TextTable:
         """Return the total mutation score. Empty without operator mutants."""
         return totals_table(self.mutation_score())
 
@@ -146,7 +146,7 @@ class Run(RunContents):
             changes = max(dict.fromkeys(driven), key=driven.count)
         seeds = self.folder.seeds
         if seed is not None and seed not in seeds:
-            raise MutatorError(f"seed {seed}", argument="seed", expected=seeds_text(seeds))
+            raise MutatorError(f"seed {seed}", argument="seed", expected=describe_seeds(seeds))
         several = seeds[0] if seed is None else seed
         wanted = GoldenRun(scenario, changes or (), several if len(seeds) > 1 else None)
         folder = self.folder.golden_folder(*wanted)
@@ -155,7 +155,7 @@ class Run(RunContents):
             raise MutatorError(
                 f"no golden run {wanted.key}",
                 where=self.path,
-                expected=one_of(known),
+                expected=describe_choices(known),
             )
         return trace_frame(load_trace(self.bench.manifest, folder), self.bench.manifest)
 

@@ -9,7 +9,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TypeAlias
 
-from mutator._common.argument_checks import check_number, check_whole
+from mutator._common.argument_checks import check_number, check_whole_number
 from mutator.campaigns.plan_warnings import changes_nothing
 from mutator.checks.library_check import spec_problems
 from mutator.config import units
@@ -20,7 +20,7 @@ from mutator.faults.spec_expansion import expand
 from mutator.model import Fault, Trigger
 from mutator.stpa.context_tables import ContextTable
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.trigger_kinds import TYPED, read_trigger
+from mutator.triggers.trigger_kinds import TRIGGER_FORMS, parse_trigger
 from mutator.workspace import Workspace
 
 WorkspaceLike: TypeAlias = "Workspace | str | PathLike[str] | None"
@@ -77,7 +77,7 @@ class Bench:
         MutatorError for a mistake in the spec; MutatorWarning for a value that changes nothing or is outside
         the declared range.
         """
-        check_whole("seed", 0 if choice.seed is None else choice.seed)
+        check_whole_number("seed", 0 if choice.seed is None else choice.seed)
         declared = self.workspace.spec(choice.spec)
         spec = choice.narrowed(declared)
         for problem in spec_problems(spec, self.models, self.manifest):
@@ -150,11 +150,13 @@ def find_trigger(
         table.check(variables)
         return table.triggers(armed_after_s=armed_after_s, rows=(row,))[0]
     try:
-        return read_trigger(text, armed_after_s, variables)
+        return parse_trigger(text, armed_after_s, variables)
     except MutatorError as e:
         names = ", ".join(row.id for table in tables for row in table.rows)
         contexts = f"a context ({names}), " if names else ""
-        raise MutatorError(e.got, argument="trigger", expected=f"{contexts}{TYPED}", remedy=e.remedy) from e
+        raise MutatorError(
+            e.got, argument="trigger", expected=f"{contexts}{TRIGGER_FORMS}", remedy=e.remedy
+        ) from e
 
 
 def _split(name: str) -> tuple[str, str | None]:

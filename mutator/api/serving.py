@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from mutator._common.folder_search import RUNS
+from mutator._common.folder_search import RUNS_FOLDER
 from mutator.api.selection import WorkspaceLike, open_workspace
 from mutator.errors import MutatorError
 from mutator.serve.application import Site
@@ -25,9 +25,9 @@ def serve_runs(
     `ready` is called with the address. Whoever knows the address has the user's rights. `at_once` is the
     number of parallel jobs. MutatorError for a missing folder, and for a port in use.
     """
-    roots = tuple(map(Path, runs)) or (RUNS,)
+    roots = tuple(map(Path, runs)) or (RUNS_FOLDER,)
     for root in roots:
-        if not root.is_dir() and root != RUNS:
+        if not root.is_dir() and root != RUNS_FOLDER:
             raise MutatorError("no such folder", where=root, expected="a run folder, or a folder of them")
     site = Site(workspace=open_workspace(workspace), runs=Runs(roots), at_once=at_once)
     serve(site, port=port, ready=ready)

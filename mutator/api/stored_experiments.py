@@ -6,7 +6,7 @@ from functools import cached_property
 from pathlib import Path
 
 from mutator._common.argument_checks import check_type
-from mutator._common.confined_files import inside
+from mutator._common.confined_files import path_below
 from mutator._common.folder_search import run_folders
 from mutator.api.experiment_results import ExperimentResult
 from mutator.api.mutants import built
@@ -128,7 +128,7 @@ class StoredExperiment(ExperimentResult):
     @property
     def plot_file(self) -> Path:
         """Path of the plot in the run folder."""
-        return inside(self.run.path / "plots", f"{self.id}.svg")
+        return path_below(self.run.path / "plots", f"{self.id}.svg")
 
     @property
     def has_series(self) -> bool:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from mutator._common.bounded_reading import read_bounded
-from mutator._common.confined_files import check_inside, check_plain, inside
+from mutator._common.confined_files import check_inside, check_only_plain_files, path_below
 from mutator._common.files import ScratchFolder
 from mutator._common.hashing import digest
 from mutator.api.experiment_results import ExperimentResult, TraceFrames, trace_frame
@@ -54,7 +54,7 @@ class Trial(ExperimentResult):
     @property
     def has_trace(self) -> bool:
         """Whether the faulty run left a trace."""
-        return (inside(self.single.faulty, self.manifest.trace_file)).is_file()
+        return (path_below(self.single.faulty, self.manifest.trace_file)).is_file()
 
     @property
     def golden_hazards(self) -> tuple[tuple[str, float], ...]:
@@ -127,8 +127,8 @@ def try_fault(
     )
     temporary = ScratchFolder("mutator-try-") if out is None else None
     place = temporary.path if temporary else Path(out or "")
-    folder = check_inside(place, inside(place, experiment.id))
-    check_plain(folder)
+    folder = check_inside(place, path_below(place, experiment.id))
+    check_only_plain_files(folder)
     single = run_single(bench.workspace, bench.manifest, experiment, folder)
     scale = bench.workspace.scale_of(bench.manifest)
     return trial_of(single, bench.manifest, scale=scale, temporary=temporary)

@@ -6,7 +6,7 @@ from fnmatch import fnmatchcase
 from itertools import islice
 from typing import Any
 
-from mutator._common.confined_files import inside
+from mutator._common.confined_files import path_below
 from mutator._common.files import read_json
 from mutator.audit.record_audit import Recorded
 from mutator.campaigns.freezing import target_facts
@@ -59,7 +59,7 @@ def seeds_and_sessions(folder: RunFolder) -> Problems:
         if not any(fnmatchcase(stem, pattern) for pattern in patterns):
             yield MutatorError(
                 "records of no session",
-                where=inside(folder.path, name),
+                where=path_below(folder.path, name),
                 expected=f"a stretch of work in {HEAD}",
             )
 

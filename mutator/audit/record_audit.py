@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from math import inf
 from pathlib import Path
 
-from mutator._common.confined_files import inside
+from mutator._common.confined_files import path_below
 from mutator._common.hashing import digest
 from mutator._common.message_text import counted
 from mutator.engines.engine_jobs import FAST
@@ -40,7 +40,7 @@ class Recorded:
 def recorded(folder: RunFolder, kind: str) -> list[Recorded]:
     """Return the readable records of one kind, without harness errors."""
     found = []
-    for path in sorted(path for path in inside(folder.path, kind).glob("*.jsonl") if path.is_file()):
+    for path in sorted(path for path in path_below(folder.path, kind).glob("*.jsonl") if path.is_file()):
         segment = read_segment(path)
         for number in segment.lines:
             try:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 
-from mutator._common.confined_files import inside
+from mutator._common.confined_files import path_below
 from mutator._common.files import read_json
 from mutator._common.hashing import digest
 from mutator.audit.head_audit import checks as checks_of
@@ -174,7 +174,7 @@ def _goldens(folder: RunFolder) -> Problems:
         if checks["goldens"].get(name) != found:
             known = str(checks["goldens"].get(name))
             got = f"golden run {name} with digest {found[:16]}"
-            yield MutatorError(got, where=inside(folder.path / "golden", name), expected=known[:16])
+            yield MutatorError(got, where=path_below(folder.path / "golden", name), expected=known[:16])
 
 
 def _sources(folder: RunFolder, workspace: Workspace | None) -> Problems:

@@ -11,17 +11,17 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from mutator._common.bounded_reading import MOST_DATA, check_open, read_bounded
+from mutator._common.bounded_reading import MOST_DATA_BYTES, check_file_size, read_bounded
 from mutator._common.confined_files import (
-    inside,
     move_below,
     open_below,
+    path_below,
     unlink_below,
     write_below,
     writing_below,
 )
 from mutator._common.files import raising_disk_full
-from mutator._common.folder_locks import owned
+from mutator._common.folder_locks import owning_run_folder
 from mutator._common.message_text import counted
 from mutator.audit.record_audit import recorded
 from mutator.audit.series_repair import repair_series
@@ -48,7 +48,7 @@ def repair(folder: RunFolder, workspace: Workspace | None = None) -> list[str]:
     With a `workspace`, golden series are rebuilt. Raises MutatorError if a command is using the folder
     or the plan is damaged.
     """
-    with owned(folder.path, patience_s=0.0), raising_disk_full(folder.path):
+    with owning_run_folder(folder.path, patience_s=0.0), raising_disk_full(folder.path):
         renewed = list(_renewed_ledger(folder))
         ledger = file_digests.settled_ledger(folder.path)
         lost = _lost_patches(folder)
@@ -148,7 +148,7 @@ def _segments(folder: RunFolder, ledger: DigestLedger, lost: Collection[str]) ->
             if not path.is_file():
                 yield name, None, f"{name} set aside: it is not a file"
                 continue
-            data = read_bounded(path, MOST_DATA)
+            data = read_bounded(path, MOST_DATA_BYTES)
             segment, known = read_segment(path, data), ledger.files.get(name)
             dropped = lost if kind == "records" else ()
             kept = list(_kept(_trusted(segment, known, data), planned, dropped, done))
@@ -158,7 +158,7 @@ def _segments(folder: RunFolder, ledger: DigestLedger, lost: Collection[str]) ->
                 said = f"{name}: {counted(gone, 'line')} set aside, {len(kept)} kept"
                 yield name, line_file_bytes(path, head, kept), said
     for name, known in ledger.files.items():
-        if known.lines is not None and not os.path.lexists(inside(run, name)):
+        if known.lines is not None and not os.path.lexists(path_below(run, name)):
             yield name, None, f"{name} is gone"
 
 
@@ -203,11 +203,11 @@ def _kept(
 
 def _put_aside(run: Path, name: str) -> None:
     """Copy a file to a free name in `damaged/`; move a folder, and a file too large to copy."""
-    path = inside(run, name)
+    path = path_below(run, name)
     if not os.path.lexists(path):
         return
     place, number = f"{DAMAGED_FOLDER}/{name}", 1
-    while os.path.lexists(inside(run, place)):
+    while os.path.lexists(path_below(run, place)):
         number += 1
         place = f"{DAMAGED_FOLDER}/{name}.{number}"
     if path.is_dir():
@@ -215,7 +215,7 @@ def _put_aside(run: Path, name: str) -> None:
         return
     try:
         with open_below(run, name) as file:
-            check_open(file, path)
+            check_file_size(file, path)
             with writing_below(run, place) as copy:
                 shutil.copyfileobj(file, copy)
     except TooLarge:

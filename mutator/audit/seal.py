@@ -16,9 +16,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from mutator._common.bounded_reading import read_bounded
-from mutator._common.confined_files import inside
+from mutator._common.confined_files import path_below
 from mutator._common.files import read_json
-from mutator._common.hashing import canonical, digest
+from mutator._common.hashing import canonical_json, digest
 from mutator.campaigns.freezing import CSV
 from mutator.store import file_digests, plan_file
 from mutator.store.approvals import review_digest
@@ -124,7 +124,7 @@ def golden_digests(folder: RunFolder, names: Sequence[str]) -> dict[str, str]:
     found = {}
     for one in folder.golden_runs:
         place = folder.golden_folder(*one)
-        files = [digest(read_bounded(inside(place, name))) for name in names]
+        files = [digest(read_bounded(path_below(place, name))) for name in names]
         found[one.key] = digest(files)
     return found
 
@@ -142,7 +142,7 @@ def _sha256(folder: RunFolder, names: Sequence[str]) -> dict[str, str]:
 
 def _versions(folder: RunFolder) -> list[str]:
     """Return the distinct sets of versions that computed anything, as canonical text."""
-    return sorted({canonical([one.python, one.packages]) for one in folder.stretches})
+    return sorted({canonical_json([one.python, one.packages]) for one in folder.stretches})
 
 
 def _records(
@@ -150,7 +150,7 @@ def _records(
 ) -> dict[str, str]:
     """Digest of what is `sealed` of each valid record's line without its checksum, by experiment id."""
     found = {}
-    for path in sorted(inside(folder.path, kind).glob("*.jsonl")):
+    for path in sorted(path_below(folder.path, kind).glob("*.jsonl")):
         segment = bare_segment(path)
         for number, line in intact_lines(path):
             if number > 1 and (ending := parse_ending(line)).is_final:
@@ -162,4 +162,4 @@ def _without_texts(body: bytes) -> bytes:
     """Return a record's line without the texts of exceptions, which differ between versions of Python."""
     if all(part in body for part in _NO_TEXTS):
         return body
-    return canonical(without(json.loads(b"{" + body), _TEXTS)).encode()
+    return canonical_json(without(json.loads(b"{" + body), _TEXTS)).encode()

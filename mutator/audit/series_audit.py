@@ -4,7 +4,7 @@ from collections.abc import Iterator, Set
 
 import numpy as np
 
-from mutator._common.confined_files import inside
+from mutator._common.confined_files import path_below
 from mutator.errors import MutatorError
 from mutator.outcomes.hazards_and_metrics import load_channels
 from mutator.outcomes.series_sampling import Sampler
@@ -120,7 +120,7 @@ def _of_other_runs(
         )
         if damaged & {chunk, golden_chunk}:
             continue
-        path = inside(there.path, f"{chunk}.js")
+        path = path_below(there.path, f"{chunk}.js")
         try:
             golden, faulty = there.load_packed_series(index, name)
             check_same_run(faulty.facts, record)
@@ -135,10 +135,12 @@ def _of_other_goldens(
 ) -> Iterator[MutatorError]:
     for key, number in index.golden_entries.items() if manifest else ():
         assert manifest is not None
-        path = inside(there.path, f"{index.entry_places[number][0]}.js")
+        path = path_below(there.path, f"{index.entry_places[number][0]}.js")
         try:
             stored = decode_series(there.read_entry(number))
-            golden = Sampler(manifest, load_channels(manifest, inside(folder.path, f"golden/{key}"))).golden
+            golden = Sampler(
+                manifest, load_channels(manifest, path_below(folder.path, f"golden/{key}"))
+            ).golden
         except MutatorError:  # reported elsewhere
             continue
         if not _are_same(stored, golden):

@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from mutator._common.confined_files import check_name, inside, unlink_below, write_below
+from mutator._common.confined_files import check_name, path_below, unlink_below, write_below
 from mutator.audit.series_audit import series
 from mutator.errors import MutatorError
 from mutator.outcomes.hazards_and_metrics import load_channels
@@ -61,7 +61,7 @@ def _golden_chunk(
     try:
         manifest = workspace.manifest(folder.head.target)
         goldens = [
-            load_channels(manifest, inside(folder.path / "golden", keys[number])) for number in numbers
+            load_channels(manifest, path_below(folder.path / "golden", keys[number])) for number in numbers
         ]
     except MutatorError:
         return None

@@ -13,7 +13,7 @@ from tempfile import NamedTemporaryFile
 
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.confined_files import open_below, write_below
-from mutator._common.hashing import canonical
+from mutator._common.hashing import canonical_json
 from mutator.audit.seal import Seals
 from mutator.errors import CheckFailed, MutatorError
 from mutator.store.run_folder import RunFolder
@@ -43,7 +43,7 @@ def statement(folder: RunFolder, seals: Seals) -> bytes:
         "plan": folder.head.plan,
         "mutator": folder.head.provenance.mutator,
     }
-    return canonical(said).encode() + b"\n"
+    return canonical_json(said).encode() + b"\n"
 
 
 def sign(folder: RunFolder, seals: Seals, key: Path) -> None:

@@ -6,8 +6,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import BinaryIO
 
-from mutator._common.bounded_reading import bounded_lines
-from mutator._common.confined_files import inside
+from mutator._common.bounded_reading import read_bounded_lines
+from mutator._common.confined_files import path_below
 from mutator.errors import MutatorError, TooLarge
 from mutator.results import table_building
 from mutator.results.table_reader import same_parquet
@@ -28,10 +28,10 @@ def _differences(folder: RunFolder, there: list[str]) -> Iterator[MutatorError]:
     if not there:
         return
     with TemporaryDirectory() as scratch:
-        made = {name: inside(Path(scratch), name) for name in table_building.TABLES}
+        made = {name: path_below(Path(scratch), name) for name in table_building.TABLES}
         table_building.write(folder, made)
         for name in there:
-            path = inside(folder.path, name)
+            path = path_below(folder.path, name)
             if name == table_building.CSV:
                 try:
                     yield from _cells(path, made[name])
@@ -57,4 +57,4 @@ def _cells(path: Path, made: Path) -> Iterator[MutatorError]:
 
 
 def _texts(file: BinaryIO, path: Path) -> Iterator[str]:
-    return (line.decode(errors="replace") for line in bounded_lines(file, path))
+    return (line.decode(errors="replace") for line in read_bounded_lines(file, path))

@@ -9,22 +9,22 @@ from itertools import chain
 from pathlib import Path
 
 from mutator._common.bounded_reading import read_bounded
-from mutator._common.confined_files import inside, is_inside
+from mutator._common.confined_files import is_inside, path_below
 from mutator._common.hashing import digest
-from mutator._common.message_text import one_of
+from mutator._common.message_text import describe_choices
 from mutator.campaigns.campaign_files import Campaign
 from mutator.campaigns.campaign_triggers import listed_triggers
 from mutator.campaigns.operator_faults import OperatorFault, OperatorFaults
 from mutator.campaigns.operator_selection import When
 from mutator.campaigns.sampling import spread
-from mutator.config.yaml_sources import Keys
+from mutator.config.yaml_sources import KeyPath
 from mutator.errors import MutatorError
 from mutator.faults.fault_specs import FaultSpec
 from mutator.faults.spec_expansion import expand
 from mutator.model import Experiment, Fault, Method, Trigger
 from mutator.operators.executed_lines import GoldenRunInputs
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.trigger_kinds import always, at_time, draw_time
+from mutator.triggers.trigger_kinds import always_trigger, draw_time, trigger_at_time
 from mutator.workspace import Workspace
 
 _Numbered = tuple[int, Fault]  # a fault and its position among its variant's values
@@ -89,7 +89,7 @@ class Expansion:
         if not faults:
             raise self._unmatched(("canary", "spec"), canary.spec)
         worst = max(faults, key=lambda fault: fault.size)
-        trigger = at_time(canary.at_s, name="canary")
+        trigger = trigger_at_time(canary.at_s, name="canary")
         return self._experiment(worst, canary.scenario, Method.RANDOM, trigger)
 
     def _check_setting(self) -> None:
@@ -99,7 +99,7 @@ class Expansion:
                 raise self.campaign.error(
                     (*keys, i),
                     f"change '{change}'",
-                    expected=one_of(self.manifest.changes),
+                    expected=describe_choices(self.manifest.changes),
                     remedy="name a change of the target's manifest",
                 )
 
@@ -112,7 +112,7 @@ class Expansion:
         files = {i: one.file for i, one in enumerate(self.campaign.faults) if one.file is not None}
         return {i: self._expanded([self._spec_of_file(("faults", i, "spec"), files[i])]) for i in files}
 
-    def _spec_of_file(self, keys: Keys, file: Path) -> FaultSpec:
+    def _spec_of_file(self, keys: KeyPath, file: Path) -> FaultSpec:
         if not file.is_file():
             raise self.campaign.error(
                 keys,
@@ -129,7 +129,7 @@ class Expansion:
                 remedy="copy it there",
             )
         spec = self.workspace.spec(file)
-        known = inside(self.workspace.library / "faults", f"{spec.name}.yaml")
+        known = path_below(self.workspace.library / "faults", f"{spec.name}.yaml")
         if known.exists() and not known.samefile(file):
             raise self.campaign.error(
                 keys,
@@ -191,7 +191,7 @@ class Expansion:
             for name in self.campaign.scenarios
         }
 
-    def _unmatched(self, keys: Keys, pattern: str, library: Sequence[_Numbered] = ()) -> MutatorError:
+    def _unmatched(self, keys: KeyPath, pattern: str, library: Sequence[_Numbered] = ()) -> MutatorError:
         whole = f"{pattern}/*"
         fits = any(fnmatchcase(fault.spec, whole) for _, fault in library)
         return self.campaign.error(
@@ -235,7 +235,7 @@ class Expansion:
 
         Permanent mutants are always active; transient ones follow the campaign's triggers.
         """
-        permanent = always(armed_after_s=self.armed_after_s)
+        permanent = always_trigger(armed_after_s=self.armed_after_s)
         for one in mutants:
             if scenario not in one.scenarios:
                 continue
@@ -265,7 +265,7 @@ class Expansion:
             last_s=self.campaign.random_until_s,
             step_s=self.manifest.step_s,
         )
-        return at_time(time, name=f"random/{row.name}", hold_s=self.campaign.hold_s)
+        return trigger_at_time(time, name=f"random/{row.name}", hold_s=self.campaign.hold_s)
 
     def _experiment(self, fault: Fault, scenario: str, method: Method, trigger: Trigger) -> Experiment:
         return Experiment(
@@ -290,13 +290,13 @@ class Expansion:
             raise self.campaign.error(
                 self._scenario_keys(scenario),
                 f"no scenario '{scenario}' in the library",
-                expected=one_of(known),
+                expected=describe_choices(known),
                 remedy="correct the name, or add the file to the library's scenarios/",
             )
         return self.workspace.scenario(scenario)
 
     @contextmanager
-    def _placed(self, keys: Keys) -> Iterator[None]:
+    def _placed(self, keys: KeyPath) -> Iterator[None]:
         """Point errors without a line number to `keys` in the campaign file; leave others unchanged."""
         try:
             yield
@@ -307,7 +307,7 @@ class Expansion:
                 keys, err.got, expected=err.expected or "", remedy=err.remedy or "correct the name"
             ) from None
 
-    def _scenario_keys(self, scenario: str) -> Keys:
+    def _scenario_keys(self, scenario: str) -> KeyPath:
         if scenario in self.campaign.scenarios:
             return ("scenarios", self.campaign.scenarios.index(scenario))
         return ("canary", "scenario")

@@ -15,8 +15,8 @@ from mutator.campaigns.campaign_triggers import (
 )
 from mutator.campaigns.installed_studies import Study, find_study
 from mutator.campaigns.operator_selection import OperatorSelection, When
-from mutator.config.yaml_files import read
-from mutator.config.yaml_sources import Keys, Source
+from mutator.config.yaml_files import load_yaml_model
+from mutator.config.yaml_sources import KeyPath, YamlSource
 from mutator.errors import MutatorError
 from mutator.faults.library_readings import FILE, Readings
 from mutator.model import AfterHazard, Limits, Method
@@ -64,7 +64,7 @@ class Campaign:
     limits: Limits
     chunk: int
     after_hazard: AfterHazard
-    yaml: Source
+    yaml: YamlSource
 
     @property
     def seed(self) -> int:
@@ -78,11 +78,11 @@ class Campaign:
     def setting_in(self, reading: str) -> tuple[str, ...]:
         return _in(self.setting, reading)
 
-    def setting_keys(self, reading: str) -> Keys:
+    def setting_keys(self, reading: str) -> KeyPath:
         """Return where the campaign file has the value of `setting_in`."""
         return ("setting", reading) if reading in self.setting else ("setting",)
 
-    def error(self, keys: Keys, got: str, *, expected: str, remedy: str) -> MutatorError:
+    def error(self, keys: KeyPath, got: str, *, expected: str, remedy: str) -> MutatorError:
         """Return an error at `keys` of the campaign file; the caller raises it."""
         return self.yaml.error(keys, got, expected=expected, remedy=remedy)
 
@@ -96,11 +96,11 @@ def load_campaign(path: Path) -> Campaign:
 
     The study need not be installed, so that old runs can be read. `load_study` checks it.
     """
-    model, source = read(path, CampaignModel, SCHEMA, prepare=with_list)
+    model, source = load_yaml_model(path, CampaignModel, SCHEMA, prepare=with_list)
     _check_once(model, source)
     triggers = model.triggers
     for keys, name in {("target",): model.target, ("triggers", "table"): triggers.table or ""}.items():
-        with source.placing(keys):
+        with source.locating_errors(keys):
             check_library_name(name, path)
     return Campaign(
         name=model.name,
@@ -157,12 +157,12 @@ def _seeds(model: CampaignModel) -> range:
     return range(model.seed, model.seed + 1)
 
 
-def _check_once(model: CampaignModel, source: Source) -> None:
-    settings: dict[Keys, Sequence[str]] = {
+def _check_once(model: CampaignModel, source: YamlSource) -> None:
+    settings: dict[KeyPath, Sequence[str]] = {
         ("setting",) if name == EVERY_READING else ("setting", name): names
         for name, names in model.setting.items()
     }
-    once: dict[Keys, Sequence[str]] = {("scenarios",): model.scenarios, ("methods",): model.methods}
+    once: dict[KeyPath, Sequence[str]] = {("scenarios",): model.scenarios, ("methods",): model.methods}
     for keys, values in (once | settings).items():
         seen = set[str]()
         for i, value in enumerate(values):
@@ -194,7 +194,7 @@ def check_readings(campaign: Campaign, readings: Readings) -> None:
         raise campaign.error(
             ("reading",), f"reading '{campaign.reading}'", expected=f"one of {known}", remedy=remedy
         )
-    places: dict[Keys, tuple[str, Mapping[str, object]]] = {
+    places: dict[KeyPath, tuple[str, Mapping[str, object]]] = {
         ("triggers", "armed_after_s"): ("time", campaign.armed_after_s),
         ("setting",): ("setting", campaign.setting),
     }

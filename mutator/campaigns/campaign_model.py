@@ -7,7 +7,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, mod
 from pydantic_core import PydanticKnownError
 
 from mutator._common.doors import OPERATORS
-from mutator._common.yaml_dataclasses import mapping, written
+from mutator._common.yaml_dataclasses import mapping_config, yaml_metadata
 from mutator.campaigns.campaign_triggers import (
     EVERY_READING,
     Triggers,
@@ -15,7 +15,7 @@ from mutator.campaigns.campaign_triggers import (
     or_by_reading,
 )
 from mutator.campaigns.operator_selection import When
-from mutator.config.yaml_files import StrictModel, Written
+from mutator.config.yaml_files import StrictModel, YamlRecord
 from mutator.model import AfterHazard, Limits, Method
 
 
@@ -29,7 +29,7 @@ def _operator(name: str) -> str:
 _Operator = Annotated[
     str,
     AfterValidator(_operator),
-    WithJsonSchema({"anyOf": [{"enum": OPERATORS.shipped()}, {"type": "string"}]}),
+    WithJsonSchema({"anyOf": [{"enum": OPERATORS.shipped_names()}, {"type": "string"}]}),
 ]
 
 
@@ -90,18 +90,18 @@ _NAMES = {"type": "array", "items": {"type": "string"}}
 class Canary:
     """A fault known to be harmful. The campaign starts only if this fault causes its hazard."""
 
-    __pydantic_config__ = mapping("The canary")
+    __pydantic_config__ = mapping_config("The canary")
 
     spec: str = field(
-        metadata=written(
+        metadata=yaml_metadata(
             "The full name of a variant, `<module>/<fault_type>/<variant>`. Its largest value runs first; "
             "the other values follow until one causes the hazard."
         )
     )
-    scenario: str = field(metadata=written("The scenario."))
-    hazard: str = field(metadata=written("The hazard that the fault must cause."))
+    scenario: str = field(metadata=yaml_metadata("The scenario."))
+    hazard: str = field(metadata=yaml_metadata("The hazard that the fault must cause."))
     at_s: float = field(
-        metadata=written("The time from which the fault is active.", ge=0.0, allow_inf_nan=False)
+        metadata=yaml_metadata("The time from which the fault is active.", ge=0.0, allow_inf_nan=False)
     )
 
 
@@ -170,14 +170,14 @@ class CampaignModel(StrictModel, title="The file"):
         description="The seeds; the campaign, including its `sample`, is repeated with each. `--seed` runs "
         "one seed instead.",
     )
-    canary: Written[Canary] = Field(description="A check that a known fault causes a hazard.")
+    canary: YamlRecord[Canary] = Field(description="A check that a known fault causes a hazard.")
     after_hazard: Annotated[AfterHazard, Field(strict=False)] = Field(
         AfterHazard.GO_ON,
         description="`stop` ends each faulty run at its first [terminal "
         "hazard](../explanation/verdicts.md#the-end-of-the-drive). This saves time, but later "
         "hazards and alerts are not observed.",
     )
-    limits: Written[Limits] = Field(Limits(), description="The resources that one run is allowed to use.")
+    limits: YamlRecord[Limits] = Field(Limits(), description="The resources that one run is allowed to use.")
     chunk: int = Field(
         20,
         ge=1,

@@ -6,16 +6,16 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
-from mutator._common.yaml_dataclasses import mapping, written
-from mutator.config.yaml_files import StrictModel, Written
-from mutator.config.yaml_sources import Keys, Source
+from mutator._common.yaml_dataclasses import mapping_config, yaml_metadata
+from mutator.config.yaml_files import StrictModel, YamlRecord
+from mutator.config.yaml_sources import KeyPath, YamlSource
 from mutator.model import MOST, Hold, Trigger
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.conditions import check_condition
-from mutator.triggers.trigger_kinds import always, at_time
+from mutator.triggers.conditions import canonical_condition
+from mutator.triggers.trigger_kinds import always_trigger, trigger_at_time
 
 EVERY_READING = "*"  # key of a value that applies to all readings
-_LIST: Keys = ("triggers", "list")
+_LIST: KeyPath = ("triggers", "list")
 Seconds = Annotated[float, Field(ge=0.0, le=MOST, allow_inf_nan=False)]
 _SECONDS = {"type": "number", "minimum": 0.0, "maximum": MOST}
 
@@ -34,19 +34,23 @@ def or_by_reading(schema: dict[str, Any]) -> dict[str, Any]:
 class ListedTrigger:
     """Exactly one of `always`, `at_s` and `when`. `always` is short for `always: true`."""
 
-    __pydantic_config__ = mapping("A trigger")
+    __pydantic_config__ = mapping_config("A trigger")
 
     always: bool = field(
-        default=False, metadata=written("`true`: active from the time at which triggers are armed.")
+        default=False, metadata=yaml_metadata("`true`: active from the time at which triggers are armed.")
     )
-    at_s: Seconds | None = field(default=None, metadata=written("Active from this time (s) to the end."))
+    at_s: Seconds | None = field(
+        default=None, metadata=yaml_metadata("Active from this time (s) to the end.")
+    )
     when: str | None = field(
         default=None,
-        metadata=written("Active while this condition on `t` (s) and the target's observed values holds."),
+        metadata=yaml_metadata(
+            "Active while this condition on `t` (s) and the target's observed values holds."
+        ),
     )
     hold_s: float | None = field(
         default=None,
-        metadata=written(
+        metadata=yaml_metadata(
             "How long the fault stays active after the trigger first fires, in s. Default: the campaign's "
             "`hold_s`.",
             gt=0.0,
@@ -59,7 +63,7 @@ class ListedTrigger:
             raise ValueError("one of `always`, `at_s` and `when`")
 
 
-_Mapping = Written[ListedTrigger]
+_Mapping = YamlRecord[ListedTrigger]
 _Word = Literal["always"] | _Mapping
 
 
@@ -131,7 +135,7 @@ Triggers = Annotated[
 ]
 
 
-def with_list(source: Source) -> Source:
+def with_list(source: YamlSource) -> YamlSource:
     """Convert a campaign whose key `triggers` has a list into one with that list under `list`."""
     given = source.data.get("triggers")
     if not isinstance(given, list):
@@ -143,7 +147,7 @@ def with_list(source: Source) -> Source:
 
 def listed_triggers(
     listed: Sequence[ListedTrigger],
-    source: Source,
+    source: YamlSource,
     manifest: TargetManifest,
     *,
     armed_after_s: float,
@@ -155,7 +159,7 @@ def listed_triggers(
     """
     found: dict[str, Trigger] = {}
     for i, one in enumerate(listed):
-        with source.placing((*_LIST, i, "when")):
+        with source.locating_errors((*_LIST, i, "when")):
             trigger = _made(one, manifest.observation.variables, armed_after_s, one.hold_s or hold_s)
         if trigger.name in found:
             got = f"'{trigger.name}' is listed twice"
@@ -168,9 +172,9 @@ def _made(
     listed: ListedTrigger, variables: Collection[str], armed_after_s: float, hold_s: float | None
 ) -> Trigger:
     if listed.at_s is not None:
-        return at_time(listed.at_s, name=f"at {listed.at_s:g} s", hold_s=hold_s)
-    trigger = always(armed_after_s=armed_after_s)
+        return trigger_at_time(listed.at_s, name=f"at {listed.at_s:g} s", hold_s=hold_s)
+    trigger = always_trigger(armed_after_s=armed_after_s)
     if listed.when is not None:
-        text = check_condition(listed.when, variables=variables)
+        text = canonical_condition(listed.when, variables=variables)
         trigger = Trigger(name=text, condition=text, armed_after_s=armed_after_s)
     return replace(trigger, hold=Hold.FOR, hold_s=hold_s) if hold_s else trigger

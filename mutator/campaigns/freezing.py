@@ -14,8 +14,8 @@ from mutator._common.files import (
     write_atomic,
     writing_atomic,
 )
-from mutator._common.folder_locks import owned
-from mutator._common.hashing import digest, plain
+from mutator._common.folder_locks import owning_run_folder
+from mutator._common.hashing import as_json_types, digest
 from mutator._common.version import VERSION
 from mutator.campaigns.plan import Plan, Planning
 from mutator.campaigns.plan_parts import Part, PlanDigest, Tally
@@ -58,7 +58,7 @@ def freeze_and_tell(plan: Plan | Planning, out: Path, workspace: Workspace) -> t
     is_new = not out.exists()
     make_run_folder(out)
     try:
-        with owned(out):
+        with owning_run_folder(out):
             return freeze_owned(plan, out, workspace)
     except BaseException:
         if is_new and not RunFolder.exists(out):
@@ -153,7 +153,7 @@ def _head(
     plan: Plan | Planning, tally: Tally, found: str, workspace: Workspace, chunks: list[plan_file.Chunk]
 ) -> RunHead:
     manifest = workspace.manifest(plan.campaign.target)
-    canary = plan_file.experiment_as_json(plan.canary) | {"fault": plain(plan.canary.fault)}
+    canary = plan_file.experiment_as_json(plan.canary) | {"fault": as_json_types(plan.canary.fault)}
     return RunHead(
         schema=SCHEMA,
         plan=found,

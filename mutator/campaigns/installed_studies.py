@@ -22,7 +22,7 @@ class Study(Protocol):
 
 def find_study(name: str) -> Study:
     """Load the study of that name; MutatorError if it is not installed, cannot be loaded or is no study."""
-    return cast(Study, STUDIES.find(name))
+    return cast(Study, STUDIES.load(name))
 
 
 def study_problems(name: str, study: Study, workspace: Workspace) -> list[MutatorError]:

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mutator._common.argument_checks import check_type
-from mutator._common.message_text import counted, seeds_text
-from mutator._common.table_rendering import Table
+from mutator._common.message_text import counted, describe_seeds
+from mutator._common.table_rendering import TextTable
 from mutator.campaigns.campaign_expansion import Expansion
 from mutator.campaigns.campaign_files import Campaign, check_readings, load_campaign, load_study
 from mutator.campaigns.chunks import cut_runs
@@ -72,7 +72,7 @@ class Plan:
 
     def __repr__(self) -> str:
         count = counted(len(self.experiments), "experiment")
-        return f"<Plan of {self.campaign.name}, {self.reading}: {count}, {seeds_text(self.seeds)}>"
+        return f"<Plan of {self.campaign.name}, {self.reading}: {count}, {describe_seeds(self.seeds)}>"
 
     @property
     def seeds(self) -> range:
@@ -99,7 +99,9 @@ class Plan:
         groups = sorted(self.groups().items())
         rows = [(f"{module}/{kind}", method, str(n)) for (module, kind, method), n in groups]
         rows.append(("total", "", str(len(self.experiments))))
-        table = Table(heads=("fault type", "method", "experiments"), rows=rows, right=(2,)).as_html()
+        table = TextTable(
+            heads=("fault type", "method", "experiments"), rows=rows, right_aligned=(2,)
+        ).as_html()
         return f"<p>{escape(repr(self))}</p>{table}"
 
     def frame(self) -> "pd.DataFrame":

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from hashlib import sha256
 
-from mutator._common.hashing import canonical, plain
+from mutator._common.hashing import as_json_types, canonical_json
 from mutator.campaigns.campaign_files import Campaign
 from mutator.model import Experiment, Fault
 from mutator.store.run_folder import GoldenRun
@@ -59,7 +59,7 @@ class PlanDigest:
     """The digest of the ids and chunks of the experiments, the canary's id, and the campaign."""
 
     def __init__(self) -> None:
-        self._hash = sha256(f"[{canonical(_DIGEST_PREFIX)},[".encode())
+        self._hash = sha256(f"[{canonical_json(_DIGEST_PREFIX)},[".encode())
         self._joint = ""
 
     def add(self, ids: Sequence[str]) -> None:
@@ -68,8 +68,8 @@ class PlanDigest:
             self._joint = ","
 
     def end(self, chunks: Sequence[int], canary: str, campaign: Campaign) -> str:
-        rest = [chunks, canary, plain(campaign.canary), plain(campaign.limits)]
-        self._hash.update(f"],{canonical(rest)[1:]}".encode())
+        rest = [chunks, canary, as_json_types(campaign.canary), as_json_types(campaign.limits)]
+        self._hash.update(f"],{canonical_json(rest)[1:]}".encode())
         return self._hash.hexdigest()
 
 

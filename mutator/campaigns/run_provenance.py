@@ -93,7 +93,7 @@ def begin_stretch(
     manifest = workspace.manifest(folder.head.target)
     places = {"library": workspace.library, "templates": workspace.templates, "target": manifest.root}
     places |= {"overlay": manifest.overlay} if manifest.overlay else {}
-    importer = IMPORTERS.package(Path(manifest.trace_file).suffix.removeprefix("."))
+    importer = IMPORTERS.package_of(Path(manifest.trace_file).suffix.removeprefix("."))
     used = (*(wanted.name for wanted in manifest.requires), *packages, *([importer] if importer else []))
     versions = _packages(folder, map(canonicalize_name, used))
     states = {name: clone_state(place) for name, place in ({"mutator": _OWN} | places).items()}

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from mutator._common.confined_files import inside
+from mutator._common.confined_files import path_below
 from mutator._common.cpu_cores import usable_cores
 from mutator._common.files import ScratchFolder
 from mutator.campaigns.campaign_expansion import Expansion
@@ -34,7 +34,7 @@ from mutator.mutants.probe import is_probe_path
 from mutator.preflight import canary
 from mutator.preflight.preflight_rules import CheckRun, golden_problem, null_mutant_problem, read_check_run
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.trigger_kinds import always
+from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
 
 _OTHER_HASH_SEED = 4242
@@ -144,7 +144,7 @@ class _DriveCheck:
         )
 
     def _run(self, job: Job) -> Execution:
-        folder = inside(self.engine.work, f"{job.name}-{'-'.join(job.changes)}")
+        folder = path_below(self.engine.work, f"{job.name}-{'-'.join(job.changes)}")
         return self.engine.execute(job, folder)
 
     def _check_run(self, execution: Execution) -> CheckRun:
@@ -253,7 +253,7 @@ class _DriveCheck:
         return replace(finding, places=tuple(places))
 
     def _forking_refusal(self, scenario: str, golden: _GoldenRuns) -> NotForkable | None:
-        null = build(self.manifest, self.workspace.fault_models(), None, always())
+        null = build(self.manifest, self.workspace.fault_models(), None, always_trigger())
         work = self._scratch / "fork"
         work.mkdir()
         engine = ForkEngine(self.manifest, work, self.engine.limits, null=null)

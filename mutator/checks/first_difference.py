@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from mutator._common.bounded_reading import read_bounded
-from mutator._common.confined_files import inside
-from mutator._common.message_text import shown
+from mutator._common.confined_files import path_below
+from mutator._common.message_text import describe_value
 from mutator.errors import BadOutput
 from mutator.outcomes import golden_comparison
 from mutator.targets.manifest import TargetManifest
@@ -19,7 +19,7 @@ def describe_first_difference(manifest: TargetManifest, first_folder: Path, seco
     The text names the channel, step and time, or the key of the record, and both values.
     """
     for name in manifest.outputs:
-        if read_bounded(inside(first_folder, name)) != read_bounded(inside(second_folder, name)):
+        if read_bounded(path_below(first_folder, name)) != read_bounded(path_below(second_folder, name)):
             in_trace = name == manifest.trace_file
             difference = (
                 _describe_trace_difference(manifest, first_folder, second_folder)
@@ -57,8 +57,10 @@ def _describe_trace_difference(manifest: TargetManifest, first_folder: Path, sec
 
 
 def _describe_record_difference(first_folder: Path, second_folder: Path, name: str) -> str:
-    first, second = (json.loads(read_bounded(inside(out, name))) for out in (first_folder, second_folder))
+    first, second = (json.loads(read_bounded(path_below(out, name))) for out in (first_folder, second_folder))
     for key in dict.fromkeys((*first, *second)):
         if first.get(key) != second.get(key):
-            return f"in {name}, '{key}': {shown(first.get(key))} and {shown(second.get(key))}"
+            return (
+                f"in {name}, '{key}': {describe_value(first.get(key))} and {describe_value(second.get(key))}"
+            )
     return ""

@@ -8,7 +8,7 @@ from typing import TypeVar
 from mutator.campaigns.campaign_files import Campaign, check_readings, load_campaign, load_study
 from mutator.campaigns.campaign_triggers import listed_triggers
 from mutator.campaigns.installed_studies import study_problems
-from mutator.config.yaml_sources import Keys
+from mutator.config.yaml_sources import KeyPath
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import Example, FaultModel, FaultModels
 from mutator.faults.fault_specs import FaultSpec, Variant
@@ -25,7 +25,7 @@ from mutator.stpa.analysis_checks import check_analysis
 from mutator.stpa.context_tables import ContextTable
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.required_packages import check_requirements
-from mutator.triggers.trigger_kinds import always
+from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
 
 EXAMPLE_TAG = "example"
@@ -61,7 +61,7 @@ def library_problems(workspace: Workspace, target: str) -> list[MutatorError]:
         collector.problems += _unknown_hazard_problems(
             manifest, tuple(hazards.hazards), [t for t in tables if t]
         )
-    if manifest and models and collector.tried(lambda: build(manifest, models, None, always())):
+    if manifest and models and collector.tried(lambda: build(manifest, models, None, always_trigger())):
         for spec in specs:
             collector.problems += spec_problems(spec, models, manifest) if spec else ()
     if readings:
@@ -142,7 +142,7 @@ def _build_problems(
 ) -> Iterator[MutatorError]:
     """Yield why a fault of a variant cannot be built, located at the injection that is the cause, if any."""
     try:
-        build(manifest, models, fault, always())
+        build(manifest, models, fault, always_trigger())
     except MutatorError as error:
         keys = (*variant.keys, fault.reading, *_keys_of_failing_injection(fault, models, manifest))
         got = f"{fault.spec} ({fault.reading}): {error.got}{_describe_target_place(error, manifest)}"
@@ -150,7 +150,7 @@ def _build_problems(
         yield spec.source.error(keys, got, expected=error.expected, remedy=remedy)
 
 
-def _keys_of_failing_injection(fault: Fault, models: FaultModels, manifest: TargetManifest) -> Keys:
+def _keys_of_failing_injection(fault: Fault, models: FaultModels, manifest: TargetManifest) -> KeyPath:
     """Return the keys of the first injection without an edit; none if all have one."""
     for count in range(1, len(fault.injections) + 1):
         try:

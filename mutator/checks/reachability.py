@@ -20,7 +20,7 @@ from mutator.model import Fault, FaultLocation, Injection, Method, Trigger
 from mutator.mutants.mutant_building import Mutant, build
 from mutator.preflight.unreached_triggers import armed_condition_of, is_ever_active
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.trigger_kinds import always, at_time
+from mutator.triggers.trigger_kinds import always_trigger, trigger_at_time
 from mutator.workspace import Workspace
 
 _COUNTING_MODEL = "count_only"
@@ -132,7 +132,7 @@ def _spec_statements(workspace: Workspace, manifest: TargetManifest) -> Iterator
                     anchor = f"{at.anchor.kind.value} {at.anchor.name}".strip()
                     what = f"{spec.name}/{variant.name}: {at.path}, {at.function}, {anchor}"
                     place = FindingPlace(
-                        file=str(spec.path), line=spec.source.line(injection.keys), what=what
+                        file=str(spec.path), line=spec.source.line_of(injection.keys), what=what
                     )
                     yield SpecStatement(location=at, place=place, changes=variant.changes)
 
@@ -146,7 +146,7 @@ def _build_counting_mutant(
     fault = Fault(
         _COUNTING_MODEL, _COUNTING_MODEL, _COUNTING_MODEL, _COUNTING_MODEL, None, "", "", injections
     )
-    mutant = build(manifest, _with_counting_model(models), fault, always())
+    mutant = build(manifest, _with_counting_model(models), fault, always_trigger())
     return mutant, dict(zip(mutant.injection_ids, once, strict=True))
 
 
@@ -180,15 +180,15 @@ def _awaited_triggers(
         yield from _listed_triggers(campaign, manifest, earliest)
         if (until := campaign.random_until_s) is not None and Method.RANDOM in campaign.methods:
             what = f"{campaign.name}: random times until {until:g} s"
-            place = _yaml_place(campaign.path, campaign.yaml.line(("triggers", "random_until_s")), what)
-            yield AwaitedTrigger(trigger=at_time(until, name=campaign.name), place=place)
+            place = _yaml_place(campaign.path, campaign.yaml.line_of(("triggers", "random_until_s")), what)
+            yield AwaitedTrigger(trigger=trigger_at_time(until, name=campaign.name), place=place)
     for name in {table: None for table, _ in armed_after_s_by_row} if campaigns else workspace.context_tables:
         table = workspace.context_table(name)
         for trigger in table.triggers(armed_after_s=manifest.armed_after_s):
             if not campaigns or (name, trigger.name) in armed_after_s_by_row:
                 after = armed_after_s_by_row.get((name, trigger.name), manifest.armed_after_s)
                 what = f"{name}, {trigger.name}: {trigger.condition}, armed after {after:g} s"
-                place = _yaml_place(table.source.path, table.source.line(("contexts", trigger.name)), what)
+                place = _yaml_place(table.source.path, table.source.line_of(("contexts", trigger.name)), what)
                 yield AwaitedTrigger(trigger=replace(trigger, armed_after_s=after), place=place)
 
 
@@ -209,7 +209,7 @@ def _listed_triggers(
         what = f"{campaign.name}: {trigger.name}"
         yield AwaitedTrigger(
             trigger=trigger,
-            place=_yaml_place(campaign.path, campaign.yaml.line(("triggers", "list", i)), what),
+            place=_yaml_place(campaign.path, campaign.yaml.line_of(("triggers", "list", i)), what),
         )
 
 

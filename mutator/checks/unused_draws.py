@@ -36,7 +36,7 @@ def _unused_draw_places(specs: tuple[FaultSpec, ...], models: FaultModels) -> It
             for reading, injections in variant.readings.items():
                 if draw and not any(_does_use_draw(injection, draw.name, models) for injection in injections):
                     what = f"{spec.name}/{variant.name} draws '{draw.name}', unused in reading {reading}"
-                    yield FindingPlace(file=str(spec.path), line=spec.source.line(draw.keys), what=what)
+                    yield FindingPlace(file=str(spec.path), line=spec.source.line_of(draw.keys), what=what)
 
 
 def _does_use_draw(injection: InjectionSpec, name: str, models: FaultModels) -> bool:
@@ -61,5 +61,5 @@ def _unused_parameter_places(models: FaultModels) -> Iterator[FindingPlace]:
         for param in model.params:
             if param.name not in used:
                 what = f"parameter '{param.name}' of model {model.name}, unused in its template"
-                line = model.source.line(("params", param.name))
+                line = model.source.line_of(("params", param.name))
                 yield FindingPlace(file=str(model.source.path), line=line, what=what)

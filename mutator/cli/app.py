@@ -16,9 +16,9 @@ from typer.core import TyperGroup
 from typer.main import get_command
 
 from mutator._common import progress_events
-from mutator._common.files import disk_full, is_disk_full
-from mutator._common.interrupts import terminable
-from mutator._common.resource_shortages import shortage
+from mutator._common.files import disk_full_error, is_disk_full_error
+from mutator._common.interrupts import interruptible
+from mutator._common.resource_shortages import find_shortage
 from mutator._common.version import VERSION
 from mutator.cli import (
     audits,
@@ -195,7 +195,7 @@ def _answer(words: Sequence[str]) -> int:
             command.main(prog_name="mutator")
         with (
             _warnings_in_one_line(),
-            terminable(),
+            interruptible(),
             command.make_context("mutator", [*words] or ["--help"]) as ctx,
         ):
             command.invoke(ctx)
@@ -224,9 +224,9 @@ def _answer(words: Sequence[str]) -> int:
 def _known(error: Exception) -> MutatorError | None:
     """Return a MutatorError for an error that the user can fix on the machine, or None."""
     where = getattr(error, "filename", None)
-    if is_disk_full(error):
-        return disk_full(where)
-    if short := shortage(error):
+    if is_disk_full_error(error):
+        return disk_full_error(where)
+    if short := find_shortage(error):
         return short
     if isinstance(error, UnicodeEncodeError) and isinstance(error.object, str):
         return _no_text(error.object[error.start : error.end])
@@ -250,7 +250,7 @@ def _warnings_in_one_line() -> Iterator[None]:
 
         def show(message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
             if issubclass(category, MutatorWarning):
-                progress_events.warning(str(message))
+                progress_events.report_warning(str(message))
                 Terminal().note(f"warning: {message}")
             else:
                 others(message, category, *place, **more)
@@ -276,7 +276,7 @@ def _defect() -> int:
 
 
 def _say(text: str) -> None:
-    progress_events.error(text)
+    progress_events.report_error(text)
     with remarking():
         print(text, file=sys.stderr)
 

@@ -13,7 +13,7 @@ from mutator.cli.options import Json
 from mutator.errors import MutatorError
 
 if TYPE_CHECKING:
-    from mutator._common.shared_cache import Entry
+    from mutator._common.shared_cache import CacheEntry
 
 _UNITS = {"B": 1, "KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
 
@@ -82,18 +82,18 @@ def parse_size(text: str) -> int:
     return int(float(found[1]) * _UNITS[(found[2] or "B").upper()])
 
 
-def _by_what(entries: "Sequence[Entry]") -> "dict[str, list[Entry]]":
-    groups: dict[str, list[Entry]] = {}
+def _by_what(entries: "Sequence[CacheEntry]") -> "dict[str, list[CacheEntry]]":
+    groups: dict[str, list[CacheEntry]] = {}
     for entry in entries:
         groups.setdefault(entry.what, []).append(entry)
     return groups
 
 
-def _size(entries: "Sequence[Entry]") -> str:
+def _size(entries: "Sequence[CacheEntry]") -> str:
     size = sum(entry.size for entry in entries)
     unit = next((unit for unit in ("GB", "MB") if size >= _UNITS[unit]), "KB")
     return f"{size / _UNITS[unit]:.1f} {unit.replace('K', 'k')}"
 
 
-def _facts(entries: "Sequence[Entry]") -> list[dict[str, object]]:
+def _facts(entries: "Sequence[CacheEntry]") -> list[dict[str, object]]:
     return [{"what": e.what, "path": str(e.path), "bytes": e.size} for e in entries]

@@ -11,7 +11,7 @@ import typer
 
 import mutator
 from mutator._common.cpu_cores import usable_cores
-from mutator._common.message_text import counted, seeds_text
+from mutator._common.message_text import counted, describe_seeds
 from mutator.cli import completion
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import (
@@ -129,7 +129,9 @@ def _print_plan(terminal: Terminal, made: "mutator.Plan", cost: "Cost", anew: di
     for text in made.told:
         terminal.say(text)
     if len(made.seeds) > 1:
-        terminal.say(f"{seeds_text(made.seeds)}: {len(made.goldens())} golden runs (each seed has its own)")
+        terminal.say(
+            f"{describe_seeds(made.seeds)}: {len(made.goldens())} golden runs (each seed has its own)"
+        )
     if shared := len(made.experiments) - made.runs:
         terminal.say(f"runs: {made.runs}; experiments that reuse another scenario's identical run: {shared}")
     for why, variants in _by_reason(anew).items():

@@ -18,9 +18,9 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TextIO
 
 from mutator._common import progress_events
-from mutator._common.hashing import plain
-from mutator._common.message_text import folded
-from mutator._common.table_rendering import Table
+from mutator._common.hashing import as_json_types
+from mutator._common.message_text import wrap_text
+from mutator._common.table_rendering import TextTable
 from mutator.errors import MutatorError
 
 if TYPE_CHECKING:
@@ -65,12 +65,12 @@ class Terminal:
 
     def result(self, text: str, style: str | None = None) -> None:
         """Print the sentence that says what came out of the command."""
-        progress_events.result(text)
+        progress_events.report_result(text)
         self.say(text, style)
 
     def link(self, kind: str, path: Path, text: str | None = None) -> None:
         """Print where a file was written: `kind: path`, or `text`."""
-        progress_events.link(kind, path)
+        progress_events.report_link(kind, path)
         self.say(text or f"{kind}: {short_path(path)}")
 
     def note(self, text: str) -> None:
@@ -80,7 +80,7 @@ class Terminal:
 
     def complain(self, text: str) -> None:
         """Print an error to standard error."""
-        progress_events.error(text)
+        progress_events.report_error(text)
         with remarking():
             _print(self.err, f"error: {text}", "bold red")
 
@@ -105,7 +105,7 @@ class Terminal:
         if self.out.is_terminal:
             self.out.print(_rich_table(heads, cells, right, total))
         else:
-            self.say(Table(heads=heads, rows=cells, right=right).as_text(), whole=True)
+            self.say(TextTable(heads=heads, rows=cells, right_aligned=right).as_text(), whole=True)
 
     def diff(self, patch: str) -> None:
         """Print a unified diff: coloured in a terminal, elsewhere unchanged, as `patch` needs it."""
@@ -125,7 +125,7 @@ class Terminal:
 
     @contextmanager
     def wait(self, text: str) -> Iterator[None]:
-        progress_events.phase(text)
+        progress_events.report_phase(text)
         if self.as_json or not self.err.is_terminal:
             yield
             return
@@ -265,7 +265,7 @@ def _print(console: "Console", text: str, style: str | None, *, whole: bool = Fa
     text = _visible(text)
     if not whole:
         width = console.width if console.is_terminal else _columns()
-        text = folded(text, width).replace(NO_BREAK, " ")
+        text = wrap_text(text, width).replace(NO_BREAK, " ")
     console.print(text, style=style, markup=False, highlight=False, soft_wrap=True)
 
 
@@ -284,7 +284,7 @@ def _visible(text: str) -> str:
 
 
 def _jsonable(value: Any) -> Any:
-    value = plain(value)
+    value = as_json_types(value)
     if isinstance(value, dict):
         return {k: _jsonable(v) for k, v in value.items()}
     if isinstance(value, list):

@@ -183,7 +183,7 @@ def _print_diffs(terminal: Terminal, diffs: list[tuple[str, str, str]], *, whole
             terminal.note(note)
 
 
-OPERATOR_NAMES = ", ".join(OPERATORS.shipped())
+OPERATOR_NAMES = ", ".join(OPERATORS.shipped_names())
 
 GENERATE_EXAMPLES = """\b
 Examples:

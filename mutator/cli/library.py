@@ -83,11 +83,11 @@ def _campaigns(workspace: "Workspace") -> Table:
 
 
 def _files(files: Mapping[str, Path], key: str) -> Table:
-    from mutator.config.yaml_files import load
+    from mutator.config.yaml_files import load_yaml
 
     rows: list[dict[str, Any]] = []
     for name, path in files.items():
-        data = load(path).data
+        data = load_yaml(path).data
         about = data.get(key, "") if isinstance(data, dict) else ""
         rows.append({"name": name, "file": short_path(path), "about": _line(str(about))})
     return ["name", "file", "about"], rows

@@ -18,7 +18,7 @@ def campaign_progress(terminal: Terminal) -> Iterator[Callable[["Progress"], Non
     with _live(terminal) if terminal.err.is_terminal else nullcontext(Lines(terminal.note)) as show:
 
         def notify(progress: "Progress") -> None:
-            progress_events.phase(title(progress), progress.done, progress.total, progress.outcomes)
+            progress_events.report_phase(title(progress), progress.done, progress.total, progress.outcomes)
             show(progress)
 
         yield notify

@@ -29,10 +29,10 @@ def register(app: typer.Typer) -> None:
 
 def show_counts(terminal: Terminal, run: "Run") -> None:
     counts = run.counts()
-    terminal.table(counts.heads, counts.rows, right=tuple(counts.right), total=True)
+    terminal.table(counts.heads, counts.rows, right=tuple(counts.right_aligned), total=True)
     score = run.mutation_totals()
     if score.rows:
-        terminal.table(score.heads, score.rows, right=tuple(score.right))
+        terminal.table(score.heads, score.rows, right=tuple(score.right_aligned))
     with suppress(MutatorError):  # the note needs the library
         if note := run.alerts_note():
             terminal.say(note)
@@ -110,7 +110,7 @@ def report(
         terminal.emit({"markdown": str(written.markdown), "page": str(written.page), "rows": written.rows})
     show_counts(terminal, loaded)
     for summary in written.summaries:
-        terminal.table(summary.heads, summary.rows, right=tuple(summary.right))
+        terminal.table(summary.heads, summary.rows, right=tuple(summary.right_aligned))
     terminal.say(f"report: {short_path(written.markdown)} and {short_path(written.page)}")
     loaded.check_equivalence()
 

@@ -7,10 +7,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from mutator._common.confined_files import inside
+from mutator._common.confined_files import path_below
 from mutator._common.files import make_folder, write_atomic
 from mutator._common.message_text import counted
-from mutator._common.table_rendering import Table, markdown_line
+from mutator._common.table_rendering import TextTable, markdown_line
 from mutator.comparison.input_differences import InputFact
 from mutator.comparison.pairs import ExperimentPair, ResultChange, time_to_hazard
 from mutator.comparison.run_comparison import Comparison, Gate, describe_ending_change
@@ -39,7 +39,7 @@ def write_comparison(comparison: Comparison, out: Path) -> ComparisonFiles:
     make_folder(out / "tables")
     text, hypertext, pairs = out / "COMPARISON.md", out / "index.html", out / "pairs.csv"
     for sheet in comparison.sheets:
-        write_atomic(inside(out / "tables", f"{sheet.name}.csv"), sheet.as_csv().encode())
+        write_atomic(path_below(out / "tables", f"{sheet.name}.csv"), sheet.as_csv().encode())
     write_atomic(pairs, pairs_csv(comparison))
     write_atomic(out / "unmatched.csv", unmatched_csv(comparison))
     write_atomic(text, render_markdown(comparison).encode())
@@ -124,16 +124,18 @@ def _pair_list(pairs: tuple[ExperimentPair, ...]) -> str:
     return "\n".join([*lines, f"- and {more} more"] if more > 0 else lines)
 
 
-def _facts_table(comparison: Comparison, facts: Sequence[InputFact]) -> Table:
+def _facts_table(comparison: Comparison, facts: Sequence[InputFact]) -> TextTable:
     names = comparison.names
-    return Table(
-        heads=("what", names.a, names.b), rows=[(fact.name, fact.a, fact.b) for fact in facts], named=True
+    return TextTable(
+        heads=("what", names.a, names.b),
+        rows=[(fact.name, fact.a, fact.b) for fact in facts],
+        has_row_headings=True,
     )
 
 
-def _reasons_table(comparison: Comparison) -> Table:
+def _reasons_table(comparison: Comparison) -> TextTable:
     rows = [(why, str(number)) for why, number in count_by_reason(comparison)]
-    return Table(heads=("why", "experiments"), rows=rows, right=(1,))
+    return TextTable(heads=("why", "experiments"), rows=rows, right_aligned=(1,))
 
 
 def render_page(comparison: Comparison) -> str:
@@ -164,10 +166,12 @@ def page_style() -> str:
     return "".join(map(asset, load_order("comparison", ".css"))).replace("LIMIT", str(MOST_SHOWN_ROWS + 1))
 
 
-def _changed_table(comparison: Comparison) -> Table:
+def _changed_table(comparison: Comparison) -> TextTable:
     a, b = comparison.names.a, comparison.names.b
     heads = ("experiment", "what changed", a, b, f"hazard, {a} [s]", f"hazard, {b} [s]", "ids")
-    return Table(heads=heads, rows=list(map(_changed_row, comparison.changed_pairs)), right=(4, 5))
+    return TextTable(
+        heads=heads, rows=list(map(_changed_row, comparison.changed_pairs)), right_aligned=(4, 5)
+    )
 
 
 def _changed_row(pair: ExperimentPair) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from mutator._common.hashing import plain
+from mutator._common.hashing import as_json_types
 from mutator.comparison.compared_runs import ComparedRun
 from mutator.comparison.pairs import ExperimentMatching, ExperimentPair
 from mutator.store.run_folder import RunFolder
@@ -51,7 +51,9 @@ def _facts_of_run(side: ComparedRun) -> dict[str, str]:
     if len(seeds := side.folder.seeds) > 1:
         values["seed"] = f"{seeds[0]} to {seeds[-1]}"
     values["setting"] = ", ".join(dict.fromkeys(c for e in side.experiments for c in e.setting)) or "-"
-    values["chosen"] = ", ".join(f"{k} {v}" for k, v in plain(head.choices).items() if v is not None) or "-"
+    values["chosen"] = (
+        ", ".join(f"{k} {v}" for k, v in as_json_types(head.choices).items() if v is not None) or "-"
+    )
     values |= {f"digest of {name}": value[:_SHOWN_DIGEST_DIGITS] for name, value in head.sources.items()}
     if scale := side.folder.severity_scale:
         bounds = ", ".join(f"{name} from {least:.3g} m/s" for name, least, _ in scale.classes[1:])

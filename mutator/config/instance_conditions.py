@@ -4,28 +4,28 @@ import ast
 
 from mutator.config.location_syntax import PROBE_NAME
 
-_LONGEST = 1000
-_PLAIN = (
+_MOST_LENGTH = 1000
+_ALLOWED_NODES = (
     *(ast.Expression, ast.BoolOp, ast.And, ast.Or, ast.UnaryOp, ast.Not, ast.USub, ast.Compare, ast.cmpop),
     *(ast.Name, ast.Load, ast.Attribute, ast.Subscript, ast.Constant, ast.Tuple),
 )
 
 
-def instance_condition(text: str) -> str:
+def canonical_instance_condition(text: str) -> str:
     """Return the condition in the form that mutants contain.
 
     ValueError unless it consists of names, attributes, items, constants, comparisons, `and`, `or` and `not`.
     """
     try:
-        tree = ast.parse(text.strip(), mode="eval") if len(text) <= _LONGEST else None
+        tree = ast.parse(text.strip(), mode="eval") if len(text) <= _MOST_LENGTH else None
     except (SyntaxError, RecursionError, MemoryError):
         tree = None
-    plain = tree is not None and all(isinstance(node, _PLAIN) for node in ast.walk(tree))
-    if tree is None or not plain or PROBE_NAME in names_of(text) or "#" in text:
+    plain = tree is not None and all(isinstance(node, _ALLOWED_NODES) for node in ast.walk(tree))
+    if tree is None or not plain or PROBE_NAME in names_in_condition(text) or "#" in text:
         raise ValueError(text)
     return ast.unparse(tree)
 
 
-def names_of(text: str) -> frozenset[str]:
+def names_in_condition(text: str) -> frozenset[str]:
     tree = ast.parse(text.strip(), mode="eval")
     return frozenset(node.id for node in ast.walk(tree) if isinstance(node, ast.Name))

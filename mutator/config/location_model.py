@@ -2,16 +2,16 @@
 
 from pydantic import Field
 
-from mutator.config.location_syntax import assignable, dotted_name, is_expression
+from mutator.config.location_syntax import is_assignable, is_dotted_name, is_expression
 from mutator.config.yaml_files import StrictModel
-from mutator.config.yaml_sources import Keys, Source
+from mutator.config.yaml_sources import KeyPath, YamlSource
 from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS, Anchor, AnchorKind, FaultLocation
 
-_NAMELESS = (AnchorKind.ENTRY, AnchorKind.BEFORE_RETURN, AnchorKind.RETURN_VALUE, AnchorKind.CONDITION)
-_ASSIGNMENTS = (AnchorKind.AFTER_ASSIGN, AnchorKind.BEFORE_ASSIGN)
+_NAMELESS_KINDS = (AnchorKind.ENTRY, AnchorKind.BEFORE_RETURN, AnchorKind.RETURN_VALUE, AnchorKind.CONDITION)
+_ASSIGNMENT_KINDS = (AnchorKind.AFTER_ASSIGN, AnchorKind.BEFORE_ASSIGN)
 
 
-class AtModel(StrictModel, title="A place"):
+class LocationModel(StrictModel, title="A place"):
     """Give exactly one anchor. It must match exactly one place in the function. If it matches several, the
     error lists them, and `nth` chooses one. Anchors `before_...` and `after_...` match statements, not parts
     of expressions. Write names as in the source (`gap`, `self.angle`, `frames.extend`).
@@ -73,19 +73,19 @@ class AtModel(StrictModel, title="A place"):
         "after all other statements.",
     )
 
-    def location(self, source: Source, keys: Keys) -> FaultLocation:
+    def location(self, source: YamlSource, keys: KeyPath) -> FaultLocation:
         """Return the location; errors point at `keys` in `source`."""
-        given = [kind for kind in AnchorKind if getattr(self, kind.value) not in (None, False)]
-        if len(given) != 1:
+        anchors = [kind for kind in AnchorKind if getattr(self, kind.value) not in (None, False)]
+        if len(anchors) != 1:
             raise source.error(
                 keys,
-                f"{len(given)} anchors" + (f" ({', '.join(given)})" if given else ""),
+                f"{len(anchors)} anchors" + (f" ({', '.join(anchors)})" if anchors else ""),
                 expected=f"exactly one of {', '.join(AnchorKind)}",
                 remedy="name one statement, e.g. `after_assign: gap`",
             )
-        kind = given[0]
+        kind = anchors[0]
         name = "" if kind is AnchorKind.ENTRY else getattr(self, kind.value)
-        if not (_fits(kind, name) or (not name and kind in _NAMELESS)):
+        if not (_is_valid_name(kind, name) or (not name and kind in _NAMELESS_KINDS)):
             expected = (
                 "an expression as in the source" if kind in VALUE_ANCHORS else "a name as in the source"
             )
@@ -111,7 +111,7 @@ class AtModel(StrictModel, title="A place"):
         anchor = Anchor(kind=kind, name=name, nth=self.nth, which=which)
         return FaultLocation(path=self.file, function=function, anchor=anchor)
 
-    def _function_of(self, kind: AnchorKind, source: Source, keys: Keys) -> str:
+    def _function_of(self, kind: AnchorKind, source: YamlSource, keys: KeyPath) -> str:
         name = self.function
         if kind is AnchorKind.CONSTANT:
             if name is not None:
@@ -126,16 +126,16 @@ class AtModel(StrictModel, title="A place"):
             raise source.error(
                 keys, "'function' is missing", expected="a qualified name such as Sensor.measure"
             )
-        if not dotted_name(name.replace(".<locals>", "")):
+        if not is_dotted_name(name.replace(".<locals>", "")):
             raise source.error(
                 (*keys, "function"), f"'{name}'", expected="a qualified name such as Sensor.measure"
             )
         return name
 
 
-def _fits(kind: AnchorKind, name: str) -> bool:
+def _is_valid_name(kind: AnchorKind, name: str) -> bool:
     if kind is AnchorKind.DEFAULT and "." in name:
         return False
     if kind in VALUE_ANCHORS:
         return is_expression(name)
-    return dotted_name(name) or (kind in _ASSIGNMENTS and assignable(name))
+    return is_dotted_name(name) or (kind in _ASSIGNMENT_KINDS and is_assignable(name))

@@ -9,36 +9,41 @@ from mutator.model import AnchorKind, FaultLocation
 
 PROBE_NAME = "_fi"  # reserved for the probe's module in every mutant (mutants/probe.py)
 
-_NO_PYTHON = (SyntaxError, ValueError, RecursionError, MemoryError)  # what `ast` raises for invalid source
+_INVALID_SOURCE_ERRORS = (
+    SyntaxError,
+    ValueError,
+    RecursionError,
+    MemoryError,
+)  # what `ast` raises for invalid source
 
 
-def as_written_at(location: FaultLocation) -> dict[str, Any]:
+def location_as_yaml(location: FaultLocation) -> dict[str, Any]:
     anchor = location.anchor
-    found: dict[str, Any] = {"file": location.path}
-    found |= {"function": location.function} if location.function else {}
-    found[anchor.kind.value] = anchor.name if anchor.kind is not AnchorKind.ENTRY else True
+    keys: dict[str, Any] = {"file": location.path}
+    keys |= {"function": location.function} if location.function else {}
+    keys[anchor.kind.value] = anchor.name if anchor.kind is not AnchorKind.ENTRY else True
     if anchor.which is not None:
-        found["which"] = int(anchor.which) if anchor.which.isdecimal() else anchor.which
-    return found | ({"nth": anchor.nth} if anchor.nth is not None else {})
+        keys["which"] = int(anchor.which) if anchor.which.isdecimal() else anchor.which
+    return keys | ({"nth": anchor.nth} if anchor.nth is not None else {})
 
 
 def is_expression(text: str) -> bool:
     """Whether `text` is a Python expression that does not use the probe."""
     try:
         tree = ast.parse(text.strip(), mode="eval")
-    except _NO_PYTHON:
+    except _INVALID_SOURCE_ERRORS:
         return False
     return not any(isinstance(node, ast.Name) and node.id == PROBE_NAME for node in ast.walk(tree))
 
 
-def assignable(text: str) -> bool:
+def is_assignable(text: str) -> bool:
     """Whether `text` is an assignment target of names, attributes, and items by constant or name only."""
     try:
         node: ast.expr = ast.parse(text, mode="eval").body
         ast.parse(f"({text})", mode="eval")  # a comment would swallow the bracket
-    except _NO_PYTHON:
+    except _INVALID_SOURCE_ERRORS:
         return False
-    whole = isinstance(node, ast.Name | ast.Attribute | ast.Subscript) and _is_chain(node)
+    whole = isinstance(node, ast.Name | ast.Attribute | ast.Subscript) and _is_attribute_chain(node)
     return whole and text.isprintable()  # excludes line breaks
 
 
@@ -46,14 +51,14 @@ def base_name(text: str) -> str:
     return re.split(r"[.\[\s]", text, maxsplit=1)[0]
 
 
-def _is_chain(node: ast.expr) -> bool:
+def _is_attribute_chain(node: ast.expr) -> bool:
     match node:
         case ast.Name(id=name):
             return name != PROBE_NAME
         case ast.Attribute(value=value):
-            return _is_chain(value)
+            return _is_attribute_chain(value)
         case ast.Subscript(value=value, slice=index):
-            return _is_chain(value) and (_is_constant(index) or _is_chain(index))
+            return _is_attribute_chain(value) and (_is_constant(index) or _is_attribute_chain(index))
     return False
 
 
@@ -63,7 +68,7 @@ def _is_constant(node: ast.expr) -> bool:
     return isinstance(node, ast.Constant) and isinstance(node.value, str | int)
 
 
-def dotted_name(text: str) -> bool:
+def is_dotted_name(text: str) -> bool:
     """Whether `text` is a chain of identifiers that does not start with the probe's name."""
     parts = text.split(".")
     return all(p.isidentifier() and not keyword.iskeyword(p) for p in parts) and parts[0] != PROBE_NAME

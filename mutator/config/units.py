@@ -11,14 +11,14 @@ class Unit:
     suffix: str
     symbol: str
     dimension: str
-    factor: float
+    si_factor: float
 
 
-_DEG = math.pi / 180
+_RAD_PER_DEG = math.pi / 180
 
 # Units only have factors. degC and K also differ by an offset, so they are not converted into each other.
 UNITS = {
-    suffix: Unit(suffix=suffix, symbol=symbol, dimension=dimension, factor=factor)
+    suffix: Unit(suffix=suffix, symbol=symbol, dimension=dimension, si_factor=factor)
     for suffix, symbol, dimension, factor in (
         ("m", "m", "length", 1.0),
         ("mm", "mm", "length", 0.001),
@@ -30,9 +30,9 @@ UNITS = {
         ("mph", "mph", "speed", 0.44704),
         ("mps2", "m/s^2", "acceleration", 1.0),
         ("rad", "rad", "angle", 1.0),
-        ("deg", "deg", "angle", _DEG),
+        ("deg", "deg", "angle", _RAD_PER_DEG),
         ("radps", "rad/s", "angular speed", 1.0),
-        ("degps", "deg/s", "angular speed", _DEG),
+        ("degps", "deg/s", "angular speed", _RAD_PER_DEG),
         ("radps2", "rad/s^2", "angular acceleration", 1.0),
         ("s", "s", "time", 1.0),
         ("ms", "ms", "time", 0.001),
@@ -56,15 +56,15 @@ UNITS = {
         ("percent", "%", "share", 1.0),
     )
 }
-KNOWN = ", ".join(UNITS)
-_WORDS = 1 + max(suffix.count("_") for suffix in UNITS)  # number of parts of the longest suffix
+UNIT_LIST = ", ".join(UNITS)
+_MOST_SUFFIX_PARTS = 1 + max(suffix.count("_") for suffix in UNITS)  # number of parts of the longest suffix
 
 
-def split(key: str) -> tuple[str, Unit | None]:
+def split_unit(key: str) -> tuple[str, Unit | None]:
     """Split `offset_m` into (`offset`, metre), at the longest suffix. A key without a unit is returned with
     None.
     """
-    for words in range(_WORDS, 0, -1):
+    for words in range(_MOST_SUFFIX_PARTS, 0, -1):
         stem, *parts = key.rsplit("_", words)
         suffix = "_".join(parts)
         if stem and suffix in UNITS:
@@ -72,10 +72,10 @@ def split(key: str) -> tuple[str, Unit | None]:
     return key, None
 
 
-def convert(number: float, source: Unit, target: Unit) -> float:
+def convert_unit(number: float, source: Unit, target: Unit) -> float:
     """Convert a number to another unit; ValueError if the dimensions differ."""
     if source.dimension != target.dimension:
         raise ValueError(f"{source.symbol} is not a unit of {target.dimension}")
-    if source.factor == target.factor:
+    if source.si_factor == target.si_factor:
         return float(number)
-    return number * source.factor / target.factor
+    return number * source.si_factor / target.si_factor

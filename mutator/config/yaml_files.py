@@ -15,20 +15,20 @@ from pydantic_core import CoreSchema
 
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.files import check_schema
-from mutator._common.message_text import counted, shown
+from mutator._common.message_text import counted, describe_value
 from mutator.config import validation_messages
-from mutator.config.yaml_sources import Keys, Source
+from mutator.config.yaml_sources import KeyPath, YamlSource
 from mutator.errors import MutatorError
 
 M = TypeVar("M", bound="StrictModel")
 T = TypeVar("T")
 
-MAX_BYTES = 1_000_000
-MAX_DEPTH = 40  # nested lists and mappings
-MAX_VALUES = 100_000  # keys, texts, numbers, lists and mappings
-_LINE_BREAK = re.compile(r"\r\n|[\r\n\x85\u2028\u2029]")
-_DIRECTIVE = re.compile(r"(?:\A\ufeff?|[\r\n\x85\u2028\u2029])%")
-_CORE = {
+MOST_YAML_BYTES = 1_000_000
+MOST_YAML_DEPTH = 40  # nested lists and mappings
+MOST_YAML_VALUES = 100_000  # keys, texts, numbers, lists and mappings
+_LINE_BREAK_PATTERN = re.compile(r"\r\n|[\r\n\x85\u2028\u2029]")
+_DIRECTIVE_PATTERN = re.compile(r"(?:\A\ufeff?|[\r\n\x85\u2028\u2029])%")
+_SCALAR_PATTERNS = {
     "bool": ("tTfF", r"true|True|TRUE|false|False|FALSE"),
     "null": ("~nN\0", r"~|null|Null|NULL|"),
     "int": ("-+0123456789", r"[-+]?[0-9]{1,300}"),  # longer integers are floats, infinite if too large
@@ -48,13 +48,13 @@ class StrictModel(BaseModel):
 class _AsMapping:
     def __get_pydantic_core_schema__(self, record: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         schema = handler(record)
-        found = cast(dict[str, Any], handler.resolve_ref_schema(schema))
-        found["strict"] = False  # a mapping, not only an instance
+        resolved = cast(dict[str, Any], handler.resolve_ref_schema(schema))
+        resolved["strict"] = False  # a mapping, not only an instance
         return schema
 
 
-Written = Annotated[T, _AsMapping()]
-"""A dataclass in a file model, with fields of `written` and a configuration of `mapping`."""
+YamlRecord = Annotated[T, _AsMapping()]
+"""A dataclass in a file model, with fields of `yaml_metadata` and a configuration of `mapping_config`."""
 
 
 class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
@@ -63,21 +63,21 @@ class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[mi
     yaml_implicit_resolvers: dict[str, list[tuple[str, re.Pattern[str]]]] = {}  # noqa: RUF012
 
 
-for _kind, (_first, _pattern) in _CORE.items():
+for _kind, (_first, _pattern) in _SCALAR_PATTERNS.items():
     for _character in _first:
         _Loader.yaml_implicit_resolvers.setdefault("" if _character == "\0" else _character, []).append(
             (f"tag:yaml.org,2002:{_kind}", re.compile(rf"(?:{_pattern})\Z"))
         )
 
 
-def load(path: Path) -> Source:
-    return parse(_read_text(path), path)
+def load_yaml(path: Path) -> YamlSource:
+    return parse_yaml(_read_text(path), path)
 
 
-def parse(text: str, path: Path) -> Source:
-    """Parse text as `load` does; errors name `path`."""
+def parse_yaml(text: str, path: Path) -> YamlSource:
+    """Parse text as `load_yaml` does; errors name `path`."""
     try:
-        _check_events(text, path)
+        _check_syntax(text, path)
         node = yaml.compose(text, Loader=_Loader)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
@@ -89,14 +89,14 @@ def parse(text: str, path: Path) -> Source:
         ) from None
     except yaml.YAMLError as error:
         raise MutatorError(f"not valid YAML: {error}", where=path, remedy="save it as plain text") from None
-    lines: dict[Keys, int] = {}
-    data = _construct(node, (), lines, path) if node is not None else None
-    return Source(path=path, data=data, lines=lines)
+    lines: dict[KeyPath, int] = {}
+    data = _build_value(node, (), lines, path) if node is not None else None
+    return YamlSource(path=path, data=data, lines=lines)
 
 
 def _read_text(path: Path) -> str:
     try:
-        text = read_bounded(path, MAX_BYTES).decode()
+        text = read_bounded(path, MOST_YAML_BYTES).decode()
         return text.replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeDecodeError as error:
         raise MutatorError(
@@ -110,13 +110,13 @@ def _read_text(path: Path) -> str:
         ) from None
 
 
-def _check_events(text: str, path: Path) -> None:
+def _check_syntax(text: str, path: Path) -> None:
     """Reject excluded syntax and large files before building any value."""
-    if directive := _DIRECTIVE.search(text):
+    if directive := _DIRECTIVE_PATTERN.search(text):
         raise MutatorError(
             "'%' at the start of a line (a directive)",
             where=path,
-            line=len(_LINE_BREAK.findall(text, 0, directive.end())) + 1,
+            line=len(_LINE_BREAK_PATTERN.findall(text, 0, directive.end())) + 1,
             expected="plain values",
             remedy="remove or indent it",
         )
@@ -144,28 +144,28 @@ def _check_events(text: str, path: Path) -> None:
                 expected="one document in each file",
                 remedy="remove the `---` above it",
             )
-        if depth > MAX_DEPTH or values > MAX_VALUES:
+        if depth > MOST_YAML_DEPTH or values > MOST_YAML_VALUES:
             raise MutatorError(
-                "nested too deeply" if depth > MAX_DEPTH else "too many values",
+                "nested too deeply" if depth > MOST_YAML_DEPTH else "too many values",
                 where=path,
                 line=line,
-                expected=f"at most {MAX_VALUES} values, nested at most {MAX_DEPTH} deep",
-                remedy="flatten the file" if depth > MAX_DEPTH else "split it",
+                expected=f"at most {MOST_YAML_VALUES} values, nested at most {MOST_YAML_DEPTH} deep",
+                remedy="flatten the file" if depth > MOST_YAML_DEPTH else "split it",
             )
 
 
-def _construct(node: yaml.Node, keys: Keys, lines: dict[Keys, int], path: Path) -> Any:
+def _build_value(node: yaml.Node, keys: KeyPath, lines: dict[KeyPath, int], path: Path) -> Any:
     lines.setdefault(keys, node.start_mark.line + 1)
     if isinstance(node, yaml.MappingNode):
-        return _construct_mapping(node, keys, lines, path)
+        return _build_mapping(node, keys, lines, path)
     if isinstance(node, yaml.SequenceNode):
-        return [_construct(item, (*keys, i), lines, path) for i, item in enumerate(node.value)]
-    _check_text(node, path)
-    return _scalar(node.tag.rpartition(":")[2], node.value)
+        return [_build_value(item, (*keys, i), lines, path) for i, item in enumerate(node.value)]
+    _check_no_nul(node, path)
+    return _parse_scalar(node.tag.rpartition(":")[2], node.value)
 
 
-def _construct_mapping(
-    node: yaml.MappingNode, keys: Keys, lines: dict[Keys, int], path: Path
+def _build_mapping(
+    node: yaml.MappingNode, keys: KeyPath, lines: dict[KeyPath, int], path: Path
 ) -> dict[str, Any]:
     result: dict[str, Any] = {}
     for key_node, value_node in node.value:
@@ -174,7 +174,7 @@ def _construct_mapping(
             raise MutatorError(
                 f"key {key_node.value!r}", where=path, line=line, expected="text", remedy="put it in quotes"
             )
-        _check_text(key_node, path)
+        _check_no_nul(key_node, path)
         key = key_node.value
         if key in result:
             raise MutatorError(
@@ -185,11 +185,11 @@ def _construct_mapping(
                 remedy="remove one of the two",
             )
         lines[(*keys, key)] = line
-        result[key] = _construct(value_node, (*keys, key), lines, path)
+        result[key] = _build_value(value_node, (*keys, key), lines, path)
     return result
 
 
-def _check_text(node: yaml.Node, path: Path) -> None:
+def _check_no_nul(node: yaml.Node, path: Path) -> None:
     """Refuse NUL, which no file name, argument or variable can contain."""
     if "\0" in node.value:
         line = node.start_mark.line + 1
@@ -198,7 +198,7 @@ def _check_text(node: yaml.Node, path: Path) -> None:
         )
 
 
-def _scalar(kind: str, text: str) -> Any:
+def _parse_scalar(kind: str, text: str) -> Any:
     if kind == "null":
         return None
     if kind == "bool":
@@ -210,33 +210,33 @@ def _scalar(kind: str, text: str) -> Any:
     return text
 
 
-def read(
-    path: Path, model: type[M], schema: str, prepare: Callable[[Source], Source] | None = None
-) -> tuple[M, Source]:
+def load_yaml_model(
+    path: Path, model: type[M], schema: str, prepare: Callable[[YamlSource], YamlSource] | None = None
+) -> tuple[M, YamlSource]:
     """Parse `path`, check its key `schema: name/version` against `schema`, and validate the rest as `model`.
 
     `prepare` changes the content before it is validated. MutatorError for an invalid file or another schema.
     """
-    source = load(path)
+    source = load_yaml(path)
     if not isinstance(source.data, dict):
         raise source.error(
             (),
-            f"{shown(source.data)}",
+            f"{describe_value(source.data)}",
             expected="a mapping of keys to values",
             remedy="write `key: value` lines",
         )
     remedy = f"start the file with `schema: {schema}`, and follow its page"
-    check_schema(source.data.get("schema"), schema, path, line=source.line(("schema",)), remedy=remedy)
+    check_schema(source.data.get("schema"), schema, path, line=source.line_of(("schema",)), remedy=remedy)
     if prepare is not None:
         source = prepare(source)
     body = {key: value for key, value in source.data.items() if key != "schema"}
     try:
         return model.model_validate(body), source
     except ValidationError as error:
-        found = error.errors(include_url=False)
-        got, expected, remedy, keys = validation_messages.explain(
-            validation_messages.most_telling(found), model
+        errors = error.errors(include_url=False)
+        got, expected, remedy, keys = validation_messages.explain_error(
+            validation_messages.choose_error(errors), model
         )
-        if len(found) > 1:
-            remedy += f" ({counted(len(found) - 1, 'more mistake')} after this one)"
+        if len(errors) > 1:
+            remedy += f" ({counted(len(errors) - 1, 'more mistake')} after this one)"
         raise source.error(keys, got, expected=expected, remedy=remedy) from None

@@ -8,18 +8,18 @@ from typing import Any
 
 from mutator.errors import MutatorError
 
-Keys = tuple[str | int, ...]
+KeyPath = tuple[str | int, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Source:
+class YamlSource:
     """A parsed file. `lines` maps a path of keys to its line (from 1)."""
 
     path: Path
     data: Any
-    lines: dict[Keys, int]
+    lines: dict[KeyPath, int]
 
-    def line(self, keys: Keys) -> int | None:
+    def line_of(self, keys: KeyPath) -> int | None:
         """Return the line of the value at `keys`, or of the nearest enclosing value."""
         for end in range(len(keys), -1, -1):
             if keys[:end] in self.lines:
@@ -27,13 +27,13 @@ class Source:
         return None
 
     def error(
-        self, keys: Keys, got: str, *, expected: str | None = None, remedy: str | None = None
+        self, keys: KeyPath, got: str, *, expected: str | None = None, remedy: str | None = None
     ) -> MutatorError:
         """Return an error that points at the value at `keys`."""
-        return MutatorError(got, where=self.path, line=self.line(keys), expected=expected, remedy=remedy)
+        return MutatorError(got, where=self.path, line=self.line_of(keys), expected=expected, remedy=remedy)
 
     @contextmanager
-    def placing(self, keys: Keys) -> Iterator[None]:
+    def locating_errors(self, keys: KeyPath) -> Iterator[None]:
         """Make every MutatorError raised in the block point at the value at `keys`."""
         try:
             yield

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from mutator.mutants.probe import Probe
-from mutator.triggers.trace_formulas import ARITHMETIC, COMPARE
+from mutator.triggers.trace_formulas import ARITHMETIC, COMPARISONS
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)  # hashed by identity, because hashing all values is slow
@@ -126,7 +126,7 @@ def _value(node: ast.expr, values: Mapping[str, Any]) -> Any:
 
 
 def _compared(operator: ast.cmpop, one: Any, other: Any) -> Any:
-    return COMPARE[type(operator)](one, other)
+    return COMPARISONS[type(operator)](one, other)
 
 
 def _least(*terms: Any) -> Any:

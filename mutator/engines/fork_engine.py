@@ -17,7 +17,13 @@ from secrets import token_bytes
 from typing import Any
 
 from mutator._common.bounded_reading import read_bounded
-from mutator._common.files import clear_place, disk_full, raising_disk_full, remove_folder, write_atomic
+from mutator._common.files import (
+    disk_full_error,
+    raising_disk_full,
+    remove_anything_at,
+    remove_folder,
+    write_atomic,
+)
 from mutator._common.hashing import content_id
 from mutator.engines.code_swap import CodeSwap, plan_swap
 from mutator.engines.engine_jobs import Execution, Job, RunMode, Setting, failed
@@ -39,7 +45,7 @@ from mutator.mutants.mutant_building import Mutant, build
 from mutator.mutants.probe import Probe, probe_module, probe_state_after, untriggered_report
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.stop_code import stop_source
-from mutator.triggers.trigger_kinds import always
+from mutator.triggers.trigger_kinds import always_trigger
 
 _Key = tuple[str, int, tuple[str, ...]]
 
@@ -107,7 +113,7 @@ class ForkEngine:
 
     def _by_reference(self, job: Job, why: str) -> Execution:
         another = self.reference.folder_of(job)
-        clear_place(another)
+        remove_anything_at(another)
         return replace(self.reference.execute(job, another), why=why)
 
     def refusal(self, job: Job) -> NotForkable | None:
@@ -242,7 +248,7 @@ class ForkEngine:
             self._check(job, report)
         status, detail = judge(self._limits, ended, report)
         if status is not Status.OK and is_full(self._work, report):
-            raise disk_full(self._work)
+            raise disk_full_error(self._work)
         if status is Status.CRASHED:
             raise NotForkable(f"ended as crashed: {detail}")
         return Execution(
@@ -364,7 +370,7 @@ def make_warm(setting: Setting) -> ForkEngine:
 
 
 def _make(setting: Setting, *, warm: bool) -> ForkEngine:
-    null = build(setting.manifest, setting.models, None, always())
+    null = build(setting.manifest, setting.models, None, always_trigger())
     return ForkEngine(
         setting.manifest,
         setting.work,

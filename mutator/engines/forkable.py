@@ -11,7 +11,7 @@ from mutator.faults.fault_models import FaultModels
 from mutator.model import Fault
 from mutator.mutants.mutant_building import build
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.trigger_kinds import always
+from mutator.triggers.trigger_kinds import always_trigger
 
 
 def unfit(manifest: TargetManifest) -> NotForkable | None:
@@ -47,7 +47,7 @@ def not_forked(manifest: TargetManifest, models: FaultModels, faults: Iterable[F
     found = {}
     for name, fault in variants.items():
         try:
-            mutant = build(manifest, models, fault, always())
+            mutant = build(manifest, models, fault, always_trigger())
             plan_swap(manifest, mutant.files, mutant.probe, "")
         except NotSwappable as reason:
             found[name] = str(reason)

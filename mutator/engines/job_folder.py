@@ -17,8 +17,8 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from mutator._common.confined_files import move_plain, open_folder, read_below
-from mutator._common.files import clear_place
+from mutator._common.confined_files import move_plain_files, open_folder, read_below
+from mutator._common.files import remove_anything_at
 from mutator.engines.target_processes import parsed_report, tail
 from mutator.errors import Outside
 
@@ -98,10 +98,10 @@ class RunHome:
 
     def move_output(self, place: Path) -> Path:
         """Move the plain files of the output to the new folder `place`; return it."""
-        clear_place(place)
+        remove_anything_at(place)
         place.mkdir(parents=True)
         with open_folder(place) as target:
-            move_plain(self._out, target)
+            move_plain_files(self._out, target)
         return place
 
 

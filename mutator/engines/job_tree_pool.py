@@ -12,7 +12,7 @@ from contextlib import suppress
 from itertools import count
 from pathlib import Path
 
-from mutator._common.files import clear_place, is_disk_full, remove_folder
+from mutator._common.files import is_disk_full_error, remove_anything_at, remove_folder
 from mutator.engines import bytecode
 from mutator.engines.job_tree import RunTree
 from mutator.targets.source_tree import SourceTree
@@ -65,7 +65,7 @@ class BaseTree:
                     bytecode.put(changed, place)
                     return True
             except OSError as err:
-                if is_disk_full(err):
+                if is_disk_full_error(err):
                     raise
-            clear_place(place)  # a run has deleted the tree, or put something else in its place
+            remove_anything_at(place)  # a run has deleted the tree, or put something else in its place
         return False

@@ -13,7 +13,7 @@ from typing import Any
 
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.file_change_detection import UnchangedFiles
-from mutator._common.files import clear_place, disk_full, raising_disk_full, remove_folder
+from mutator._common.files import disk_full_error, raising_disk_full, remove_anything_at, remove_folder
 from mutator._common.hashing import digest
 from mutator.engines.engine_jobs import Execution, Job, Raised, RunMode, Setting, failed
 from mutator.engines.job_folder import OUTPUT, RunHome, is_disturbance, make_work
@@ -95,7 +95,7 @@ class ReferenceEngine:
                     raise
                 disturbed = True
             if disturbed:
-                clear_place(folder)
+                remove_anything_at(folder)
                 try:
                     execution, _ = self._try(job, folder, new=True)
                 except OSError as err:
@@ -136,7 +136,7 @@ class ReferenceEngine:
         report = home.read_report(files=dict, modules=list)
         status, detail = self._judge(job, ended, report, changed)
         if status is not Status.OK and is_full(self.work, report):
-            raise disk_full(self.work)
+            raise disk_full_error(self.work)
         raised = raised_in(report) if report and status is Status.CRASHED else None
         return Execution(
             status=status,

@@ -16,7 +16,7 @@ from functools import lru_cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from mutator._common.files import clear_place
+from mutator._common.files import remove_anything_at
 from mutator.engines.target_processes import environment
 from mutator.errors import MutatorError
 from mutator.targets.manifest import TargetManifest
@@ -86,7 +86,7 @@ class Sandbox:
     def clear(self) -> None:
         """Delete what a run left in /tmp and /dev/shm."""
         for path in set(self._left()) - self._first:
-            clear_place(path)
+            remove_anything_at(path)
 
     def close(self) -> None:
         while self._temporary:

@@ -13,7 +13,7 @@ from tempfile import TemporaryFile
 from typing import Any
 
 from mutator._common.confined_files import open_below
-from mutator._common.files import is_disk_full
+from mutator._common.files import is_disk_full_error
 from mutator.engines.engine_jobs import Raised
 from mutator.engines.in_target import process_guard
 from mutator.errors import MutatorError, Outside
@@ -162,14 +162,14 @@ def is_full(work: Path, report: dict[str, Any] | None) -> bool:
     try:
         state = os.statvfs(work)
     except OSError as err:
-        return is_disk_full(err)  # a run can delete the folder
+        return is_disk_full_error(err)  # a run can delete the folder
     if state.f_bavail * state.f_frsize < _LEAST_FREE:
         return True
     try:
         with TemporaryFile(dir=work) as trial:
             trial.write(bytes(_TRIAL))
     except OSError as err:
-        return is_disk_full(err)
+        return is_disk_full_error(err)
     return False
 
 

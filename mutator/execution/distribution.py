@@ -56,17 +56,17 @@ def distributor(cluster: str | None = None, *, insecure: bool = False) -> Distri
     name, colon, where = cluster.partition(":")
     if not (colon and DISTRIBUTORS.has(name)):
         name, where = _DEFAULT, cluster
-    kind = DISTRIBUTORS.find(name)
+    kind = DISTRIBUTORS.load(name)
     assert isinstance(kind, DistributorKind)
-    with DISTRIBUTORS.running(name):
+    with DISTRIBUTORS.blaming_package(name):
         opened = kind.open(where, insecure)
-    return opened if name in DISTRIBUTORS.shipped() else _OfAnotherPackage(name, opened)
+    return opened if name in DISTRIBUTORS.shipped_names() else _OfAnotherPackage(name, opened)
 
 
 def packages_of(distributor: Distributor) -> tuple[str, ...]:
     """Return the package that adds a distributor, if the harness does not."""
     name = distributor.name if isinstance(distributor, _OfAnotherPackage) else ""
-    return (package,) if (package := DISTRIBUTORS.package(name)) else ()
+    return (package,) if (package := DISTRIBUTORS.package_of(name)) else ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,5 +75,5 @@ class _OfAnotherPackage:
     opened: Distributor
 
     def run(self, session: Session) -> None:
-        with DISTRIBUTORS.running(self.name):
+        with DISTRIBUTORS.blaming_package(self.name):
             self.opened.run(session)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from mutator._common.bounded_reading import read_bounded
-from mutator._common.confined_files import inside
+from mutator._common.confined_files import path_below
 from mutator._common.file_change_detection import UnchangedFiles
 from mutator._common.hashing import digest
 from mutator.campaigns.shared_runs import runs
@@ -92,7 +92,7 @@ class Goldens:
         return loaded
 
     def _watched(self, folder: Path) -> UnchangedFiles:
-        paths = [path for name in self._manifest.outputs if (path := inside(folder, name)).is_file()]
+        paths = [path for name in self._manifest.outputs if (path := path_below(folder, name)).is_file()]
         files = UnchangedFiles({str(path): read_bounded(path) for path in paths})
         if self._digests is not None and output_digest_of(self._manifest, folder) != self._digests[folder]:
             raise _changed(folder)

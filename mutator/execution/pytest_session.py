@@ -11,8 +11,8 @@ from typing import Any, Protocol
 
 import pytest
 
-from mutator._common.folder_locks import living_workers
-from mutator._common.resource_shortages import shortage
+from mutator._common.folder_locks import living_worker_pids
+from mutator._common.resource_shortages import find_shortage
 from mutator.errors import HarnessErrors, MutatorError
 from mutator.execution.progress_reporting import followed
 from mutator.execution.progress_text import Lines
@@ -131,11 +131,11 @@ class Controller:
             return
         if type(excinfo.value) is KeyboardInterrupt:  # pytest's own exceptions mean a regular stop
             self.begun.interrupted = True
-        for pid in living_workers(self.begun.folder.path):
+        for pid in living_worker_pids(self.begun.folder.path):
             os.kill(pid, signal.SIGTERM)
 
     def pytest_internalerror(self, excinfo: pytest.ExceptionInfo[BaseException]) -> None:
-        self._note(str(shortage(excinfo.value) or ""))
+        self._note(str(find_shortage(excinfo.value) or ""))
 
     @pytest.hookimpl(trylast=True)  # after xdist has ended its workers
     def pytest_sessionfinish(self, session: pytest.Session) -> None:

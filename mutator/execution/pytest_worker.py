@@ -11,7 +11,7 @@ import pytest
 
 from mutator._common.files import raising_disk_full
 from mutator._common.folder_locks import register_worker
-from mutator._common.resource_shortages import shortage
+from mutator._common.resource_shortages import find_shortage
 from mutator.campaigns.chunks import Pending
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.errors import DiskFull, HarnessErrors, MutatorError, Shortage
@@ -51,7 +51,7 @@ class WorkItem(CampaignItem):
                 worker, work = self.worker.get(), self.work
                 errors = worker.run(work) if isinstance(work, Pending) else worker.prove(work)
         except Exception as err:
-            known = err if isinstance(err, MutatorError) else shortage(err)
+            known = err if isinstance(err, MutatorError) else find_shortage(err)
             problem = str(known) if known else _defect(err, self.name)
             self.user_properties.append((PROBLEM, problem))
             if isinstance(known, DiskFull | Shortage):

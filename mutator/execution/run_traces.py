@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from mutator._common.confined_files import inside
+from mutator._common.confined_files import path_below
 from mutator.errors import MutatorError
 from mutator.execution.single_run import rerun
 from mutator.model import Experiment, Record
@@ -82,6 +82,6 @@ class Traces:
     def is_kept(self, experiment_id: str) -> bool:
         """Return whether a stored faulty trace matches the record."""
         faulty = self.folder.kept_traces_folder(experiment_id) / "faulty"
-        if not inside(faulty, self.manifest.trace_file).is_file():
+        if not path_below(faulty, self.manifest.trace_file).is_file():
             return False
         return trace_digest(self.manifest, faulty) == self.record(experiment_id).trace_digest

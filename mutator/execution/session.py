@@ -18,9 +18,9 @@ from pathlib import Path
 from secrets import token_bytes
 from typing import Any
 
-from mutator._common.files import clear_place, is_half_written
-from mutator._common.folder_locks import owned, wait_for_workers
-from mutator._common.interrupts import terminable
+from mutator._common.files import is_half_written, remove_anything_at
+from mutator._common.folder_locks import owning_run_folder, wait_for_workers
+from mutator._common.interrupts import interruptible
 from mutator.audit.seal import Seals, seals_of
 from mutator.campaigns.chunks import Pending, pending
 from mutator.campaigns.freezing import make_run_folder
@@ -327,7 +327,7 @@ def open_session(
     """
     is_new = not out.exists()
     make_run_folder(out)
-    with terminable(), owned(out):
+    with interruptible(), owning_run_folder(out):
         if notify and not RunFolder.exists(out):
             notify(Progress(stage="plan"))
         try:
@@ -337,7 +337,7 @@ def open_session(
                 shutil.rmtree(out, ignore_errors=True)
             raise
         file_digests.close_segments(folder.path)
-        clear_place(folder.scratch_folder)
+        remove_anything_at(folder.scratch_folder)
         folders = ("plan", "report", "series", "patches")
         written = (folder.path.iterdir(), *((folder.path / name).rglob("*") for name in folders))
         for path in chain(*written):
@@ -353,4 +353,4 @@ def open_session(
                 notify=notify,
             )
         finally:
-            clear_place(folder.scratch_folder)
+            remove_anything_at(folder.scratch_folder)

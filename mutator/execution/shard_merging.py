@@ -7,9 +7,9 @@ from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
-from mutator._common.confined_files import inside, open_below
+from mutator._common.confined_files import open_below, path_below
 from mutator._common.files import raising_disk_full, read_json, write_atomic, writing_atomic
-from mutator._common.folder_locks import owned
+from mutator._common.folder_locks import owning_run_folder
 from mutator._common.message_text import counted
 from mutator.audit.seal import OUTSIDE, without
 from mutator.campaigns.freezing import make_run_folder
@@ -60,15 +60,15 @@ def merge(shards: Sequence[Path], out: Path, *, accept_versions: bool = False) -
     _check_numbers(folders)
     with ExitStack() as stack:
         for folder in folders:
-            stack.enter_context(owned(folder.path, patience_s=0.0))
+            stack.enter_context(owning_run_folder(folder.path, patience_s=0.0))
             _check_complete(folder)
         stretches = list(_stretches(folders, accept=accept_versions))
         _check_goldens(folders)
         _make_empty(out)
-        stack.enter_context(owned(out))
+        stack.enter_context(owning_run_folder(out))
         try:
             with raising_disk_full(out):
-                inside(out, f"{_MARK}{os.getpid()}").touch()
+                path_below(out, f"{_MARK}{os.getpid()}").touch()
                 _copy(folders, out, stretches)
             return table_building.build(out)
         except BaseException:
@@ -81,7 +81,7 @@ def _make_empty(out: Path) -> None:
     if out.is_dir():
         check_contents(out.resolve())
     if any(out.glob(f"{_MARK}*")):
-        with owned(out, patience_s=0.0):
+        with owning_run_folder(out, patience_s=0.0):
             cleaning.delete_unfinished_run(out)
     make_run_folder(out)
 
@@ -204,7 +204,7 @@ def _copy(folders: Sequence[RunFolder], out: Path, stretches: Sequence[Stretch])
         if one.lines is None and name != HEAD and (reviewed or name != REVIEWED)
     }
     for name in files:
-        place = inside(out, name)
+        place = path_below(out, name)
         place.parent.mkdir(parents=True, exist_ok=True)
         with open_below(first.path, name) as source, writing_atomic(place) as copy:
             shutil.copyfileobj(source, copy)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import mkdtemp
 
-from mutator._common.confined_files import inside
+from mutator._common.confined_files import path_below
 from mutator._common.files import make_folder, raising_disk_full, remove_folder, write_atomic
-from mutator._common.folder_locks import alone_in
+from mutator._common.folder_locks import locking_folder
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.run_provenance import check_sources
 from mutator.engines.engine_jobs import Job
@@ -123,7 +123,7 @@ def _engine(manifest: TargetManifest, out: Path, limits: Limits) -> Iterator[Ref
     """Yield an engine that works in `out`. Its scratch folder is deleted afterwards."""
     check_requirements(manifest)
     make_folder(out)
-    with alone_in(out):
+    with locking_folder(out):
         work = out / "work"
         remove_folder(work)
         try:
@@ -141,7 +141,7 @@ def _run_golden(workspace: Workspace, engine: ReferenceEngine, experiment: Exper
         seed=experiment.seed,
         changes=experiment.changes,
     )
-    execution = engine.execute(job, inside(engine.work, job.name))
+    execution = engine.execute(job, path_below(engine.work, job.name))
     if execution.status is not Status.OK:
         raise CheckFailed(
             f"the run without any fault ended as {execution.status.value}: {execution.detail}",
@@ -168,6 +168,6 @@ def _replace(new: Path, place: Path) -> None:
     """Replace a folder that another process might be reading."""
     aside = Path(mkdtemp(dir=new.parent))
     if os.path.lexists(place):
-        place.rename(inside(aside, place.name))
+        place.rename(path_below(aside, place.name))
     new.rename(place)
     remove_folder(aside)

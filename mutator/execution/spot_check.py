@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from random import SystemRandom
 
-from mutator._common.confined_files import inside
+from mutator._common.confined_files import path_below
 from mutator._common.files import ScratchFolder
 from mutator.errors import MutatorError
 from mutator.execution.single_run import manifest_of, run_single
@@ -36,7 +36,7 @@ def driven_again(workspace: Workspace, folder: RunFolder, ids: Sequence[str]) ->
                 workspace,
                 manifest,
                 experiment,
-                inside(scratch, name),
+                path_below(scratch, name),
                 limits=folder.limits,
                 golden=golden if golden.is_dir() else None,
             )

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from mutator._common import shared_cache
-from mutator._common.confined_files import inside
+from mutator._common.confined_files import path_below
 from mutator._common.files import raising_disk_full
 from mutator.campaigns.chunks import Pending
 from mutator.campaigns.run_inputs import RunInputs
@@ -85,7 +85,7 @@ class Worker:
     def _make_room(self, seed: int) -> None:
         """Delete images of earlier seeds, which would fill the disk."""
         if len(self.folder.seeds) > 1 and seed != self._seed:
-            shared_cache.make_room(self._manifest.cache_name)
+            shared_cache.prune_target(self._manifest.cache_name)
         self._seed = seed
 
     def prove(self, sample: SampledExperiment) -> list[tuple[str, str]]:
@@ -127,7 +127,7 @@ class Worker:
             folder.golden_folder_of,
             several_seeds=several,
             digests={
-                inside(folder.path / "golden", key): one for key, one in self._assignment.goldens.items()
+                path_below(folder.path / "golden", key): one for key, one in self._assignment.goldens.items()
             },
         )
         inputs = self._inputs

@@ -29,7 +29,7 @@ class Format(StrEnum, metaclass=_Members):
     """The formats that a run can be written in. Other packages can add more, which have names only."""
 
     _ignore_ = "name"
-    for name in EXPORTS.shipped():
+    for name in EXPORTS.shipped_names():
         vars()[name.replace("-", "_").upper()] = name
 
     @property
@@ -88,9 +88,9 @@ class Export:
 
 def find_export(name: str) -> Export:
     """Return the format of that name; MutatorError if there is none, or if its package is broken."""
-    found = EXPORTS.find(name)
+    found = EXPORTS.load(name)
     assert isinstance(found, Export)
-    if name not in EXPORTS.shipped() and not fnmatchcase(found.file, f"{name}.?*"):
+    if name not in EXPORTS.shipped_names() and not fnmatchcase(found.file, f"{name}.?*"):
         raise MutatorError(  # `mutator clean` knows an export by this name
             f"export '{name}' writes the file '{found.file}'",
             expected=f"the name '{name}' with a suffix",

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from mutator._common.confined_files import inside
+from mutator._common.confined_files import path_below
 from mutator._common.doors import EXPORTS
 from mutator._common.files import make_folder, write_atomic
 from mutator.exports import ExportRequest, Parts, check_options, find_export
@@ -29,8 +29,8 @@ def export(
     found = find_export(format)
     folder = RunFolder.open(run)
     check_options(format, found, parts)
-    with EXPORTS.running(format):
-        place = out or inside(folder.path / FOLDER, found.file.format(table=parts.table.value))
+    with EXPORTS.blaming_package(format):
+        place = out or path_below(folder.path / FOLDER, found.file.format(table=parts.table.value))
         content = found.write(ExportRequest(folder=folder, out=place, workspace=workspace, parts=parts))
         if not isinstance(content, bytes | None):
             raise TypeError(f"`write` returns {type(content).__name__}, not bytes")

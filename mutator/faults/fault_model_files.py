@@ -11,8 +11,8 @@ from mutator._common import hashing
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.confined_files import check_inside
 from mutator.config import units
-from mutator.config.yaml_files import MAX_BYTES, StrictModel, Written, read
-from mutator.config.yaml_sources import Source
+from mutator.config.yaml_files import MOST_YAML_BYTES, StrictModel, YamlRecord, load_yaml_model
+from mutator.config.yaml_sources import YamlSource
 from mutator.errors import MutatorError
 from mutator.faults import probe_templates
 from mutator.faults.fault_models import (
@@ -75,7 +75,7 @@ class FaultModelModel(StrictModel, title="The file"):
         "is a call, passed as `called` and `arguments`. `statement`: the anchored statement on "
         "one line. `next_statement`: also the statement after it; a guard then wraps both.",
     )
-    params: dict[str, Written[Param]] = Field(default_factory=dict, description="Name -> parameter.")
+    params: dict[str, YamlRecord[Param]] = Field(default_factory=dict, description="Name -> parameter.")
     examples: list[_ExampleModel] = Field(min_length=1, description="At least one.")
 
 
@@ -83,7 +83,7 @@ def load_fault_models(folder: Path) -> FaultModels:
     """Load the fault models of a templates folder, from memory unless a file has changed."""
     paths = [check_inside(folder, path) for kind in FILES for path in sorted(folder.glob(kind))]
     try:
-        contents = tuple((path, read_bounded(path, MAX_BYTES)) for path in paths)
+        contents = tuple((path, read_bounded(path, MOST_YAML_BYTES)) for path in paths)
     except OSError:
         return _load_all(folder)  # the error that names the file
     return _unchanged(folder, contents)
@@ -114,7 +114,7 @@ def _load_all(folder: Path) -> FaultModels:
 
 
 def _load(path: Path) -> FaultModel:
-    model, source = read(path, FaultModelModel, SCHEMA)
+    model, source = load_yaml_model(path, FaultModelModel, SCHEMA)
     if model.name != path.stem:
         raise source.error(("name",), f"'{model.name}'", expected=f"'{path.stem}', the name of the file")
     template_path, kind = path.with_suffix(".py.j2"), SnippetKind(model.kind)
@@ -140,7 +140,7 @@ def _load(path: Path) -> FaultModel:
                 injection=example.injection.injection(source, ("examples", i, "injection")),
                 before=example.before,
                 after=example.after,
-                line=source.line(("examples", i)),
+                line=source.line_of(("examples", i)),
             )
             for i, example in enumerate(model.examples)
         ),
@@ -151,9 +151,9 @@ def _load(path: Path) -> FaultModel:
     )
 
 
-def _param(name: str, param: Param, source: Source) -> ParamSchema:
+def _param(name: str, param: Param, source: YamlSource) -> ParamSchema:
     keys = ("params", name)
-    if not name.isidentifier() or units.split(name)[1]:
+    if not name.isidentifier() or units.split_unit(name)[1]:
         raise source.error(keys, f"parameter '{name}'", expected="an identifier without a unit suffix")
     if name in _GIVEN:
         raise source.error(
@@ -163,7 +163,7 @@ def _param(name: str, param: Param, source: Source) -> ParamSchema:
             remedy="rename the parameter",
         )
     if param.unit not in (None, TARGET_UNIT, *units.UNITS):
-        raise source.error((*keys, "unit"), f"'{param.unit}'", expected=f"target or one of {units.KNOWN}")
+        raise source.error((*keys, "unit"), f"'{param.unit}'", expected=f"target or one of {units.UNIT_LIST}")
     if (param.type == "choice") != bool(param.choices):
         state = "no `choices`" if param.type == "choice" else "`choices`"
         raise source.error(
@@ -176,7 +176,7 @@ def _param(name: str, param: Param, source: Source) -> ParamSchema:
 
 def _text(path: Path) -> str:
     try:
-        return read_bounded(path, MAX_BYTES).decode()
+        return read_bounded(path, MOST_YAML_BYTES).decode()
     except (OSError, UnicodeDecodeError) as error:
         raise MutatorError(
             f"cannot be read ({error})", where=path, remedy="put the template next to its YAML file, as UTF-8"

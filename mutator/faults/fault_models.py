@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Literal
 
 from mutator._common.message_text import suggestion
-from mutator._common.yaml_dataclasses import mapping, written
-from mutator.config.yaml_sources import Source
+from mutator._common.yaml_dataclasses import mapping_config, yaml_metadata
+from mutator.config.yaml_sources import YamlSource
 from mutator.errors import MutatorError
 from mutator.faults.injection_specs import InjectionSpec
 from mutator.faults.probe_templates import ProbeTemplates
@@ -43,37 +43,39 @@ class Needs(StrEnum):
 class Param:
     """The key is the parameter's name without a unit. A spec adds the unit: `by_m` for the parameter `by`."""
 
-    __pydantic_config__ = mapping("A parameter")
+    __pydantic_config__ = mapping_config("A parameter")
 
     type: ParamType = field(
-        metadata=written(
+        metadata=yaml_metadata(
             "The type of a value. `variable`: a name in the function. `import`: a dotted name to import. "
             "`number`, `integer`, `boolean`: a value of that type. `constant`: a number, truth value, text "
             "or null. `choice`: one of the terms in `choices`. `unit`: the suffix of a unit. `seed`: drawn "
             "during expansion; a spec cannot set it."
         )
     )
-    about: str = field(metadata=written("What the parameter is."))
+    about: str = field(metadata=yaml_metadata("What the parameter is."))
     unit: str | None = field(
         default=None,
-        metadata=written(
+        metadata=yaml_metadata(
             "The unit that the template expects, or `target` for the unit of the changed variable. Default: "
             "no unit."
         ),
     )
     optional: bool = field(
         default=False,
-        metadata=written("Whether a spec can omit the parameter. The template then gets `none`."),
+        metadata=yaml_metadata("Whether a spec can omit the parameter. The template then gets `none`."),
     )
-    min: float | None = field(default=None, metadata=written("The minimum, in the parameter's unit."))
-    max: float | None = field(default=None, metadata=written("The maximum, in the parameter's unit."))
+    min: float | None = field(default=None, metadata=yaml_metadata("The minimum, in the parameter's unit."))
+    max: float | None = field(default=None, metadata=yaml_metadata("The maximum, in the parameter's unit."))
     neutral: float | None = field(
         default=None,
-        metadata=written("The value with which a fault changes nothing. Plans and `try` warn about it."),
+        metadata=yaml_metadata(
+            "The value with which a fault changes nothing. Plans and `try` warn about it."
+        ),
     )
     choices: tuple[str, ...] = field(
         default=(),
-        metadata=written(
+        metadata=yaml_metadata(
             "The terms that a `choice` allows. The template writes them verbatim.", strict=False
         ),
     )
@@ -115,7 +117,7 @@ class FaultModel:
     examples: tuple[Example, ...]
     template: str
     expression: str | None = None
-    source: Source  # the YAML
+    source: YamlSource  # the YAML
     template_path: Path
 
     def param(self, name: str) -> ParamSchema | None:

@@ -10,8 +10,8 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, create_model, model_validator
 
 from mutator.config import units
-from mutator.config.yaml_files import StrictModel, read
-from mutator.config.yaml_sources import Keys, Source
+from mutator.config.yaml_files import StrictModel, load_yaml_model
+from mutator.config.yaml_sources import KeyPath, YamlSource
 from mutator.faults.injection_model import InjectionModel
 from mutator.faults.injection_specs import InjectionSpec
 from mutator.faults.library_readings import Readings
@@ -39,7 +39,7 @@ class Draw:
     values: tuple[float | int, ...] = ()
     decimals: int | None = None
     cap: float | None = None
-    keys: Keys = ()
+    keys: KeyPath = ()
 
     @property
     def count(self) -> int:
@@ -67,7 +67,7 @@ class Variant:
     changes: tuple[str, ...]
     readings: Mapping[str, tuple[InjectionSpec, ...]]
     holds: Mapping[str, Hold | None]
-    keys: Keys
+    keys: KeyPath
 
     def injections(self, reading: str) -> tuple[InjectionSpec, ...]:
         return self.readings[self._written(reading)]
@@ -93,7 +93,7 @@ class FaultSpec:
     about: str
     variants: tuple[Variant, ...]
     readings: Readings  # the library's
-    source: Source
+    source: YamlSource
 
     @property
     def name(self) -> str:
@@ -228,7 +228,7 @@ def spec_model(readings: Readings) -> type[SpecModel]:
 
 def load_spec(path: Path, readings: Readings) -> FaultSpec:
     """Read one spec of a library; errors have file and line. `expand` does the remaining checks."""
-    model, source = read(path, spec_model(readings), SCHEMA)
+    model, source = load_yaml_model(path, spec_model(readings), SCHEMA)
     models: dict[str, _VariantBase] = model.variants  # type: ignore[attr-defined]
     for key in ("module", "fault_type"):
         _check_name(getattr(model, key), source, (key,))
@@ -246,13 +246,13 @@ def load_spec(path: Path, readings: Readings) -> FaultSpec:
     )
 
 
-def _check_name(name: str, source: Source, keys: Keys) -> None:
+def _check_name(name: str, source: YamlSource, keys: KeyPath) -> None:
     if not _NAME.match(name):
         raise source.error(keys, f"'{name}'", expected="lowercase letters, digits and _", remedy="rename it")
 
 
-def _variant(spec: str, name: str, model: _VariantBase, readings: Readings, source: Source) -> Variant:
-    keys: Keys = ("variants", name)
+def _variant(spec: str, name: str, model: _VariantBase, readings: Readings, source: YamlSource) -> Variant:
+    keys: KeyPath = ("variants", name)
     _check_name(name, source, keys)
     written: dict[str, _ReadingModel | None] = {name: getattr(model, name) for name in readings.names}
     holds = {reading: one.hold or model.hold for reading, one in written.items() if one}
@@ -270,7 +270,7 @@ def _variant(spec: str, name: str, model: _VariantBase, readings: Readings, sour
     )
 
 
-def _injections(model: _ReadingModel, source: Source, keys: Keys) -> tuple[InjectionSpec, ...]:
+def _injections(model: _ReadingModel, source: YamlSource, keys: KeyPath) -> tuple[InjectionSpec, ...]:
     if not model.injections:
         raise source.error((*keys, "injections"), "no injection", expected="at least one")
     return tuple(
@@ -278,13 +278,13 @@ def _injections(model: _ReadingModel, source: Source, keys: Keys) -> tuple[Injec
     )
 
 
-def _draw(default_key: str, models: dict[str, _DrawModel], source: Source, keys: Keys) -> Draw:
+def _draw(default_key: str, models: dict[str, _DrawModel], source: YamlSource, keys: KeyPath) -> Draw:
     if len(models) != 1:
         raise source.error(
             keys, f"{len(models)} draws", expected="one", remedy="use one draw for all injections"
         )
     key, model = next(iter(models.items()))
-    name, unit = units.split(key)
+    name, unit = units.split_unit(key)
     _check_name(name, source, (*keys, key))
     ways = {"integers": model.integers_from, "reals": model.reals_from, "list": model.values}
     given = [kind for kind, way in ways.items() if way is not None]

@@ -4,7 +4,7 @@ import ast
 from collections.abc import Iterator
 from pathlib import Path
 
-from mutator._common.message_text import one_of, suggestion
+from mutator._common.message_text import describe_choices, suggestion
 from mutator.errors import MutatorError
 from mutator.targets.manifest import TargetManifest
 
@@ -28,7 +28,7 @@ def check_import(manifest: TargetManifest, dotted: str) -> None:
         public = [x for x in known if not x.startswith("_")]
         raise MutatorError(
             f"'{name}' is not defined in {path}",
-            expected=one_of(public),
+            expected=describe_choices(public),
             remedy="correct the name" + suggestion(name, public),
         )
 

@@ -5,12 +5,12 @@ from typing import Any
 
 from pydantic import Field
 
-from mutator._common.message_text import shown
+from mutator._common.message_text import describe_value
 from mutator.config import units
-from mutator.config.instance_conditions import instance_condition
-from mutator.config.location_model import AtModel
+from mutator.config.instance_conditions import canonical_instance_condition
+from mutator.config.location_model import LocationModel
 from mutator.config.yaml_files import StrictModel
-from mutator.config.yaml_sources import Keys, Source
+from mutator.config.yaml_sources import KeyPath, YamlSource
 from mutator.faults.injection_specs import DIMENSIONLESS, InjectionSpec, ParamSpec, ParamValue, reference
 from mutator.model import FIXED_ANCHORS, AnchorKind
 
@@ -18,7 +18,7 @@ from mutator.model import FIXED_ANCHORS, AnchorKind
 class InjectionModel(StrictModel, title="An injection"):
     """One fault model applied at one place."""
 
-    at: AtModel = Field(description="The place where the fault is injected.")
+    at: LocationModel = Field(description="The place where the fault is injected.")
     model: str = Field(description="A [fault model](fault-models.md).")
     unit: str | None = Field(
         None,
@@ -49,18 +49,18 @@ class InjectionModel(StrictModel, title="An injection"):
         None, ge=1, description="The fault acts in every n-th execution of the place, counted as for `call`."
     )
 
-    def injection(self, source: Source, keys: Keys) -> InjectionSpec:
+    def injection(self, source: YamlSource, keys: KeyPath) -> InjectionSpec:
         """Check and convert the injection; errors point into `source` at `keys`."""
         if self.unit is not None and self.unit != DIMENSIONLESS and self.unit not in units.UNITS:
             raise source.error(
                 (*keys, "unit"),
                 f"unit '{self.unit}'",
-                expected=f"one of {units.KNOWN}, or '1' for a plain number",
+                expected=f"one of {units.UNIT_LIST}, or '1' for a plain number",
                 remedy="name the unit that the variable has in the source",
             )
         params = []
         for key, value in self.params.items():
-            name, unit = units.split(key)
+            name, unit = units.split_unit(key)
             place = (*keys, "params", key)
             suffix = unit.suffix if unit else None
             params.append(ParamSpec(name=name, unit=suffix, value=_value(value, source, place), keys=place))
@@ -72,12 +72,12 @@ class InjectionModel(StrictModel, title="An injection"):
             params=tuple(params),
             unit=self.unit,
             keys=keys,
-            where=None if self.where is None else instance_condition(self.where),
+            where=None if self.where is None else canonical_instance_condition(self.where),
             call=self.call,
             every=self.every,
         )
 
-    def _check_instance(self, kind: AnchorKind, source: Source, keys: Keys) -> None:
+    def _check_instance(self, kind: AnchorKind, source: YamlSource, keys: KeyPath) -> None:
         given = [name for name in ("where", "call", "every") if getattr(self, name) is not None]
         if given and kind in FIXED_ANCHORS:
             raise source.error(
@@ -91,33 +91,37 @@ class InjectionModel(StrictModel, title="An injection"):
                 (*keys, "every"), "`call` and `every`", expected="one of them", remedy="leave one out"
             )
         try:
-            instance_condition("True" if self.where is None else self.where)
+            canonical_instance_condition("True" if self.where is None else self.where)
         except ValueError:
             raise source.error(
                 (*keys, "where"),
-                shown(self.where),
+                describe_value(self.where),
                 expected="names, attributes, items, constants, comparisons, `and`, `or` and `not`",
                 remedy="use something that the function knows, e.g. `where: index == 2`",
             ) from None
 
 
-def _value(value: Any, source: Source, keys: Keys) -> ParamValue:
+def _value(value: Any, source: YamlSource, keys: KeyPath) -> ParamValue:
     if value is None or isinstance(value, bool | int | float | str):
         return value
     key = keys[-1]
     if not isinstance(value, dict) or set(value) != {"draw", "written_in", "read_as"}:
         raise source.error(
             keys,
-            f"{shown(value)} for '{key}'",
+            f"{describe_value(value)} for '{key}'",
             expected="a number, a name, or {draw: ..., written_in: ..., read_as: ...}",
             remedy="write a plain value",
         )
     for name in ("written_in", "read_as"):
         if value[name] not in units.UNITS:
             raise source.error(
-                (*keys, name), f"{shown(value[name])} for '{name}'", expected=f"one of {units.KNOWN}"
+                (*keys, name),
+                f"{describe_value(value[name])} for '{name}'",
+                expected=f"one of {units.UNIT_LIST}",
             )
     drawn = reference(str(value["draw"]))
     if not drawn:
-        raise source.error((*keys, "draw"), f"{shown(value['draw'])} for 'draw'", expected="the draw's name")
+        raise source.error(
+            (*keys, "draw"), f"{describe_value(value['draw'])} for 'draw'", expected="the draw's name"
+        )
     return replace(drawn, written_in=value["written_in"], read_as=value["read_as"])

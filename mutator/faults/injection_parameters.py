@@ -1,10 +1,10 @@
 """Check an injection's parameters and convert them from the spec's form to the template's."""
 
-from mutator._common.message_text import one_of, shown, suggestion
-from mutator._common.random_streams import generator
+from mutator._common.message_text import describe_choices, describe_value, suggestion
+from mutator._common.random_streams import random_generator
 from mutator.config import units
-from mutator.config.location_syntax import assignable, dotted_name
-from mutator.config.yaml_sources import Source
+from mutator.config.location_syntax import is_assignable, is_dotted_name
+from mutator.config.yaml_sources import YamlSource
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import NAMES, TARGET_UNIT, FaultModel, ParamSchema
 from mutator.faults.fault_specs import Draw
@@ -19,7 +19,7 @@ _WITH_DEFAULT_TARGET = (AnchorKind.AFTER_ASSIGN, AnchorKind.BEFORE_ASSIGN)
 def resolve(
     spec: InjectionSpec,
     model: FaultModel,
-    source: Source,
+    source: YamlSource,
     *,
     draw: Draw | None = None,
     value: float | int | None = None,
@@ -46,7 +46,7 @@ def resolve(
             )
     for schema in model.params:
         if schema.type == "seed":
-            params[schema.name] = int(generator(seed, f"{key}/{schema.name}").random() * 2**53)
+            params[schema.name] = int(random_generator(seed, f"{key}/{schema.name}").random() * 2**53)
         elif schema.name == "target" and spec.location.anchor.kind in _WITH_DEFAULT_TARGET:
             params.setdefault("target", spec.location.anchor.name)
         at_value = schema.name == "target" and spec.location.anchor.kind in _WITHOUT_TARGET
@@ -72,7 +72,7 @@ class _Resolver:
         self,
         spec: InjectionSpec,
         model: FaultModel,
-        source: Source,
+        source: YamlSource,
         draw: Draw | None,
         value: float | int | None,
     ) -> None:
@@ -94,7 +94,7 @@ class _Resolver:
             raise self.source.error(
                 param.keys,
                 f"unknown parameter '{param.key}' of model {self.model.name}",
-                expected=one_of(map(self.key, known)),
+                expected=describe_choices(map(self.key, known)),
                 remedy="correct or remove it" + suggestion(param.key, names),
             )
         unit = None if self.is_plain(param, schema) else self.unit(schema)
@@ -135,7 +135,7 @@ class _Resolver:
             raise self.source.error(
                 self.spec.keys,
                 f"model {self.model.name} without `unit`",
-                expected=f"the changed variable's unit, one of {units.KNOWN}, or '1'",
+                expected=f"the changed variable's unit, one of {units.UNIT_LIST}, or '1'",
                 remedy="add `unit: m` (the variable's unit in the source) next to `model`",
             )
         return None if self.spec.unit == DIMENSIONLESS else units.UNITS[self.spec.unit]
@@ -143,7 +143,7 @@ class _Resolver:
     def value(self, param: ParamSpec, schema: ParamSchema) -> Value:
         """Return the value in the template's unit, after checking its type and range."""
         if schema.type in NAMES:
-            fits = dotted_name if schema.type == "import" else assignable
+            fits = is_dotted_name if schema.type == "import" else is_assignable
             if not isinstance(param.value, str) or not fits(param.value):
                 raise self._wrong(param, _NAMED[schema.type])
             return param.value
@@ -188,7 +188,9 @@ class _Resolver:
             raise self._wrong(param, "a number")
         if isinstance(value, int | float):
             return (
-                units.convert(value, units.UNITS[param.unit], unit) if unit and param.unit else float(value)
+                units.convert_unit(value, units.UNITS[param.unit], unit)
+                if unit and param.unit
+                else float(value)
             )
         drawn = value if isinstance(value, Drawn) else reference(str(value))
         if drawn is None or self.draw is None or self.drawn is None or drawn.name != self.draw.name:
@@ -206,7 +208,7 @@ class _Resolver:
 
     def _wrong(self, param: ParamSpec, expected: str, got: str | None = None) -> MutatorError:
         value = param.value.name if isinstance(param.value, Drawn) else param.value
-        text = got or shown(value)
+        text = got or describe_value(value)
         return self.source.error(
             param.keys, f"{text} for '{param.key}'", expected=expected, remedy="correct the value"
         )

@@ -5,7 +5,7 @@ import re
 from dataclasses import dataclass
 
 from mutator.config import units
-from mutator.config.yaml_sources import Keys
+from mutator.config.yaml_sources import KeyPath
 from mutator.model import FaultLocation
 
 DIMENSIONLESS = "1"
@@ -35,7 +35,7 @@ class ParamSpec:
     name: str
     unit: str | None
     value: ParamValue
-    keys: Keys  # its position in the file
+    keys: KeyPath  # its position in the file
 
     @property
     def key(self) -> str:
@@ -50,7 +50,7 @@ class InjectionSpec:
     model: str
     params: tuple[ParamSpec, ...]
     unit: str | None
-    keys: Keys
+    keys: KeyPath
     where: str | None = None
     call: int | None = None
     every: int | None = None
@@ -66,6 +66,6 @@ def quantity(drawn: Drawn, number: float, unit: units.Unit, target: units.Unit) 
     """Convert the drawn `number` from `unit` to `target`; ValueError if the units are incompatible."""
     number = math.copysign(1.0, drawn.sign) * number
     if drawn.written_in and drawn.read_as:
-        number = units.convert(number, unit, units.UNITS[drawn.written_in])
+        number = units.convert_unit(number, unit, units.UNITS[drawn.written_in])
         unit = units.UNITS[drawn.read_as]
-    return units.convert(number, unit, target)
+    return units.convert_unit(number, unit, target)

@@ -7,7 +7,7 @@ from pathlib import Path
 from pydantic import Field
 
 from mutator._common.confined_files import check_inside
-from mutator.config.yaml_files import StrictModel, read
+from mutator.config.yaml_files import StrictModel, load_yaml_model
 from mutator.errors import MutatorError
 
 SCHEMA = "readings/1"
@@ -64,7 +64,7 @@ def load_readings(library: Path) -> Readings:
     path = check_inside(library, library / FILE)
     if not path.is_file():
         return UNDECLARED
-    model, source = read(path, ReadingsModel, SCHEMA)
+    model, source = load_yaml_model(path, ReadingsModel, SCHEMA)
     for name in model.readings:
         if not _NAME.match(name):
             raise source.error(

@@ -3,10 +3,10 @@
 import math
 from collections.abc import Iterator
 
-from mutator._common.message_text import one_of
-from mutator._common.random_streams import generator
+from mutator._common.message_text import describe_choices
+from mutator._common.random_streams import random_generator
 from mutator.config import units
-from mutator.config.yaml_sources import Keys
+from mutator.config.yaml_sources import KeyPath
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.faults.fault_specs import Draw, FaultSpec, Variant
@@ -49,7 +49,7 @@ def draw_values(draw: Draw, seed: int) -> tuple[int | float, ...]:
     """
     if draw.kind == "list":
         return draw.values
-    stream = generator(seed, draw.key).random(len(draw.ranges))
+    stream = random_generator(seed, draw.key).random(len(draw.ranges))
     values: list[int | float] = []
     left = _ALL_REDRAWS
     for i, u in enumerate(map(float, stream)):
@@ -58,7 +58,7 @@ def draw_values(draw: Draw, seed: int) -> tuple[int | float, ...]:
             if value not in values and not (value == 0 and draw.kind == "reals"):
                 break
             left -= 1
-            value = _value(draw, i, float(generator(seed, f"{draw.key}/{i}/{attempt}").random()))
+            value = _value(draw, i, float(random_generator(seed, f"{draw.key}/{i}/{attempt}").random()))
         values.append(value)
     return tuple(values)
 
@@ -128,7 +128,7 @@ class _Expander:
             self._check_injection(injection)
 
     def _check_injection(self, injection: InjectionSpec) -> None:
-        keys: Keys = (*injection.keys, "model")
+        keys: KeyPath = (*injection.keys, "model")
         try:
             model = self.models.get(injection.model)
             keys = (*injection.keys, "at", "file")
@@ -143,10 +143,10 @@ class _Expander:
                 keys, error.got, expected=error.expected, remedy=error.remedy
             ) from None
 
-    def _wrong(self, keys: Keys, got: str, known: tuple[str, ...]) -> MutatorError:
+    def _wrong(self, keys: KeyPath, got: str, known: tuple[str, ...]) -> MutatorError:
         return self.spec.source.error(
             keys,
             got,
-            expected=f"{one_of(known)}, as in {self.manifest.path.name}",
+            expected=f"{describe_choices(known)}, as in {self.manifest.path.name}",
             remedy="correct it",
         )

@@ -4,7 +4,7 @@ from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from mutator._common.interrupts import held
+from mutator._common.interrupts import delaying_interrupts
 from mutator._common.message_text import counted, suggestion
 from mutator.errors import MutatorError
 from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS, Anchor, AnchorKind, FaultLocation
@@ -115,7 +115,7 @@ def parsed_file(tree: SourceTree, path: str) -> ParsedFile:
     return tree.derived(path, parse_file)
 
 
-@held()
+@delaying_interrupts()
 def parse_file(path: str, data: bytes, root: Path) -> ParsedFile:
     """Parse a file of the target; MutatorError if it is not Python, or already has injected lines."""
     where = root / path

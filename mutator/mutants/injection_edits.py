@@ -4,7 +4,7 @@ import ast
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from mutator.config.instance_conditions import names_of
+from mutator.config.instance_conditions import names_in_condition
 from mutator.config.location_syntax import base_name
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel, FaultModels, Needs, SnippetKind
@@ -199,7 +199,7 @@ def _checked_variables(
 
 
 def _check_instance(file: ParsedFile, names: frozenset[str], first: int, injection: Injection) -> None:
-    unknown = names_of(injection.where or "True") - names
+    unknown = names_in_condition(injection.where or "True") - names
     if unknown:
         raise MutatorError(
             f"'{min(unknown)}' in `where` is not known in {injection.location.function}",

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from mutator._common.confined_files import inside
+from mutator._common.confined_files import path_below
 from mutator._common.hashing import content_id
 from mutator.errors import InvalidMutant, MutatorError
 from mutator.faults.fault_models import FaultModels
@@ -215,6 +215,6 @@ class _ReusingSplicer(_Splicer):
 
 def write_tree(manifest: TargetManifest, mutant: Mutant, dest: Path) -> None:
     for path, data in {**manifest.tree.files, **mutant.files}.items():
-        place = inside(dest, path)
+        place = path_below(dest, path)
         place.parent.mkdir(parents=True, exist_ok=True)
         place.write_bytes(data)

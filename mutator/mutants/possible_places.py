@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from mutator.config.location_syntax import as_written_at, assignable, dotted_name
+from mutator.config.location_syntax import is_assignable, is_dotted_name, location_as_yaml
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel, FaultModels, Needs, SnippetKind
 from mutator.model import Anchor, AnchorKind, FaultLocation
@@ -31,7 +31,7 @@ class ListedPlace:
 
     @property
     def at(self) -> dict[str, Any]:
-        return as_written_at(self.location)
+        return location_as_yaml(self.location)
 
 
 def places_of(file: ParsedFile, models: FaultModels, function: str | None = None) -> list[ListedPlace]:
@@ -137,7 +137,7 @@ class _PlaceLister:
 
 def is_writable_in_spec(name: str) -> bool:
     """Return whether a spec can use this name of a statement. `None`, as in `return None`, is not a name."""
-    return not name or dotted_name(name) or assignable(name)
+    return not name or is_dotted_name(name) or is_assignable(name)
 
 
 def can_change(model: FaultModel, expression: Expression | None) -> bool:

@@ -18,7 +18,7 @@ from mutator.faults.probe_templates import ProbeTemplates, TemplatePart
 from mutator.model import Activation, Hold, Injection, Trigger
 from mutator.mutants.template_rendering import render_template
 from mutator.targets.observed_values import Observation
-from mutator.triggers.conditions import TIME, check_condition, to_code
+from mutator.triggers.conditions import TIME, canonical_condition, to_python
 
 _SETTINGS_IN_CODE = ("observed", "values", "counted", "sets")  # settings that the template of the code uses
 
@@ -119,11 +119,11 @@ def build_probe_settings(
         hold=hold.value,
         hold_s=float(trigger.hold_s or 0.0),
         armed_after_s=float(trigger.armed_after_s),
-        condition=to_code(check_condition(trigger.condition, variables=observation.variables)),
+        condition=to_python(canonical_condition(trigger.condition, variables=observation.variables)),
         variables=(TIME, *names),
         values=names,
         observed=tuple(name for name, _ in observation.expressions),
-        derived=tuple((value.name, to_code(value.text, number=True)) for value in observation.derived),
+        derived=tuple((value.name, to_python(value.text, number=True)) for value in observation.derived),
         counted=observation.time is None,
         step_s=float(step_s),
         sets=sets,

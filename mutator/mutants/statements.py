@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import libcst as cst
 
-from mutator.config.location_syntax import assignable
+from mutator.config.location_syntax import is_assignable
 from mutator.mutants.name_scopes import NamesByFunction, normalize_identifier
 from mutator.mutants.node_positions import (
     NodePosition,
@@ -87,7 +87,7 @@ def dotted_name_of(node: cst.CSTNode | None) -> str | None:
 def item_name_of(node: cst.Subscript) -> str | None:
     """Return `a['b']`, as anchors name it; None if it has a computed part, which could change."""
     text = ast.unparse(ast.parse(cst.Module([]).code_for_node(node), mode="eval"))
-    return text if assignable(text) else None
+    return text if is_assignable(text) else None
 
 
 class _FunctionCollector(cst.CSTVisitor):

@@ -17,7 +17,7 @@ from typing import NoReturn
 from jinja2 import TemplateError, TemplateSyntaxError, Undefined
 
 from mutator.config import units
-from mutator.config.location_syntax import PROBE_NAME, assignable, dotted_name
+from mutator.config.location_syntax import PROBE_NAME, is_assignable, is_dotted_name
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import NAMES, FaultModel, ParamSchema, SnippetKind
 from mutator.model import Value
@@ -82,7 +82,7 @@ def unit_mixup_factor(written: str, read: str) -> float:
             expected=f"two different units of {written_unit.dimension}",
             remedy="correct one of them",
         )
-    return units.convert(1.0, read_unit, written_unit)
+    return units.convert_unit(1.0, read_unit, written_unit)
 
 
 def refuse_params(why: str) -> NoReturn:
@@ -213,7 +213,7 @@ def _checked_param(param: ParamSchema, params: Mapping[str, Value]) -> Value:
         if value not in words and not (value is None and param.optional):
             raise MutatorError(f"{value!r} for '{param.name}'", expected=f"one of {', '.join(words)}")
         return value
-    fits = assignable if param.type == "variable" else dotted_name
+    fits = is_assignable if param.type == "variable" else is_dotted_name
     is_name = isinstance(value, str) and fits(value)
     if is_name != (param.type in NAMES) or (isinstance(value, str) and not is_name):
         raise MutatorError(

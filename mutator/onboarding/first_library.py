@@ -11,7 +11,7 @@ import yaml
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from mutator._common.message_text import counted
-from mutator._common.shipped_files import make_empty
+from mutator._common.shipped_files import make_empty_folder
 from mutator.errors import MutatorWarning
 from mutator.onboarding.source_survey import SourceSurvey
 from mutator.onboarding.step_candidates import StepCandidate, list_step_candidates
@@ -34,7 +34,7 @@ def write_first_library(survey: SourceSurvey, folder: Path) -> None:
 
     MutatorWarning if no function in the source looks like a controller's step.
     """
-    make_empty(folder)
+    make_empty_folder(folder)
     variables = _template_variables(survey, folder.resolve())
     templates = Environment(
         loader=PackageLoader("mutator.onboarding", "files"),

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.confined_files import files_inside
-from mutator.config.yaml_files import MAX_BYTES
+from mutator.config.yaml_files import MOST_YAML_BYTES
 from mutator.errors import MutatorError
 
 TODO_MARK = "TODO(init)"
@@ -16,7 +16,7 @@ def unfilled_mark_errors(library: Path) -> Iterator[MutatorError]:
     for path in files_inside(library, "", "*"):
         if path.suffix not in (".yaml", ".py") or not path.is_file():
             continue
-        lines = read_bounded(path, MAX_BYTES).decode(errors="replace").splitlines()
+        lines = read_bounded(path, MOST_YAML_BYTES).decode(errors="replace").splitlines()
         for number, line in enumerate(lines, 1):
             _, mark, text = line.partition(f"# {TODO_MARK}:")
             if mark:

@@ -31,7 +31,7 @@ def mutations_of(
     mutations = list(_expression_mutations(file, facts, function, models, operator_by_name))
     if any(operator.omits for operator in operator_by_name.values()):
         mutations += _omission_mutations(file, facts, function, operator_by_name)
-    return sorted(mutations, key=lambda one: (one.line, OPERATORS.place(one.operator)))
+    return sorted(mutations, key=lambda one: (one.line, OPERATORS.sort_key(one.operator)))
 
 
 def _expression_mutations(
@@ -70,7 +70,7 @@ def _rules_for(
 ) -> Iterator[tuple[str, Rule]]:
     for name, operator in operators.items():
         if operator.rules:
-            with OPERATORS.running(name):
+            with OPERATORS.blaming_package(name):
                 for rule in operator.rules(expression, facts):
                     if not isinstance(rule, Rule):
                         raise TypeError(f"{rule!r} is no Rule")
@@ -116,7 +116,7 @@ def _omission_mutations(
 
 
 def _does_omit(name: str, operator: Operator, statement: Statement, facts: StatementFacts) -> bool:
-    with OPERATORS.running(name):
+    with OPERATORS.blaming_package(name):
         return bool(operator.omits and operator.omits(statement, facts))
 
 

@@ -6,7 +6,7 @@ from fnmatch import fnmatchcase
 
 from mutator._common.hashing import digest
 from mutator._common.message_text import counted, suggestion
-from mutator._common.random_streams import generator
+from mutator._common.random_streams import random_generator
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModels
 from mutator.mutants.anchors import parsed_file
@@ -162,7 +162,7 @@ def sample_mutations(selected: SelectedMutations, count: int | None, seed: int) 
     if count is None or count >= total:
         return selected.mutations
     strata_order = sorted(range(total), key=lambda i: _stratum(selected.mutations[i], seed))
-    start = float(generator(seed, "operators").random())
+    start = float(random_generator(seed, "operators").random())
     chosen = {strata_order[int((k + start) * total / count)] for k in range(count)}
     return tuple(selected.mutations[i] for i in sorted(chosen))
 

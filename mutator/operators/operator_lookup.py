@@ -18,7 +18,7 @@ OPERATOR_MODELS = (
 @cache
 def find_operator(name: str) -> Operator:
     """Return the operator of that name; MutatorError if there is none, or if its package is broken."""
-    operator = doors.OPERATORS.find(name)
+    operator = doors.OPERATORS.load(name)
     assert isinstance(operator, Operator)
     return operator
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mutator._common.table_rendering import Table
+from mutator._common.table_rendering import TextTable
 from mutator.outcomes.golden_comparison import load_record, load_trace
 from mutator.outcomes.hazards_and_metrics import judge_run
 from mutator.store.run_folder import GoldenRun, RunFolder
@@ -43,7 +43,7 @@ def load_fault_free_runs(folder: RunFolder, manifest: TargetManifest) -> tuple[F
     return tuple(found)
 
 
-def fault_free_table(runs: Sequence[FaultFreeRun], *, alerts: bool = True) -> Table:
+def fault_free_table(runs: Sequence[FaultFreeRun], *, alerts: bool = True) -> TextTable:
     """Return the table of fault-free runs: first times of hazards and alerts, and channel ranges."""
     channels = list(dict.fromkeys(name for run in runs for name, _, _ in run.ranges))
     rows = []
@@ -53,7 +53,7 @@ def fault_free_table(runs: Sequence[FaultFreeRun], *, alerts: bool = True) -> Ta
         events = [_told(run.alerts), _told(run.hazards)] if alerts else [_told(run.hazards)]
         rows.append([key, *events, *(ranges.get(name, "") for name in channels)])
     events = ["alerts", "hazards"] if alerts else ["hazards"]
-    return Table(heads=["fault-free run", *events, *channels], rows=rows)
+    return TextTable(heads=["fault-free run", *events, *channels], rows=rows)
 
 
 def own_alerts(runs: Iterable[FaultFreeRun]) -> str:

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from mutator._common.bounded_reading import MOST_JSON, read_bounded
-from mutator._common.confined_files import inside
+from mutator._common.bounded_reading import MOST_JSON_BYTES, read_bounded
+from mutator._common.confined_files import path_below
 from mutator._common.doors import IMPORTERS
 from mutator._common.hashing import digest
-from mutator._common.resource_shortages import shortage
+from mutator._common.resource_shortages import find_shortage
 from mutator.errors import BadOutput, BadTrace, MutatorError
 from mutator.outcomes import trace_files
 from mutator.outcomes.trace_files import own_times
@@ -40,10 +40,10 @@ class Difference:
 
 def trace_digest(manifest: TargetManifest, out: Path) -> str:
     try:
-        return digest(read_bounded(inside(out, manifest.trace_file)))
+        return digest(read_bounded(path_below(out, manifest.trace_file)))
     except OSError as err:
         _check_is_of_output(err)
-        raise BadOutput("the run left no trace", where=inside(out, manifest.trace_file)) from None
+        raise BadOutput("the run left no trace", where=path_below(out, manifest.trace_file)) from None
 
 
 def load_trace(
@@ -53,7 +53,7 @@ def load_trace(
     also: Sequence[Channel] = (),
 ) -> Trace:
     """Load channels (default: all) and times of the trace in `out`. Channels in `also` can be missing."""
-    path = inside(out, manifest.trace_file)
+    path = path_below(out, manifest.trace_file)
     kind = f"an {path.suffix} file" if path.suffix in (".npz", ".mcap") else f"a {path.suffix} file"
     try:
         trace = trace_files.read(path, manifest, channels, also)
@@ -76,7 +76,11 @@ def _check_is_of_run(err: Exception, manifest: TargetManifest, path: Path) -> No
     """Raise BadAddition if an importer of another package failed: nobody knows whether the run did."""
     names = {name for one in manifest.channels for name in (one.in_trace, one.time)}
     lacks = isinstance(err, KeyError) and err.args[:1] and err.args[0] in {manifest.time_channel, *names}
-    if path.is_file() and not lacks and (failure := IMPORTERS.failure(path.suffix.removeprefix("."), err)):
+    if (
+        path.is_file()
+        and not lacks
+        and (failure := IMPORTERS.addition_error(path.suffix.removeprefix("."), err))
+    ):
         raise failure from err
 
 
@@ -138,9 +142,9 @@ def load_record(manifest: TargetManifest, out: Path) -> dict[str, Any]:
     """Load the record that the target wrote in `out`, or an empty one if the manifest names no record."""
     if manifest.record_file is None:
         return {"hazards": {}, "alerts": []}
-    path = inside(out, manifest.record_file)
+    path = path_below(out, manifest.record_file)
     try:
-        data = json.loads(read_bounded(path, MOST_JSON))
+        data = json.loads(read_bounded(path, MOST_JSON_BYTES))
     except (OSError, ValueError, RecursionError) as err:
         _check_is_of_output(err)
         raise BadOutput(
@@ -155,7 +159,7 @@ def load_record(manifest: TargetManifest, out: Path) -> dict[str, Any]:
 
 def _check_is_of_output(err: Exception) -> None:
     """Raise Shortage if mutator itself ran out of memory or file handles, so the output can be valid."""
-    if short := shortage(err):
+    if short := find_shortage(err):
         if isinstance(err, MemoryError):
             with suppress(MemoryError):
                 bytes(_TRIAL)

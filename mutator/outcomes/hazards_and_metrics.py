@@ -21,7 +21,7 @@ from mutator.targets.contact_severity import DELTA_V
 from mutator.targets.criteria import Hazard, Metric
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers import temporal_logic, trace_formulas
-from mutator.triggers.conditions import GOLDEN, TIME, names_in
+from mutator.triggers.conditions import GOLDEN_PREFIX, TIME, names_in
 
 Values = Mapping[str, np.ndarray]
 
@@ -76,7 +76,9 @@ def judge_run(
         if (end := _end(hazard, first, values)) is not None:
             ends[hazard.name] = end
         if hazard.metric is not None:
-            numbers = robust if robust is not None else trace_formulas.numbers(hazard.margin, values)
+            numbers = (
+                robust if robust is not None else trace_formulas.formula_at_each_step(hazard.margin, values)
+            )
             metrics.append((hazard.metric, numbers))
     measured = [metric for metric in manifest.metrics if golden is not None or not metric.uses_golden]
     metrics += [(metric, _numbers(metric, values)) for metric in measured]
@@ -105,14 +107,15 @@ def values_of(manifest: TargetManifest, trace: Trace) -> Values:
         values[channel.name] = on_steps(trace, channel.name, time).astype(float)
     for value in manifest.observation.derived:
         if value.name not in values and all(name in values for name in names_in(value.text)):
-            values[value.name] = trace_formulas.numbers(value.text, values)
+            values[value.name] = trace_formulas.formula_at_each_step(value.text, values)
     return values
 
 
 def _golden_values(golden: Values, steps: np.ndarray) -> Values:
     """Return the values of the golden run at the steps of another run; NaN at steps that it does not have."""
     return {
-        GOLDEN + name: at_steps_of_other(golden[TIME], numbers, steps) for name, numbers in golden.items()
+        GOLDEN_PREFIX + name: at_steps_of_other(golden[TIME], numbers, steps)
+        for name, numbers in golden.items()
     }
 
 
@@ -129,7 +132,7 @@ def _first(
 ) -> float | None:
     if hazard.recorded:
         return record.get("hazards", {}).get(hazard.name)  # type: ignore[no-any-return]
-    holds = robust < 0.0 if robust is not None else trace_formulas.holds(hazard.when, values)
+    holds = robust < 0.0 if robust is not None else trace_formulas.condition_at_each_step(hazard.when, values)
     return _first_of(_lasting(holds, values[TIME], hazard.for_s), values[TIME])
 
 
@@ -151,7 +154,7 @@ def _end(hazard: Hazard, first: float | None, values: Values) -> float | None:
         return first
     if not hazard.terminal:
         return None
-    return _first_of(trace_formulas.holds(hazard.terminal, values), values[TIME])
+    return _first_of(trace_formulas.condition_at_each_step(hazard.terminal, values), values[TIME])
 
 
 def _numbers(metric: Metric, values: Values) -> np.ndarray:
@@ -159,10 +162,12 @@ def _numbers(metric: Metric, values: Values) -> np.ndarray:
     missing.
     """
     if metric.aggregate == "duration":
-        numbers = trace_formulas.holds(metric.formula, values).astype(float)
+        numbers = trace_formulas.condition_at_each_step(metric.formula, values).astype(float)
     else:
-        numbers = trace_formulas.numbers(metric.formula, values)
-    return np.where(np.isnan(values[GOLDEN + TIME]), np.nan, numbers) if metric.uses_golden else numbers
+        numbers = trace_formulas.formula_at_each_step(metric.formula, values)
+    return (
+        np.where(np.isnan(values[GOLDEN_PREFIX + TIME]), np.nan, numbers) if metric.uses_golden else numbers
+    )
 
 
 def _aggregate(metric: Metric, numbers: np.ndarray, values: Values, t_end: float | None) -> float | None:
@@ -176,7 +181,7 @@ def _aggregate(metric: Metric, numbers: np.ndarray, values: Values, t_end: float
         driven &= t_end is not None and time == time[driven].max(initial=-math.inf)
     counts = np.isfinite(numbers) & driven
     if metric.where:
-        counts &= trace_formulas.holds(metric.where, values)
+        counts &= trace_formulas.condition_at_each_step(metric.where, values)
     if metric.aggregate in ("integral", "duration"):
         until = np.append(time[1:], time[-1:])  # each value lasts until the next step or the end of the drive
         lengths = np.minimum(until, math.inf if t_end is None else max(t_end, time[0])) - time

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from mutator._common.bounded_reading import MOST_JSON, MOST_WHOLE, read_bounded
+from mutator._common.bounded_reading import MOST_FILE_BYTES, MOST_JSON_BYTES, read_bounded
 from mutator.errors import BadTrace
 
 _MAGIC = b"\x89MCAP0\r\n"
@@ -26,7 +26,7 @@ def read_topics(path: Path, fields: Mapping[str, Iterable[str]]) -> dict[str, Va
     Messages are in the order of their times. BadTrace for a file that exceeds a limit, or with another
     content; KeyError for a missing field. Other errors of damaged content are not caught.
     """
-    data = read_bounded(path, MOST_WHOLE)
+    data = read_bounded(path, MOST_FILE_BYTES)
     if len(data) < 2 * len(_MAGIC) or not (data.startswith(_MAGIC) and data.endswith(_MAGIC)):
         raise BadTrace("no beginning or no end of an .mcap file", "a complete .mcap file")
     topics: dict[int, str] = {}
@@ -77,8 +77,8 @@ class _Records:
         content = chunk[_CHUNK_HEAD.size + 4 + len(compression.encode()) :]
         (packed,) = _SIZE.unpack_from(content)
         self._bytes += size
-        if self._bytes > MOST_WHOLE:
-            raise BadTrace(f"{self._bytes:,} bytes when unpacked", f"at most {MOST_WHOLE:,}")
+        if self._bytes > MOST_FILE_BYTES:
+            raise BadTrace(f"{self._bytes:,} bytes when unpacked", f"at most {MOST_FILE_BYTES:,}")
         data = _decompressed(content[_SIZE.size : _SIZE.size + packed], compression, size + 1)
         if len(data) != size:
             raise BadTrace("a chunk that unpacks to another size than it claims", f"{size:,} bytes")
@@ -111,8 +111,8 @@ def _texts(data: memoryview, count: int = 2) -> list[str]:
 
 
 def _numbers(message: memoryview, topic: str, fields: Iterable[str]) -> list[Any]:
-    if len(message) > MOST_JSON:
-        raise BadTrace(f"a message of {len(message):,} bytes in {topic}", f"at most {MOST_JSON:,}")
+    if len(message) > MOST_JSON_BYTES:
+        raise BadTrace(f"a message of {len(message):,} bytes in {topic}", f"at most {MOST_JSON_BYTES:,}")
     data = json.loads(bytes(message))
     values = [_field(data, field) for field in fields]
     for field, value in zip(fields, values, strict=True):

@@ -12,14 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from mutator._common.bounded_reading import MOST_WHOLE
+from mutator._common.bounded_reading import MOST_FILE_BYTES
 from mutator._common.doors import IMPORTERS
 from mutator.errors import BadTrace
 from mutator.targets.channels import Channel
 from mutator.targets.manifest import TargetManifest
 
 Arrays = dict[str, np.ndarray]
-MOST_TRACE = MOST_WHOLE  # bytes of a trace, also when unpacked
+MOST_TRACE = MOST_FILE_BYTES  # bytes of a trace, also when unpacked
 MOST_COLUMNS = 10_000
 
 
@@ -62,7 +62,7 @@ class Importer:
 
 @cache
 def _importer(name: str) -> Importer:
-    found = IMPORTERS.find(name)
+    found = IMPORTERS.load(name)
     assert isinstance(found, Importer)
     return found
 

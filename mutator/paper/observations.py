@@ -12,8 +12,8 @@ from typing import Any
 import pandas as pd
 from pydantic import Field, model_validator
 
-from mutator.config.yaml_files import StrictModel, read
-from mutator.config.yaml_sources import Source
+from mutator.config.yaml_files import StrictModel, load_yaml_model
+from mutator.config.yaml_sources import YamlSource
 from mutator.paper.measures import MEASURES, Estimate, estimate_of_difference, estimate_of_share
 from mutator.statistics.shares import share
 
@@ -189,7 +189,7 @@ def judge_observations(
     differ from the paper's mixture of faults. MutatorError with file and line if the file or a query is
     invalid.
     """
-    model, source = read(path, ObservationsFile, SCHEMA)
+    model, source = load_yaml_model(path, ObservationsFile, SCHEMA)
     judged = []
     for i, observation in enumerate(model.observations):
         claims = tuple(
@@ -221,7 +221,7 @@ def _judge_claim(
     claim: Claim,
     runs: pd.DataFrame,
     mixture_gaps: Sequence[str],
-    source: Source,
+    source: YamlSource,
     keys: tuple[str | int, ...],
 ) -> JudgedClaim:
     if claim.measure is None or claim.claim_rule is None:
@@ -257,7 +257,7 @@ def _answer_claim(
     rule: ClaimRule,
     arguments: dict[str, str],
     runs: pd.DataFrame,
-    source: Source,
+    source: YamlSource,
     keys: tuple[str | int, ...],
 ) -> ClaimAnswer:
     query = f"{measure}(runs, {', '.join(f'{name}={text!r}' for name, text in arguments.items())})"

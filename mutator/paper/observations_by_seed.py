@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from mutator._common.table_rendering import Table
+from mutator._common.table_rendering import TextTable
 from mutator.paper.observations import ClaimVerdict, JudgedObservation, judge_observations
 from mutator.statistics.seed_spread import seeds_of
 from mutator.statistics.statistics_sheet import Sheet, SheetCell
@@ -36,7 +36,7 @@ def judge_by_seed(
     }
 
 
-def verdicts_by_seed_table(judged: Sequence[JudgedObservation], by_seed: JudgedBySeed) -> Table:
+def verdicts_by_seed_table(judged: Sequence[JudgedObservation], by_seed: JudgedBySeed) -> TextTable:
     heads = ("observation", "", "all seeds together", *(verdict.value for verdict in ClaimVerdict), "seeds")
     rows = [
         (
@@ -49,7 +49,7 @@ def verdicts_by_seed_table(judged: Sequence[JudgedObservation], by_seed: JudgedB
         )
         for observation in judged
     ]
-    return Table(heads=heads, rows=rows, right=range(3, len(heads)))
+    return TextTable(heads=heads, rows=rows, right_aligned=range(3, len(heads)))
 
 
 def _seeds_with_verdict(number: int, verdict: ClaimVerdict, by_seed: JudgedBySeed) -> list[str]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
-from mutator._common.table_rendering import Table
+from mutator._common.table_rendering import TextTable
 from mutator.paper.observations import MIN_RUNS_FOR_VERDICT, JudgedClaim, JudgedObservation
 from mutator.statistics.statistics_sheet import Sheet, SheetCell
 
@@ -26,7 +26,7 @@ runs = load_usable_results(Path("results.csv"))"""
 CLAIM_HEADS = ("claim", "", "the paper", "verdict on its counts", "here", "rule", "verdict")
 
 
-def claims_table(observation: JudgedObservation) -> Table:
+def claims_table(observation: JudgedObservation) -> TextTable:
     """Return the table of an observation: a row for each claim, and a row for each of its groups."""
     rows = []
     for claim in observation.claims:
@@ -47,7 +47,7 @@ def claims_table(observation: JudgedObservation) -> Table:
                 ["", answer.group, "", "", answer.result.text, "", answer.verdict.value]
                 for answer in claim.answers
             ]
-    return Table(heads=CLAIM_HEADS, rows=rows)
+    return TextTable(heads=CLAIM_HEADS, rows=rows)
 
 
 def describe_published(claim: JudgedClaim) -> str:
@@ -85,7 +85,7 @@ def verdicts_markdown(observations: Sequence[JudgedObservation]) -> str:
         [str(observation.number), observation.title, observation.verdict.value]
         for observation in observations
     ]
-    return Table(heads=("observation", "", "verdict"), rows=rows).as_markdown()
+    return TextTable(heads=("observation", "", "verdict"), rows=rows).as_markdown()
 
 
 def observation_heading(observation: JudgedObservation) -> str:

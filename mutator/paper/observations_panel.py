@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.message_text import counted
-from mutator.config.yaml_files import MAX_BYTES
+from mutator.config.yaml_files import MOST_YAML_BYTES
 from mutator.outcomes.fault_free_runs import own_alerts
 from mutator.paper import observations, observations_by_seed, observations_page
 from mutator.paper.observations import ClaimVerdict
@@ -70,7 +70,7 @@ def build_observations_panel(run: ReportedRun) -> Panel | None:
     if len(missing) == len(fault_types):
         return None
     ends = run.ends() or {}
-    words = re.findall(r"\w+", read_bounded(file, MAX_BYTES).decode())
+    words = re.findall(r"\w+", read_bounded(file, MOST_YAML_BYTES).decode())
     frame = select_columns(run.frame, *words)  # the queries use only columns that the file names
     frame = frame.assign(t_end=frame["scenario"].map(ends))
     judged = observations.judge_observations(file, frame, list(_mixture_gaps(run, missing)))

@@ -5,8 +5,8 @@ from pathlib import Path
 
 from pydantic import Field
 
-from mutator.config.yaml_files import StrictModel, read
-from mutator.config.yaml_sources import Source
+from mutator.config.yaml_files import StrictModel, load_yaml_model
+from mutator.config.yaml_sources import YamlSource
 from mutator.statistics.published_counts import PublishedCounts
 from mutator.statistics.tallies import Tally
 
@@ -83,9 +83,9 @@ class _TimesFile(StrictModel):
 
 def load_published_numbers(references: Path) -> PublishedNumbers:
     """Load the numbers cited in a folder. MutatorError with file and line if counts are impossible."""
-    summary, summary_source = read(references / FILE_NAMES[0], _SummaryFile, "paper_summary/1")
-    coverage, coverage_source = read(references / FILE_NAMES[1], _CoverageFile, "paper_coverage/1")
-    times, _ = read(references / FILE_NAMES[2], _TimesFile, "paper_times/1")
+    summary, summary_source = load_yaml_model(references / FILE_NAMES[0], _SummaryFile, "paper_summary/1")
+    coverage, coverage_source = load_yaml_model(references / FILE_NAMES[1], _CoverageFile, "paper_coverage/1")
+    times, _ = load_yaml_model(references / FILE_NAMES[2], _TimesFile, "paper_times/1")
     tally_by_scenario = {}
     for i, row in enumerate(summary.rows):
         tally = Tally(**row.model_dump(exclude={"method", "scenario"}))
@@ -114,7 +114,7 @@ def has_published_numbers(references: Path) -> bool:
     return all((references / name).is_file() for name in FILE_NAMES)
 
 
-def _check_tally(tally: Tally, source: Source, row: int) -> None:
+def _check_tally(tally: Tally, source: YamlSource, row: int) -> None:
     """Raise MutatorError if a part exceeds its whole, or if counts of hazards and alerts are inconsistent."""
     parts = (tally.manifested or 0, tally.hazards, tally.alerts or 0)
     is_consistent = tally.activated <= tally.injected and max(parts) <= tally.activated

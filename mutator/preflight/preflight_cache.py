@@ -5,7 +5,7 @@ import shutil
 from pathlib import Path
 
 from mutator._common import cached_folders, shared_cache
-from mutator._common.confined_files import inside
+from mutator._common.confined_files import path_below
 from mutator._common.hashing import digest
 from mutator.preflight.unreached_triggers import OBSERVATIONS_FOLDER
 
@@ -14,7 +14,7 @@ def entry_path(key: str) -> Path:
     """Return the path for checks with this digest. Machines with a shared home folder have separate entries,
     because the digest might not cover everything that changes last digits.
     """
-    return inside(shared_cache.of_checks(), digest([key, platform.node()]))
+    return path_below(shared_cache.checks_folder(), digest([key, platform.node()]))
 
 
 def store_checks(entry: Path, run: Path, file: str, observation_folder: Path) -> None:
@@ -24,8 +24,8 @@ def store_checks(entry: Path, run: Path, file: str, observation_folder: Path) ->
 
     def fill(entry_folder: Path) -> None:
         shutil.copytree(run / "golden", entry_folder / "golden")
-        shutil.copy(inside(run, file), inside(entry_folder, file))
+        shutil.copy(path_below(run, file), path_below(entry_folder, file))
         if (observation_folder / OBSERVATIONS_FOLDER).is_dir():
             shutil.copytree(observation_folder / OBSERVATIONS_FOLDER, entry_folder / OBSERVATIONS_FOLDER)
 
-    cached_folders.store(entry, fill)
+    cached_folders.store_in_cache(entry, fill)

@@ -8,7 +8,7 @@ from typing import Any
 
 from mutator._common import cached_folders
 from mutator._common.bounded_reading import read_bounded
-from mutator._common.confined_files import inside
+from mutator._common.confined_files import path_below
 from mutator._common.files import json_bytes, raising_disk_full, read_json, write_atomic
 from mutator._common.hashing import digest
 from mutator.campaigns import run_environment
@@ -37,7 +37,7 @@ from mutator.store.check_results import FILE, SCHEMA, CheckResult
 from mutator.store.file_digests import FileDigest
 from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.trigger_kinds import always
+from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
 
 
@@ -84,7 +84,7 @@ def describe_unreached_triggers(workspace: Workspace, folder: RunFolder) -> list
 
 def checks_and_goldens_exist(folder: RunFolder) -> bool:
     folders = (folder.golden_folder(*golden_run) for golden_run in folder.golden_runs)
-    goldens = (inside(place, name) for place in folders for name in folder.head.golden_files)
+    goldens = (path_below(place, name) for place in folders for name in folder.head.golden_files)
     return all(path.is_file() for path in (folder.path / FILE, *goldens))
 
 
@@ -125,7 +125,7 @@ class _PreflightChecks:
         copy = self.kept
         try:
             with raising_disk_full(copy):
-                cached_folders.fetch(preflight_cache.entry_path(self.digest), copy)
+                cached_folders.copy_from_cache(preflight_cache.entry_path(self.digest), copy)
             stored = read_json(copy / FILE, SCHEMA)
             results = self._passed_results(stored, copy)
         except DiskFull:
@@ -147,7 +147,7 @@ class _PreflightChecks:
             return None
         keys = [golden_run.key for golden_run in self.keys]
         if any(
-            output_digest_of(self.manifest, inside(folder / "golden", key)) != stored["goldens"][key]
+            output_digest_of(self.manifest, path_below(folder / "golden", key)) != stored["goldens"][key]
             for key in keys
         ):
             return None
@@ -203,7 +203,7 @@ class _PreflightChecks:
         """
         run, before = self.folder.path, (self._stored_checks() or {}).get("goldens", {})
         known_digests = {
-            key: before.get(key) or output_digest_of(self.manifest, inside(run / "golden", key))
+            key: before.get(key) or output_digest_of(self.manifest, path_below(run / "golden", key))
             for key in goldens
         }
         changed = [key for key in goldens if known_digests[key] not in ("", goldens[key])]
@@ -250,7 +250,7 @@ class _PreflightChecks:
         problems: dict[str, list[str]] = {}
         for fault in self.variants.values():
             try:
-                build(self.manifest, self.models, fault, always())
+                build(self.manifest, self.models, fault, always_trigger())
             except InvalidMutant:
                 continue
             except MutatorError as err:

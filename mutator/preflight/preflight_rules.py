@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mutator._common.bounded_reading import read_bounded
-from mutator._common.confined_files import inside
+from mutator._common.confined_files import path_below
 from mutator._common.hashing import digest
 from mutator.engines.engine_jobs import Execution
 from mutator.errors import BadOutput
@@ -57,7 +57,7 @@ def read_check_run(manifest: TargetManifest, execution: Execution) -> CheckRun:
 def output_digest_of(manifest: TargetManifest, out: Path) -> str:
     """Digest of trace and record in an output folder; empty if they are missing."""
     try:
-        return digest([digest(read_bounded(inside(out, name))) for name in manifest.outputs])
+        return digest([digest(read_bounded(path_below(out, name))) for name in manifest.outputs])
     except OSError:
         return ""
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from mutator._common import shared_cache
-from mutator._common.confined_files import inside
+from mutator._common.confined_files import path_below
 from mutator._common.files import remove_folder
 from mutator.engines.engine_jobs import Job
 from mutator.engines.reference_engine import ReferenceEngine
@@ -19,7 +19,7 @@ from mutator.preflight.preflight_rules import CheckRun, read_check_run
 from mutator.store.run_folder import RunFolder
 from mutator.store.run_progress import Progress, StagePace
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.trigger_kinds import always
+from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
 
 GOLDEN, GOLDEN_AGAIN, NULL_MUTANT = "golden", "golden again", "null mutant"
@@ -92,7 +92,7 @@ class CheckRunner:
 
     def _jobs_by_name(self) -> dict[tuple[str, Any], Job]:
         jobs: dict[tuple[str, Any], Job] = {}
-        null = build(self.manifest, self.workspace.fault_models(), None, always())
+        null = build(self.manifest, self.workspace.fault_models(), None, always_trigger())
         for key in self.folder.golden_runs:
             common: dict[str, Any] = {
                 "scenario": self.workspace.scenario(key.scenario),
@@ -108,18 +108,18 @@ class CheckRunner:
         return dict(sorted(jobs.items(), key=lambda entry: entry[0][0] != NULL_MUTANT))  # null mutants last
 
     def _run_job(self, engine: ReferenceEngine, name: tuple[str, Any], job: Job) -> CheckRun:
-        scratch = inside(engine.work, job.name)
+        scratch = path_below(engine.work, job.name)
         try:
             execution = engine.execute(job, scratch)
             run = read_check_run(self.manifest, execution)
             if name[0] == GOLDEN and name[1].seed is not None:
-                shared_cache.make_room(self.manifest.cache_name)
+                shared_cache.prune_target(self.manifest.cache_name)
             if name[0] == NULL_MUTANT:
                 unreached_triggers.save_observations(
                     self.kept, name[1].key, execution.watched.get("seen", ())
                 )
             if name[0] == GOLDEN and not run.problem:
-                golden_folder = inside(self.kept / "golden", name[1].key)
+                golden_folder = path_below(self.kept / "golden", name[1].key)
                 golden_folder.parent.mkdir(parents=True, exist_ok=True)
                 execution.out.rename(golden_folder)
             return run

@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from mutator._common.bounded_reading import read_bounded
-from mutator._common.confined_files import inside
+from mutator._common.confined_files import path_below
 from mutator._common.message_text import counted
 from mutator.engines.first_activation import active_at
 from mutator.model import Experiment, Trigger
@@ -31,7 +31,7 @@ ArmedCondition = tuple[float, str]  # of a trigger's probe
 
 
 def save_observations(folder: Path, key: str, observations: Iterable[Sequence[float]]) -> None:
-    path = inside(folder / OBSERVATIONS_FOLDER, f"{key}.npy")
+    path = path_below(folder / OBSERVATIONS_FOLDER, f"{key}.npy")
     path.parent.mkdir(parents=True, exist_ok=True)  # scenario names can contain folders
     np.save(path, np.array(list(observations), dtype=float))
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 
-from mutator._common.table_rendering import Table
+from mutator._common.table_rendering import TextTable
 from mutator.reference.yaml_key_tables import generated_page_head
 from mutator.results.plan_columns import PLAN_COLUMNS
 from mutator.results.propagation_columns import COLUMNS as PROPAGATION
@@ -60,7 +60,7 @@ def _result_columns_section(manifest: TargetManifest) -> Iterator[str]:
 def _columns_table(columns: Iterable[Column]) -> Iterator[str]:
     heads = ("column", "type", "Parquet", "unit", "meaning")
     rows = [(f"`{c.name}`", c.type, ARROW_TYPES[c.type], c.unit or "-", c.about) for c in columns]
-    yield Table(heads=heads, rows=rows).as_markdown(escape=False)
+    yield TextTable(heads=heads, rows=rows).as_markdown(escape=False)
     yield ""
 
 
@@ -83,31 +83,33 @@ def _target_section(manifest: TargetManifest) -> Iterator[str]:
     yield "Triggers and contexts can use these variables:\n"
     observed_variables = variable_units(manifest.observation)
     variables = [(f"`{name}`", *unit_and_meaning) for name, unit_and_meaning in observed_variables.items()]
-    yield Table(heads=("variable", "unit", "meaning"), rows=variables).as_markdown(escape=False)
+    yield TextTable(heads=("variable", "unit", "meaning"), rows=variables).as_markdown(escape=False)
     yield ""
     yield (
         f"A trace in `{manifest.trace_file}` has one array for each channel, with one value for each step of "
         f"{manifest.step_s:g} s. `{manifest.time_channel}` is the time in s.\n"
     )
     rows = [_channel_row(channel) for channel in manifest.channels]
-    yield Table(heads=("channel", "unit", "role", "component", "meaning"), rows=rows).as_markdown(
+    yield TextTable(heads=("channel", "unit", "role", "component", "meaning"), rows=rows).as_markdown(
         escape=False
     )
     yield ""
     hazards = [_hazard_row(hazard) for hazard in manifest.rules]
-    yield Table(heads=("hazard", "condition", "ends the drive", "meaning"), rows=hazards).as_markdown(
+    yield TextTable(heads=("hazard", "condition", "ends the drive", "meaning"), rows=hazards).as_markdown(
         escape=False
     )
     yield ""
     metrics = [_metric_row(metric) for metric in manifest.measures]
     if metrics:
-        yield Table(heads=("metric", "unit", "is", "worse", "meaning"), rows=metrics).as_markdown(
+        yield TextTable(heads=("metric", "unit", "is", "worse", "meaning"), rows=metrics).as_markdown(
             escape=False
         )
         yield ""
     yield f"Alerts: {', '.join(manifest.alerts) or 'none'}.\n"
     changes = [(f"`{name}`", f"`{' '.join(words)}`") for name, words in manifest.changes.items()]
-    yield Table(heads=("change of the scenario", "arguments it adds"), rows=changes).as_markdown(escape=False)
+    yield TextTable(heads=("change of the scenario", "arguments it adds"), rows=changes).as_markdown(
+        escape=False
+    )
     yield ""
 
 

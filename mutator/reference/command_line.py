@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from typer.main import get_command
 
-from mutator._common.table_rendering import Table
+from mutator._common.table_rendering import TextTable
 from mutator.cli.app import EXIT_CODES, GROUPS, app
 from mutator.cli.options import Place
 from mutator.execution import pytest_plugin
@@ -104,4 +104,4 @@ def _pytest_section() -> Iterator[str]:
 
 
 def _table_markdown(heads: tuple[str, str], rows: list[tuple[str, str]]) -> str:
-    return Table(heads=heads, rows=rows).as_markdown(escape=False)
+    return TextTable(heads=heads, rows=rows).as_markdown(escape=False)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pkgutil import resolve_name
 
 from mutator._common.doors import DISTRIBUTORS, DOORS, EXPORTS, IMPORTERS, OPERATORS, STUDIES, Door
-from mutator._common.table_rendering import Table
+from mutator._common.table_rendering import TextTable
 from mutator.reference.yaml_key_tables import generated_page_head
 from mutator.workspace import Workspace
 
@@ -27,19 +27,19 @@ Once a package is uninstalled, the files that its exports wrote in run folders a
 The package in `tests/fixtures/doors/` has an example of each but the study.
 """
 _EXAMPLE_BY_DOOR = {
-    EXPORTS.thing: ("a format of `mutator export`", "counts", "door_examples.counts:EXPORT"),
-    IMPORTERS.thing: ("a format of traces; its name is the suffix", "jsonl", "door_examples.jsonl:IMPORTER"),
-    DISTRIBUTORS.thing: (
+    EXPORTS.addition: ("a format of `mutator export`", "counts", "door_examples.counts:EXPORT"),
+    IMPORTERS.addition: ("a format of traces; its name is the suffix", "jsonl", "door_examples.jsonl:IMPORTER"),
+    DISTRIBUTORS.addition: (
         "a way to run experiments elsewhere, chosen by `--cluster NAME:WHERE`",
         "here",
         "door_examples.here:DISTRIBUTOR",
     ),
-    OPERATORS.thing: (
+    OPERATORS.addition: (
         "mutants without a spec ([mutation operators](operators.md))",
         "zero",
         "door_examples.zero:OPERATOR",
     ),
-    STUDIES.thing: (
+    STUDIES.addition: (
         "published results with which runs are compared ([add a study](../how-to/add-a-study.md))",
         "crash_tests",
         "crash_tests.study:STUDY",
@@ -84,8 +84,9 @@ _INTERNAL_DOORS = (
         name="trigger kind",
         purpose="when a fault is active",
         protocol="a function that makes a `Trigger` from a condition and a hold",
-        how_to_register="`mutator/triggers/trigger_kinds.py`; `READERS` and `TYPED` for the command line",
-        example="`always` in that module",
+        how_to_register="`mutator/triggers/trigger_kinds.py`; for the command line, `TRIGGER_PARSERS` and "
+        "`TRIGGER_FORMS`",
+        example="`always_trigger` in that module",
     ),
     _InternalDoor(
         name="engine",
@@ -107,7 +108,7 @@ _INTERNAL_DOORS = (
 def render_doors_page(workspace: Workspace) -> str:
     heads = ("door", "what it adds", "protocol", "how to register", "example")
     rows = [(f"**{p.name}**", p.purpose, p.protocol, p.how_to_register, p.example) for p in _INTERNAL_DOORS]
-    inside = Table(heads=heads, rows=rows).as_markdown(escape=False)
+    inside = TextTable(heads=heads, rows=rows).as_markdown(escape=False)
     parts = [generated_page_head("Doors"), _INTRO, "## Entry points of other packages\n", _ENTRY_POINTS_NOTE]
     for door in DOORS:
         parts += _door_section(door)
@@ -115,15 +116,15 @@ def render_doors_page(workspace: Workspace) -> str:
 
 
 def _door_section(door: Door) -> Iterator[str]:
-    adds, example_name, example_value = _EXAMPLE_BY_DOOR[door.thing]
-    kind = resolve_name(door.kind)
-    yield f"### {door.thing.capitalize()}\n"
-    yield f"It adds {adds}. The object is a `{door.kind.replace(':', '.')}`."
-    if door.folder:
-        folder = door.folder.replace(".", "/")
+    adds, example_name, example_value = _EXAMPLE_BY_DOOR[door.addition]
+    kind = resolve_name(door.type_path)
+    yield f"### {door.addition.capitalize()}\n"
+    yield f"It adds {adds}. The object is a `{door.type_path.replace(':', '.')}`."
+    if door.shipped_package:
+        folder = door.shipped_package.replace(".", "/")
         yield f"Inside the project, it is the attribute `{door.attribute}` of a module in `{folder}/`."
     yield f"\n{inspect.cleandoc(kind.__doc__)}\n"
     yield f'```toml\n[project.entry-points."{door.group}"]\n{example_name} = "{example_value}"\n```\n'
-    shipped_rows = [(f"`{name}`", door.find(name).about) for name in door.shipped()]
+    shipped_rows = [(f"`{name}`", door.load(name).about) for name in door.shipped_names()]
     if shipped_rows:
-        yield Table(heads=(door.thing, "what it is"), rows=shipped_rows).as_markdown(escape=False) + "\n"
+        yield TextTable(heads=(door.addition, "what it is"), rows=shipped_rows).as_markdown(escape=False) + "\n"

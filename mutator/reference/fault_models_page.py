@@ -3,7 +3,7 @@
 import difflib
 from collections.abc import Iterator
 
-from mutator._common.table_rendering import Table
+from mutator._common.table_rendering import TextTable
 from mutator.faults import fault_model_files
 from mutator.faults.fault_models import TARGET_UNIT, Example, FaultModel, ParamSchema, SnippetKind
 from mutator.reference.yaml_key_tables import generated_page_head, model_sections
@@ -47,7 +47,7 @@ def render_fault_models_page(workspace: Workspace) -> str:
     models = list(workspace.fault_models())
     parts = [generated_page_head("Fault models"), INTRODUCTION]
     rows = [(f"[{model.name}](#{model.name})", _first_sentence(model.about)) for model in models]
-    parts += [Table(heads=("model", "what it does"), rows=rows).as_markdown(escape=False), ""]
+    parts += [TextTable(heads=("model", "what it does"), rows=rows).as_markdown(escape=False), ""]
     for model in models:
         parts += _model_section(model)
     parts += [
@@ -67,7 +67,7 @@ def _model_section(model: FaultModel) -> Iterator[str]:
     params = [param for param in model.params if param.type != "seed"]
     if params:
         heads = ("parameter", "type", "unit", "meaning")
-        yield Table(heads=heads, rows=list(map(_parameter_row, params))).as_markdown(escape=False)
+        yield TextTable(heads=heads, rows=list(map(_parameter_row, params))).as_markdown(escape=False)
         yield ""
     for example in model.examples:
         yield f"For example, {example.about}:\n"

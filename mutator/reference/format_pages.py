@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from mutator._common.table_rendering import Table
+from mutator._common.table_rendering import TextTable
 from mutator.campaigns import campaign_files, campaign_model
 from mutator.config import units
 from mutator.execution.cluster import cluster_files
@@ -131,7 +131,7 @@ def _readings_section() -> Iterator[str]:
 
 def _units_table() -> Iterator[str]:
     rows = [(f"`_{unit.suffix}`", unit.symbol, unit.dimension) for unit in units.UNITS.values()]
-    yield Table(heads=("suffix", "unit", "quantity"), rows=rows).as_markdown(escape=False)
+    yield TextTable(heads=("suffix", "unit", "quantity"), rows=rows).as_markdown(escape=False)
     yield ""
     yield (
         "The longest suffix applies: `by_per_m` is `by` in 1/m. Numbers are converted between units of the "

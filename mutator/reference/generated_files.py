@@ -4,7 +4,7 @@ import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from mutator._common.shipped_files import refuse_shipped
+from mutator._common.shipped_files import check_not_shipped
 from mutator.reference import (
     columns_and_channels,
     command_line,
@@ -50,7 +50,7 @@ def render_files(workspace: Workspace) -> dict[Path, str]:
 def write_files(workspace: Workspace) -> Iterator[Path]:
     """Write the files into the library's clone; yield the paths. MutatorError if there is no clone."""
     clone = workspace.library.parent
-    refuse_shipped(clone)
+    check_not_shipped(clone)
     for path, text in render_files(workspace).items():
         (clone / path).parent.mkdir(parents=True, exist_ok=True)
         (clone / path).write_text(text, encoding="utf-8")

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from importlib import metadata
 from pathlib import Path
 
-from mutator._common.table_rendering import Table
+from mutator._common.table_rendering import TextTable
 from mutator.errors import MutatorError
 
 PAGE_PATH = Path("docs", "reference", "licences.md")
@@ -41,7 +41,7 @@ def write_licences(clone: Path) -> None:
         (name, group_by_package.get(name, "others"), _licence_of(name, licence_by_package))
         for name in constrained_packages(clone)
     ]
-    table = Table(heads=("package", "needed by", "licence"), rows=rows).as_markdown(escape=False)
+    table = TextTable(heads=("package", "needed by", "licence"), rows=rows).as_markdown(escape=False)
     page_path.write_text(f"{_PAGE_HEAD}{table}\n", encoding="utf-8")
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from mutator._common.doors import OPERATORS
-from mutator._common.table_rendering import Table
+from mutator._common.table_rendering import TextTable
 from mutator.operators.operator_lookup import find_operator
 from mutator.reference.yaml_key_tables import generated_page_head
 from mutator.workspace import Workspace
@@ -50,8 +50,8 @@ _FAULT_FIELDS = (
 
 
 def render_operators_page(workspace: Workspace) -> str:
-    replacements = Table(heads=("operator", "where", "replacement"), rows=list(_replacement_rows()))
-    fields = Table(heads=("field", "what it is"), rows=_FAULT_FIELDS)
+    replacements = TextTable(heads=("operator", "where", "replacement"), rows=list(_replacement_rows()))
+    fields = TextTable(heads=("field", "what it is"), rows=_FAULT_FIELDS)
     tables = [table.as_markdown(escape=False) for table in (replacements, fields)]
     return (
         "\n".join(
@@ -62,7 +62,7 @@ def render_operators_page(workspace: Workspace) -> str:
 
 
 def _replacement_rows() -> Iterator[tuple[str, str, str]]:
-    for name in OPERATORS.shipped():
+    for name in OPERATORS.shipped_names():
         heads = [f"`{name}`"]
         for where, replacement in find_operator(name).replacements:
             yield heads.pop() if heads else "", where, replacement

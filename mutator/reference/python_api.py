@@ -13,7 +13,7 @@ from textwrap import dedent
 from typing import Any
 
 import mutator
-from mutator._common.table_rendering import Table
+from mutator._common.table_rendering import TextTable
 from mutator.reference.yaml_key_tables import generated_page_head
 from mutator.workspace import Workspace
 
@@ -65,7 +65,7 @@ class ApiMember:
 
 
 def render_api_page(workspace: Workspace) -> str:
-    shared = Table(heads=("argument", "what you can pass"), rows=_SHARED_ARGUMENTS).as_markdown(escape=False)
+    shared = TextTable(heads=("argument", "what you can pass"), rows=_SHARED_ARGUMENTS).as_markdown(escape=False)
     parts = [generated_page_head("Python API"), _INTRO, shared, "\n## Functions\n"]
     for name in _public_functions():
         parts += _function_section(name)
@@ -140,7 +140,7 @@ def _class_section(name: str, cls: type) -> Iterator[str]:
     ]
     if rows:
         heads = ("member", "value" if issubclass(cls, Enum) else "type", "meaning")
-        yield Table(heads=heads, rows=rows).as_markdown(escape=False)
+        yield TextTable(heads=heads, rows=rows).as_markdown(escape=False)
         yield ""
 
 

@@ -4,12 +4,12 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
-from mutator._common.table_rendering import Table
+from mutator._common.table_rendering import TextTable
 from mutator.config.yaml_files import StrictModel
 from mutator.reference.json_schemas import schema_by_model
 
 # models used in several kinds of files, and the page with their section
-_PAGE_BY_SHARED_MODEL = {"Injection": "fault-spec.md", "At": "fault-spec.md"}
+_PAGE_BY_SHARED_MODEL = {"Injection": "fault-spec.md", "Location": "fault-spec.md"}
 _BOUND_WORDS = {
     "minimum": "at least",
     "maximum": "at most",
@@ -91,7 +91,7 @@ class _KeyTables:
             )
             for key, value in part["properties"].items()
         ]
-        yield Table(heads=("key", "type", "default", "meaning"), rows=rows).as_markdown(escape=False)
+        yield TextTable(heads=("key", "type", "default", "meaning"), rows=rows).as_markdown(escape=False)
         yield ""
 
     def _type_text(self, value: dict[str, Any]) -> str:

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from mutator._common.table_rendering import Table
+from mutator._common.table_rendering import TextTable
 from mutator.engines.engine_choice import WORTH_IT
 from mutator.engines.engine_jobs import RunMode
 from mutator.errors import CheckFailed
@@ -31,7 +31,7 @@ _WORDS = {
 class EngineSummary:
     """How many experiments each mode executed, and the equivalence check as a sentence and in brief."""
 
-    table: Table
+    table: TextTable
     proof: str
     state: str
     failed: bool  # an experiment had a different result on the reference engine
@@ -45,7 +45,7 @@ def summarize_engines(
     if not ways and not (folder.path / PROOF_FOLDER).is_dir():
         return None
     sentence, state, failed = _proof(folder, records)
-    table = Table(heads=("how", "experiments"), rows=list(_lines(ways)))
+    table = TextTable(heads=("how", "experiments"), rows=list(_lines(ways)))
     return EngineSummary(table=table, proof=sentence, state=state, failed=failed)
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mutator._common.helper_processes import processes_for, shared
+from mutator._common.helper_processes import map_in_processes, process_count_for
 from mutator.model import Fault, Record
 from mutator.outcomes.fault_paths import FaultPaths, PathInputs, UntimedPath
 from mutator.results.ranking import places
@@ -88,7 +88,7 @@ def _looks(
         return all_inputs, alerts
 
     pieces = [pairs[begin : begin + _PIECE] for begin in range(0, len(pairs), _PIECE)]
-    return shared(looked_at, pieces, processes_for(len(pairs)))
+    return map_in_processes(looked_at, pieces, process_count_for(len(pairs)))
 
 
 def timings_of(folder: RunFolder) -> "DataFrame":

@@ -13,8 +13,8 @@ import yaml
 from markupsafe import Markup
 
 from mutator._common.bounded_reading import read_bounded
-from mutator._common.hashing import plain
-from mutator.config.location_syntax import as_written_at
+from mutator._common.hashing import as_json_types
+from mutator.config.location_syntax import location_as_yaml
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Fault
 from mutator.mutants.readable_patches import readable_patch
@@ -33,7 +33,7 @@ from mutator.review.patch_shapes import Shape, shapes
 from mutator.statistics.mutation_score import PERMANENT, TRANSIENT
 from mutator.store.run_folder import RunFolder
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.formula_json import Tree, tree
+from mutator.triggers.formula_json import JsonTree, formula_as_json
 from mutator.triggers.trigger_kinds import ALWAYS
 from mutator.web import embedded
 
@@ -75,8 +75,8 @@ def browse_data(run: ReportedRun) -> Browse:
         **_of_target(folder, workspace),
         "series": series_facts(folder),
         "metrics": folder.head.metrics,
-        "severity": plain(folder.head.severity),
-        "hazards": plain(folder.head.about_hazards),
+        "severity": as_json_types(folder.head.severity),
+        "hazards": as_json_types(folder.head.about_hazards),
         "meanings": meanings_of(run),
     }
     return Browse(
@@ -240,10 +240,10 @@ class _Codes:
 
 def _spec(fault: Fault) -> str:
     """Return the fault with its drawn value, as a spec in YAML."""
-    told = {name: value for name, value in plain(fault).items() if value not in (None, [], "")}
+    told = {name: value for name, value in as_json_types(fault).items() if value not in (None, [], "")}
     told["injections"] = [
         {
-            "at": as_written_at(i.location),
+            "at": location_as_yaml(i.location),
             "model": i.model,
             "params": dict(i.params),
             **{name: getattr(i, name) for name in ("where", "call", "every") if getattr(i, name) is not None},
@@ -300,8 +300,8 @@ def scene_facts(manifest: TargetManifest) -> dict[str, Any] | None:
     channels = {channel.name for channel in manifest.channels}
     derived = {v.name: v.text for v in manifest.observation.derived if v.name not in channels}
 
-    def made(text: str) -> Tree:
-        return tree(text, derived)
+    def made(text: str) -> JsonTree:
+        return formula_as_json(text, derived)
 
     actors = [
         asdict(actor) | {key: made(getattr(actor, key)) for key in ("x", "y", "heading", "visible")}

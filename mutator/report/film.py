@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from mutator._common.confined_files import inside, open_below
-from mutator._common.files import ScratchFolder, half_written, make_folder
+from mutator._common.confined_files import open_below, path_below
+from mutator._common.files import ScratchFolder, make_folder, writing_temporary_path
 from mutator.engines import bytecode
 from mutator.engines.sandbox import Sandbox
 from mutator.engines.target_processes import environment
@@ -132,7 +132,7 @@ def _show(manifest: TargetManifest, folder: Path, places: Mapping[str, str], sho
     if manifest.overlay is not None:
         tree = folder / "tree"
         bytecode.put(manifest.tree.files, tree)
-    out, made = shot.out.absolute(), inside(folder / "shown", shot.out.name)
+    out, made = shot.out.absolute(), path_below(folder / "shown", shot.out.name)
     here = {**places, "out": str(made), "t": str(shot.t)}
     for place in (out, made):
         make_folder(place.parent)
@@ -155,5 +155,9 @@ def _show(manifest: TargetManifest, folder: Path, places: Mapping[str, str], sho
         complaint = said[-1].removeprefix("error: ").replace(str(made), str(out))
         raise MutatorError(complaint, where=f"{film.module}")
     # copying can be interrupted, and the command can leave a link
-    with open_below(made.parent, made.name) as source, half_written(out) as half, half.open("wb") as target:
+    with (
+        open_below(made.parent, made.name) as source,
+        writing_temporary_path(out) as half,
+        half.open("wb") as target,
+    ):
         shutil.copyfileobj(source, target)

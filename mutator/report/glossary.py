@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from mutator.config.yaml_files import load
+from mutator.config.yaml_files import load_yaml
 from mutator.errors import MutatorError
 from mutator.model import Method
 from mutator.report.reported_run import ReportedRun
@@ -97,7 +97,7 @@ def _title(run: ReportedRun, name: str) -> str:
     if run.workspace is None:
         return ""
     try:
-        data = load(run.workspace.scenario(name)).data
+        data = load_yaml(run.workspace.scenario(name)).data
     except MutatorError:
         return ""
     told = (data.get("title") or data.get("about")) if isinstance(data, dict) else ""
@@ -122,7 +122,7 @@ def _triggers(run: ReportedRun) -> dict[str, str]:
 def _contexts(run: ReportedRun) -> dict[str, str]:
     """Return the contexts in the campaign's context table; empty if the table is not found."""
     try:
-        table = load(run.folder.path / "campaign.yaml").data["triggers"]["table"]
+        table = load_yaml(run.folder.path / "campaign.yaml").data["triggers"]["table"]
         found = run.workspace.context_table(table) if run.workspace and table else None
     except (MutatorError, KeyError, TypeError):
         return {}

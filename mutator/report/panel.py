@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from mutator._common.table_rendering import Table
+from mutator._common.table_rendering import TextTable
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -23,7 +23,7 @@ class Panel:
     link: str
     markdown: str
     html: "Markup"
-    summary: Table | None = None
+    summary: TextTable | None = None
     files: Mapping[str, bytes] = field(default_factory=dict)
     style: str = ""
 

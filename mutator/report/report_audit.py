@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from mutator._common.confined_files import inside, read_below
+from mutator._common.confined_files import path_below, read_below
 from mutator.errors import MutatorError
 from mutator.report.panel import FOLDER
 from mutator.report.report_builder import build_report
@@ -26,7 +26,7 @@ def pages(folder: RunFolder, workspace: Workspace | None) -> tuple[int, Iterator
 def _differences(folder: RunFolder, workspace: Workspace | None, stored: set[str]) -> Iterator[MutatorError]:
     built = build_report(folder, workspace).files
     for name in sorted({*built, *stored}):
-        path = inside(folder.path / FOLDER, name)
+        path = path_below(folder.path / FOLDER, name)
         if name not in built:
             yield MutatorError("not part of the report", where=path, remedy="delete it")
         elif name not in stored:

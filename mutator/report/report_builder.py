@@ -7,9 +7,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from mutator._common.helper_processes import beside, processes_for
+from mutator._common.helper_processes import computing_meanwhile, process_count_for
 from mutator._common.message_text import counted
-from mutator._common.table_rendering import Table
+from mutator._common.table_rendering import TextTable
 from mutator.report.experiment_list import Browse, browse_data
 from mutator.report.glossary import words_of
 from mutator.report.markdown_and_html import Content, markdown, page_html, study_html, study_markdown
@@ -36,7 +36,7 @@ class WrittenReport:
     markdown: Path
     page: Path
     rows: int
-    summaries: tuple[Table, ...] = ()
+    summaries: tuple[TextTable, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,7 +47,7 @@ class BuiltReport:
 
     files: Mapping[str, bytes]
     rows: int
-    summaries: tuple[Table, ...]
+    summaries: tuple[TextTable, ...]
 
 
 def ensure_report(run: Path, workspace: Workspace | None) -> WrittenReport:
@@ -74,7 +74,9 @@ def write_report(run: Path, workspace: Workspace | None) -> WrittenReport:
 def build_report(folder: RunFolder, workspace: Workspace | None) -> BuiltReport:
     """Build the report of a run folder whose tables are up to date, without writing anything."""
     reported = ReportedRun.open(folder, workspace)
-    with beside(lambda: browse_data(reported), processes_for(len(reported.results))) as browse:
+    with computing_meanwhile(
+        lambda: browse_data(reported), process_count_for(len(reported.results))
+    ) as browse:
         study = build_study_panels(reported)
         content = _build_content(replace(reported, compared=bool(study)), browse)
     panels = (*content.panels, *study)
@@ -87,7 +89,7 @@ def build_report(folder: RunFolder, workspace: Workspace | None) -> BuiltReport:
     return BuiltReport(files=files, rows=len(reported.results), summaries=summaries)
 
 
-def _written_report(run: Path, rows: int, summaries: tuple[Table, ...] = ()) -> WrittenReport:
+def _written_report(run: Path, rows: int, summaries: tuple[TextTable, ...] = ()) -> WrittenReport:
     out = run / FOLDER
     return WrittenReport(markdown=out / MARKDOWN_FILE, page=out / PAGE_FILE, rows=rows, summaries=summaries)
 

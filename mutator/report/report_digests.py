@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from mutator._common.confined_files import check_name, files_inside, read_below, unlink_below, write_below
-from mutator._common.files import json_bytes, json_object
+from mutator._common.files import json_bytes, parse_json_object
 from mutator._common.hashing import digest
 from mutator._common.version import VERSION
 from mutator.errors import MutatorError
@@ -77,7 +77,7 @@ def write_files(run: Path, made_from: str, files: Mapping[str, bytes]) -> None:
 def _stamp(run: Path) -> dict[str, Any]:
     """Return the stamp of the report before; without files if it cannot be read."""
     try:
-        stamp = json_object(read_below(run, FILE), run / FILE, SCHEMA)
+        stamp = parse_json_object(read_below(run, FILE), run / FILE, SCHEMA)
         if isinstance(files := stamp.get("files"), dict):
             for name in files:
                 check_name(name, run / FILE)

@@ -8,10 +8,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 from urllib.parse import quote
 
-from mutator._common.confined_files import inside
+from mutator._common.confined_files import path_below
 from mutator._common.files import write_atomic
 from mutator._common.message_text import counted
-from mutator._common.table_rendering import Table
+from mutator._common.table_rendering import TextTable
 from mutator.errors import MutatorError
 from mutator.execution.progress_text import duration
 from mutator.model import Outcome
@@ -155,7 +155,7 @@ def _markdown(runs: Sequence[PastRun], left_out: Sequence[str]) -> str:
     parts = ["# Runs"]
     for title, group in _plans(runs).items():
         rows = [[run.name, *_cells(run)] for run in reversed(group)]
-        parts += [f"## {title}", Table(heads=_HEADS, rows=rows).as_markdown()]
+        parts += [f"## {title}", TextTable(heads=_HEADS, rows=rows).as_markdown()]
         parts += [f"{a.name} to {b.name}: {_changes(a, b)}. `{_command(a, b)}`" for a, b in _steps(group)]
     if left_out:
         parts += ["## Left out", *(f"* {why}" for why in left_out)]
@@ -182,7 +182,7 @@ def _page(folder: Path, runs: Sequence[PastRun], left_out: Sequence[str]) -> str
     return str(page)
 
 
-def _linked(group: Sequence[PastRun]) -> Table:
+def _linked(group: Sequence[PastRun]) -> TextTable:
     """Return the table of runs, newest first, with links to their reports."""
     from markupsafe import Markup
 
@@ -195,10 +195,10 @@ def _linked(group: Sequence[PastRun]) -> Table:
         cells = _cells(run)
         cells[3] = bar(len(run.hazards) / run.activated if run.activated else 0.0, cells[3])
         rows.append([name, *cells])
-    return Table(heads=_HEADS, rows=rows)
+    return TextTable(heads=_HEADS, rows=rows)
 
 
 def _comparison(folder: Path, before: PastRun, after: PastRun) -> str:
     """Return the path of an existing comparison page, relative to the folder; '' if there is none."""
     page = Path(after.name, FOLDER, f"compare-{before.name}", "index.html")
-    return quote(page.as_posix()) if inside(folder, page.as_posix()).exists() else ""
+    return quote(page.as_posix()) if path_below(folder, page.as_posix()).exists() else ""

@@ -6,7 +6,7 @@ from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from itertools import islice
 from pathlib import Path
 
-from mutator._common.confined_files import inside
+from mutator._common.confined_files import path_below
 from mutator._common.files import ScratchFolder
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Record, Status
@@ -55,7 +55,7 @@ def take_stills(workspace: Workspace, folder: RunFolder, *, workers: int, notify
             driven = {_golden_key(experiments[name]): experiments[name] for name in due}
             # golden runs are submitted first; otherwise all threads could wait for one that has not started
             goldens = {
-                key: pool.submit(filming.golden, one, inside(scratch, key)) for key, one in driven.items()
+                key: pool.submit(filming.golden, one, path_below(scratch, key)) for key, one in driven.items()
             }
             found = [pool.submit(wrong, name, goldens[_golden_key(experiments[name])]) for name in due]
             pace = StagePace("pictures", len(found))
@@ -91,7 +91,7 @@ def _due(
 
 def _missing(folder: RunFolder, experiment_id: str, record: Record) -> list[Shot]:
     names = {f"{experiment_id}-{t:.2f}s.jpg": t for t in _times(record)}
-    shots = [Shot(out=inside(folder.path / "plots", name), t=t) for name, t in names.items()]
+    shots = [Shot(out=path_below(folder.path / "plots", name), t=t) for name, t in names.items()]
     return [shot for shot in shots if not shot.out.exists()]
 
 

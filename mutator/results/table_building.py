@@ -7,10 +7,10 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
-from mutator._common.confined_files import inside
-from mutator._common.files import half_written, read_json, write_json
+from mutator._common.confined_files import path_below
+from mutator._common.files import read_json, write_json, writing_temporary_path
 from mutator._common.hashing import digest
-from mutator._common.helper_processes import beside, processes_for, shared
+from mutator._common.helper_processes import computing_meanwhile, map_in_processes, process_count_for
 from mutator._common.version import VERSION
 from mutator.errors import MutatorError, MutatorWarning
 from mutator.outcomes.fault_paths import fault_paths_of
@@ -47,8 +47,8 @@ def build(run: Path) -> Path:
     made_from = _made_from(folder)
     with ExitStack() as stack:
         # The stack exits in reverse order, so the first table is replaced first.
-        paths = {name: inside(folder.path, name) for name in reversed(TABLES)}
-        made = {name: stack.enter_context(half_written(path)) for name, path in paths.items()}
+        paths = {name: path_below(folder.path, name) for name in reversed(TABLES)}
+        made = {name: stack.enter_context(writing_temporary_path(path)) for name, path in paths.items()}
         write(folder, made)
         now = {name: found.sha256 for name, path in made.items() if (found := FileDigest.of_file(path))}
         # Record old and new digests before the tables are replaced at the end of the block. Otherwise a kill
@@ -65,8 +65,8 @@ def write(folder: RunFolder, paths: Mapping[str, Path]) -> None:
     Experiments are read in batches, so that a million of them need only a few hundred MB of memory. For a
     large run, two processes build the batches.
     """
-    with beside(
-        lambda: _write_timings(folder, paths[TIMINGS_PARQUET]), processes_for(folder.planned_count)
+    with computing_meanwhile(
+        lambda: _write_timings(folder, paths[TIMINGS_PARQUET]), process_count_for(folder.planned_count)
     ) as end:
         _write_results(folder, paths)
         end()
@@ -89,7 +89,7 @@ def _write_results(folder: RunFolder, paths: Mapping[str, Path]) -> None:
         parquet = stack.enter_context(ParquetTable(paths[PARQUET], columns))
         propagated = stack.enter_context(ParquetTable(paths[PROPAGATION], propagation_columns.COLUMNS))
         batches = _batches(name for name in sorted(planned) if name in records)
-        for lines, table, departures in shared(made, batches, processes_for(len(records))):
+        for lines, table, departures in map_in_processes(made, batches, process_count_for(len(records))):
             csv.append(lines)
             parquet.append(table)
             propagated.append(departures)
@@ -147,7 +147,7 @@ def _unedited(folder: RunFolder, now: Mapping[str, str]) -> dict[str, str]:
     for name in found:
         if found[name] not in made[name]:
             text = "the table did not match the plan and records, so it was rebuilt"
-            warnings.warn(f"{inside(folder.path, name)}: {text}", MutatorWarning, stacklevel=2)
+            warnings.warn(f"{path_below(folder.path, name)}: {text}", MutatorWarning, stacklevel=2)
     return {name: one for name, one in found.items() if one in made[name]}
 
 

@@ -4,7 +4,7 @@ import shlex
 from typing import Any
 
 from mutator._common.bounded_reading import read_bounded
-from mutator._common.hashing import plain
+from mutator._common.hashing import as_json_types
 from mutator._common.message_text import counted
 from mutator.campaigns.plan import Plan
 from mutator.errors import CheckFailed
@@ -33,8 +33,8 @@ def approvals(workspace: Workspace, plan: Plan) -> dict[str, Any]:
 
 
 def _kept(review: Review, group: Group) -> dict[str, Any]:
-    remarks = [plain(remark) for remark in review.remarks(group.id)]
-    return {**plain(review.decision(group.id)), "remarks": remarks}
+    remarks = [as_json_types(remark) for remark in review.remarks(group.id)]
+    return {**as_json_types(review.decision(group.id)), "remarks": remarks}
 
 
 def _refusal(workspace: Workspace, plan: Plan, review: Review, refused: list[Group]) -> CheckFailed:

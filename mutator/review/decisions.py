@@ -11,10 +11,10 @@ from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
 
-from mutator._common.confined_files import inside, open_below, write_below
+from mutator._common.confined_files import open_below, path_below, write_below
 from mutator._common.files import make_folder
-from mutator._common.folder_locks import alone_in
-from mutator._common.shipped_files import refuse_shipped
+from mutator._common.folder_locks import locking_folder
+from mutator._common.shipped_files import check_not_shipped
 from mutator._common.version import VERSION
 from mutator.errors import MutatorError, ReviewConflict
 from mutator.review import review_file, seen_texts
@@ -74,7 +74,7 @@ class Review:
     @property
     def path(self) -> Path:
         """The file, which might not exist."""
-        return inside(self.library, _name_of(self.target))
+        return path_below(self.library, _name_of(self.target))
 
     def decision(self, group: str) -> Decision | None:
         entry = self.entries.get(group)
@@ -143,7 +143,7 @@ def load_review(workspace: Workspace, target: str) -> Review:
         open_below(library, name).close()
     except FileNotFoundError:
         return Review(library=library, target=target, entries={})
-    content = review_file.load(inside(library, name), target)
+    content = review_file.load(path_below(library, name), target)
     return Review(library=library, target=target, entries=content.entries, four_eyes=content.four_eyes)
 
 
@@ -164,9 +164,9 @@ def record(workspace: Workspace, target: str, changes: Sequence[Change], seen: M
     for change in made:
         _check(change)
     path = load_review(workspace, target).path  # an error here leaves the library unchanged
-    refuse_shipped(path)
+    check_not_shipped(path)
     make_folder(path.parent)
-    with alone_in(path.parent):
+    with locking_folder(path.parent):
         review = load_review(workspace, target)
         _refuse_unseen(review, made, seen)
         if review.four_eyes:

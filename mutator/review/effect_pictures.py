@@ -36,7 +36,7 @@ from mutator.review.mutant_groups import Group
 from mutator.review.patch_shapes import parameter_values
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.required_packages import check_requirements
-from mutator.triggers.trigger_kinds import always
+from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
 
 MODEL = "image_effect"
@@ -211,7 +211,7 @@ def _run(
     """Return the image before the effect, then the images after each fault of each group."""
     manifest, (location, picture) = engine.manifest, groups[0].place
     first = groups[0].faults[0]
-    mutant = build(manifest, models, replace(first, injections=_effects(first)[:1]), always())
+    mutant = build(manifest, models, replace(first, injections=_effects(first)[:1]), always_trigger())
     lines = [one for group in groups for one in group.lines]
     asked = {"file": location.path, "picture": picture, "effects": lines, "mutant": mutant.id}
     stub = Path(picture_probe.__file__).read_text(encoding="utf-8")
@@ -266,7 +266,7 @@ def _jpeg(picture: np.ndarray) -> bytes:
 
 
 def _recalled(key: str) -> Pictures | None:
-    path = shared_cache.of_pictures() / f"{key}.json"
+    path = shared_cache.pictures_folder() / f"{key}.json"
     try:
         data: dict[str, Any] = json.loads(read_bounded(path))
         before, levels = data["before"], data["levels"]
@@ -285,7 +285,7 @@ def _recalled(key: str) -> Pictures | None:
 
 
 def _remember(key: str, pictures: Pictures) -> None:
-    path = shared_cache.of_pictures() / f"{key}.json"
+    path = shared_cache.pictures_folder() / f"{key}.json"
     before = base64.b64encode(pictures.before).decode()
     levels = [[one.name, one.label, base64.b64encode(one.after).decode()] for one in pictures.levels]
     data = {"sum": digest([key, before, levels]), "before": before, "levels": levels}

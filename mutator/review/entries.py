@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 
 from mutator._common.hashing import content_id
-from mutator._common.yaml_dataclasses import mapping, written
+from mutator._common.yaml_dataclasses import mapping_config, yaml_metadata
 
 # for each parameter: least and greatest number, then values that are not finite (`nan`), as text
 Values = Mapping[str, tuple[float | str, ...]]
@@ -19,7 +19,7 @@ _WORDS = {
 
 
 TIME = r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ$"  # how times are written
-_TEXT = written(pattern=r"\S")
+_TEXT = yaml_metadata(pattern=r"\S")
 
 
 class Verdict(StrEnum):
@@ -75,10 +75,10 @@ class Decision:
 class Remark:
     """A line of text about a group."""
 
-    __pydantic_config__ = mapping("A remark")
+    __pydantic_config__ = mapping_config("A remark")
 
     by: str = field(metadata=_TEXT)
-    at: str | None = field(default=None, metadata=written(pattern=TIME))
+    at: str | None = field(default=None, metadata=yaml_metadata(pattern=TIME))
     text: str = field(metadata=_TEXT)
 
 
@@ -86,10 +86,10 @@ class Remark:
 class Flag:
     """A mark that asks for another look at a group."""
 
-    __pydantic_config__ = mapping("A flag")
+    __pydantic_config__ = mapping_config("A flag")
 
     by: str = field(metadata=_TEXT)
-    at: str = field(metadata=written(pattern=TIME))
+    at: str = field(metadata=yaml_metadata(pattern=TIME))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -32,7 +32,7 @@ from mutator.review.patch_shapes import Shape
 from mutator.review.seen_texts import text_of
 from mutator.review.value_ranges import ranges_of
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.trigger_kinds import always, at_time
+from mutator.triggers.trigger_kinds import always_trigger, trigger_at_time
 from mutator.workspace import Workspace
 
 
@@ -108,7 +108,7 @@ def of_library(
     models = workspace.fault_models()
     tables = map(workspace.context_table, workspace.context_tables)
     contexts = [t for table in tables for t in table.triggers(armed_after_s=manifest.armed_after_s)]
-    triggers = (*contexts, at_time(manifest.armed_after_s))
+    triggers = (*contexts, trigger_at_time(manifest.armed_after_s))
     chosen = tuple(_specs(workspace, specs))
     faults = [
         fault
@@ -203,7 +203,7 @@ class _Catalogue:
         """Return the texts that a decision about mutants is bound to; `faults` has one for each shape."""
         calls: dict[str, str] = {}
         for fault in faults:
-            mutant = build(self.manifest, self.models, fault, always())
+            mutant = build(self.manifest, self.models, fault, always_trigger())
             for path in dict.fromkeys(i.location.path for i in fault.injections):
                 calls |= self._called.of_lines(path, mutant.files[path])
         injections = faults[0].injections
@@ -233,7 +233,7 @@ class _Catalogue:
         """
         location = self.manifest.observation.location
         what = f"the probe, observing at {patch_shapes.location_label(location)}"
-        patch = build(self.manifest, self.models, None, always()).patch
+        patch = build(self.manifest, self.models, None, always_trigger()).patch
         material = Material(
             diff=diffs_of([patch]),
             functions=functions_of(self.manifest.tree, [location]),

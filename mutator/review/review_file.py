@@ -8,8 +8,8 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from mutator.config.yaml_files import StrictModel, Written, read
-from mutator.config.yaml_sources import Source
+from mutator.config.yaml_files import StrictModel, YamlRecord, load_yaml_model
+from mutator.config.yaml_sources import YamlSource
 from mutator.review.entries import TIME, Bound, Decision, Entry, Flag, Remark, Verdict
 
 SCHEMA = "review/2"
@@ -34,8 +34,8 @@ class _BlockModel(StrictModel):
     template: str | None = Field(None, pattern=_DIGEST)
     calls: str | None = Field(None, pattern=_DIGEST)
     values: dict[str, list[float | int | str]] | None = None
-    remarks: list[Written[Remark]] = Field(default_factory=list)
-    flag: Written[Flag] | None = None
+    remarks: list[YamlRecord[Remark]] = Field(default_factory=list)
+    flag: YamlRecord[Flag] | None = None
 
 
 class _FileModel(StrictModel):
@@ -52,7 +52,7 @@ class Content:
 
 def load(path: Path, target: str) -> Content:
     """Read an existing file for `target`; MutatorError, with the line, for a mistake."""
-    model, source = read(path, _FileModel, SCHEMA)
+    model, source = load_yaml_model(path, _FileModel, SCHEMA)
     if model.target != target:
         raise source.error(
             ("target",), f"target '{model.target}'", expected=f"'{target}', as in the file name"
@@ -77,7 +77,7 @@ def text(target: str, content: Content) -> str:
     return f"{_HEAD}{head}decisions:" + ("\n" + "".join(blocks) if blocks else " []\n")
 
 
-def _entry(block: _BlockModel, source: Source, i: int) -> Entry:
+def _entry(block: _BlockModel, source: YamlSource, i: int) -> Entry:
     given = block.model_dump(include={"by", "at", "commit", "tool", "diff", "function", "template", "calls"})
     given["values"] = block.values
     if block.decision is None:

@@ -9,7 +9,7 @@ from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
 from mutator._common.files import write_atomic
-from mutator._common.hashing import content_id, plain
+from mutator._common.hashing import as_json_types, content_id
 from mutator.errors import MutatorError
 from mutator.mutants.injected_lines import tags_for_scripts
 from mutator.review.decisions import Review, State
@@ -81,7 +81,7 @@ def state_of(review: Review, group: Group) -> dict[str, Any]:
             "changed": review.changed(group),
         },
         "remarks": [{"by": one.by, "at": one.at or "", "text": one.text} for one in review.remarks(group.id)],
-        "flag": flag and plain(flag),
+        "flag": flag and as_json_types(flag),
         "revision": review.revision(group.id),
         "digest": content_id([group.bound, group.values])[:12],
     }

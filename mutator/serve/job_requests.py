@@ -11,16 +11,16 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, TypeAdapter
 
-from mutator._common.confined_files import check_plain
+from mutator._common.confined_files import check_only_plain_files
 from mutator._common.cpu_cores import usable_cores
-from mutator._common.message_text import one_of, suggestion
+from mutator._common.message_text import describe_choices, suggestion
 from mutator.campaigns.filters import compile_filter
 from mutator.config.yaml_files import StrictModel
 from mutator.errors import MutatorError
 from mutator.results.plan_columns import PLAN_COLUMNS
 from mutator.serve.served_runs import Runs, report_of
 from mutator.store import plan_file
-from mutator.triggers.conditions import check_condition
+from mutator.triggers.conditions import canonical_condition
 from mutator.workspace import Workspace
 
 
@@ -219,7 +219,7 @@ class Desk:
             time = float(text)
         except ValueError:
             manifest = self.workspace.manifest(self.workspace.target_name(target))
-            check_condition(text, None, manifest.observation.variables)
+            canonical_condition(text, None, manifest.observation.variables)
             return
         if not math.isfinite(time) or time < 0:
             raise MutatorError(f"'{text}'", where="trigger", expected="a finite time of at least 0 s")
@@ -227,7 +227,7 @@ class Desk:
     def _folder(self, key: str) -> Path:
         """Return the run folder with this key; MutatorError if it contains links."""
         folder = self.runs.folder(key)
-        check_plain(folder)
+        check_only_plain_files(folder)
         return folder
 
     def _new(self, name: str) -> Path:
@@ -235,7 +235,7 @@ class Desk:
         if folder.is_symlink():
             raise MutatorError(f"{name} is a link", expected="a new folder", remedy="choose another name")
         if folder.is_dir():
-            check_plain(folder)
+            check_only_plain_files(folder)
         return folder.resolve()
 
     def _place(self) -> list[str]:
@@ -253,6 +253,6 @@ def _unknown(what: str, name: str, known: Collection[str]) -> MutatorError:
     return MutatorError(
         f"no {what} '{name}'",
         where=what,
-        expected=one_of(known),
+        expected=describe_choices(known),
         remedy="correct the name" + suggestion(name, list(known)),
     )

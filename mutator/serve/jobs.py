@@ -15,7 +15,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import IO, Any
 
-from mutator._common.progress_events import EVENTS_FD
+from mutator._common.progress_events import EVENTS_FD_VARIABLE
 from mutator.errors import Absent, JobEnded, MutatorError
 from mutator.execution.progress_text import endings
 from mutator.serve.job_events import Event, EventReader, Link, Phase
@@ -195,7 +195,7 @@ class Jobs:
                 process = subprocess.Popen(
                     [sys.executable, "-P", "-m", _GUARD_MODULE, str(watched), *job.work.words],
                     pass_fds=[watched, events],
-                    env={**os.environ, "COLUMNS": _COLUMNS, EVENTS_FD: str(events)},
+                    env={**os.environ, "COLUMNS": _COLUMNS, EVENTS_FD_VARIABLE: str(events)},
                     stdin=subprocess.DEVNULL,
                     stdout=subprocess.PIPE,
                     stderr=subprocess.STDOUT,

@@ -9,7 +9,7 @@ from contextlib import suppress
 
 from mutator._common import shared_cache
 from mutator._common.confined_files import read_below, write_below
-from mutator._common.files import json_bytes, json_object
+from mutator._common.files import json_bytes, parse_json_object
 from mutator._common.hashing import digest
 from mutator.errors import MutatorError
 
@@ -41,9 +41,9 @@ class ReportCache:
 
 def _stored(key: str) -> Mapping[str, bytes] | None:
     """Read a report from the cache; None if it is missing or damaged."""
-    place = shared_cache.of_pages() / key
+    place = shared_cache.pages_folder() / key
     try:
-        digests = json_object(read_below(place, FILE), place / FILE, SCHEMA)["files"]
+        digests = parse_json_object(read_below(place, FILE), place / FILE, SCHEMA)["files"]
         files = {name: read_below(place, name) for name in digests}
     except (OSError, MutatorError, LookupError, TypeError):
         return None
@@ -51,7 +51,7 @@ def _stored(key: str) -> Mapping[str, bytes] | None:
 
 
 def _store(key: str, files: Mapping[str, bytes]) -> None:
-    place = shared_cache.of_pages() / key
+    place = shared_cache.pages_folder() / key
     place.mkdir(parents=True, exist_ok=True)
     for name, data in files.items():
         write_below(place, name, data)

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from starlette.responses import HTMLResponse, Response
 
-from mutator._common.bounded_reading import read_open
-from mutator._common.confined_files import check_plain
+from mutator._common.bounded_reading import read_open_file
+from mutator._common.confined_files import check_only_plain_files
 from mutator._common.hashing import digest
 from mutator.audit.table_audit import tables
 from mutator.comparison import comparison_files
@@ -57,7 +57,7 @@ class Shown:
         """Open a file of a comparison of two runs; MutatorError if they cannot be compared."""
         folders = [self._runs.folder(key) for key in (a, b)]
         for folder in folders:
-            check_plain(folder)  # because outdated tables are written
+            check_only_plain_files(folder)  # because outdated tables are written
         with self._making:
             first, second = (digest(Results.up_to_date(folder).parquet()) for folder in folders)
             made = self._compared.pop((first, second), None) or self._comparison(*folders)
@@ -113,7 +113,7 @@ def _series(run: Path, name: str) -> bytes:
     """Read a script of series; Absent unless it equals the output of `write_script` for the same data."""
     path = run / name
     with open_in_run(run, name) as file:
-        data = read_open(file, path)
+        data = read_open_file(file, path)
     try:
         if script_bytes(path.stem, read_script(path)) == data:
             return data

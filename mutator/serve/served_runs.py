@@ -9,7 +9,7 @@ from typing import Any, BinaryIO
 from urllib.parse import quote
 
 from mutator._common.confined_files import open_below
-from mutator._common.folder_search import RUN_HEAD
+from mutator._common.folder_search import RUN_HEAD_FILE
 from mutator.errors import Absent, MutatorError, Outside
 from mutator.results.outcome_counting import outcome_counts
 from mutator.results.table_reader import Results
@@ -57,7 +57,7 @@ def _runs_in(root: Path) -> list[Path]:
     if RunFolder.exists(root):
         return [root]
     try:
-        inside = sorted(root.glob(f"*/{RUN_HEAD}"))
+        inside = sorted(root.glob(f"*/{RUN_HEAD_FILE}"))
     except OSError:
         return []
     folders = [head.parent for head in inside]

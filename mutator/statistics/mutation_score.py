@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from mutator._common.table_rendering import Table
+from mutator._common.table_rendering import TextTable
 from mutator.model import OPERATORS, Fault, Status
 from mutator.results.table_columns import alerts_of
 from mutator.statistics.paired_statistics import resampled_interval
@@ -125,14 +125,16 @@ def mutation_score_sheet(
     )
 
 
-def totals_table(sheet: Sheet) -> Table:
+def totals_table(sheet: Sheet) -> TextTable:
     """Return the lines for all mutants, with fewer columns."""
     rows = [
         (f"{'all' if fault_kind == EITHER else fault_kind} {counted}", *map(_short_text, cells))
         for name, counted, fault_kind, *cells in sheet.lines
         if name == ALL_MUTANTS
     ]
-    return Table(heads=("mutation score", *_HEADS[3:]), rows=rows, right=range(1, len(_HEADS) - 2))
+    return TextTable(
+        heads=("mutation score", *_HEADS[3:]), rows=rows, right_aligned=range(1, len(_HEADS) - 2)
+    )
 
 
 def _short_text(cell: SheetCell) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from mutator._common.table_rendering import Table
+from mutator._common.table_rendering import TextTable
 from mutator.statistics.shares import Share
 
 if TYPE_CHECKING:
@@ -45,8 +45,8 @@ class Sheet:
     heads: tuple[str, ...]
     lines: tuple[tuple[SheetCell, ...], ...]
 
-    def table(self) -> Table:
-        return Table(heads=self.heads, rows=[[cell_text(cell) for cell in line] for line in self.lines])
+    def table(self) -> TextTable:
+        return TextTable(heads=self.heads, rows=[[cell_text(cell) for cell in line] for line in self.lines])
 
     def as_markdown(self) -> str:
         return f"## {self.title}\n\n{self.note}\n\n{self.table().as_markdown()}\n"

@@ -12,7 +12,7 @@ Run folders travel: evidence comes from strangers. Two rules keep every command 
 from fnmatch import fnmatchcase
 from pathlib import Path
 
-from mutator._common.confined_files import entries_below, is_deep, is_plain, not_plain
+from mutator._common.confined_files import entries_below, is_file_or_folder, is_too_deep, not_plain_error
 from mutator.errors import Outside
 from mutator.store import file_digests
 from mutator.store.run_head import CAMPAIGN, HEAD
@@ -51,11 +51,11 @@ def check_contents(run: Path) -> None:
     """
     tops: dict[str, str] = {}  # names in `run` itself
     for name, entry in entries_below(run, is_unchecked_folder):
-        if not is_plain(entry):
-            raise not_plain(Path(entry.path))
+        if not is_file_or_folder(entry):
+            raise not_plain_error(Path(entry.path))
         if not entry.name.isprintable():
             raise _outside_error(f"the name {entry.name!a}", run, "names of printable characters")
-        if is_deep(name):
+        if is_too_deep(name):
             raise _outside_error("deeply nested folders", run, "few folders in each other")
         if name in _ALL_FOLDERS and not entry.is_dir():
             raise _outside_error("a file", Path(entry.path), "a folder")

@@ -14,9 +14,9 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from mutator._common.bounded_reading import MOST_DATA, bounded_lines, open_regular, read_open
+from mutator._common.bounded_reading import MOST_DATA_BYTES, open_regular, read_bounded_lines, read_open_file
 from mutator._common.files import check_schema, raising_disk_full, writing_atomic
-from mutator._common.hashing import canonical
+from mutator._common.hashing import canonical_json
 from mutator.errors import MutatorError
 
 _MOST_UNSYNCED = 32  # the most lines between two syncs
@@ -50,7 +50,7 @@ class LineWriter:
         self.append(_head_with_file_name(path, head))
 
     def append(self, value: Mapping[str, Any]) -> None:
-        self.extend([canonical(value).encode()])
+        self.extend([canonical_json(value).encode()])
         if self._unsynced >= _MOST_UNSYNCED:
             self.sync()
 
@@ -188,7 +188,7 @@ def verified_lines(path: Path, schema: str) -> Iterator[tuple[int, int, bytes]]:
     """
     last_checksum, offset = b"", 0
     with _open_lines(path) as file:
-        for number, line in enumerate(bounded_lines(file, path), start=1):
+        for number, line in enumerate(read_bounded_lines(file, path), start=1):
             if not line.endswith(b"\n"):  # incomplete, because the process was killed
                 return
             data = line[:-1]
@@ -206,7 +206,7 @@ def intact_lines(path: Path) -> Iterator[tuple[int, bytes]]:
     """Yield the number and bytes of each complete, intact line. MutatorError if the file is missing."""
     last_checksum = b""
     with _open_lines(path) as file:
-        for number, line in enumerate(bounded_lines(file, path), start=1):
+        for number, line in enumerate(read_bounded_lines(file, path), start=1):
             data = line[:-1]
             if line.endswith(b"\n") and _is_intact(last_checksum, data):
                 yield number, data
@@ -224,7 +224,7 @@ def _is_intact(last_checksum: bytes, line: bytes) -> bool:
 
 def _read_bytes(path: Path) -> bytes:
     with _open_lines(path) as file:
-        return read_open(file, path, MOST_DATA)
+        return read_open_file(file, path, MOST_DATA_BYTES)
 
 
 def _open_lines(path: Path) -> BinaryIO:
@@ -242,13 +242,13 @@ def line_file_bytes(path: Path, head: Mapping[str, Any], values: Iterable[Mappin
     """Return the bytes of a file at `path` after `values` were appended."""
     lines = [b""]
     for value in (_head_with_file_name(path, head), *values):
-        lines.append(_checksummed_line(lines[-1][_CHECKSUM_SLICE], canonical(value).encode()[1:]))
+        lines.append(_checksummed_line(lines[-1][_CHECKSUM_SLICE], canonical_json(value).encode()[1:]))
     return b"".join(lines)
 
 
 def write_with_new_head(path: Path, head: Mapping[str, Any], lines: Iterable[bytes]) -> None:
     """Write a file with a new head, then lines of other files, with new checksums."""
-    head_line = _checksummed_line(b"", canonical(_head_with_file_name(path, head)).encode()[1:])
+    head_line = _checksummed_line(b"", canonical_json(_head_with_file_name(path, head)).encode()[1:])
     with writing_atomic(path) as file:
         file.write(head_line)
         last_checksum = head_line[_CHECKSUM_SLICE]

@@ -17,16 +17,16 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from mutator._common.bounded_reading import (
-    MOST_DATA,
-    MOST_JSON,
-    check_open,
+    MOST_DATA_BYTES,
+    MOST_JSON_BYTES,
+    check_file_size,
     open_regular,
     read_bounded,
-    read_open,
+    read_open_file,
 )
-from mutator._common.confined_files import check_name, inside, open_below, write_below
+from mutator._common.confined_files import check_name, open_below, path_below, write_below
 from mutator._common.cpu_cores import usable_cores
-from mutator._common.files import is_no_file, json_bytes, read_json, write_json
+from mutator._common.files import is_no_file_error, json_bytes, read_json, write_json
 from mutator._common.hashing import digest
 from mutator.errors import MutatorError, Outside
 from mutator.store.checksummed_lines import read_segment
@@ -62,7 +62,7 @@ class FileDigest:
             with open_regular(path) as file:
                 return cls._of_open_file(file, path)
         except OSError as err:
-            if not is_no_file(err):
+            if not is_no_file_error(err):
                 raise
             return None
 
@@ -71,17 +71,17 @@ class FileDigest:
         """Compute the digest of a file below `run`; None if it is missing, or not a plain file."""
         try:
             with open_below(run, name) as file:
-                return cls._of_open_file(file, inside(run, name))
+                return cls._of_open_file(file, path_below(run, name))
         except Outside:
             return None
         except OSError as err:
-            if not is_no_file(err):
+            if not is_no_file_error(err):
                 raise
             return None
 
     @classmethod
     def _of_open_file(cls, file: BufferedReader, where: Path) -> "FileDigest":
-        check_open(file, where)
+        check_file_size(file, where)
         return cls(
             sha256=hashlib.file_digest(file, "sha256").hexdigest(), size=os.fstat(file.fileno()).st_size
         )
@@ -92,7 +92,7 @@ class FileDigest:
 
 def digests_of_files(run: Path, names: Sequence[str]) -> dict[str, FileDigest | None]:
     """Compute the digests of files of a run folder, in parallel: hashing releases the interpreter lock."""
-    sizes = {name: _size_or_zero(inside(run, name)) for name in names}
+    sizes = {name: _size_or_zero(path_below(run, name)) for name in names}
     if sum(sizes.values()) < _MIN_BYTES_FOR_THREADS:
         return {name: FileDigest.of_file_below(run, name) for name in names}
     largest_first = sorted(names, key=lambda name: -sizes[name])
@@ -165,7 +165,7 @@ def load_ledger(run: Path) -> DigestLedger:
     if not path.is_file():
         raise MutatorError("missing", where=path, expected="the digests of all files", remedy=remedy)
     data = read_json(path, SCHEMA)
-    as_written = read_bounded(path, MOST_JSON) == json_bytes(data)
+    as_written = read_bounded(path, MOST_JSON_BYTES) == json_bytes(data)
     if data.pop("sum", None) != digest(data) or not as_written:
         raise MutatorError(
             "changed since it was written",
@@ -276,9 +276,9 @@ def list_segments(run: Path) -> list[str]:
 
 def _close_segment(run: Path, name: str) -> FileDigest:
     with open_below(run, name) as file:
-        data = read_open(file, inside(run, name), MOST_DATA)
+        data = read_open_file(file, path_below(run, name), MOST_DATA_BYTES)
         os.fsync(file.fileno())
-    segment = read_segment(inside(run, name), data)
+    segment = read_segment(path_below(run, name), data)
     if segment.damaged_lines:
         raise segment.damage_error(segment.damaged_lines[0])
     if segment.end_offset < len(data):  # not cut in place: the file can have a second name elsewhere

@@ -11,7 +11,7 @@ from pathlib import Path
 from threading import Lock
 from typing import Any, Generic, TypeVar
 
-from mutator._common.hashing import from_json
+from mutator._common.hashing import parse_json
 from mutator.errors import MutatorError
 from mutator.store.checksummed_lines import bare_segment, verified_lines
 
@@ -106,7 +106,7 @@ class IndexedLine:
 
     def content(self) -> dict[str, Any]:
         """Return the object on the line; ValueError if the line is not a JSON object."""
-        value = from_json(self.data)
+        value = parse_json(self.data)
         if not isinstance(value, dict):
             raise ValueError("not an object")
         value.pop("sum", None)

@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
-from mutator._common.confined_files import inside
+from mutator._common.confined_files import path_below
 from mutator._common.files import is_half_written
 from mutator._common.hashing import digest
 from mutator._common.message_text import counted
@@ -141,7 +141,7 @@ def file_problems(
         if current is None:
             yield MutatorError(
                 "missing",
-                where=inside(run, name),
+                where=path_below(run, name),
                 expected=f"the file named in {file_digests.FILE}",
                 remedy=_remedy(run, name),
             )
@@ -152,7 +152,7 @@ def file_problems(
 def _changed_file_problems(
     run: Path, name: str, expected: FileDigest, current: FileDigest
 ) -> Iterator[MutatorError]:
-    path = inside(run, name)
+    path = path_below(run, name)
     if expected.lines is not None:
         segment = read_segment(path)
         if segment.damaged_lines:
@@ -198,7 +198,7 @@ def _open_segment_problems(run: Path, ledger: DigestLedger) -> Iterator[MutatorE
     for name in file_digests.list_segments(run):
         if name not in ledger.files:
             try:
-                segment = read_segment(inside(run, name))
+                segment = read_segment(path_below(run, name))
             except MutatorError as err:
                 yield err
                 continue

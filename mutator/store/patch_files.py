@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from mutator._common.bounded_reading import unpacked
-from mutator._common.confined_files import inside
+from mutator._common.bounded_reading import unpack_bounded
+from mutator._common.confined_files import path_below
 from mutator._common.files import write_atomic
 from mutator._common.hashing import digest
 from mutator.store.checksummed_blocks import Block, BlockWriter, block_bytes, intact_blocks, read_blocks
@@ -48,7 +48,7 @@ class PatchWriter:
     """Append the patches of a worker."""
 
     def __init__(self, run: Path, worker: str) -> None:
-        self._path = inside(run / FOLDER, f"{worker}{SUFFIX}")
+        self._path = path_below(run / FOLDER, f"{worker}{SUFFIX}")
         self._blocks: BlockWriter | None = None  # nothing appended yet
         self._packer = _PatchPacker()
 
@@ -81,7 +81,7 @@ class _CompletePatch:
 
     @property
     def data(self) -> bytes:
-        return unpacked(self._block.data, MOST_PATCH_BYTES)
+        return unpack_bounded(self._block.data, MOST_PATCH_BYTES)
 
     @cached_property
     def shared_end(self) -> bytes:
@@ -102,8 +102,8 @@ def _unpack_patch(block: Block, complete: _CompletePatch | None) -> bytes | None
     """Return the patch in a block; None if it or the complete patch on which it depends is damaged."""
     try:
         if block.kind == COMPLETE_BLOCK or complete is None:
-            return unpacked(block.data, MOST_PATCH_BYTES)
-        return unpacked(block.data, MOST_PATCH_BYTES, complete.shared_end)
+            return unpack_bounded(block.data, MOST_PATCH_BYTES)
+        return unpack_bounded(block.data, MOST_PATCH_BYTES, complete.shared_end)
     except (zlib.error, ValueError):
         return None
 
@@ -139,7 +139,7 @@ class PatchFolder:
         if patch is not None:
             return patch.path
         damaged = (path for path in self.block_files() if not path.is_file() or read_blocks(path).is_damaged)
-        expected_path = inside(self.run / FOLDER, f"{worker}{SUFFIX}") if worker else self.run / FOLDER
+        expected_path = path_below(self.run / FOLDER, f"{worker}{SUFFIX}") if worker else self.run / FOLDER
         return next(damaged, expected_path)
 
     def block_files(self) -> list[Path]:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from mutator._common.argument_checks import check_type, check_whole
+from mutator._common.argument_checks import check_type, check_whole_number
 from mutator.store.shards import Shard
 
 
@@ -24,7 +24,7 @@ class Choices:
     def __post_init__(self) -> None:
         for name, least in (("seed", 0), ("limit", 1), ("series_mb", 0)):
             if (value := getattr(self, name)) is not None:
-                check_whole(name, value, least=least)
+                check_whole_number(name, value, least=least)
         for name in ("reading", "only", "exclude", "shard"):
             if (value := getattr(self, name)) is not None:
                 check_type(name, value, str, "text")

@@ -8,9 +8,9 @@ from itertools import accumulate, islice
 from pathlib import Path
 from typing import Any, Protocol, TypeVar, overload
 
-from mutator._common.bounded_reading import bounded_lines, check_open, open_regular
+from mutator._common.bounded_reading import check_file_size, open_regular, read_bounded_lines
 from mutator._common.files import raising_disk_full, writing_atomic
-from mutator._common.hashing import added_values, canonical, plain
+from mutator._common.hashing import added_values, as_json_types, canonical_json
 from mutator._common.message_text import counted
 from mutator.errors import MutatorError
 from mutator.model import Experiment, Fault
@@ -46,7 +46,7 @@ class PlanWriter:
 
     def append(self, experiments: Sequence[Experiment], chunk_lengths: Iterable[int]) -> None:
         """Write the experiments of the next chunks, which have these lengths."""
-        lines = (canonical(_line_values(experiment)).encode() + b"\n" for experiment in experiments)
+        lines = (canonical_json(_line_values(experiment)).encode() + b"\n" for experiment in experiments)
         for count in chunk_lengths:
             data = b"".join(islice(lines, count))
             self._experiments.write(data)
@@ -59,7 +59,7 @@ class PlanWriter:
         }
         self._written_fault_ids.update(new_faults)
         self._faults.write(
-            b"".join(canonical(plain(fault)).encode() + b"\n" for fault in new_faults.values())
+            b"".join(canonical_json(as_json_types(fault)).encode() + b"\n" for fault in new_faults.values())
         )
 
 
@@ -124,7 +124,7 @@ def experiment_lines(run: Path, selected_ids: Container[str]) -> Iterator[bytes]
 def read_chunk_lines(run: Path, chunk: Sequence[int]) -> list[bytes]:
     offset, length, _ = chunk
     with open_regular(run / EXPERIMENTS) as file:
-        check_open(file, run / EXPERIMENTS)
+        check_file_size(file, run / EXPERIMENTS)
         file.seek(offset)
         return file.read(length).splitlines()
 
@@ -182,7 +182,7 @@ def iterate_experiments(run: Path) -> Iterator[Experiment]:
 def read_lines(path: Path) -> Iterator[bytes]:
     try:
         with open_regular(path) as file:
-            yield from bounded_lines(file, path)
+            yield from read_bounded_lines(file, path)
     except OSError as err:
         raise MutatorError(f"cannot be read ({err.strerror})", where=path, remedy=REMEDY) from None
 
@@ -221,7 +221,7 @@ def plan_problems(run: Path) -> Iterator[MutatorError]:
 
 def experiment_as_json(experiment: Experiment) -> dict[str, Any]:
     """Convert an experiment to JSON types, with its fault's id."""
-    return {name: plain(value) for name, value in _line_values(experiment).items()}
+    return {name: as_json_types(value) for name, value in _line_values(experiment).items()}
 
 
 def _line_values(experiment: Experiment) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from hashlib import sha256
 from typing import Any, TypeVar
 
 from mutator._common.confined_files import check_library_name
-from mutator._common.hashing import canonical
+from mutator._common.hashing import canonical_json
 from mutator.errors import MutatorError
 from mutator.model import (
     AfterHazard,
@@ -112,7 +112,7 @@ def parse_canonical_experiment(line: bytes, faults: Mapping[str, Fault]) -> Expe
 def _parse_canonical(text: bytes) -> Any:
     """Parse canonical JSON; ValueError for any other, since an id is a digest of canonical JSON."""
     value = json.loads(text)
-    if canonical(value).encode() != text:
+    if canonical_json(value).encode() != text:
         raise ValueError("not canonical")
     return value
 

@@ -7,7 +7,7 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from mutator._common.confined_files import inside
+from mutator._common.confined_files import path_below
 from mutator.errors import CheckFailed, MutatorError
 from mutator.model import Activation, Outcome, Record, RunError, Status
 from mutator.store.indexed_lines import IndexedLine, IndexedLines
@@ -112,7 +112,7 @@ def load_records(run: Path, folder: str = "records") -> IndexedLines[Record]:
     A harness error is replaced by any other record of its experiment. MutatorError for a damaged line, and
     for a second final record of an experiment; CheckFailed if the two differ.
     """
-    paths = sorted(inside(run, folder).glob("*.jsonl"))
+    paths = sorted(path_below(run, folder).glob("*.jsonl"))
     return IndexedLines(paths, SCHEMA, record_from_json, _replaces)
 
 

@@ -10,10 +10,10 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from mutator._common.bounded_reading import MOST_DATA, read_bounded
-from mutator._common.confined_files import inside
-from mutator._common.files import check_is_text
-from mutator._common.hashing import plain
+from mutator._common.bounded_reading import MOST_DATA_BYTES, read_bounded
+from mutator._common.confined_files import path_below
+from mutator._common.files import check_path_encodable
+from mutator._common.hashing import as_json_types
 from mutator.errors import MutatorError
 from mutator.model import AfterHazard, Experiment, Limits, Record
 from mutator.store import file_digests, integrity, plan_file
@@ -89,7 +89,7 @@ class RunFolder:
                 remedy="check the path",
             )
         folder = cls(path.resolve())
-        check_is_text(folder.path)
+        check_path_encodable(folder.path)
         check_contents(folder.path)
         _ = folder.head  # read it here, so that a wrong schema fails early
         return folder
@@ -129,10 +129,10 @@ class RunFolder:
         head = self.head
         return {
             "mutator": head.provenance.mutator,
-            "stretches": plain(head.stretches),
-            "sources": plain(head.sources),
+            "stretches": as_json_types(head.stretches),
+            "sources": as_json_types(head.sources),
             "seed": head.seed,
-            **({"seeds": plain(head.seeds)} if head.seeds else {}),
+            **({"seeds": as_json_types(head.seeds)} if head.seeds else {}),
             "reading": head.reading,
         }
 
@@ -147,7 +147,7 @@ class RunFolder:
         for stretch in reversed(self.stretches):
             for path in files:
                 if fnmatchcase(path.stem, stretch.records) and experiment_id.encode() in read_bounded(
-                    path, MOST_DATA
+                    path, MOST_DATA_BYTES
                 ):
                     return stretch
         return None
@@ -206,14 +206,14 @@ class RunFolder:
         return GoldenRun.for_experiment(experiment, several_seeds=len(self.seeds) > 1)
 
     def golden_folder(self, scenario: str, changes: tuple[str, ...] = (), seed: int | None = None) -> Path:
-        return inside(self.path / "golden", GoldenRun(scenario, changes, seed).key)
+        return path_below(self.path / "golden", GoldenRun(scenario, changes, seed).key)
 
     def golden_folder_of(self, experiment: Experiment) -> Path:
         return self.golden_folder(*self.golden_run_of(experiment))
 
     def kept_traces_folder(self, experiment_id: str) -> Path:
         """Return the folder of the traces that `rerun --trace` keeps."""
-        return inside(self.path / TRACES_FOLDER, experiment_id)
+        return path_below(self.path / TRACES_FOLDER, experiment_id)
 
     @cached_property
     def patches(self) -> PatchFolder:

@@ -7,9 +7,9 @@ from typing import Any
 
 from mutator._common.confined_files import check_library_name, check_name
 from mutator._common.files import json_bytes, read_json
-from mutator._common.folder_search import RUN_HEAD
-from mutator._common.hashing import added, plain
-from mutator._common.typed_json import from_plain
+from mutator._common.folder_search import RUN_HEAD_FILE
+from mutator._common.hashing import added_field, as_json_types
+from mutator._common.typed_json import from_json_types
 from mutator.errors import Misfit, MutatorError
 from mutator.model import Limits
 from mutator.store.plan_choices import Choices
@@ -18,7 +18,7 @@ from mutator.store.work_stretches import Stretch
 from mutator.targets.target_facts import TargetFacts
 
 SCHEMA = "run/3"
-HEAD, CAMPAIGN = RUN_HEAD, "campaign.yaml"
+HEAD, CAMPAIGN = RUN_HEAD_FILE, "campaign.yaml"
 REMEDY = "the run folder is damaged: restore the file from a copy of it"
 NameTuple = tuple[str, ...]
 StoredGolden = (
@@ -44,9 +44,9 @@ class PlanFacts:
     study: str | None
     target: str
     seed: int
-    seeds: tuple[int, int] | None = added(None)  # the first and the last, if the plan has several
+    seeds: tuple[int, int] | None = added_field(None)  # the first and the last, if the plan has several
     reading: str
-    operators: NameTuple = added(())
+    operators: NameTuple = added_field(())
     choices: Choices
     experiments: int
     runs: int
@@ -70,7 +70,7 @@ class RunHead(TargetFacts, PlanFacts):
 
     def as_json(self) -> dict[str, Any]:
         """Return the keys and their values in JSON types, in the order of the file."""
-        values: dict[str, Any] = plain(self)
+        values: dict[str, Any] = as_json_types(self)
         return {**{name: values[name] for name in _HEAD_KEYS if name in values}, **values["later"]}
 
     def differences(self, other: "RunHead") -> Iterator[tuple[str, Any, Any]]:
@@ -91,7 +91,7 @@ def load_head(run: Path) -> RunHead:
     """Read the head of a run folder; MutatorError if it is damaged or has another schema."""
     path = run / HEAD
     try:
-        head = from_plain(RunHead, _with_unknown_keys_apart(read_json(path, SCHEMA)))
+        head = from_json_types(RunHead, _with_unknown_keys_apart(read_json(path, SCHEMA)))
     except Misfit as err:
         raise _damage_error(path, err) from None
     for name in head.golden_files:

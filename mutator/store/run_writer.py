@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from mutator._common.confined_files import inside
+from mutator._common.confined_files import path_below
 from mutator.model import Record
 from mutator.store.checksummed_lines import LineWriter, verified_lines, write_with_new_head
 from mutator.store.patch_files import PatchWriter
@@ -81,7 +81,7 @@ class RunWriter:
         return self._proof
 
     def _open_lines(self, kind: str, before_sync: Callable[[], None] = lambda: None) -> LineWriter:
-        path = inside(self._run, f"{kind}/{self._name}.jsonl")
+        path = path_below(self._run, f"{kind}/{self._name}.jsonl")
         return LineWriter(path, {"schema": LINE_SCHEMA_BY_FOLDER[kind], "plan": self._plan}, before_sync)
 
     def _sync_blocks(self) -> None:
@@ -96,7 +96,7 @@ def copy_line_files(folder: RunFolder, out: Path, suffix: str) -> None:
         if (folder.path / kind).is_dir():
             (out / kind).mkdir(exist_ok=True)
         for path in sorted((folder.path / kind).glob("*.jsonl")):
-            copy_path = inside(out / kind, f"{path.stem}{suffix}.jsonl")
+            copy_path = path_below(out / kind, f"{path.stem}{suffix}.jsonl")
             lines = verified_lines(path, schema)
             head = {"schema": schema, "plan": folder.head.plan}
             write_with_new_head(copy_path, head, (line for _, _, line in lines))

@@ -12,9 +12,9 @@ from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
-from mutator._common.bounded_reading import unpacked
-from mutator._common.confined_files import check_name, inside
-from mutator._common.hashing import canonical
+from mutator._common.bounded_reading import unpack_bounded
+from mutator._common.confined_files import check_name, path_below
+from mutator._common.hashing import canonical_json
 from mutator.errors import MutatorError
 from mutator.model import Record
 from mutator.store.series_check import check_deviations
@@ -167,14 +167,14 @@ class SeriesFolder:
 
     def read_chunk(self, name: str) -> bytes:
         """Return the bytes of a chunk; MutatorError if it is missing or damaged."""
-        path = inside(self.path, f"{name}.js")
+        path = path_below(self.path, f"{name}.js")
         data = read_script(path)
         if script_name_of(data) != name:
             raise MutatorError("damaged", where=path, expected="content that matches its name")
         return data
 
     def kept_path(self, experiment_id: str) -> Path:
-        return inside(self.path / KEPT_FOLDER, f"{experiment_id}.js")
+        return path_below(self.path / KEPT_FOLDER, f"{experiment_id}.js")
 
 
 def run_facts(record: Record) -> dict[str, Any]:
@@ -216,7 +216,7 @@ def load_index(path: Path) -> SeriesIndex:
     remedy = repair_remedy(path.parent.parent)
     try:
         packed = read_script(path)
-        data = json.loads(unpacked(packed, _MOST_INDEX_RATIO * len(packed) + _MOST_INDEX_BYTES, gzip=True))
+        data = json.loads(unpack_bounded(packed, _MOST_INDEX_RATIO * len(packed) + _MOST_INDEX_BYTES, gzip=True))
         if data["schema"] != SCHEMA:
             raise MutatorError(f"schema {data['schema']!r}", where=path, expected=SCHEMA, remedy=remedy)
         index = SeriesIndex.from_json(data)
@@ -231,7 +231,7 @@ def load_index(path: Path) -> SeriesIndex:
 
 
 def save_index(path: Path, index: SeriesIndex) -> None:
-    text = canonical(index.as_json()).encode()
+    text = canonical_json(index.as_json()).encode()
     write_script(path, gzip.compress(text, compresslevel=9, mtime=0))
 
 

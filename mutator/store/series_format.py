@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from mutator._common.bounded_reading import unpacked
-from mutator._common.hashing import canonical
+from mutator._common.bounded_reading import unpack_bounded
+from mutator._common.hashing import canonical_json
 from mutator.errors import MutatorError
 
 MOST_SERIES_BYTES = 32_000_000  # of a run's series
@@ -85,7 +85,7 @@ def encode_series(series: Series, golden: Series | None = None) -> bytes:
     }
     words = [*(_difference_words(differences[channel]) for channel in changed), points.golden, points.faulty]
     planes = np.concatenate([row.view("<u4") for row in words]).view(np.uint8).reshape(-1, 4).T
-    text = canonical(head).encode()
+    text = canonical_json(head).encode()
     times = (series.t[shared_steps:].astype("<f8").tobytes(), points.t.astype("<f8").tobytes())
     raw = b"".join((_LENGTH_STRUCT.pack(len(text)), text, *times, planes.tobytes()))
     return gzip.compress(raw, compresslevel=_GZIP_LEVEL, mtime=0)
@@ -94,7 +94,7 @@ def encode_series(series: Series, golden: Series | None = None) -> bytes:
 def decode_series(data: bytes, golden: Series | None = None) -> Series:
     """Decode a run that was encoded with `golden`; MutatorError if the bytes are damaged."""
     try:
-        return _decode_unpacked(unpacked(data, MOST_SERIES_BYTES, gzip=True), golden)
+        return _decode_unpacked(unpack_bounded(data, MOST_SERIES_BYTES, gzip=True), golden)
     except (*_DECODE_ERRORS, struct.error, zlib.error) as err:
         raise MutatorError(f"a damaged series ({err})", expected="unchanged bytes") from None
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mutator._common.confined_files import inside
+from mutator._common.confined_files import path_below
 from mutator._common.files import raising_disk_full
 from mutator.errors import MutatorError
 from mutator.store.checksummed_blocks import BlockWriter, read_blocks
@@ -34,7 +34,7 @@ class SeriesWriter:
     """Append a worker's series, and each golden run once."""
 
     def __init__(self, run: Path, worker: str) -> None:
-        self._path = inside(run / FOLDER, f"{worker}{SUFFIX}")
+        self._path = path_below(run / FOLDER, f"{worker}{SUFFIX}")
         self._blocks: BlockWriter | None = None  # nothing appended yet
         self._written_golden_keys: set[str] = set()
 
@@ -274,6 +274,6 @@ def _write_chunks(folder: Path, entries: Iterable[_EntryToPack]) -> Iterator[tup
 
 def _write_chunk(folder: Path, parts: list[bytes]) -> tuple[str, list[int]]:
     data = b"".join(parts)
-    path = inside(folder, f"{script_name_of(data)}.js")
+    path = path_below(folder, f"{script_name_of(data)}.js")
     write_script(path, data)
     return path.stem, [len(part) for part in parts]

@@ -12,7 +12,7 @@ from typing import Any
 
 from mutator._common import shared_cache
 from mutator._common.bounded_reading import read_bounded
-from mutator._common.confined_files import inside
+from mutator._common.confined_files import path_below
 from mutator._common.files import json_bytes, write_atomic
 from mutator._common.hashing import digest
 from mutator._common.version import VERSION
@@ -56,4 +56,4 @@ def remember_facts(key: str, **facts: Any) -> None:
 
 
 def _path(key: str) -> Path:
-    return inside(shared_cache.of_runs(), f"{key}.json")
+    return path_below(shared_cache.runs_folder(), f"{key}.json")

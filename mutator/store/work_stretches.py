@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from mutator._common.hashing import added
+from mutator._common.hashing import added_field
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,7 +60,7 @@ class Stretch:
     git: Mapping[str, CloneState] | None = None  # the clones of mutator, library, templates and target
     records: str = "*"  # glob of the session's files in records/, timings/ and proof/, without suffix
     accepted: tuple[str, ...] = ()  # differences of Python and packages from the previous stretch
-    machines: tuple[Machine, ...] = added(())
+    machines: tuple[Machine, ...] = added_field(())
 
     def __str__(self) -> str:
         return ", ".join(filter(None, (self.python, self.platform, self.cpu)))

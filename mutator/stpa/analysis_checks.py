@@ -4,7 +4,7 @@ import ast
 from collections.abc import Iterator
 
 from mutator._common.message_text import suggestion
-from mutator.config.yaml_sources import Keys
+from mutator.config.yaml_sources import KeyPath
 from mutator.errors import MutatorError
 from mutator.faults.fault_specs import FaultSpec
 from mutator.stpa.analysis_files import Analysis, Category, FactorModel, UnsafeActionModel
@@ -218,7 +218,7 @@ def functions(code: bytes) -> Iterator[str]:
 
 def _faults(analysis: Analysis, specs: Specs) -> Iterator[MutatorError]:
     for name, factor in analysis.factors.items():
-        keys: Keys = ("causal_factors", name)
+        keys: KeyPath = ("causal_factors", name)
         known = True
         for i, fault in enumerate(factor.faults):
             if fault not in specs:
@@ -234,7 +234,9 @@ def _faults(analysis: Analysis, specs: Specs) -> Iterator[MutatorError]:
             yield from _misdirected(analysis, keys, factor, specs)
 
 
-def _misplaced(analysis: Analysis, keys: Keys, factor: FactorModel, specs: Specs) -> Iterator[MutatorError]:
+def _misplaced(
+    analysis: Analysis, keys: KeyPath, factor: FactorModel, specs: Specs
+) -> Iterator[MutatorError]:
     actual = {place for fault in factor.faults for place in injected(specs[fault])}
     if actual != set(factor.at):
         yield analysis.factors_source.error(
@@ -245,7 +247,9 @@ def _misplaced(analysis: Analysis, keys: Keys, factor: FactorModel, specs: Specs
         )
 
 
-def _misdirected(analysis: Analysis, keys: Keys, factor: FactorModel, specs: Specs) -> Iterator[MutatorError]:
+def _misdirected(
+    analysis: Analysis, keys: KeyPath, factor: FactorModel, specs: Specs
+) -> Iterator[MutatorError]:
     hazards = {hazard for action in factor.leads_to for hazard in analysis.unsafe[action].hazards}
     for i, fault in enumerate(factor.faults):
         for variant in specs[fault]:

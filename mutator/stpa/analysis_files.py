@@ -11,10 +11,10 @@ from pathlib import Path
 
 from pydantic import Field
 
-from mutator._common.confined_files import inside
-from mutator._common.message_text import one_of, suggestion
-from mutator.config.yaml_files import StrictModel, read
-from mutator.config.yaml_sources import Keys, Source
+from mutator._common.confined_files import path_below
+from mutator._common.message_text import describe_choices, suggestion
+from mutator.config.yaml_files import StrictModel, load_yaml_model
+from mutator.config.yaml_sources import KeyPath, YamlSource
 from mutator.stpa.context_tables import ContextTable, load_context_table
 from mutator.stpa.hazard_list import HazardList, load_hazards
 
@@ -145,17 +145,17 @@ class Analysis:
 
     hazards: HazardList
     structure: StructureModel
-    structure_source: Source
+    structure_source: YamlSource
     tables: Mapping[str, ContextTable]
     unsafe: Mapping[str, UnsafeActionModel]
-    unsafe_source: Source
+    unsafe_source: YamlSource
     factors: Mapping[str, FactorModel]
-    factors_source: Source
+    factors_source: YamlSource
 
 
 def load_structure(path: Path) -> StructureModel:
     """Read a control structure; MutatorError with file and line for a mistake."""
-    structure, source = read(path, StructureModel, "control_structure/1")
+    structure, source = load_yaml_model(path, StructureModel, "control_structure/1")
     _check_structure(structure, source)
     return structure
 
@@ -167,14 +167,16 @@ def load_analysis(folder: Path) -> Analysis:
     MutatorError with file and line for the first unknown name, uncovered context or other mistake.
     """
     hazards = load_hazards(folder / "hazards.yaml")
-    structure, s_source = read(folder / "control_structure.yaml", StructureModel, "control_structure/1")
+    structure, s_source = load_yaml_model(
+        folder / "control_structure.yaml", StructureModel, "control_structure/1"
+    )
     _check_structure(structure, s_source)
-    unsafe, u_source = read(
+    unsafe, u_source = load_yaml_model(
         folder / "unsafe_control_actions.yaml", UnsafeActionsModel, "unsafe_control_actions/1"
     )
     tables = _tables(folder / "contexts", unsafe, u_source, structure)
     _check_unsafe(unsafe, u_source, structure, hazards, tables)
-    factors, f_source = read(folder / "causal_factors.yaml", FactorsModel, "causal_factors/1")
+    factors, f_source = load_yaml_model(folder / "causal_factors.yaml", FactorsModel, "causal_factors/1")
     _check_factors(factors, f_source, structure, unsafe)
     return Analysis(
         hazards=hazards,
@@ -188,17 +190,17 @@ def load_analysis(folder: Path) -> Analysis:
     )
 
 
-def _known(source: Source, keys: Keys, what: str, name: str, known: Collection[str]) -> None:
+def _known(source: YamlSource, keys: KeyPath, what: str, name: str, known: Collection[str]) -> None:
     if name not in known:
         raise source.error(
             keys,
             f"{what} '{name}'",
-            expected=one_of(known),
+            expected=describe_choices(known),
             remedy="correct the name" + suggestion(name, list(known)),
         )
 
 
-def _check_structure(structure: StructureModel, source: Source) -> None:
+def _check_structure(structure: StructureModel, source: YamlSource) -> None:
     _check_grid(structure, source)
     for name, link in structure.links.items():
         if name in structure.components:
@@ -212,7 +214,7 @@ def _check_structure(structure: StructureModel, source: Source) -> None:
             raise source.error(keys, f"link '{action.link}'", expected="a link that comes from a controller")
 
 
-def _check_grid(structure: StructureModel, source: Source) -> None:
+def _check_grid(structure: StructureModel, source: YamlSource) -> None:
     taken: dict[tuple[int, int], str] = {}
     for name, component in structure.components.items():
         row, column, width = component.drawn
@@ -228,14 +230,14 @@ def _check_grid(structure: StructureModel, source: Source) -> None:
 
 
 def _tables(
-    folder: Path, unsafe: UnsafeActionsModel, source: Source, structure: StructureModel
+    folder: Path, unsafe: UnsafeActionsModel, source: YamlSource, structure: StructureModel
 ) -> dict[str, ContextTable]:
     """Load the context tables of the unsafe actions. They can judge only the structure's control actions."""
     known = sorted(path.stem for path in folder.glob("*.yaml"))
     tables = {}
     for i, name in enumerate(unsafe.tables):
         _known(source, ("tables", i), "context table", name, known)
-        tables[name] = table = load_context_table(inside(folder, f"{name}.yaml"))
+        tables[name] = table = load_context_table(path_below(folder, f"{name}.yaml"))
         for row in table.rows:
             for action in row.actions:
                 keys = ("contexts", row.id, "actions", action)
@@ -245,14 +247,14 @@ def _tables(
 
 def _check_unsafe(
     unsafe: UnsafeActionsModel,
-    source: Source,
+    source: YamlSource,
     structure: StructureModel,
     hazards: HazardList,
     tables: Mapping[str, ContextTable],
 ) -> None:
     rows = [f"{table.name}/{row.id}" for table in tables.values() for row in table.rows]
     for name, action in unsafe.unsafe_control_actions.items():
-        keys: Keys = ("unsafe_control_actions", name)
+        keys: KeyPath = ("unsafe_control_actions", name)
         _known(source, (*keys, "action"), "control action", action.action, structure.control_actions)
         for i, hazard in enumerate(action.hazards):
             _known(source, (*keys, "hazards", i), "hazard", hazard, hazards.hazards)
@@ -261,11 +263,11 @@ def _check_unsafe(
 
 
 def _check_factors(
-    factors: FactorsModel, source: Source, structure: StructureModel, unsafe: UnsafeActionsModel
+    factors: FactorsModel, source: YamlSource, structure: StructureModel, unsafe: UnsafeActionsModel
 ) -> None:
     places = (*structure.components, *structure.links)
     for name, factor in factors.causal_factors.items():
-        keys: Keys = ("causal_factors", name)
+        keys: KeyPath = ("causal_factors", name)
         for i, place in enumerate(factor.where):
             _known(source, (*keys, "where", i), "link or component", place, places)
         for i, action in enumerate(factor.leads_to):

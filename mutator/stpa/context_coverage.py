@@ -13,7 +13,7 @@ from itertools import pairwise, product
 
 from mutator._common.message_text import counted
 from mutator.errors import NotTestable
-from mutator.triggers.conditions import evaluate
+from mutator.triggers.conditions import evaluate_condition
 
 MAX_TESTS = 400_000  # most tests: contexts times cells
 
@@ -52,7 +52,7 @@ def measure_coverage(conditions: Mapping[str, str]) -> Coverage:
         return Coverage(beyond=f"its constants yield {found}, too many to test")
     for place in product(*lines):
         values = {name: cell.value for name, cell in zip(cuts, place, strict=True)}
-        rows = tuple(row for row, condition in conditions.items() if evaluate(condition, values))
+        rows = tuple(row for row, condition in conditions.items() if evaluate_condition(condition, values))
         if len(rows) != 1:
             text = " and ".join(cell.text for cell in place) or "any observation"
             return Coverage(cells=total, place=text, rows=rows)

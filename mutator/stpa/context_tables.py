@@ -7,13 +7,13 @@ from pathlib import Path
 
 from pydantic import Field
 
-from mutator._common.yaml_dataclasses import mapping, written
-from mutator.config.yaml_files import StrictModel, Written, read
-from mutator.config.yaml_sources import Source
+from mutator._common.yaml_dataclasses import mapping_config, yaml_metadata
+from mutator.config.yaml_files import StrictModel, YamlRecord, load_yaml_model
+from mutator.config.yaml_sources import YamlSource
 from mutator.errors import MutatorError
 from mutator.model import Hold, Trigger
 from mutator.stpa.context_coverage import Coverage, measure_coverage
-from mutator.triggers.conditions import TIME, check_condition, names_in
+from mutator.triggers.conditions import TIME, canonical_condition, names_in
 
 CONTEXT_SCHEMA = "context_table/1"
 _CONSTANT = re.compile(r"[a-z][a-z0-9_]*\Z")
@@ -23,11 +23,11 @@ _CONSTANT = re.compile(r"[a-z][a-z0-9_]*\Z")
 class Verdicts:
     """The hazards that follow from one control action in one context; `null` means no hazard."""
 
-    __pydantic_config__ = mapping("The hazards of an action")
+    __pydantic_config__ = mapping_config("The hazards of an action")
 
-    provided: str | None = field(metadata=written("The hazard that occurs if the action is provided."))
+    provided: str | None = field(metadata=yaml_metadata("The hazard that occurs if the action is provided."))
     not_provided: str | None = field(
-        metadata=written("The hazard that occurs if the action is not provided.")
+        metadata=yaml_metadata("The hazard that occurs if the action is not provided.")
     )
 
 
@@ -55,7 +55,7 @@ class ContextTable:
     constants: Mapping[str, float]
     rows: tuple[ContextRow, ...]
     coverage: Coverage
-    source: Source
+    source: YamlSource
 
     def check(self, variables: Collection[str]) -> None:
         """Raise MutatorError, with the line, for a row that uses an unknown variable."""
@@ -95,7 +95,7 @@ class _RowModel(StrictModel, title="A context"):
         description="A condition. It may use `t` (s), the values observed in the target, and the constants."
     )
     about: str = Field(description="A description.")
-    actions: dict[str, Written[Verdicts]] = Field(
+    actions: dict[str, YamlRecord[Verdicts]] = Field(
         description="Control action -> its hazards. All contexts must have the same actions."
     )
 
@@ -116,7 +116,7 @@ def load_context_table(path: Path, variables: Collection[str] | None = None) -> 
 
     MutatorError also if contexts provably overlap or leave a gap, or if rows judge different control actions.
     """
-    model, source = read(path, TableModel, CONTEXT_SCHEMA)
+    model, source = load_yaml_model(path, TableModel, CONTEXT_SCHEMA)
     for name in model.constants:
         if not _CONSTANT.match(name) or name == TIME:
             raise source.error(
@@ -148,7 +148,7 @@ def load_context_table(path: Path, variables: Collection[str] | None = None) -> 
     )
 
 
-def _check_names(rows: Iterable[ContextRow], variables: Collection[str], source: Source) -> None:
+def _check_names(rows: Iterable[ContextRow], variables: Collection[str], source: YamlSource) -> None:
     for row in rows:
         unknown = [name for name in names_in(row.condition) if name not in variables]
         if unknown:
@@ -160,7 +160,7 @@ def _check_names(rows: Iterable[ContextRow], variables: Collection[str], source:
             )
 
 
-def _check_actions(rows: tuple[ContextRow, ...], source: Source) -> None:
+def _check_actions(rows: tuple[ContextRow, ...], source: YamlSource) -> None:
     for row in rows[1:]:
         if row.actions.keys() != rows[0].actions.keys():
             raise source.error(
@@ -171,7 +171,7 @@ def _check_actions(rows: tuple[ContextRow, ...], source: Source) -> None:
             )
 
 
-def _covered_once(rows: tuple[ContextRow, ...], source: Source) -> Coverage:
+def _covered_once(rows: tuple[ContextRow, ...], source: YamlSource) -> Coverage:
     found = measure_coverage({row.id: row.condition for row in rows})
     if found.place is None:
         return found
@@ -191,6 +191,6 @@ def _covered_once(rows: tuple[ContextRow, ...], source: Source) -> Coverage:
     )
 
 
-def _condition(text: str, constants: Mapping[str, float], source: Source, row: str) -> str:
-    with source.placing(("contexts", row, "when")):
-        return check_condition(text, constants)
+def _condition(text: str, constants: Mapping[str, float], source: YamlSource, row: str) -> str:
+    with source.locating_errors(("contexts", row, "when")):
+        return canonical_condition(text, constants)

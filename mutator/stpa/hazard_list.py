@@ -6,8 +6,8 @@ from pathlib import Path
 
 from pydantic import Field
 
-from mutator.config.yaml_files import StrictModel, read
-from mutator.config.yaml_sources import Source
+from mutator.config.yaml_files import StrictModel, load_yaml_model
+from mutator.config.yaml_sources import YamlSource
 
 HAZARDS_SCHEMA = "hazards/1"
 
@@ -16,7 +16,7 @@ HAZARDS_SCHEMA = "hazards/1"
 class HazardList:
     """Accidents and hazards (id -> description), and the accidents that each hazard can cause."""
 
-    source: Source
+    source: YamlSource
     accidents: Mapping[str, str]
     hazards: Mapping[str, str]
     leads_to: Mapping[str, tuple[str, ...]]
@@ -36,7 +36,7 @@ class HazardsModel(StrictModel, title="hazards.yaml"):
 
 def load_hazards(path: Path) -> HazardList:
     """Read accidents and hazards; MutatorError if a hazard names an unknown accident."""
-    model, source = read(path, HazardsModel, HAZARDS_SCHEMA)
+    model, source = load_yaml_model(path, HazardsModel, HAZARDS_SCHEMA)
     for name, hazard in model.hazards.items():
         for i, accident in enumerate(hazard.leads_to):
             if accident not in model.accidents:

@@ -6,9 +6,9 @@ from pydantic import Field
 
 from mutator._common.doors import IMPORTERS
 from mutator.config.yaml_files import StrictModel
-from mutator.config.yaml_sources import Source
+from mutator.config.yaml_sources import YamlSource
 from mutator.targets.channels import ROUNDING, Channel, Role
-from mutator.triggers.conditions import RESERVED
+from mutator.triggers.conditions import RESERVED_NAMES
 
 
 class ChannelModel(StrictModel, title="A channel"):
@@ -65,7 +65,9 @@ class TraceModel(StrictModel, title="The trace"):
     )
 
 
-def read_channels(models: dict[str, ChannelModel], trace: TraceModel, source: Source) -> tuple[Channel, ...]:
+def read_channels(
+    models: dict[str, ChannelModel], trace: TraceModel, source: YamlSource
+) -> tuple[Channel, ...]:
     """Read a manifest's channels, in order; MutatorError for an invalid trace or channel."""
     suffix = Path(trace.file).suffix.removeprefix(".")
     if Path(trace.file).name != trace.file or not (suffix and IMPORTERS.has(suffix)):
@@ -86,15 +88,15 @@ def read_channels(models: dict[str, ChannelModel], trace: TraceModel, source: So
     return tuple(_channel(name, model, trace, source) for name, model in models.items())
 
 
-def _channel(name: str, model: ChannelModel, trace: TraceModel, source: Source) -> Channel:
+def _channel(name: str, model: ChannelModel, trace: TraceModel, source: YamlSource) -> Channel:
     keys = ("channels", name)
     if name == trace.time:
         raise source.error(keys, f"'{name}'", expected="a channel other than the time", remedy="leave it out")
-    if name in RESERVED:
+    if name in RESERVED_NAMES:
         raise source.error(
             keys,
             f"'{name}'",
-            expected=f"a name other than these, which formulas already use: {', '.join(RESERVED)}",
+            expected=f"a name other than these, which formulas already use: {', '.join(RESERVED_NAMES)}",
             remedy=f"choose another name, with `from: {name}`",
         )
     in_topics = trace.file.endswith(".mcap")

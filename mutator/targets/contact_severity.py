@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from mutator._common.yaml_dataclasses import mapping, written
+from mutator._common.yaml_dataclasses import mapping_config, yaml_metadata
 
 CLASSES = ("S0", "S1", "S2", "S3")  # from ISO 26262-3, the mildest first
 DELTA_V = "delta_v"  # name of the metric
@@ -14,26 +14,28 @@ class Contact:
     other_mass_kg / (mass_kg + other_mass_kg)`; the scale assigns its class.
     """
 
-    __pydantic_config__ = mapping("Severity")
+    __pydantic_config__ = mapping_config("Severity")
 
     hazard: str = field(
-        metadata=written("The terminal hazard that is a contact with another vehicle.", alias="contact")
+        metadata=yaml_metadata("The terminal hazard that is a contact with another vehicle.", alias="contact")
     )
     speed: str = field(
-        metadata=written(
+        metadata=yaml_metadata(
             "The metric that holds the closing speed at the contact: one with `at_end`, in m/s. If it is "
             "negative, the cars separate, and delta-v is 0.",
             alias="contact_speed",
         )
     )
     mass: float = field(
-        metadata=written("The mass of the ego car.", alias="mass_kg", gt=0.0, allow_inf_nan=False)
+        metadata=yaml_metadata("The mass of the ego car.", alias="mass_kg", gt=0.0, allow_inf_nan=False)
     )
     other_mass: float = field(
-        metadata=written("The mass of the other vehicle.", alias="other_mass_kg", gt=0.0, allow_inf_nan=False)
+        metadata=yaml_metadata(
+            "The mass of the other vehicle.", alias="other_mass_kg", gt=0.0, allow_inf_nan=False
+        )
     )
     scale: str = field(
-        metadata=written(
+        metadata=yaml_metadata(
             "The name of a file in the library's `severity/`, without `.yaml`; or `collision`, which ships "
             "with mutator."
         )

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from mutator.triggers.conditions import GOLDEN
+from mutator.triggers.conditions import GOLDEN_PREFIX
 
 Aggregate = Literal["min", "max", "mean", "last", "integral", "duration", "at_end"]
 Worse = Literal["higher", "lower"]
@@ -26,7 +26,7 @@ class Metric:
 
     @property
     def uses_golden(self) -> bool:
-        return GOLDEN in self.formula or GOLDEN in self.where
+        return GOLDEN_PREFIX in self.formula or GOLDEN_PREFIX in self.where
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,11 +7,11 @@ from typing import get_args
 from pydantic import Field
 
 from mutator.config.yaml_files import StrictModel
-from mutator.config.yaml_sources import Keys, Source
+from mutator.config.yaml_sources import KeyPath, YamlSource
 from mutator.targets.criteria import Aggregate, Hazard, Metric, Worse
 from mutator.targets.manifest_formulas import condition, formula
 from mutator.triggers import temporal_logic
-from mutator.triggers.conditions import GOLDEN, TIME, parse
+from mutator.triggers.conditions import GOLDEN_PREFIX, TIME, parse_expression
 
 _AGGREGATES = get_args(Aggregate)
 
@@ -77,7 +77,7 @@ class MetricModel(StrictModel, title="A metric"):
 def read_hazards(
     models: list[str] | dict[str, HazardModel],
     known: Collection[str],
-    source: Source,
+    source: YamlSource,
     *,
     recorded: bool,
     step_s: float,
@@ -92,7 +92,7 @@ def read_hazards(
     else:
         hazards = tuple(_hazard(name, model, known, source, step_s) for name, model in models.items())
     if not recorded and (left := [hazard.name for hazard in hazards if hazard.recorded]):
-        keys: Keys = ("hazards", left[0]) if isinstance(models, dict) else ("hazards",)
+        keys: KeyPath = ("hazards", left[0]) if isinstance(models, dict) else ("hazards",)
         raise source.error(
             keys,
             f"hazard '{left[0]}' without `when`, in a manifest without `record`",
@@ -102,8 +102,10 @@ def read_hazards(
     return hazards
 
 
-def _hazard(name: str, model: HazardModel, known: Collection[str], source: Source, step_s: float) -> Hazard:
-    keys: Keys = ("hazards", name)
+def _hazard(
+    name: str, model: HazardModel, known: Collection[str], source: YamlSource, step_s: float
+) -> Hazard:
+    keys: KeyPath = ("hazards", name)
     if model.when is not None and model.stl is not None:
         raise source.error((*keys, "stl"), "`when` and `stl`", expected="one of them", remedy="remove one")
     judged_by = "stl" if model.stl is not None else "the record"
@@ -118,8 +120,8 @@ def _hazard(name: str, model: HazardModel, known: Collection[str], source: Sourc
             )
     when = condition(model.when, known, source, (*keys, "when"))
     if model.stl:
-        with source.placing((*keys, "stl")):
-            temporal_logic.check(model.stl, known, step_s)
+        with source.locating_errors((*keys, "stl")):
+            temporal_logic.check_stl_formula(model.stl, known, step_s)
     terminal = model.terminal
     return Hazard(
         name=name,
@@ -139,7 +141,7 @@ def _margin_of(when: str) -> str:
     """Return the margin of a single comparison: the difference of its two sides, positive while it does not
     hold.
     """
-    node = parse(when) if when else None
+    node = parse_expression(when) if when else None
     if not isinstance(node, ast.Compare) or len(node.ops) != 1:
         return ""
     low, high = ast.unparse(node.left), ast.unparse(node.comparators[0])
@@ -151,15 +153,15 @@ def _margin_of(when: str) -> str:
 
 
 def read_metrics(
-    models: dict[str, MetricModel], known: Collection[str], source: Source
+    models: dict[str, MetricModel], known: Collection[str], source: YamlSource
 ) -> tuple[Metric, ...]:
     """Read a manifest's metrics; the arguments and errors are those of `read_hazards`."""
-    known = (*known, *(GOLDEN + name for name in known if name != TIME))
+    known = (*known, *(GOLDEN_PREFIX + name for name in known if name != TIME))
     return tuple(_metric(name, model, known, source) for name, model in models.items())
 
 
-def _metric(name: str, model: MetricModel, known: Collection[str], source: Source) -> Metric:
-    keys: Keys = ("metrics", name)
+def _metric(name: str, model: MetricModel, known: Collection[str], source: YamlSource) -> Metric:
+    keys: KeyPath = ("metrics", name)
     if not name.isidentifier():
         raise source.error(keys, f"'{name}'", expected="a name of letters, digits and _", remedy="rename it")
     given = [key for key in _AGGREGATES if getattr(model, key) is not None]

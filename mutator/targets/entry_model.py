@@ -4,9 +4,9 @@ from collections.abc import Collection
 
 from pydantic import Field
 
-from mutator._common.message_text import one_of
+from mutator._common.message_text import describe_choices
 from mutator.config.yaml_files import StrictModel
-from mutator.config.yaml_sources import Source
+from mutator.config.yaml_sources import YamlSource
 from mutator.targets.manifest import Film
 from mutator.targets.placeholders import OF_FILMED_RUNS, OF_FILMS, OF_RUNS, check_placeholders
 
@@ -47,7 +47,7 @@ class EntryModel(StrictModel, title="The entry"):
     )
 
 
-def check_commands(entry: EntryModel, film: Film | None, source: Source) -> None:
+def check_commands(entry: EntryModel, film: Film | None, source: YamlSource) -> None:
     for key, command in (("entry", entry), ("film", film)):
         if command and not all(part.isidentifier() for part in command.module.split(".")):
             raise source.error(
@@ -69,7 +69,7 @@ def check_commands(entry: EntryModel, film: Film | None, source: Source) -> None
         _check_films(film, entry.changes, source)
 
 
-def _check_runs(entry: EntryModel, source: Source) -> None:
+def _check_runs(entry: EntryModel, source: YamlSource) -> None:
     keys = ("entry",)
     check_placeholders(entry.args, OF_RUNS, source, (*keys, "args"))
     check_placeholders(entry.independent, OF_RUNS, source, (*keys, "independent"))
@@ -81,13 +81,13 @@ def _check_runs(entry: EntryModel, source: Source) -> None:
             check_placeholders(change.args, OF_RUNS, source, (*place, "args"))
 
 
-def _check_films(film: Film, changes: Collection[str], source: Source) -> None:
+def _check_films(film: Film, changes: Collection[str], source: YamlSource) -> None:
     for i, name in enumerate(film.pictures):
         if name not in changes:
             raise source.error(
                 ("film", "pictures", i),
                 f"'{name}'",
-                expected=f"{one_of(changes)}, the entry's changes",
+                expected=f"{describe_choices(changes)}, the entry's changes",
                 remedy="correct the name",
             )
     check_placeholders(film.run_args, OF_FILMED_RUNS, source, ("film", "run"))

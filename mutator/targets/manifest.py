@@ -10,8 +10,8 @@ from packaging.requirements import Requirement
 from mutator._common import shared_cache
 from mutator._common.bounded_reading import read_bounded
 from mutator._common.hashing import digest
-from mutator._common.yaml_dataclasses import mapping, written
-from mutator.config.yaml_sources import Source
+from mutator._common.yaml_dataclasses import mapping_config, yaml_metadata
+from mutator.config.yaml_sources import YamlSource
 from mutator.errors import MutatorError
 from mutator.targets.channels import Channel, Role
 from mutator.targets.contact_severity import DELTA_V, Contact
@@ -21,7 +21,7 @@ from mutator.targets.placeholders import filled
 from mutator.targets.scene import Scene
 from mutator.targets.source_tree import SourceTree, matches, read_tree
 from mutator.triggers import temporal_logic
-from mutator.triggers.conditions import GOLDEN, names_in
+from mutator.triggers.conditions import GOLDEN_PREFIX, names_in
 
 _DELTA_V = Metric(
     name=DELTA_V,
@@ -41,21 +41,21 @@ class Film:
     `{out}` the file to write, and `{t}` the time of a still in s.
     """
 
-    __pydantic_config__ = mapping("Films")
+    __pydantic_config__ = mapping_config("Films")
 
     run_args: tuple[str, ...] = field(
-        metadata=written(
+        metadata=yaml_metadata(
             "Extra arguments of the entry that make a run write a film.", alias="run", strict=False
         )
     )
-    module: str = field(metadata=written("The module that shows two films. It is run as `python -m`."))
-    args: tuple[str, ...] = field(metadata=written("The module's arguments.", strict=False))
+    module: str = field(metadata=yaml_metadata("The module that shows two films. It is run as `python -m`."))
+    args: tuple[str, ...] = field(metadata=yaml_metadata("The module's arguments.", strict=False))
     still_args: tuple[str, ...] = field(
-        metadata=written("Extra arguments for a still.", alias="still", strict=False)
+        metadata=yaml_metadata("Extra arguments for a still.", alias="still", strict=False)
     )
     pictures: tuple[str, ...] = field(
         default=(),
-        metadata=written(
+        metadata=yaml_metadata(
             "The entry's changes that make the controller use camera images. After a run, stills are made "
             "automatically for the worst experiments with one of these changes.",
             strict=False,
@@ -99,7 +99,7 @@ class TargetManifest:
     contact: Contact | None
     scene: Scene | None
     alerts: tuple[str, ...]  # other alerts are ignored
-    source: Source = field(repr=False, compare=False)  # the file's lines, for errors
+    source: YamlSource = field(repr=False, compare=False)  # the file's lines, for errors
     film: Film | None = None
     # change -> scenarios that it makes identical, e.g. because they differ only in traffic that it removes
     same_in: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
@@ -203,7 +203,7 @@ class TargetManifest:
     @property
     def cache(self) -> Path:
         """The folder `{cache}`, which need not exist."""
-        return shared_cache.of_target(self.cache_name)
+        return shared_cache.target_folder(self.cache_name)
 
     def read_by_runs(self) -> tuple[Path, ...]:
         """Return what runs read besides their tree, scenario and cache: the target's root, if an argument
@@ -232,4 +232,6 @@ def _names_of(rules: Iterable[Hazard], metrics: Iterable[Metric], known: Collect
     texts = [text for rule in rules for text in (rule.when, rule.margin, rule.terminal)]
     texts += [text for metric in metrics for text in (metric.formula, metric.where)]
     in_stl = (name for rule in rules for name in temporal_logic.names_in(rule.stl, known))
-    return {name.removeprefix(GOLDEN) for text in texts if text for name in names_in(text)}.union(in_stl)
+    return {name.removeprefix(GOLDEN_PREFIX) for text in texts if text for name in names_in(text)}.union(
+        in_stl
+    )

@@ -6,9 +6,9 @@ from pathlib import Path
 from pydantic import Field
 
 from mutator._common.confined_files import check_name
-from mutator._common.shipped_files import SHIPPED_TARGET
-from mutator.config.yaml_files import StrictModel, Written, read
-from mutator.config.yaml_sources import Source
+from mutator._common.shipped_files import SHIPPED_TARGET_ROOT
+from mutator.config.yaml_files import StrictModel, YamlRecord, load_yaml_model
+from mutator.config.yaml_sources import YamlSource
 from mutator.targets.channel_model import ChannelModel, TraceModel, read_channels
 from mutator.targets.contact_severity import Contact
 from mutator.targets.criteria_model import HazardModel, MetricModel, read_hazards, read_metrics
@@ -105,7 +105,7 @@ class ManifestModel(StrictModel, title="The file"):
         default_factory=dict,
         description="The numbers computed for each run. They are columns of the results.",
     )
-    severity: Written[Contact] | None = Field(
+    severity: YamlRecord[Contact] | None = Field(
         None, description="How severe a contact is. Without it, results have no severity class."
     )
     scene: SceneModel | None = Field(None, description="How to draw a drive from above.")
@@ -113,21 +113,21 @@ class ManifestModel(StrictModel, title="The file"):
         default_factory=list,
         description="The names of the alerts to use; other alerts in a record are ignored.",
     )
-    film: Written[Film] | None = Field(
+    film: YamlRecord[Film] | None = Field(
         None, description="How to film runs. Without it, runs cannot be filmed."
     )
 
 
 def load_manifest(path: Path, root: Path | None = None, overlay: Path | None = None) -> TargetManifest:
     """Read a manifest; `root` and `overlay` override the values in the file."""
-    model, source = read(path, ManifestModel, SCHEMA)
+    model, source = load_yaml_model(path, ManifestModel, SCHEMA)
     requires = read_requirements(model.requires, source)
     folder = (root or find_root(model.root, source, requires)).resolve()
     if not folder.is_dir():
         raise source.error(
             ("root",),
             f"no folder {folder}",
-            expected=f"the target's source root, relative to this file, or {SHIPPED_TARGET}, or "
+            expected=f"the target's source root, relative to this file, or {SHIPPED_TARGET_ROOT}, or "
             f"{INSTALLED}NAME",
             remedy="correct `root`, or give the target with --target or MUTATOR_TARGET",
         )
@@ -183,20 +183,20 @@ def load_manifest(path: Path, root: Path | None = None, overlay: Path | None = N
     )
 
 
-def _check_names(model: ManifestModel, source: Source) -> None:
+def _check_names(model: ManifestModel, source: YamlSource) -> None:
     """Refuse names that point out of the folders to which they belong."""
-    with source.placing(("name",)):
+    with source.locating_errors(("name",)):
         check_name(model.name, source.path)
     for name in model.entry.changes:
-        with source.placing(("entry", "changes", name)):
+        with source.locating_errors(("entry", "changes", name)):
             check_name(name, source.path, folders=False)
     for key in ("files", "forbid", "reads_itself"):
         for i, glob in enumerate(getattr(model, key) or ()):
-            with source.placing((key, i)):
+            with source.locating_errors((key, i)):
                 inside(glob)
 
 
-def _check_record(model: ManifestModel, source: Source) -> None:
+def _check_record(model: ManifestModel, source: YamlSource) -> None:
     if model.record is not None and Path(model.record).name != model.record:
         raise source.error(
             ("record",),
@@ -206,7 +206,7 @@ def _check_record(model: ManifestModel, source: Source) -> None:
         )
 
 
-def _check_recorded(source: Source, hidden: Collection[str]) -> None:
+def _check_recorded(source: YamlSource, hidden: Collection[str]) -> None:
     """Check that hazards and metrics use only recorded values, because they are judged on the trace."""
     for key in ("hazards", "metrics"):
         entries = source.data.get(key)
@@ -222,7 +222,7 @@ def _check_recorded(source: Source, hidden: Collection[str]) -> None:
                     )
 
 
-def _check_events(model: ManifestModel, source: Source) -> None:
+def _check_events(model: ManifestModel, source: YamlSource) -> None:
     for key in ("hazards", "alerts"):
         seen = set[str]()
         names = getattr(model, key)

@@ -5,15 +5,15 @@ import keyword
 
 from pydantic import Field
 
-from mutator._common.message_text import shown
-from mutator.config.location_model import AtModel
-from mutator.config.location_syntax import PROBE_NAME, dotted_name
+from mutator._common.message_text import describe_value
+from mutator.config.location_model import LocationModel
+from mutator.config.location_syntax import PROBE_NAME, is_dotted_name
 from mutator.config.yaml_files import StrictModel
-from mutator.config.yaml_sources import Source
+from mutator.config.yaml_sources import YamlSource
 from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS
 from mutator.targets.observed_values import Observation, Value
 from mutator.targets.relative_paths import inside
-from mutator.triggers.conditions import RESERVED, TIME, check_formula
+from mutator.triggers.conditions import RESERVED_NAMES, TIME, canonical_formula
 
 _LONGEST = 1000  # characters in an expression, at most
 _READING = (
@@ -21,7 +21,7 @@ _READING = (
     *(ast.operator, ast.unaryop, ast.cmpop),
 )
 _FUNCTIONS = ("abs", "min", "max", "hypot", "float", "len")
-_TAKEN = (*RESERVED, "math")
+_TAKEN = (*RESERVED_NAMES, "math")
 _ARGUMENTS = {"abs": (1, 1), "float": (1, 1), "len": (1, 1), "hypot": (2, 2)}  # other functions: one or more
 
 
@@ -40,7 +40,7 @@ class ObservationModel(StrictModel, title="The observation"):
     when another run begins.
     """
 
-    at: AtModel = Field(description="The place in the source at which the values are read.")
+    at: LocationModel = Field(description="The place in the source at which the values are read.")
     time: str | None = Field(
         None,
         description="The time in s, as an expression like those of `values`. Without it, the probe counts "
@@ -60,7 +60,7 @@ class ObservationModel(StrictModel, title="The observation"):
     )
 
 
-def read_observation(model: ObservationModel, source: Source) -> Observation:
+def read_observation(model: ObservationModel, source: YamlSource) -> Observation:
     location = model.at.location(source, ("observation", "at"))
     if location.anchor.kind in VALUE_ANCHORS | FIXED_ANCHORS:
         raise source.error(
@@ -68,7 +68,7 @@ def read_observation(model: ObservationModel, source: Source) -> Observation:
             f"an observation at `{location.anchor.kind.value}`",
             expected="a statement, such as `after_assign: gap`",
         )
-    with source.placing(("observation", "at", "file")):
+    with source.locating_errors(("observation", "at", "file")):
         inside(location.path)
     _check_names(model, source)
     time = None if model.time is None else _read(model.time, source, ("observation", "time"))
@@ -86,7 +86,7 @@ def read_observation(model: ObservationModel, source: Source) -> Observation:
     )
 
 
-def _check_names(model: ObservationModel, source: Source) -> None:
+def _check_names(model: ObservationModel, source: YamlSource) -> None:
     for key, names in (("values", model.values), ("derived", model.derived)):
         for name in names:
             good = name.isidentifier() and not keyword.iskeyword(name) and not name.startswith("_")
@@ -99,23 +99,23 @@ def _check_names(model: ObservationModel, source: Source) -> None:
                 )
 
 
-def _derived(model: ObservationModel, source: Source, known: list[str]) -> tuple[Value, ...]:
+def _derived(model: ObservationModel, source: YamlSource, known: list[str]) -> tuple[Value, ...]:
     found = []
     for name, value in model.derived.items():
-        with source.placing(("observation", "derived", name, "is")):
-            text = check_formula(value.is_, known)
+        with source.locating_errors(("observation", "derived", name, "is")):
+            text = canonical_formula(value.is_, known)
         found.append(Value(name=name, text=text, unit=value.unit, about=value.about))
         known.append(name)
     return tuple(found)
 
 
-def _read(text: str, source: Source, keys: tuple[str, ...]) -> str:
+def _read(text: str, source: YamlSource, keys: tuple[str, ...]) -> str:
     try:
         return _expression(text)
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise source.error(
             keys,
-            shown(text),
+            describe_value(text),
             expected="names, attributes, items with constant keys, numbers, arithmetic, comparisons, and "
             f"calls of {', '.join(_FUNCTIONS)}",
             remedy="write an expression that gives the value at that statement",
@@ -153,9 +153,9 @@ def _is_plain(node: ast.AST) -> bool:
     if isinstance(node, ast.Constant):
         return type(node.value) in (int, float, str)
     if isinstance(node, ast.Name):
-        return dotted_name(node.id)
+        return is_dotted_name(node.id)
     if isinstance(node, ast.Attribute):
-        return dotted_name(node.attr)
+        return is_dotted_name(node.attr)
     return isinstance(node, _READING)
 
 

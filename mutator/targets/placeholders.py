@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterable, Mapping, Sequence
 
-from mutator.config.yaml_sources import Keys, Source
+from mutator.config.yaml_sources import KeyPath, YamlSource
 
 OF_RUNS = ("scenario", "seed", "out", "cache", "root")
 OF_FILMED_RUNS = (*OF_RUNS, "film")
@@ -15,7 +15,9 @@ def filled(arguments: Iterable[str], values: Mapping[str, str]) -> list[str]:
     return [_PLACEHOLDER.sub(lambda found: values[found[1]], argument) for argument in arguments]
 
 
-def check_placeholders(arguments: Sequence[str], known: Sequence[str], source: Source, keys: Keys) -> None:
+def check_placeholders(
+    arguments: Sequence[str], known: Sequence[str], source: YamlSource, keys: KeyPath
+) -> None:
     for i, argument in enumerate(arguments):
         for name in _PLACEHOLDER.findall(argument):
             if name not in known:

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Mapping
 
-from mutator.config.yaml_sources import Source
+from mutator.config.yaml_sources import YamlSource
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
 KEPT = ("PATH", "LD_LIBRARY_PATH", "HOME")  # the user's own values, needed to start Python
@@ -20,7 +20,7 @@ _OWN = ("TMPDIR", *KEPT, *FIXED)
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
 
 
-def check_environment(env: Mapping[str, str], source: Source) -> None:
+def check_environment(env: Mapping[str, str], source: YamlSource) -> None:
     """Raise MutatorError for a variable in a manifest's `env` that cannot be set, or that the harness sets
     differently.
     """

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from packaging.requirements import InvalidRequirement, Requirement
 
-from mutator.config.yaml_sources import Source
+from mutator.config.yaml_sources import YamlSource
 
 if TYPE_CHECKING:
     from mutator.targets.manifest import TargetManifest
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 MISSING = "not installed"
 
 
-def read_requirements(texts: Sequence[str], source: Source) -> tuple[Requirement, ...]:
+def read_requirements(texts: Sequence[str], source: YamlSource) -> tuple[Requirement, ...]:
     """Read a manifest's `requires`; MutatorError with the line of an invalid requirement."""
     found = []
     for i, text in enumerate(texts):

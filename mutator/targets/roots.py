@@ -7,19 +7,19 @@ from pathlib import Path
 from packaging.requirements import Requirement
 
 from mutator._common.confined_files import is_inside
-from mutator._common.shipped_files import SHIPPED_TARGET, shipped_folder
+from mutator._common.shipped_files import SHIPPED_TARGET_ROOT, shipped_folder
 from mutator.config.location_syntax import PROBE_NAME
-from mutator.config.yaml_sources import Source
+from mutator.config.yaml_sources import YamlSource
 from mutator.targets.required_packages import pip_install
 
 INSTALLED = "installed:"  # prefix of an import package's name, as `root` of a manifest
 
 
-def find_root(root: str, source: Source, requires: Sequence[Requirement]) -> Path:
+def find_root(root: str, source: YamlSource, requires: Sequence[Requirement]) -> Path:
     """Find the folder that a manifest's `root` names; it might not exist. An installed package is not
     imported.
     """
-    if root == SHIPPED_TARGET:
+    if root == SHIPPED_TARGET_ROOT:
         return shipped_folder() / "target"
     if not root.startswith(INSTALLED):
         return source.path.parent / root
@@ -37,7 +37,7 @@ def find_root(root: str, source: Source, requires: Sequence[Requirement]) -> Pat
     return place.parent
 
 
-def find_overlay(overlay: str | None, source: Source) -> Path | None:
+def find_overlay(overlay: str | None, source: YamlSource) -> Path | None:
     path = source.path
     if overlay is None:
         return None
@@ -59,7 +59,7 @@ def find_overlay(overlay: str | None, source: Source) -> Path | None:
     )
 
 
-def read_packages(package: str | None, packages: Sequence[str] | None, source: Source) -> tuple[str, ...]:
+def read_packages(package: str | None, packages: Sequence[str] | None, source: YamlSource) -> tuple[str, ...]:
     """Read the target's packages and modules, without duplicates."""
     if (package is None) == (packages is None):
         raise source.error(
@@ -92,7 +92,7 @@ def read_packages(package: str | None, packages: Sequence[str] | None, source: S
     return names
 
 
-def check_installed(root: str, packages: Sequence[str], files: Sequence[str], source: Source) -> None:
+def check_installed(root: str, packages: Sequence[str], files: Sequence[str], source: YamlSource) -> None:
     """Raise MutatorError if the tree would contain files outside an installed package."""
     name = root.removeprefix(INSTALLED)
     if name == root:

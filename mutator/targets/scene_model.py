@@ -6,7 +6,7 @@ from collections.abc import Collection
 from pydantic import Field
 
 from mutator.config.yaml_files import StrictModel
-from mutator.config.yaml_sources import Keys, Source
+from mutator.config.yaml_sources import KeyPath, YamlSource
 from mutator.targets.manifest_formulas import condition, formula
 from mutator.targets.scene import Actor, Line, Scene, Shape
 
@@ -59,7 +59,7 @@ class SceneModel(StrictModel, title="The scene"):
     )
 
 
-def read_scene(model: SceneModel, known: Collection[str], source: Source) -> Scene:
+def read_scene(model: SceneModel, known: Collection[str], source: YamlSource) -> Scene:
     if model.follow is not None and model.follow not in model.actors:
         raise source.error(
             ("scene", "follow"),
@@ -73,8 +73,8 @@ def read_scene(model: SceneModel, known: Collection[str], source: Source) -> Sce
     return Scene(actors=actors, lines=lines, follow=model.follow or "", speed=speed)
 
 
-def _actor(name: str, model: _ActorModel, known: Collection[str], source: Source) -> Actor:
-    keys: Keys = ("scene", "actors", name)
+def _actor(name: str, model: _ActorModel, known: Collection[str], source: YamlSource) -> Actor:
+    keys: KeyPath = ("scene", "actors", name)
     if model.shape == "circle" and model.width_m is not None:
         raise source.error(
             (*keys, "width_m"), "the width of a circle", expected="`length_m` alone", remedy="remove it"
@@ -93,8 +93,8 @@ def _actor(name: str, model: _ActorModel, known: Collection[str], source: Source
     )
 
 
-def _line(name: str, model: _LineModel, known: Collection[str], source: Source) -> Line:
-    keys: Keys = ("scene", "lines", name)
+def _line(name: str, model: _LineModel, known: Collection[str], source: YamlSource) -> Line:
+    keys: KeyPath = ("scene", "lines", name)
     if (model.points_m is None) == (model.y is None):
         raise source.error(
             keys, f"line '{name}'", expected="either `points_m` or `y`", remedy="give exactly one of the two"

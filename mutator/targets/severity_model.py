@@ -6,13 +6,13 @@ from pathlib import Path
 from pydantic import Field
 
 from mutator.config.units import UNITS
-from mutator.config.yaml_files import StrictModel, read
-from mutator.config.yaml_sources import Source
+from mutator.config.yaml_files import StrictModel, load_yaml_model
+from mutator.config.yaml_sources import YamlSource
 from mutator.targets.contact_severity import CLASSES, Contact, Scale
 from mutator.targets.criteria import Hazard, Metric
 
 SCHEMA = "severity/1"
-_KPH = UNITS["kph"].factor
+_KPH = UNITS["kph"].si_factor
 
 
 class _ClassModel(StrictModel, title="A class"):
@@ -33,7 +33,7 @@ class ScaleModel(StrictModel, title="severity/*.yaml"):
 
 
 def check_contact(
-    contact: Contact, hazards: Sequence[Hazard], metrics: Sequence[Metric], source: Source
+    contact: Contact, hazards: Sequence[Hazard], metrics: Sequence[Metric], source: YamlSource
 ) -> None:
     """Raise MutatorError, with the line, for an unsuitable hazard or metric of a manifest's severity."""
     terminal = [hazard.name for hazard in hazards if hazard.terminal]
@@ -56,7 +56,7 @@ def check_contact(
 
 def load_scale(path: Path) -> Scale:
     """Read a scale of a library; MutatorError, with the line, unless the classes are S0 to S3 in order."""
-    model, source = read(path, ScaleModel, SCHEMA)
+    model, source = load_yaml_model(path, ScaleModel, SCHEMA)
     if tuple(model.classes) != CLASSES:
         raise source.error(
             ("classes",),

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from mutator._common.bounded_reading import read_bounded
-from mutator._common.confined_files import check_inside, check_name, inside, is_inside
-from mutator._common.files import check_is_text
-from mutator._common.hashing import canonical, digest
+from mutator._common.confined_files import check_inside, check_name, is_inside, path_below
+from mutator._common.files import check_path_encodable
+from mutator._common.hashing import canonical_json, digest
 from mutator.errors import MutatorError
 
 T = TypeVar("T")
@@ -75,7 +75,7 @@ class SourceTree:
 
 def _entries(files: Mapping[str, bytes]) -> dict[str, str]:
     """Return what each file adds to the digest: its path and digest, as canonical text."""
-    return {path: canonical([path, digest(data)]) for path, data in files.items()}
+    return {path: canonical_json([path, digest(data)]) for path, data in files.items()}
 
 
 def _digest(entries: Mapping[str, str]) -> str:
@@ -99,7 +99,7 @@ def read_tree(
     files = _read(root, tuple(globs), None if any_links else root)
     laid_over = _read(overlay, ("**",), library or overlay) if overlay else {}
     for path in laid_over:
-        if os.path.lexists(inside(root, path)):
+        if os.path.lexists(path_below(root, path)):
             raise MutatorError(
                 f"'{path}' is in the overlay and in {root}",
                 where=overlay,
@@ -150,7 +150,7 @@ def _read(root: Path, globs: tuple[str, ...], bounds: Path | None) -> dict[str, 
     files: dict[str, bytes] = {}
     left = MOST_TREE
     for path in sorted(path for path, name in found.items() if matches(name, globs)):
-        check_is_text(path)
+        check_path_encodable(path)
         check_name(found[path], root)
         if bounds is not None and path.is_symlink():
             check_inside(bounds, path)

@@ -3,11 +3,11 @@
 import ast
 from inspect import getsource
 
-from mutator.config.yaml_sources import Keys
+from mutator.config.yaml_sources import KeyPath
 from mutator.errors import MutatorError
 from mutator.targets.criteria import Hazard
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.conditions import TIME, divide, names_in, parse, to_code
+from mutator.triggers.conditions import TIME, divide, names_in, parse_expression, to_python
 
 _REMEDY = "leave `after_hazard` out of the campaign, so that runs continue"
 
@@ -37,8 +37,8 @@ def stop_source(manifest: TargetManifest) -> str:
             raise _refused(manifest, keys, f"{channel.name} has separate times", "a number in each step")
         if channel.name in needed:
             lines.append(f"    {channel.name} = float(recorded[{channel.in_trace!r}])")
-    lines += [f"    {v.name} = {to_code(v.text, number=True)}" for v in derived if v.name in needed]
-    holds = " or ".join(f"({to_code(text)})" for text in conditions)
+    lines += [f"    {v.name} = {to_python(v.text, number=True)}" for v in derived if v.name in needed]
+    holds = " or ".join(f"({to_python(text)})" for text in conditions)
     return "\n".join(
         [getsource(divide), "_div = divide", "def over(recorded):", *lines, f"    return {holds}", ""]
     )
@@ -53,13 +53,15 @@ def _condition(manifest: TargetManifest, hazard: Hazard) -> str:
         raise _refused(manifest, keys, f"{hazard.name}, which is judged by {judge}", "a condition, `when`")
     if hazard.for_s and not own:
         raise _refused(manifest, (*keys, "for_s"), f"{hazard.name} has `for_s`", "a condition of one step")
-    calls = {ast.unparse(node.func) for node in ast.walk(parse(text)) if isinstance(node, ast.Call)}
+    calls = {
+        ast.unparse(node.func) for node in ast.walk(parse_expression(text)) if isinstance(node, ast.Call)
+    }
     if earlier := calls & {"ever", "rate"}:
         got = f"{hazard.name} uses `{min(earlier)}`"
         raise _refused(manifest, keys, got, "a condition of a single step")
     return text
 
 
-def _refused(manifest: TargetManifest, keys: Keys, got: str, expected: str) -> MutatorError:
+def _refused(manifest: TargetManifest, keys: KeyPath, got: str, expected: str) -> MutatorError:
     got = f"runs cannot stop at a terminal hazard: {got}"
     return manifest.source.error(keys, got, expected=expected, remedy=_REMEDY)

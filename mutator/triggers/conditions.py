@@ -14,19 +14,28 @@ from mutator._common.message_text import counted, operator_hint
 from mutator.errors import MutatorError
 
 TIME = "t"  # s; every target has it
-GOLDEN = "golden."  # before a name: its value in the golden run
-_FUNCTIONS = ("abs", "min", "max", "hypot")
-_OVER_TIME = ("ever", "rate")  # whether a condition has held so far; a number's change per second
-_ARGUMENTS = {"abs": (1, 1), "hypot": (2, 2), "rate": (1, 1)}  # minimum, maximum; others take two or more
-_NAMES = (*_FUNCTIONS, *_OVER_TIME, "inf", "True", "False")  # not variables
-_COMPARE = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
-_ARITHMETIC = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
-RESERVED = (*_FUNCTIONS, *_OVER_TIME, "inf", TIME)  # names in formulas that are not the target's values
-_MAX_LENGTH = 1000
-_ALLOWED = "comparisons, and/or/not, + - * /, abs/min/max/hypot, numbers, True, and "
+GOLDEN_PREFIX = "golden."  # before a name: its value in the golden run
+_ALLOWED_FUNCTIONS = ("abs", "min", "max", "hypot")
+_FUNCTIONS_OVER_TIME = ("ever", "rate")  # whether a condition has held so far; a number's change per second
+_ARGUMENT_COUNTS = {
+    "abs": (1, 1),
+    "hypot": (2, 2),
+    "rate": (1, 1),
+}  # minimum, maximum; others take two or more
+_BUILT_IN_NAMES = (*_ALLOWED_FUNCTIONS, *_FUNCTIONS_OVER_TIME, "inf", "True", "False")  # not variables
+_COMPARISON_SIGNS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
+_ARITHMETIC_SIGNS = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
+RESERVED_NAMES = (
+    *_ALLOWED_FUNCTIONS,
+    *_FUNCTIONS_OVER_TIME,
+    "inf",
+    TIME,
+)  # names in formulas that are not the target's values
+_MOST_LENGTH = 1000
+_ALLOWED_SYNTAX = "comparisons, and/or/not, + - * /, abs/min/max/hypot, numbers, True, and "
 
 
-def check_condition(
+def canonical_condition(
     text: str,
     constants: Mapping[str, float] | None = None,
     variables: Collection[str] | None = None,
@@ -40,18 +49,19 @@ def check_condition(
     number, which need a whole trace. Anything else raises MutatorError without file and line, which the
     caller adds.
     """
-    return _checked(text, constants or {}, variables, number=False, over_time=over_time)
+    return _canonical_text(text, constants or {}, variables, number=False, over_time=over_time)
 
 
-def check_formula(text: str, variables: Collection[str], *, over_time: bool = False) -> str:
-    """Check a formula and return its canonical text; errors as in `check_condition`.
+def canonical_formula(text: str, variables: Collection[str], *, over_time: bool = False) -> str:
+    """Check a formula and return its canonical text; errors as in `canonical_condition`.
 
-    Allowed: everything that `check_condition` allows inside a comparison, `inf`, and `a if CONDITION else b`.
+    Allowed: everything that `canonical_condition` allows inside a comparison, `inf`, and `a if CONDITION else
+    b`.
     """
-    return _checked(text, {}, variables, number=True, over_time=over_time)
+    return _canonical_text(text, {}, variables, number=True, over_time=over_time)
 
 
-def _checked(
+def _canonical_text(
     text: str,
     constants: Mapping[str, float],
     variables: Collection[str] | None,
@@ -60,34 +70,38 @@ def _checked(
     over_time: bool,
 ) -> str:
     try:
-        writer = _Writer(text, constants, variables, divide="({} / {})", over_time=over_time)
-        canonical = writer.number(parse(text)) if number else writer.boolean(parse(text))
+        writer = _ExpressionWriter(text, constants, variables, divide="({} / {})", over_time=over_time)
+        canonical = (
+            writer.number(parse_expression(text)) if number else writer.boolean(parse_expression(text))
+        )
         # the probe must be able to compile it, too
         if over_time:
             compile(canonical, "<condition>", "eval")
         else:
-            _function(canonical, names_in(canonical), number)
+            _compile_function(canonical, names_in(canonical), number)
     except (SyntaxError, RecursionError, MemoryError):
-        raise _refuse("too many nested operations", text, variables, "simplify it") from None
+        raise _syntax_error("too many nested operations", text, variables, "simplify it") from None
     return canonical
 
 
 def names_in(text: str) -> tuple[str, ...]:
-    nodes = (node for node in ast.walk(parse(text)) if isinstance(node, ast.Name))
-    found = sorted(nodes, key=lambda node: (node.lineno, node.col_offset))
-    return tuple(dict.fromkeys(node.id for node in found if node.id not in _NAMES))
+    nodes = (node for node in ast.walk(parse_expression(text)) if isinstance(node, ast.Name))
+    ordered = sorted(nodes, key=lambda node: (node.lineno, node.col_offset))
+    return tuple(dict.fromkeys(node.id for node in ordered if node.id not in _BUILT_IN_NAMES))
 
 
-def to_code(text: str, *, number: bool = False) -> str:
+def to_python(text: str, *, number: bool = False) -> str:
     """Convert a checked condition or formula to Python that cannot raise and uses `_div` and `math`."""
-    writer = _Writer(text, {}, None, divide="_div({}, {})", infinity="math.inf", hypot="math.hypot")
-    return writer.number(parse(text)) if number else writer.boolean(parse(text))
+    writer = _ExpressionWriter(text, {}, None, divide="_div({}, {})", infinity="math.inf", hypot="math.hypot")
+    return writer.number(parse_expression(text)) if number else writer.boolean(parse_expression(text))
 
 
-def evaluate(condition: str, values: Mapping[str, float]) -> bool:
+def evaluate_condition(condition: str, values: Mapping[str, float]) -> bool:
     """Evaluate a condition as the probe does; missing values are NaN."""
     names = names_in(condition)
-    return bool(_function(condition, names, False)(*(float(values.get(name, math.nan)) for name in names)))
+    return bool(
+        _compile_function(condition, names, False)(*(float(values.get(name, math.nan)) for name in names))
+    )
 
 
 def divide(a: float, b: float) -> float:
@@ -98,30 +112,30 @@ def divide(a: float, b: float) -> float:
 
 
 @lru_cache(maxsize=256)
-def _function(text: str, names: tuple[str, ...], number: bool) -> Callable[..., object]:
-    source = f"lambda {', '.join(names)}: {to_code(text, number=number)}"
+def _compile_function(text: str, names: tuple[str, ...], number: bool) -> Callable[..., object]:
+    source = f"lambda {', '.join(names)}: {to_python(text, number=number)}"
     functions = {"__builtins__": {}, "abs": abs, "min": min, "max": max, "math": math, "_div": divide}
     return eval(compile(source, "<condition>", "eval"), functions)  # type: ignore[no-any-return]
 
 
-def _refuse(
+def _syntax_error(
     what: str, text: str, variables: Collection[str] | None, remedy: str = "rewrite it"
 ) -> MutatorError:
-    known = "the target's observed values" if variables is None else ", ".join(variables)
-    return MutatorError(f"{what} in {text!r}", expected=_ALLOWED + known, remedy=remedy)
+    allowed = "the target's observed values" if variables is None else ", ".join(variables)
+    return MutatorError(f"{what} in {text!r}", expected=_ALLOWED_SYNTAX + allowed, remedy=remedy)
 
 
 @lru_cache(maxsize=1024)  # a manifest's conditions are parsed for each run that is judged
-def parse(text: str) -> ast.expr:
+def parse_expression(text: str) -> ast.expr:
     """Parse a condition or formula into a tree that must not be changed; MutatorError for bad syntax."""
-    if len(text) > _MAX_LENGTH:
-        raise MutatorError(f"a condition of {len(text)} characters", expected=f"at most {_MAX_LENGTH}")
+    if len(text) > _MOST_LENGTH:
+        raise MutatorError(f"a condition of {len(text)} characters", expected=f"at most {_MOST_LENGTH}")
     try:
         tree = ast.parse(text.strip(), mode="eval").body
-        return _GoldenNames().visit(tree) if GOLDEN in text else tree
+        return _GoldenNames().visit(tree) if GOLDEN_PREFIX in text else tree
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         hint = operator_hint(text) or "rewrite it"
-        raise _refuse(f"{getattr(error, 'msg', error)}", text, None, hint) from None
+        raise _syntax_error(f"{getattr(error, 'msg', error)}", text, None, hint) from None
 
 
 class _GoldenNames(ast.NodeTransformer):
@@ -129,10 +143,10 @@ class _GoldenNames(ast.NodeTransformer):
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
         name = ast.unparse(node)
-        return ast.copy_location(ast.Name(name, ast.Load()), node) if name.startswith(GOLDEN) else node
+        return ast.copy_location(ast.Name(name, ast.Load()), node) if name.startswith(GOLDEN_PREFIX) else node
 
 
-class _Writer:
+class _ExpressionWriter:
     """Writes a parsed condition as text.
 
     It rejects everything that is not allowed, booleans used as numbers, and numbers used as booleans.
@@ -152,8 +166,8 @@ class _Writer:
         self.text = text
         self.constants = constants
         self.variables = variables
-        self.divide = divide
-        self.written = {"inf": infinity, "hypot": hypot}
+        self.division_format = divide
+        self.replacements = {"inf": infinity, "hypot": hypot}
         self.over_time = over_time
 
     def boolean(self, node: ast.expr) -> str:
@@ -186,9 +200,9 @@ class _Writer:
     def _compare(self, node: ast.Compare) -> str:
         parts = [self._term(node.left)]
         for operator, value in zip(node.ops, node.comparators, strict=True):
-            if type(operator) not in _COMPARE:
+            if type(operator) not in _COMPARISON_SIGNS:
                 raise self._refuse(f"{ast.unparse(node)!r}")
-            parts += [_COMPARE[type(operator)], self._term(value)]
+            parts += [_COMPARISON_SIGNS[type(operator)], self._term(value)]
         return " ".join(parts)
 
     def _term(self, node: ast.expr) -> str:
@@ -199,11 +213,11 @@ class _Writer:
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub | ast.UAdd):
             sign = "-" if isinstance(node.op, ast.USub) else ""
             return f"{sign}{self._term(node.operand)}"
-        if isinstance(node, ast.BinOp) and type(node.op) in _ARITHMETIC:
+        if isinstance(node, ast.BinOp) and type(node.op) in _ARITHMETIC_SIGNS:
             left, right = self._term(node.left), self._term(node.right)
             if isinstance(node.op, ast.Div):
-                return self.divide.format(left, right)
-            return f"({left} {_ARITHMETIC[type(node.op)]} {right})"
+                return self.division_format.format(left, right)
+            return f"({left} {_ARITHMETIC_SIGNS[type(node.op)]} {right})"
         if isinstance(node, ast.Call):
             return self._call(node)
         raise self._refuse(f"{ast.unparse(node)!r}")
@@ -223,8 +237,10 @@ class _Writer:
         if name in self.constants:
             return repr(float(self.constants[name]))
         if name == "inf":
-            return self.written["inf"]
-        if name not in _NAMES and (GOLDEN not in name if self.variables is None else name in self.variables):
+            return self.replacements["inf"]
+        if name not in _BUILT_IN_NAMES and (
+            GOLDEN_PREFIX not in name if self.variables is None else name in self.variables
+        ):
             return name
         remedy = (
             f"the known constants are {', '.join(self.constants)}" if self.constants else "check its spelling"
@@ -233,13 +249,13 @@ class _Writer:
 
     def _call(self, node: ast.Call) -> str:
         name = node.func.id if isinstance(node.func, ast.Name) else ast.unparse(node.func)
-        known = (*_FUNCTIONS, "rate") if self.over_time else _FUNCTIONS
-        if name not in known or node.keywords or any(isinstance(a, ast.Starred) for a in node.args):
+        allowed = (*_ALLOWED_FUNCTIONS, "rate") if self.over_time else _ALLOWED_FUNCTIONS
+        if name not in allowed or node.keywords or any(isinstance(a, ast.Starred) for a in node.args):
             raise self._refuse(f"a call of '{name}'")
-        least, most = _ARGUMENTS.get(name, (2, math.inf))
+        least, most = _ARGUMENT_COUNTS.get(name, (2, math.inf))
         if not least <= len(node.args) <= most:
             raise self._refuse(f"{name} with {counted(len(node.args), 'argument')}")
-        return f"{self.written.get(name, name)}({', '.join(self._term(a) for a in node.args)})"
+        return f"{self.replacements.get(name, name)}({', '.join(self._term(a) for a in node.args)})"
 
     def _refuse(self, what: str, remedy: str = "rewrite it") -> MutatorError:
-        return _refuse(what, self.text, self.variables, remedy)
+        return _syntax_error(what, self.text, self.variables, remedy)

@@ -9,11 +9,11 @@ import ast
 from collections.abc import Mapping
 from typing import Any
 
-from mutator.triggers.conditions import parse
+from mutator.triggers.conditions import parse_expression
 
-Tree = bool | float | str | list[Any]
+JsonTree = bool | float | str | list[Any]
 
-_OPERATORS: Mapping[type[ast.AST], str] = {
+_OPERATOR_SIGNS: Mapping[type[ast.AST], str] = {
     ast.Add: "+",
     ast.Sub: "-",
     ast.Mult: "*",
@@ -31,36 +31,36 @@ _OPERATORS: Mapping[type[ast.AST], str] = {
 }
 
 
-def tree(text: str, derived: Mapping[str, str]) -> Tree:
+def formula_as_json(text: str, derived: Mapping[str, str]) -> JsonTree:
     """Return the tree of a checked condition or formula; `derived` values are replaced by their formulas."""
-    return _tree(parse(text), derived)
+    return _node_as_json(parse_expression(text), derived)
 
 
-def _tree(node: ast.expr, derived: Mapping[str, str]) -> Tree:
+def _node_as_json(node: ast.expr, derived: Mapping[str, str]) -> JsonTree:
     if isinstance(node, ast.Constant):
         return node.value if isinstance(node.value, bool) else float(node.value)  # type: ignore[arg-type]
     if isinstance(node, ast.Name):
-        return tree(derived[node.id], derived) if node.id in derived else node.id
+        return formula_as_json(derived[node.id], derived) if node.id in derived else node.id
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.UAdd):
-        return _tree(node.operand, derived)
-    name, parts = _application(node)
-    return [name, *(_tree(part, derived) for part in parts)]
+        return _node_as_json(node.operand, derived)
+    name, parts = _operator_and_operands(node)
+    return [name, *(_node_as_json(part, derived) for part in parts)]
 
 
-def _application(node: ast.expr) -> tuple[str, list[ast.expr]]:
+def _operator_and_operands(node: ast.expr) -> tuple[str, list[ast.expr]]:
     if isinstance(node, ast.BoolOp):
-        return _OPERATORS[type(node.op)], node.values
+        return _OPERATOR_SIGNS[type(node.op)], node.values
     if isinstance(node, ast.UnaryOp):
-        return _OPERATORS[type(node.op)], [node.operand]
+        return _OPERATOR_SIGNS[type(node.op)], [node.operand]
     if isinstance(node, ast.BinOp):
-        return _OPERATORS[type(node.op)], [node.left, node.right]
+        return _OPERATOR_SIGNS[type(node.op)], [node.left, node.right]
     if isinstance(node, ast.IfExp):
         return "if", [node.test, node.body, node.orelse]
     if isinstance(node, ast.Call):
         return ast.unparse(node.func), node.args
     assert isinstance(node, ast.Compare)
     if len(node.ops) == 1:
-        return _OPERATORS[type(node.ops[0])], [node.left, *node.comparators]
+        return _OPERATOR_SIGNS[type(node.ops[0])], [node.left, *node.comparators]
     terms = [node.left, *node.comparators]  # a < b < c
     pairs = zip(terms, node.ops, terms[1:], strict=False)
     return "and", [ast.Compare(left, [op], [right]) for left, op, right in pairs]

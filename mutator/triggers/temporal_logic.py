@@ -12,26 +12,28 @@ from mutator._common.message_text import suggestion
 from mutator.errors import MutatorError
 from mutator.triggers.conditions import TIME
 
-_NAME = re.compile(r"\b[A-Za-z_]\w*\b")
-_OUT = "robustness_of_it"
-_PLACE = re.compile(r"1:(\d+): Syntax")
-_BOUNDED = ("TimedAlways", "TimedEventually", "TimedUntil")
-_UNBOUNDED = ("Always", "Eventually", "Until")
-_NEXT = ("Next", "StrongNext")
-_LONGEST = 1000  # characters of a formula
-MOST_STEPS = 3000  # of all intervals of a formula together; rtamt's time grows with the square of some
-_SAME_LENGTH = 0.01  # tolerance in steps; times are sums of steps, or rounded
+_NAME_PATTERN = re.compile(r"\b[A-Za-z_]\w*\b")
+_OUTPUT_NAME = "robustness_of_it"
+_SYNTAX_ERROR_PATTERN = re.compile(r"1:(\d+): Syntax")
+_BOUNDED_OPERATORS = ("TimedAlways", "TimedEventually", "TimedUntil")
+_UNBOUNDED_OPERATORS = ("Always", "Eventually", "Until")
+_NEXT_OPERATORS = ("Next", "StrongNext")
+_MOST_LENGTH = 1000  # characters of a formula
+MOST_INTERVAL_STEPS = (
+    3000  # of all intervals of a formula together; rtamt's time grows with the square of some
+)
+_STEP_TOLERANCE = 0.01  # tolerance in steps; times are sums of steps, or rounded
 
 
-def check(formula: str, variables: Collection[str], step_s: float) -> None:
+def check_stl_formula(formula: str, variables: Collection[str], step_s: float) -> None:
     """Raise MutatorError if rtamt is missing, or cannot evaluate the formula in steps of `step_s`."""
     # NaN suffices: no arithmetic fails on it
-    _evaluated(formula, {name: np.full(1, np.nan) for name in (*variables, TIME)}, step_s)
+    _evaluate(formula, {name: np.full(1, np.nan) for name in (*variables, TIME)}, step_s)
 
 
 def names_in(formula: str, variables: Collection[str]) -> tuple[str, ...]:
-    known = set(variables)
-    return tuple(dict.fromkeys(name for name in _NAME.findall(formula) if name in known))
+    allowed = set(variables)
+    return tuple(dict.fromkeys(name for name in _NAME_PATTERN.findall(formula) if name in allowed))
 
 
 def robustness(formula: str, values: Mapping[str, np.ndarray], step_s: float) -> np.ndarray:
@@ -43,19 +45,19 @@ def robustness(formula: str, values: Mapping[str, np.ndarray], step_s: float) ->
     """
     time = values[TIME]
     lengths = np.diff(time)
-    uneven = np.flatnonzero(~(np.abs(lengths - step_s) <= _SAME_LENGTH * step_s))
+    uneven = np.flatnonzero(~(np.abs(lengths - step_s) <= _STEP_TOLERANCE * step_s))
     if uneven.size:
         raise MutatorError(
             f"a step of {lengths[uneven[0]]:g} s at {time[uneven[0]]:g} s, but {formula!r} counts steps",
             expected=f"steps of {step_s:g} s, the manifest's `step_s`",
             remedy="record steps of equal length, or write the hazard with `when`",
         )
-    return _evaluated(formula, values, step_s)
+    return _evaluate(formula, values, step_s)
 
 
-def _evaluated(formula: str, values: Mapping[str, np.ndarray], step_s: float) -> np.ndarray:
-    if len(formula) > _LONGEST:
-        raise MutatorError(f"a formula of {len(formula)} characters", expected=f"at most {_LONGEST}")
+def _evaluate(formula: str, values: Mapping[str, np.ndarray], step_s: float) -> np.ndarray:
+    if len(formula) > _MOST_LENGTH:
+        raise MutatorError(f"a formula of {len(formula)} characters", expected=f"at most {_MOST_LENGTH}")
     specification = _specification(step_s)
     formula = " ".join(formula.split())
     names, steps = names_in(formula, values), len(values[TIME])
@@ -64,12 +66,12 @@ def _evaluated(formula: str, values: Mapping[str, np.ndarray], step_s: float) ->
     try:
         _parse(specification, formula, names)
         _check_intervals(specification.ast.specs[-1], specification.offline_interpreter)
-        ahead = _ahead(specification.ast.specs[-1], specification.offline_interpreter)
-        told = specification.evaluate({**rows, "time": [*range(steps + 1)]}) if steps else []
+        steps_ahead = _steps_ahead(specification.ast.specs[-1], specification.offline_interpreter)
+        robustness_by_step = specification.evaluate({**rows, "time": [*range(steps + 1)]}) if steps else []
     except Exception as error:  # rtamt raises KeyError, ValueError, errors of its own, and arithmetic errors
-        raise _refusal(error, formula, values, step_s) from None
-    judged = [number for _, number in told[: max(0, steps - ahead)]]
-    return np.array([np.inf] * min(ahead, steps) + judged, dtype=float)
+        raise _formula_error(error, formula, values, step_s) from None
+    judged = [number for _, number in robustness_by_step[: max(0, steps - steps_ahead)]]
+    return np.array([np.inf] * min(steps_ahead, steps) + judged, dtype=float)
 
 
 def _specification(step_s: float) -> Any:
@@ -87,16 +89,16 @@ def _specification(step_s: float) -> Any:
 
 
 def _parse(specification: Any, formula: str, names: Collection[str]) -> None:
-    declared = {*names, _OUT}
+    declared = {*names, _OUTPUT_NAME}
     for name in declared:
         specification.declare_var(name, "float")
-    specification.spec = f"{_OUT} = {formula}"
-    before = logging.root.manager.disable
+    specification.spec = f"{_OUTPUT_NAME} = {formula}"
+    previous_level = logging.root.manager.disable
     logging.disable(logging.WARNING)  # rtamt warns about an unknown name, which is rejected below
     try:
         specification.parse()
     finally:
-        logging.disable(before)
+        logging.disable(previous_level)
     specification.offline_interpreter.set_ast(specification.ast)
     if unknown := sorted(specification.ast.vars - declared):
         raise KeyError(unknown[0])
@@ -109,7 +111,7 @@ def _check_intervals(node: Any, interpreter: Any) -> None:
         node = waiting.pop()
         waiting += _children(node)
         total += int(interpreter.time_unit_transformer(node)[1]) if hasattr(node, "begin") else 0
-    if total > MOST_STEPS:
+    if total > MOST_INTERVAL_STEPS:
         raise ValueError(f"intervals of {total} steps")
 
 
@@ -118,38 +120,39 @@ def _children(node: Any) -> list[Any]:
     return list({id(child): child for child in node.children}.values())
 
 
-def _ahead(node: Any, interpreter: Any) -> int:
+def _steps_ahead(node: Any, interpreter: Any) -> int:
     """Return how many steps a formula looks ahead; ValueError if unbounded."""
     kind = type(node).__name__
-    if kind in _UNBOUNDED:
+    if kind in _UNBOUNDED_OPERATORS:
         raise ValueError(f"unbounded {kind.lower()}")
-    below: int = max((_ahead(child, interpreter) for child in _children(node)), default=0)
+    below: int = max((_steps_ahead(child, interpreter) for child in _children(node)), default=0)
     if not hasattr(node, "begin"):
-        return below + (kind in _NEXT)
+        return below + (kind in _NEXT_OPERATORS)
     begin, end = interpreter.time_unit_transformer(node)
     if begin > end:
         raise ValueError("an interval that ends before it begins")
-    return below + (int(end) if kind in _BOUNDED else 0)
+    return below + (int(end) if kind in _BOUNDED_OPERATORS else 0)
 
 
-def _refusal(error: Exception, formula: str, variables: Collection[str], step_s: float) -> MutatorError:
+def _formula_error(error: Exception, formula: str, variables: Collection[str], step_s: float) -> MutatorError:
     """Turn rtamt's message into one for the formula's author."""
-    said = str(error).removeprefix("RTAMT Exception: ").strip()
+    message = str(error).removeprefix("RTAMT Exception: ").strip()
     remedy = "correct the formula"
-    if place := _PLACE.match(said):
-        rest = formula[int(place[1]) - len(f"{_OUT} = ") :]
-        said = f"unexpected {rest!r}" if rest else "an unexpected end"
+    if position := _SYNTAX_ERROR_PATTERN.match(message):
+        rest = formula[int(position[1]) - len(f"{_OUTPUT_NAME} = ") :]
+        message = f"unexpected {rest!r}" if rest else "an unexpected end"
     elif isinstance(error, KeyError):
         name = str(error.args[0])
-        said, remedy = f"unknown name '{name}'", f"correct it{suggestion(name, [*variables])}"
-    elif "unbounded" in said:
+        message, remedy = f"unknown name '{name}'", f"correct it{suggestion(name, [*variables])}"
+    elif "unbounded" in message:
         remedy = "bound the look-ahead, `always[0:2](x < 3)`, or look back: `historically(x < 3)`"
-    elif said.startswith("intervals of"):
-        remedy = f"shorten them: at most {MOST_STEPS} steps together, {MOST_STEPS * step_s:g} s here"
-    elif "sampling period" in said:
-        said, remedy = f"a time that is not a multiple of the step, {step_s:g} s,", "use a multiple"
+    elif message.startswith("intervals of"):
+        longest = f"{MOST_INTERVAL_STEPS} steps together, {MOST_INTERVAL_STEPS * step_s:g} s here"
+        remedy = f"shorten them: at most {longest}"
+    elif "sampling period" in message:
+        message, remedy = f"a time that is not a multiple of the step, {step_s:g} s,", "use a multiple"
     return MutatorError(
-        f"{said} in {formula!r}",
+        f"{message} in {formula!r}",
         expected="a formula of signal temporal logic that looks back, or ahead for a bounded time, over "
         + ", ".join(variables),
         remedy=remedy,

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from mutator.triggers.conditions import TIME, parse
+from mutator.triggers.conditions import TIME, parse_expression
 
-COMPARE: Mapping[type[ast.cmpop], np.ufunc] = {
+COMPARISONS: Mapping[type[ast.cmpop], np.ufunc] = {
     ast.Lt: np.less,
     ast.LtE: np.less_equal,
     ast.Gt: np.greater,
@@ -24,24 +24,24 @@ ARITHMETIC: Mapping[type[ast.operator], np.ufunc] = {
     ast.Div: np.divide,
 }
 _FUNCTIONS: Mapping[str, np.ufunc] = {"abs": np.abs, "hypot": np.hypot}
-_OF_MANY: Mapping[str, np.ufunc] = {"min": np.minimum, "max": np.maximum}
+_FUNCTIONS_OF_MANY: Mapping[str, np.ufunc] = {"min": np.minimum, "max": np.maximum}
 
 
-def holds(condition: str, values: Mapping[str, np.ndarray]) -> np.ndarray:
+def condition_at_each_step(condition: str, values: Mapping[str, np.ndarray]) -> np.ndarray:
     """Return for each step whether a checked condition holds. `values` includes the time (s)."""
     with np.errstate(all="ignore"):
-        return _for_each_step(_Evaluation(values).boolean(parse(condition)), values)
+        return _for_each_step(_Evaluation(values).boolean(parse_expression(condition)), values)
 
 
-def numbers(formula: str, values: Mapping[str, np.ndarray]) -> np.ndarray:
+def formula_at_each_step(formula: str, values: Mapping[str, np.ndarray]) -> np.ndarray:
     """Return a checked formula's value for each step. Division by 0 is infinite or NaN, as in the probe."""
     with np.errstate(all="ignore"):
-        return _for_each_step(_Evaluation(values).number(parse(formula)), values)
+        return _for_each_step(_Evaluation(values).number(parse_expression(formula)), values)
 
 
-def _for_each_step(found: Any, values: Mapping[str, np.ndarray]) -> np.ndarray:
+def _for_each_step(result: Any, values: Mapping[str, np.ndarray]) -> np.ndarray:
     shape = values[TIME].shape
-    return found if np.shape(found) == shape else np.full(shape, found)
+    return result if np.shape(result) == shape else np.full(shape, result)
 
 
 class _Evaluation:
@@ -60,12 +60,12 @@ class _Evaluation:
         if isinstance(node, ast.UnaryOp):
             return np.logical_not(self.boolean(node.operand))
         if isinstance(node, ast.Call):  # ever
-            held = _for_each_step(self.boolean(node.args[0]), self._values)
-            return np.logical_or.accumulate(held)
+            condition = _for_each_step(self.boolean(node.args[0]), self._values)
+            return np.logical_or.accumulate(condition)
         assert isinstance(node, ast.Compare)
         terms = [self.number(part) for part in (node.left, *node.comparators)]
-        found = [COMPARE[type(op)](*terms[i : i + 2]) for i, op in enumerate(node.ops)]
-        return reduce(np.logical_and, found)
+        comparisons = [COMPARISONS[type(op)](*terms[i : i + 2]) for i, op in enumerate(node.ops)]
+        return reduce(np.logical_and, comparisons)
 
     def number(self, node: ast.expr) -> Any:
         if isinstance(node, ast.Constant):
@@ -85,8 +85,8 @@ class _Evaluation:
     def _call(self, node: ast.Call, arguments: list[Any]) -> Any:
         assert isinstance(node.func, ast.Name)
         name = node.func.id
-        if name in _OF_MANY:
-            return reduce(_OF_MANY[name], arguments)
+        if name in _FUNCTIONS_OF_MANY:
+            return reduce(_FUNCTIONS_OF_MANY[name], arguments)
         if name == "rate":
             values = _for_each_step(arguments[0], self._values)
             return np.concatenate(([np.nan], np.diff(values) / np.diff(self._time)))[: len(values)]

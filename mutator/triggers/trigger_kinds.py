@@ -1,25 +1,25 @@
 """The kinds of triggers: each makes a `Trigger` from a condition and a hold.
 
-A kind is a function that makes its triggers and, if users can type it, a reader in `READERS`.
+A kind is a function that makes its triggers and, if users can type it, a parser in `TRIGGER_PARSERS`.
 """
 
 import math
 from collections.abc import Callable, Collection
 
-from mutator._common.random_streams import generator
+from mutator._common.random_streams import random_generator
 from mutator.errors import MutatorError
 from mutator.model import Hold, Trigger
-from mutator.triggers.conditions import check_condition
+from mutator.triggers.conditions import canonical_condition
 
 ALWAYS = "always"  # the trigger of a permanent fault
 
 
-def always(*, armed_after_s: float = 0.0) -> Trigger:
+def always_trigger(*, armed_after_s: float = 0.0) -> Trigger:
     """Return a trigger that fires at the first observation after arming and stays active."""
     return Trigger(name=ALWAYS, condition="True", hold=Hold.TO_END, armed_after_s=armed_after_s)
 
 
-def at_time(time_s: float, *, name: str = "random", hold_s: float | None = None) -> Trigger:
+def trigger_at_time(time_s: float, *, name: str = "random", hold_s: float | None = None) -> Trigger:
     """Return a trigger that fires at the first step that starts at `time_s` or later.
 
     It stays active for `hold_s`, or to the end of the run.
@@ -48,35 +48,35 @@ def draw_time(seed: int, key: str, *, first_s: float, last_s: float, step_s: flo
     if last < first:
         got = f"random times from {first_s:g} s to {last_s:g} s"
         raise MutatorError(got, expected="an end that is not before the beginning")
-    frame = first + int(generator(seed, key).random() * (last - first + 1))
+    frame = first + int(random_generator(seed, key).random() * (last - first + 1))
     return round(frame * step_s, 9)
 
 
-def _read_always(text: str, armed_after_s: float, variables: Collection[str]) -> Trigger | None:
-    return always(armed_after_s=armed_after_s) if text == ALWAYS else None
+def _parse_always(text: str, armed_after_s: float, variables: Collection[str]) -> Trigger | None:
+    return always_trigger(armed_after_s=armed_after_s) if text == ALWAYS else None
 
 
-def _read_time(text: str, armed_after_s: float, variables: Collection[str]) -> Trigger | None:
+def _parse_time(text: str, armed_after_s: float, variables: Collection[str]) -> Trigger | None:
     try:
-        return at_time(float(text))
+        return trigger_at_time(float(text))
     except ValueError:
         return None
 
 
-def _read_condition(text: str, armed_after_s: float, variables: Collection[str]) -> Trigger:
-    condition = check_condition(text, variables=variables)
+def _parse_condition(text: str, armed_after_s: float, variables: Collection[str]) -> Trigger:
+    condition = canonical_condition(text, variables=variables)
     return Trigger(name="condition", condition=condition, armed_after_s=armed_after_s)
 
 
-_Reader = Callable[[str, float, Collection[str]], Trigger | None]
+_TriggerParser = Callable[[str, float, Collection[str]], Trigger | None]
 
 
-# a reader returns None for other kinds; the last one raises MutatorError
-READERS: tuple[_Reader, ...] = (_read_always, _read_time, _read_condition)
-TYPED = "a time in s, `always`, or a condition, e.g. 't > 3'"
+# a parser returns None for other kinds; the last one raises MutatorError
+TRIGGER_PARSERS: tuple[_TriggerParser, ...] = (_parse_always, _parse_time, _parse_condition)
+TRIGGER_FORMS = "a time in s, `always`, or a condition, e.g. 't > 3'"
 
 
-def read_trigger(text: str, armed_after_s: float, variables: Collection[str]) -> Trigger:
-    """Parse a trigger that a user typed (`TYPED`) over observed values; MutatorError if invalid."""
-    found = (reader(text, armed_after_s, variables) for reader in READERS)
-    return next(trigger for trigger in found if trigger is not None)
+def parse_trigger(text: str, armed_after_s: float, variables: Collection[str]) -> Trigger:
+    """Parse a trigger that a user typed (`TRIGGER_FORMS`) over observed values; MutatorError if invalid."""
+    parsed = (parse(text, armed_after_s, variables) for parse in TRIGGER_PARSERS)
+    return next(trigger for trigger in parsed if trigger is not None)

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mutator.triggers.conditions import check_condition, check_formula
-from mutator.triggers.formula_json import tree
-from mutator.triggers.trace_formulas import holds, numbers
+from mutator.triggers.conditions import canonical_condition, canonical_formula
+from mutator.triggers.formula_json import formula_as_json
+from mutator.triggers.trace_formulas import condition_at_each_step, formula_at_each_step
 from mutator.web import asset
 
 NAMES = ("t", "gap", "speed", "closing")
@@ -48,16 +48,18 @@ def values() -> dict[str, np.ndarray]:
 
 def test_python_and_the_page_agree_on_formulas(browser: Any, values: dict[str, np.ndarray]) -> None:
     rng = random.Random(18)
-    formulas = [check_formula(formula(rng), NAMES, over_time=True) for _ in range(COUNT)]
-    conditions = [check_condition(condition(rng), variables=NAMES, over_time=True) for _ in range(COUNT)]
+    formulas = [canonical_formula(formula(rng), NAMES, over_time=True) for _ in range(COUNT)]
+    conditions = [canonical_condition(condition(rng), variables=NAMES, over_time=True) for _ in range(COUNT)]
     page = browser.new_page()
     page.add_script_tag(content=asset("replay/formula.js") + "\nglobalThis.Formula = Formula;")
     given = {name: array.tolist() for name, array in values.items()}
     script = "([trees, values]) => trees.map((tree) => Formula.evaluate(tree, values))"
-    found = page.evaluate(script, [[tree(text, {}) for text in (*formulas, *conditions)], given])
+    found = page.evaluate(script, [[formula_as_json(text, {}) for text in (*formulas, *conditions)], given])
     page.close()
     for text, there in zip(formulas, found[:COUNT], strict=True):
         tolerance = 1e-12 if "hypot" in text else 0.0
-        np.testing.assert_allclose(there, numbers(text, values), rtol=tolerance, atol=0.0, err_msg=text)
+        np.testing.assert_allclose(
+            there, formula_at_each_step(text, values), rtol=tolerance, atol=0.0, err_msg=text
+        )
     for text, there in zip(conditions, found[COUNT:], strict=True):
-        assert there == holds(text, values).tolist(), text
+        assert there == condition_at_each_step(text, values).tolist(), text

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from mutator._common.message_text import folded
+from mutator._common.message_text import wrap_text
 from mutator.cli.console import Terminal
 from mutator.cli.progress_display import campaign_progress
 from mutator.execution.progress_text import duration
@@ -127,7 +127,7 @@ COMMAND = "`mutator review approve 3b5103806ae0 a9281388d042 --campaign paper_sm
     ],
 )
 def test_long_lines_are_folded(text: str, width: int, lines: list[str]) -> None:
-    assert folded(text, width).split("\n") == lines
+    assert wrap_text(text, width).split("\n") == lines
 
 
 @pytest.mark.parametrize(("columns", "width"), [(None, 100), ("60", 60), ("many", 100)])

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common.folder_locks import living_workers, wait_for_workers
+from mutator._common.folder_locks import living_worker_pids, wait_for_workers
 from mutator.execution.campaign_running import run_campaign
 from mutator.preflight.equivalence_check import EquivalenceResult
 from mutator.store.records import load_records
@@ -102,7 +102,7 @@ def _proved(out: Path) -> list[str]:
 
 def _victims(out: Path, kind: str) -> list[int]:
     if kind == "worker":
-        return living_workers(out)[:1]
+        return living_worker_pids(out)[:1]
     found = []
     for path in Path("/proc").glob("[0-9]*"):
         try:

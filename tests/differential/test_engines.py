@@ -26,7 +26,7 @@ from mutator.model import (
 )
 from mutator.mutants.anchors import parsed_file
 from mutator.mutants.mutant_building import build
-from mutator.triggers.trigger_kinds import always, at_time
+from mutator.triggers.trigger_kinds import always_trigger, trigger_at_time
 from mutator.workspace import Workspace
 
 LIMITS = Limits(cpu_s=2, wall_s=60, memory_mb=1024, steps=500)
@@ -87,9 +87,9 @@ MODELS: dict[str, tuple[str, Anchor, dict[str, Value]]] = {
 }
 ENDS = ("crash", "hang", "hoard", "leave", "segfault")
 TRIGGERS = {
-    "always": always(),
-    "from 2.01 s": at_time(2.01),
-    "for 1 s": at_time(3.0, hold_s=1.0),
+    "always": always_trigger(),
+    "from 2.01 s": trigger_at_time(2.01),
+    "for 1 s": trigger_at_time(3.0, hold_s=1.0),
     "in a context": Trigger(name="x", condition="hwt < 1.915 and rs > 0.0", armed_after_s=1.0),
     "once in a context": Trigger(name="x", condition="hwt < 1.915", hold=Hold.TO_END, armed_after_s=1.0),
     "off and on": Trigger(name="x", condition="v_ego > 18.5 or v_ego < 17.5"),

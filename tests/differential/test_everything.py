@@ -127,7 +127,7 @@ def everything(tmp_path: Path, copy_toycar: Callable[[Path], Workspace]) -> Work
     campaign = yaml.safe_load((toy.library / "campaigns" / "toy.yaml").read_text())
     del campaign["sample"]
     operators = {
-        "operators": list(OPERATORS.shipped()),
+        "operators": list(OPERATORS.shipped_names()),
         "in": ["toycar/sensing.py", "toycar/driver.py"],
         "sample": 40,
     }

@@ -26,13 +26,13 @@ from mutator.model import (
     Value,
 )
 from mutator.mutants.mutant_building import build
-from mutator.triggers.trigger_kinds import at_time
+from mutator.triggers.trigger_kinds import trigger_at_time
 from mutator.workspace import Workspace
 
 SEED = 7
 GAP = Anchor(kind=AnchorKind.AFTER_ASSIGN, name="gap")
 SEEN = Anchor(kind=AnchorKind.BEFORE_ASSIGN, name="self.seen")
-FROM_2_S = at_time(2.0)
+FROM_2_S = trigger_at_time(2.0)
 IN_ONE_STEP = Trigger(name="x", condition="t > 1.97 and t < 2.02")
 FIRST_ACTIVE_S = 2.0
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common.hashing import canonical
+from mutator._common.hashing import canonical_json
 from mutator.campaigns.chunks import Pending, pending
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import load_plan, make_plan
@@ -129,7 +129,7 @@ def test_one_experiment_of_a_shared_run_can_run_on_a_cluster(runs: tuple[Path, P
     runner = PieceRunner(site, read_inputs(site), "w", os.getpid())
     [record] = runner.run(piece, lambda name: None).records
     [name] = piece.ids
-    assert record == canonical(record_as_json(folder.records()[name])).encode()
+    assert record == canonical_json(record_as_json(folder.records()[name])).encode()
 
 
 def _scenarios(folder: RunFolder, chunk: Pending) -> list[str]:

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 import mutator
-from mutator._common.hashing import canonical
+from mutator._common.hashing import canonical_json
 from mutator.audit.seal import Seals, seals_of
 from mutator.errors import MutatorError
 from mutator.execution.campaign_running import run_campaign
@@ -102,7 +102,7 @@ def in_file(name: str, path: tuple[Any, ...]) -> Callable[[Path], None]:
 def in_line(name: str, line: int, path: tuple[Any, ...]) -> Callable[[Path], None]:
     def apply(run: Path) -> None:
         lines = (run / name).read_text().splitlines()
-        lines[line] = canonical(changed(json.loads(lines[line]), path))
+        lines[line] = canonical_json(changed(json.loads(lines[line]), path))
         (run / name).write_text("\n".join([*lines, ""]))
 
     return apply

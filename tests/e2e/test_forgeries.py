@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 import mutator
-from mutator._common.hashing import canonical, digest
+from mutator._common.hashing import canonical_json, digest
 from mutator.audit.seal import golden_digests, seals_of
 from mutator.campaigns.freezing import plan_csv
 from mutator.campaigns.plan import load_plan
@@ -74,7 +74,7 @@ def rewrite(path: Path, place: int, *lines: str) -> None:
 
 def change(run: Path, **values: Any) -> str:
     path, place, record = hazardous(run)
-    rewrite(path, place, canonical(record | values))
+    rewrite(path, place, canonical_json(record | values))
     return str(record["experiment_id"])
 
 
@@ -144,7 +144,7 @@ def an_added_record(run: Path, deep: bool) -> None:
         added = record | {"experiment_id": twin.id}
         replan(run, lambda experiments: [*experiments, twin])
         copy_patch(run, record["experiment_id"], twin.id)
-    rewrite(path, place, canonical(record), canonical(added))
+    rewrite(path, place, canonical_json(record), canonical_json(added))
 
 
 def copy_patch(run: Path, name: str, other: str) -> None:
@@ -158,10 +158,10 @@ def a_plan_condition(run: Path, deep: bool) -> None:
     new = replace(old, trigger=replace(old.trigger, armed_after_s=old.trigger.armed_after_s + 1.0))
     path = run / plan_file.EXPERIMENTS
     if not deep:
-        one = canonical(plan_file.experiment_as_json(old))
+        one = canonical_json(plan_file.experiment_as_json(old))
         assert one in path.read_text()
         path.write_text(
-            path.read_text().replace(one, canonical(plan_file.experiment_as_json(new) | {"id": name}))
+            path.read_text().replace(one, canonical_json(plan_file.experiment_as_json(new) | {"id": name}))
         )
         return
     copy_patch(run, name, new.id)
@@ -197,12 +197,12 @@ def a_proof_entry(run: Path, deep: bool) -> None:
     path = next((run / "proof").iterdir())
     record = json.loads(path.read_text().splitlines()[1])
     wrong = {"trace_digest": "0" * 64}
-    rewrite(path, 1, canonical(record | wrong))
+    rewrite(path, 1, canonical_json(record | wrong))
     if deep:
         for file in (run / "records").iterdir():
             for place, line in enumerate(file.read_text().splitlines()):
                 if json.loads(line).get("experiment_id") == record["experiment_id"]:
-                    rewrite(file, place, canonical(json.loads(line) | wrong))
+                    rewrite(file, place, canonical_json(json.loads(line) | wrong))
 
 
 def the_table(run: Path, deep: bool) -> None:

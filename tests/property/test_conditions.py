@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mutator.errors import MutatorError
-from mutator.triggers.conditions import check_condition, check_formula, evaluate, to_code
-from mutator.triggers.trace_formulas import holds, numbers
+from mutator.triggers.conditions import canonical_condition, canonical_formula, evaluate_condition, to_python
+from mutator.triggers.trace_formulas import condition_at_each_step, formula_at_each_step
 
 VARIABLES = ("t", "gap", "speed", "closing")
 NUMBERS = st.integers(-100, 100).map(str) | st.floats(0, 1e300).map(repr) | st.sampled_from(VARIABLES)
@@ -38,31 +38,31 @@ OBSERVED = st.fixed_dictionaries({name: st.floats(allow_nan=True, allow_infinity
 @given(CONDITIONS, OBSERVED)
 def test_canonical_text_has_the_same_meaning(text: str, values: dict[str, float]) -> None:
     try:
-        canonical = check_condition(text)
+        canonical = canonical_condition(text)
     except MutatorError as error:
         assert "characters" in str(error)
         return
-    assert check_condition(canonical) == canonical
+    assert canonical_condition(canonical) == canonical
     plain = eval(text, {"__builtins__": {}, "abs": abs, "max": max}, values)
-    assert evaluate(canonical, values) == bool(plain)
+    assert evaluate_condition(canonical, values) == bool(plain)
 
 
 @settings(max_examples=200, deadline=None)
 @given(CONDITIONS, TERMS, TERMS, OBSERVED)
 def test_no_observation_raises(text: str, a: str, b: str, values: dict[str, float]) -> None:
     try:
-        canonical = check_condition(f"({text}) and ({a}) / ({b}) > 1")
+        canonical = canonical_condition(f"({text}) and ({a}) / ({b}) > 1")
     except MutatorError as error:
         assert "characters" in str(error)
         return
-    assert isinstance(evaluate(canonical, values), bool)
+    assert isinstance(evaluate_condition(canonical, values), bool)
 
 
 @settings(max_examples=300, deadline=None)
 @given(st.text(max_size=40) | st.text(alphabet="gap speed<=>()[].'_+-*/0123456789,:andort", max_size=40))
 def test_any_text_is_accepted_or_refused(text: str) -> None:
     try:
-        code = to_code(check_condition(text, variables=VARIABLES))
+        code = to_python(canonical_condition(text, variables=VARIABLES))
     except MutatorError:
         return
     names = {node.id for node in ast.walk(ast.parse(code)) if isinstance(node, ast.Name)}
@@ -74,14 +74,16 @@ def test_any_text_is_accepted_or_refused(text: str) -> None:
 @given(CONDITIONS, st.lists(OBSERVED, min_size=1, max_size=6))
 def test_a_trace_gives_the_same_results_as_its_single_steps(text: str, steps: list[dict[str, float]]) -> None:
     try:
-        canonical = check_condition(text, variables=VARIABLES)
+        canonical = canonical_condition(text, variables=VARIABLES)
     except MutatorError as error:
         assert "characters" in str(error)
         return
     columns = {name: np.array([step[name] for step in steps]) for name in VARIABLES}
     # the result of min and max depends on the position of a NaN
     if not {"min", "max"} & set(re.findall(r"\w+", text)):
-        assert holds(canonical, columns).tolist() == [evaluate(canonical, step) for step in steps]
+        assert condition_at_each_step(canonical, columns).tolist() == [
+            evaluate_condition(canonical, step) for step in steps
+        ]
 
 
 def test_formulas_are_evaluated_over_a_trace() -> None:
@@ -90,11 +92,11 @@ def test_formulas_are_evaluated_over_a_trace() -> None:
         "gap": np.array([3.0, 2.0, -1.0]),
         "v": np.array([0.0, 1.0, 2.0]),
     }
-    headway = check_formula("gap / v if v > 0 else inf", trace)
-    assert numbers(headway, trace).tolist() == [np.inf, 2.0, -0.5]
-    assert numbers(check_formula("gap / v", trace), trace).tolist() == [np.inf, 2.0, -0.5]
-    rate = numbers(check_formula("rate(gap)", trace, over_time=True), trace)
+    headway = canonical_formula("gap / v if v > 0 else inf", trace)
+    assert formula_at_each_step(headway, trace).tolist() == [np.inf, 2.0, -0.5]
+    assert formula_at_each_step(canonical_formula("gap / v", trace), trace).tolist() == [np.inf, 2.0, -0.5]
+    rate = formula_at_each_step(canonical_formula("rate(gap)", trace, over_time=True), trace)
     assert np.isnan(rate[0])
     assert rate[1:].tolist() == [-2.0, -3.0]
-    past = check_condition("ever(v >= 1) and gap < 2", variables=trace, over_time=True)
-    assert holds(past, trace).tolist() == [False, False, True]
+    past = canonical_condition("ever(v >= 1) and gap < 2", variables=trace, over_time=True)
+    assert condition_at_each_step(past, trace).tolist() == [False, False, True]

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mutator.stpa.context_coverage import measure_coverage
-from mutator.triggers.conditions import check_condition, evaluate
+from mutator.triggers.conditions import canonical_condition, evaluate_condition
 
 NUMBERS = st.sampled_from([-1.0, 0.0, 0.5, 2.0])
 COMPARISON = st.builds(
@@ -27,7 +27,7 @@ ANYWHERE = NUMBERS | st.floats(allow_nan=False)
 
 def contexts_at(conditions: dict[str, str], hwt: float, rs: float, v_ego: float) -> tuple[str, ...]:
     values = {"hwt": hwt, "rs": rs, "v_ego": v_ego}
-    return tuple(row for row, condition in conditions.items() if evaluate(condition, values))
+    return tuple(row for row, condition in conditions.items() if evaluate_condition(condition, values))
 
 
 @given(CONDITION, CONDITION, ANYWHERE, ANYWHERE, ANYWHERE)
@@ -35,9 +35,9 @@ def test_a_proved_table_has_one_context_for_every_observation(
     first: str, second: str, hwt: float, rs: float, v_ego: float
 ) -> None:
     texts = {"A": first, "B": f"not ({first}) and ({second})", "C": f"not ({first}) and not ({second})"}
-    right = {row: check_condition(text) for row, text in texts.items()}
+    right = {row: canonical_condition(text) for row, text in texts.items()}
     assert measure_coverage(right).place is None
     assert len(contexts_at(right, hwt, rs, v_ego)) == 1
-    loose = {"A": check_condition(first), "B": check_condition(second)}
+    loose = {"A": canonical_condition(first), "B": canonical_condition(second)}
     if len(contexts_at(loose, hwt, rs, v_ego)) != 1:
         assert measure_coverage(loose).place is not None

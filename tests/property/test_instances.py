@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from mutator.config.instance_conditions import instance_condition
+from mutator.config.instance_conditions import canonical_instance_condition
 from mutator.errors import MutatorError
 from mutator.model import Anchor, AnchorKind, FaultLocation, Injection
 from mutator.mutants.anchors import ParsedFile
@@ -73,7 +73,7 @@ def limited(random_: random.Random, file: ParsedFile, location: FaultLocation) -
     names = sorted(file.names_in_function_at(location))
     if names and random_.random() < 0.8:
         text = random_.choice(SHAPES).format(random_.choice(names), random_.choice(names))
-        made = replace(made, where=instance_condition(text))
+        made = replace(made, where=canonical_instance_condition(text))
     number = random_.randrange(1, 100)
     return replace(made, **random_.choice(({"call": number}, {"every": number}, {})))
 

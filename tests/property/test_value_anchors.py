@@ -170,7 +170,7 @@ def mutations(file: ParsedFile) -> Iterator[Mutation]:
     tree = SourceTree(root=Path(), files={file.path: file.data}, digest="", _entries={})
     facts = facts_of(tree, file.path)
     for function in file.functions_by_name:
-        yield from mutations_of(file, facts, function, models(), OPERATORS.shipped())
+        yield from mutations_of(file, facts, function, models(), OPERATORS.shipped_names())
 
 
 def checked_mutations(names: Sequence[str], count: int) -> int:

@@ -1,4 +1,4 @@
-"""A name that is not a constant of the code is joined to a path only by `inside`, which checks it.
+"""A name that is not a constant of the code is joined to a path only by `path_below`, which checks it.
 
 Names in the files of a run folder or a library, such as ids, golden runs, files of the ledger and scenarios,
 come from whoever made the folder: `../../setup.py` must not reach a user's file. A reader of the code cannot
@@ -47,7 +47,7 @@ ALLOWED = {  # joins of names that no file contains
     "review/called_code.py: folder / one.value": "only compared with the tree's paths",
     "review/effect_pictures.py: scratch / 'work' / f'pictures-{i}'": "a number",
     "store/cleaning.py: Path(folder, name)": "names from os.walk",
-    "store/cleaning.py: Path(name).with_name(complete(Path(name).name))": "only compared with patterns",
+    "store/cleaning.py: Path(name).with_name(final_name(Path(name).name))": "only compared with patterns",
     "targets/source_tree.py: root / name": "the folder of a checked glob",
 }
 
@@ -184,7 +184,7 @@ def test_a_join_that_bypasses_the_check_is_reported(tmp_path: Path, line: str) -
 @pytest.mark.parametrize(
     "line",
     [
-        "inside(run, name).unlink()",
+        "path_below(run, name).unlink()",
         "(run / 'records' / f'{NAMES}.csv').unlink()",
         "[(run / one).unlink() for one in NAMES]",
         "share = number / of",

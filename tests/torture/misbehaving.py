@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from mutator._common.files import is_half_written, remove_folder
-from mutator._common.table_rendering import Table
+from mutator._common.table_rendering import TextTable
 from mutator.engines.engine_kinds import OFFERED, REFERENCE
 from mutator.errors import EXIT_HARNESS_ERRORS, EXIT_OK
 from mutator.model import Status
@@ -298,4 +298,7 @@ class Misbehaving:
         rows = [
             (name, *(", ".join(sorted(self.verdicts[name, one])) or "-" for one in OFFERED)) for name in names
         ]
-        return "verdicts of misdeeds\n" + Table(heads=("misdeed", *OFFERED), rows=rows, right=()).as_text()
+        return (
+            "verdicts of misdeeds\n"
+            + TextTable(heads=("misdeed", *OFFERED), rows=rows, right_aligned=()).as_text()
+        )

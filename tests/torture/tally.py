@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, fields
 from enum import StrEnum
 
-from mutator._common.table_rendering import Table
+from mutator._common.table_rendering import TextTable
 
 
 class End(StrEnum):
@@ -60,4 +60,6 @@ class Tally:
         names = sorted({one for one, _ in counts})
         rows = [(one, *(str(counts[one, end]) for end in End)) for one in names]
         total = [str(sum(counts[one, end] for one in names)) for end in End]
-        return Table(heads=(head, *End), rows=[*rows, ("total", *total)], right=(1, 2, 3)).as_text()
+        return TextTable(
+            heads=(head, *End), rows=[*rows, ("total", *total)], right_aligned=(1, 2, 3)
+        ).as_text()

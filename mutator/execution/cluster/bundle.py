@@ -17,9 +17,9 @@ from hashlib import sha256
 from pathlib import Path
 
 from mutator._common.bounded_reading import read_bounded
-from mutator._common.confined_files import check_inside, check_name, files_inside, inside
+from mutator._common.confined_files import check_inside, check_name, files_inside, path_below
 from mutator._common.files import raising_disk_full, read_json
-from mutator._common.hashing import plain
+from mutator._common.hashing import as_json_types
 from mutator._common.version import VERSION
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.errors import MutatorError, Outside
@@ -93,7 +93,7 @@ def _parts(workspace: Workspace, folder: RunFolder, engine: str) -> Iterator[tup
         "schema": SCHEMA,
         "mutator": VERSION,
         "engine": engine,
-        "limits": plain(head.limits),
+        "limits": as_json_types(head.limits),
         "seed": head.seed,
         "series": bool(folder.series_budget_mb),
         "several_seeds": len(folder.seeds) > 1,
@@ -122,9 +122,9 @@ def _read_in_root(manifest: TargetManifest) -> Iterator[Path]:
     """Yield the files that a run's arguments name, or that are in folders that they name."""
     for i, word in enumerate(manifest.entry_args):
         if word.startswith(_ROOT):
-            with manifest.source.placing(("entry", "args", i)):
+            with manifest.source.locating_errors(("entry", "args", i)):
                 name = check_name(word.removeprefix(_ROOT).removesuffix("/"), manifest.path)
-                place = check_inside(manifest.root, inside(manifest.root, name))
+                place = check_inside(manifest.root, path_below(manifest.root, name))
                 files = files_inside(manifest.root, name, "*")
             yield from (path for path in (place, *files) if path.is_file())
 
@@ -135,7 +135,7 @@ def lay_out(data: bytes, place: Path) -> None:
     _check(parts, place)
     with raising_disk_full(place):
         for name, content in parts.items():
-            path = inside(place, name)  # a new folder has no links
+            path = path_below(place, name)  # a new folder has no links
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(content)
 
@@ -144,7 +144,7 @@ def read_inputs(site: Site) -> RunInputs:
     """Read the YAML of an unpacked bundle. The target's root is in the bundle."""
     overlay = site.place / "overlay"
     manifest = load_manifest(
-        inside(site.place / "manifest", site.meta["manifest"]),
+        path_below(site.place / "manifest", site.meta["manifest"]),
         site.place / "target",
         overlay if overlay.is_dir() else None,
     )

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from mutator._common.bounded_reading import MOST_JSON, read_bounded
+from mutator._common.bounded_reading import MOST_JSON_BYTES, read_bounded
 from mutator.errors import MutatorError
 from mutator.execution.cluster.cluster_files import load_cluster
 from mutator.execution.cluster.dask_connections import (
@@ -70,7 +70,7 @@ def _counted(workers: int) -> int:
 def _scheduler_file(path: Path) -> "Scheduler":
     remedy = "start `dask scheduler --scheduler-file FILE` first, then give FILE"
     try:
-        content = json.loads(read_bounded(path, MOST_JSON))
+        content = json.loads(read_bounded(path, MOST_JSON_BYTES))
         address = content["address"]
     except OSError as error:
         raise MutatorError(f"cannot be read ({error.strerror})", where=path, remedy=remedy) from None

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field
 
-from mutator.config.yaml_files import StrictModel, read
-from mutator.config.yaml_sources import Source
+from mutator.config.yaml_files import StrictModel, load_yaml_model
+from mutator.config.yaml_sources import YamlSource
 from mutator.errors import MutatorError
 from mutator.execution.cluster.dask_connections import (
     certificates,
@@ -76,7 +76,7 @@ class ClusterFile:
     """A checked cluster file. The cluster's class checks the names of the options."""
 
     model: ClusterModel
-    source: Source
+    source: YamlSource
 
     @asynccontextmanager
     async def open(self, *, insecure: bool) -> AsyncIterator["Client"]:
@@ -134,7 +134,7 @@ class ClusterFile:
             if tls or (is_loopback(str(scheduler["host"])) if "host" in scheduler else on_loopback):
                 return
             what = "the network of the cluster's scheduler"
-        raise refused(what, where=self.source.path, line=self.source.line(("options",)))
+        raise refused(what, where=self.source.path, line=self.source.line_of(("options",)))
 
     def _check_options(self, cluster_class: type) -> None:
         known = set(_parameters(cluster_class)) - _NO_OPTIONS
@@ -200,7 +200,7 @@ class ClusterFile:
 
 
 def load_cluster(path: Path) -> ClusterFile:
-    model, source = read(path, ClusterModel, SCHEMA)
+    model, source = load_yaml_model(path, ClusterModel, SCHEMA)
     return ClusterFile(model=model, source=source)
 
 

@@ -39,7 +39,7 @@ class DrivenGoldens:
     def fetch(self, golden: GoldenRun, known: str, to: Path) -> bool:
         """Copy the golden run with the digest `known` to `to`; return False if it is not cached."""
         with suppress(OSError):
-            cached_folders.fetch(self._entry(golden), to)
+            cached_folders.copy_from_cache(self._entry(golden), to)
             if output_digest_of(self._manifest, to) == known:
                 return True
         shutil.rmtree(to, ignore_errors=True)
@@ -47,10 +47,10 @@ class DrivenGoldens:
 
     def keep(self, golden: GoldenRun, out: Path) -> None:
         """Cache the golden run in the folder `out`, if the cache is writable."""
-        cached_folders.store(self._entry(golden), lambda made: shutil.copytree(out, made))
+        cached_folders.store_in_cache(self._entry(golden), lambda made: shutil.copytree(out, made))
 
     def _entry(self, golden: GoldenRun) -> Path:
         scenario = digest(read_bounded(self._site.scenario(golden.scenario)))
         seed = self._site.meta["seed"] if golden.seed is None else golden.seed
         content = [*self._common, scenario, seed, list(golden.changes)]
-        return shared_cache.of_goldens() / digest(content)
+        return shared_cache.goldens_folder() / digest(content)

@@ -4,7 +4,7 @@ import json
 from collections.abc import Mapping
 from hashlib import sha256
 
-from mutator._common.bounded_reading import MOST_JSON
+from mutator._common.bounded_reading import MOST_JSON_BYTES
 from mutator.errors import MutatorError
 
 _MARK, _DIGEST, _LENGTH = b"FIP1", 32, 4
@@ -33,7 +33,7 @@ def unpack(data: bytes) -> dict[str, bytes]:
 
 def _head(data: bytes, begin: int, end: int) -> list[tuple[str, int]]:
     """Return the names and lengths of a parcel's parts, which begin at `end`."""
-    if end - begin > MOST_JSON:
+    if end - begin > MOST_JSON_BYTES:
         raise _damaged(data)
     try:
         head = [(str(name), int(length)) for name, length in json.loads(data[begin:end])]

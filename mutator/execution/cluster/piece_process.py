@@ -18,10 +18,10 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 from mutator._common import shared_cache
-from mutator._common.confined_files import inside
+from mutator._common.confined_files import path_below
 from mutator._common.files import raising_disk_full
-from mutator._common.hashing import canonical
-from mutator._common.resource_shortages import shortage
+from mutator._common.hashing import canonical_json
+from mutator._common.resource_shortages import find_shortage
 from mutator.campaigns.run_inputs import RunInputs
 from mutator.campaigns.shared_runs import runs
 from mutator.engines import sandbox
@@ -102,9 +102,9 @@ class PieceRunner:
                 engine = make_engine(site.meta["engine"], setting)  # type: ignore[assignment]
             goldens = Goldens(
                 self._manifest,
-                lambda experiment: inside(self._goldens, self._golden_of(experiment).key),
+                lambda experiment: path_below(self._goldens, self._golden_of(experiment).key),
                 several_seeds=site.meta["several_seeds"],
-                digests={inside(self._goldens, key): known for key, (_, known) in site.goldens.items()},
+                digests={path_below(self._goldens, key): known for key, (_, known) in site.goldens.items()},
             )
             with_series = kind is Kind.RUN and site.meta["series"]
             self._runners[kind] = Runner(
@@ -115,7 +115,7 @@ class PieceRunner:
     def _have_golden(self, key: str) -> None:
         """Make a golden run or copy it from the cache; GoldenRunsDiffer if it differs from the campaign's."""
         golden, known = self._site.goldens[key]
-        place = inside(self._goldens, key)
+        place = path_below(self._goldens, key)
         self._goldens.mkdir(exist_ok=True)
         if not self._driven.fetch(golden, known, place):
             self._drive_golden(golden, known, place)
@@ -138,14 +138,14 @@ class PieceRunner:
                 raise GoldenRunsDiffer(f"golden run {golden.key} {came}")
             execution.out.rename(place)
             if golden.seed is not None:  # the images of a hundred seeds would fill the disk
-                shared_cache.make_room(self._manifest.cache_name)
+                shared_cache.prune_target(self._manifest.cache_name)
 
     def _golden_of(self, experiment: Experiment) -> GoldenRun:
         return GoldenRun.for_experiment(experiment, several_seeds=self._site.meta["several_seeds"])
 
 
 def _made(finished: list[Finished], name: str, *, proof: bool) -> Result:
-    records = tuple(canonical(record_as_json(one.record)).encode() for one in finished)
+    records = tuple(canonical_json(record_as_json(one.record)).encode() for one in finished)
     if proof:
         return Result(number=0, ending=Ending.DONE, records=records)
     patches = [(one.experiment.id, one.mutant.patch_bytes) for one in finished if one.mutant is not None]
@@ -155,7 +155,7 @@ def _made(finished: list[Finished], name: str, *, proof: bool) -> Result:
         ending=Ending.DONE,
         forked=any(one.mode in FAST for one in finished),
         records=records,
-        timings=tuple(canonical(timing_of(one, name)).encode() for one in finished),
+        timings=tuple(canonical_json(timing_of(one, name)).encode() for one in finished),
         patches=pack_patches(patches),
         series=b"".join(block_bytes(*series_block(experiment, one)) for experiment, one in series),
         series_of=tuple(sorted({one.golden_key for _, one in series})),
@@ -169,7 +169,7 @@ def _result(runner: PieceRunner, piece: Piece, tell: Callable[[str], None]) -> R
     except GoldenRunsDiffer as err:
         return Result(number=piece.number, ending=Ending.UNLIKE, text=str(err))
     except Exception as err:
-        known = err if isinstance(err, MutatorError) else shortage(err)
+        known = err if isinstance(err, MutatorError) else find_shortage(err)
         short = isinstance(known, DiskFull | Shortage)
         text = str(known) if known else "".join(traceback.format_exception(err)).rstrip()
         return Result(number=piece.number, ending=Ending.UNFIT if short else Ending.FAILED, text=text)
@@ -189,7 +189,7 @@ def _refuse(connection: Connection, err: Exception) -> None:
     """Answer the first piece with the reason why this process cannot run anything."""
     with suppress(EOFError):
         piece = Piece.of(connection.recv_bytes())
-        text = str(err if isinstance(err, MutatorError) else shortage(err) or repr(err))
+        text = str(err if isinstance(err, MutatorError) else find_shortage(err) or repr(err))
         connection.send(Result(number=piece.number, ending=Ending.UNFIT, text=text).packed())
 
 

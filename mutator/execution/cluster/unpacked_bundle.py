@@ -5,7 +5,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from mutator._common.confined_files import check_name, inside
+from mutator._common.confined_files import check_name, path_below
 from mutator._common.files import read_json
 from mutator.errors import MutatorError
 from mutator.model import Limits
@@ -42,7 +42,7 @@ class Site:
         return Limits(**self.meta["limits"])
 
     def scenario(self, name: str) -> Path:
-        return inside(self.place / "scenarios", f"{name}.yaml")
+        return path_below(self.place / "scenarios", f"{name}.yaml")
 
     @cached_property
     def goldens(self) -> dict[str, tuple[GoldenRun, str]]:

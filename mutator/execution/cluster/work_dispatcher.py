@@ -14,7 +14,7 @@ from typing import Any
 
 from distributed import Client, Future
 
-from mutator._common.typed_json import from_plain
+from mutator._common.typed_json import from_json_types
 from mutator.errors import DiskFull, MutatorError, SchedulerGone, WorkerCutOff, WorkerRefused
 from mutator.execution.cluster import worker_tasks
 from mutator.execution.cluster.bundle import Bundle
@@ -249,7 +249,7 @@ class Deal:
 
     async def _done(self, piece: Piece, one: _Tended, result: Result) -> None:
         if one.facts:  # before its first results are written, run.json must name the worker
-            self._session.note_machine(from_plain(Machine, {"worker": one.name, **one.facts}))
+            self._session.note_machine(from_json_types(Machine, {"worker": one.name, **one.facts}))
             one.facts = {}
         for other in self._tended.values():  # the piece ran here, so it did not cause the failures elsewhere
             other.failures += other.name in piece.died_at and other is not one

@@ -20,7 +20,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 from mutator._common.files import raising_disk_full, remove_folder
-from mutator._common.resource_shortages import shortage
+from mutator._common.resource_shortages import find_shortage
 from mutator.errors import MutatorError, PieceNotWanted
 from mutator.execution.cluster import bundle
 from mutator.execution.cluster.pieces import Ending, Piece, Result
@@ -142,7 +142,7 @@ class Host:
         try:
             child = self._borrowed()
         except (OSError, MutatorError) as err:
-            text = str(err if isinstance(err, MutatorError) else shortage(err) or err)
+            text = str(err if isinstance(err, MutatorError) else find_shortage(err) or err)
             return Result(number=piece.number, ending=Ending.UNFIT, text=text)
         keep = False
         try:

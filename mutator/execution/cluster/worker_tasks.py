@@ -16,7 +16,7 @@ from typing import Any
 from distributed import Worker, get_worker, secede
 from distributed.core import Status
 
-from mutator._common.hashing import plain
+from mutator._common.hashing import as_json_types
 from mutator._common.version import VERSION
 from mutator.campaigns import run_environment
 from mutator.errors import MutatorError
@@ -36,7 +36,7 @@ def facts(packages: Iterable[str]) -> dict[str, Any]:
         "python": run_environment.python(),
         "platform": platform.platform(),
         "cpu": run_environment.cpu(),
-        "blas": plain(run_environment.blas()),
+        "blas": as_json_types(run_environment.blas()),
         "packages": run_environment.versions(packages),
     }
 

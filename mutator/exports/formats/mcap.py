@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from mutator._common.confined_files import inside
+from mutator._common.confined_files import path_below
 from mutator._common.files import make_folder, write_atomic
 from mutator._common.message_text import counted
 from mutator.campaigns.filters import compile_filter
@@ -77,7 +77,7 @@ def _write_experiments(request: ExportRequest) -> None:
         )
     make_folder(out)
     for name in found:
-        write_atomic(inside(out, f"{name}.mcap"), content.of(name))
+        write_atomic(path_below(out, f"{name}.mcap"), content.of(name))
 
 
 class Content:
@@ -121,7 +121,7 @@ class Content:
         if self._traces is None or not kept.is_dir() or experiment_id not in self._records:
             return None
         golden = self._folder.golden_folder_of(self._experiments[experiment_id])
-        faulty = inside(kept / "faulty", self._traces.manifest.trace_file)
+        faulty = path_below(kept / "faulty", self._traces.manifest.trace_file)
         if not (golden.is_dir() or (kept / "golden").is_dir()) or not faulty.is_file():
             return None
         if not self._traces.is_kept(experiment_id):

@@ -36,7 +36,7 @@ def build_study_panels(run: ReportedRun) -> tuple[Panel, ...]:
     """
     if not run.study:
         return ()
-    with STUDIES.running(run.folder.head.study or ""):
+    with STUDIES.blaming_package(run.folder.head.study or ""):
         said = [panel for panel_of in run.study.panels if (panel := panel_of(run))]
         beside = (
             (tables_panel.build_published_panel(run), figures_panel.build_study_figures_panel(run))

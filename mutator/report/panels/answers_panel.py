@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 from markupsafe import Markup
 
-from mutator._common.table_rendering import Table
+from mutator._common.table_rendering import TextTable
 from mutator.report.answer_parts import Cell, Codes, Link, Listing, Part
 from mutator.report.answers import answers_of
 from mutator.report.glossary import Words, meanings_of
@@ -47,9 +47,9 @@ def build_answers_panel(run: ReportedRun) -> Panel:
     return Panel(anchor="answers", link="Answers", markdown="\n\n".join(parts), html=html)
 
 
-def _table(listing: Listing) -> Table:
+def _table(listing: Listing) -> TextTable:
     rows = [[cell if isinstance(cell, str) else cell.text for cell in line] for line in listing.lines]
-    return Table(heads=listing.heads, rows=rows)
+    return TextTable(heads=listing.heads, rows=rows)
 
 
 def _html(listing: Listing, meanings: Words) -> Markup:
@@ -61,7 +61,7 @@ def _html(listing: Listing, meanings: Words) -> Markup:
         ]
         for line in listing.lines
     ]
-    return Table(heads=listing.heads, rows=rows).as_html("plain")
+    return TextTable(heads=listing.heads, rows=rows).as_html("plain")
 
 
 def _labelled(head: str, cell: Cell, meanings: Mapping[str, str]) -> str:

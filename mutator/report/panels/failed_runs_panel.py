@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from pandas import DataFrame
 
-from mutator._common.table_rendering import Table
+from mutator._common.table_rendering import TextTable
 from mutator.model import Status
 from mutator.report.panel import Panel, rendered
 from mutator.report.reported_run import ReportedRun
@@ -41,12 +41,12 @@ def build_failed_runs_panel(run: ReportedRun) -> Panel | None:
 
 def _markdown(failed: Sequence[Row], count: int) -> str:
     rows = [(r.status.value, r.experiment_id, r.fault, r.scenario, r.detail) for r in failed[:LISTED]]
-    table = Table(heads=_HEADS, rows=rows).as_markdown()
+    table = TextTable(heads=_HEADS, rows=rows).as_markdown()
     more = count - LISTED
     return f"{table}\n\nOthers in `results.csv`: {more}." if more > 0 else table
 
 
-def _linked(failed: Sequence[Row]) -> Table:
+def _linked(failed: Sequence[Row]) -> TextTable:
     from markupsafe import Markup
 
     ending = Markup('<span class="ending {0}">{0}</span>').format
@@ -55,4 +55,4 @@ def _linked(failed: Sequence[Row]) -> Table:
         (ending(r.status.value), link(r.experiment_id), r.fault, r.scenario, r.detail)
         for r in failed[:PAGE_LISTED]
     ]
-    return Table(heads=_HEADS, rows=rows)
+    return TextTable(heads=_HEADS, rows=rows)

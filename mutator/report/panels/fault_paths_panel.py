@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from mutator._common.table_rendering import Table
+from mutator._common.table_rendering import TextTable
 from mutator.report.fault_path_data import ALL, PathCounts, RunPaths, counts_by_fault_type
 from mutator.report.panel import Panel, rendered
 from mutator.report.path_drawing import draw_path_counts, drawn_counts, share_text
@@ -108,16 +108,18 @@ def _links(paths: RunPaths) -> Links:
     }
 
 
-def _table(links: Links, counts: PathCounts, paths: RunPaths) -> Table:
+def _table(links: Links, counts: PathCounts, paths: RunPaths) -> TextTable:
     rows = [
         (paths.label(tail), paths.label(tip), carries, share_text(counts.through[name], came))
         for name, (tail, tip, carries) in links.items()
         if (came := counts.came[name])
     ]
-    return Table(heads=("from", "to", "what it carries", "got through, of those that reached it"), rows=rows)
+    return TextTable(
+        heads=("from", "to", "what it carries", "got through, of those that reached it"), rows=rows
+    )
 
 
-def _stops(counts: Mapping[str, PathCounts], paths: RunPaths) -> Table | None:
+def _stops(counts: Mapping[str, PathCounts], paths: RunPaths) -> TextTable | None:
     """Return the table of masked faults by fault type, with a column for each set of components that stopped
     them. None if no fault was masked.
     """
@@ -134,7 +136,7 @@ def _stops(counts: Mapping[str, PathCounts], paths: RunPaths) -> Table | None:
         )
         for kind in order
     ]
-    return Table(heads=heads, rows=rows, right=range(1, len(heads)))
+    return TextTable(heads=heads, rows=rows, right_aligned=range(1, len(heads)))
 
 
 def _markup(text: str):  # type: ignore[no-untyped-def]  # markupsafe is imported where a page is made

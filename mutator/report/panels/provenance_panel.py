@@ -1,6 +1,6 @@
 """The provenance panel: how the experiments were executed, and what is needed to reproduce them."""
 
-from mutator._common.table_rendering import Table
+from mutator._common.table_rendering import TextTable
 from mutator.audit.seal import OUTSIDE, seal_or_why_not, unsealed_facts, without
 from mutator.campaigns.installed_studies import study_problems
 from mutator.report.panel import Panel, rendered
@@ -32,14 +32,16 @@ def build_provenance_panel(run: ReportedRun) -> Panel:
     parts = []
     if engines:
         parts += ["## How the experiments were run", engines.proof, engines.table.as_markdown()]
-    parts += ["## Origin of the results", Table(heads=("what", "value"), rows=facts).as_markdown()]
-    parts += ["### Not sealed", _NOTE, Table(heads=("what", "value"), rows=unsealed).as_markdown()]
+    parts += ["## Origin of the results", TextTable(heads=("what", "value"), rows=facts).as_markdown()]
+    parts += ["### Not sealed", _NOTE, TextTable(heads=("what", "value"), rows=unsealed).as_markdown()]
     tables = {"facts": facts, "unsealed": unsealed}
     html = rendered(
         _HTML,
         engines=engines,
         note=_NOTE,
-        **{name: Table(heads=("", ""), rows=rows, named=True) for name, rows in tables.items()},
+        **{
+            name: TextTable(heads=("", ""), rows=rows, has_row_headings=True) for name, rows in tables.items()
+        },
     )
     return Panel(anchor="origin", link="Origin", markdown="\n\n".join(parts), html=html)
 

@@ -1,6 +1,6 @@
 """The panel that shows how much results vary between seeds. Runs with one seed have no such panel."""
 
-from mutator._common.table_rendering import Table
+from mutator._common.table_rendering import TextTable
 from mutator.report.panel import Panel, rendered
 from mutator.report.panels.tables_panel import sheet_files
 from mutator.report.reported_run import ReportedRun
@@ -39,7 +39,7 @@ def build_seeds_panel(run: ReportedRun) -> Panel | None:
     )
 
 
-def _summary(sheet: Sheet) -> Table:
+def _summary(sheet: Sheet) -> TextTable:
     """Return the lines over all faults, with fewer columns."""
     rows = []
     for faults, part, whole, share, *cells, _ in sheet.lines:
@@ -48,4 +48,4 @@ def _summary(sheet: Sheet) -> Table:
             ends = [f"{least} (seed {its})", f"{largest} (seed {other})"] if its != "-" else ["-", "-"]
             rows.append([f"{part} / {whole}", cell_text(share), f"{low} to {high}", *ends])
     heads = ("share", "all seeds, 95 % of runs", "95 % between seeds", "least", "largest")
-    return Table(heads=heads, rows=rows)
+    return TextTable(heads=heads, rows=rows)

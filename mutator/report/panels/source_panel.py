@@ -11,7 +11,7 @@ from urllib.parse import quote
 from markupsafe import Markup, escape
 
 from mutator._common.message_text import counted
-from mutator._common.table_rendering import Table
+from mutator._common.table_rendering import TextTable
 from mutator.report.panel import Panel, rendered
 from mutator.report.reported_run import ReportedRun
 from mutator.report.source_lines import ENDINGS, LASTING, Mark, MarkedFile
@@ -90,7 +90,7 @@ def _told(file: MarkedFile) -> str:
     return f"{counted(len(file.marks), 'line')} with mutants, by worst outcome: {', '.join(endings)}"
 
 
-def _worst(files: Sequence[MarkedFile]) -> Table:
+def _worst(files: Sequence[MarkedFile]) -> TextTable:
     found = [
         (min(ENDINGS.index(mark.ending) for mark in here.values()), number, line, here)
         for number, file in enumerate(files)
@@ -104,7 +104,7 @@ def _worst(files: Sequence[MarkedFile]) -> Table:
         )
         for _, number, line, here in sorted(found, key=lambda one: one[:3])[:_LISTED]
     ]
-    return Table(heads=("line", "source (the worst lines)", *LASTING), rows=rows)
+    return TextTable(heads=("line", "source (the worst lines)", *LASTING), rows=rows)
 
 
 def _words(mark: Mark) -> str:

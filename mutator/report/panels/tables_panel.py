@@ -4,7 +4,7 @@ from collections.abc import Collection
 from dataclasses import replace
 from operator import itemgetter
 
-from mutator._common.table_rendering import Table
+from mutator._common.table_rendering import TextTable
 from mutator.outcomes.fault_free_runs import fault_free_table, own_alerts
 from mutator.report.panel import Panel, rendered
 from mutator.report.reported_run import ReportedRun
@@ -109,13 +109,13 @@ def build_published_panel(run: ReportedRun) -> Panel | None:
     return Panel(anchor="tables", link="Tables", markdown=markdown, html=html, files=sheet_files(sheets))
 
 
-def _counts(run: ReportedRun) -> list[tuple[str, Table]]:
+def _counts(run: ReportedRun) -> list[tuple[str, TextTable]]:
     hazards = hazard_names(run.results)
     made = []
     for title, head, groups in _GROUPS:
         counts = counts_by(run.results, groups(run.results))
         heads, lines = count_table(counts, head, hazards, alerts=run.folder.has_alerts)
-        made.append((title, Table(heads=heads, rows=lines, right=range(1, len(heads)))))
+        made.append((title, TextTable(heads=heads, rows=lines, right_aligned=range(1, len(heads)))))
     return made
 
 

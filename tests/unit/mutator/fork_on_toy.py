@@ -10,7 +10,7 @@ from mutator.engines.fork_server_client import Pool
 from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection, Limits, Trigger
 from mutator.mutants.mutant_building import build
 from mutator.targets.manifest import TargetManifest
-from mutator.triggers.trigger_kinds import always
+from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
 
 Edit = Callable[[str, str, str], None]
@@ -33,7 +33,7 @@ class Fork:
             self.models = self.toy.fault_models()
             work = self.folder / "work"
             work.mkdir()
-            null = build(self.manifest, self.models, None, always())
+            null = build(self.manifest, self.models, None, always_trigger())
             self._engine = ForkEngine(self.manifest, work, self.limits, null=null)
             golden = Job(name="golden", scenario=self.toy.scenario("A"), seed=7)
             self.golden = self._engine.reference.execute(golden, self.folder / "golden").out

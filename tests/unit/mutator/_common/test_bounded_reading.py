@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common.bounded_reading import bounded_lines, open_regular, read_bounded, unpacked
-from mutator._common.files import is_no_file
+from mutator._common.bounded_reading import open_regular, read_bounded, read_bounded_lines, unpack_bounded
+from mutator._common.files import is_no_file_error
 from mutator.errors import TooLarge
 
 TERABYTES = 4 * 10**12
@@ -37,7 +37,7 @@ def test_a_sparse_file_is_refused_for_its_size_and_for_its_holes(tmp_path: Path)
 
 def test_a_file_that_grows_is_not_read_further() -> None:
     with Path("/proc/self/maps").open("rb") as file, pytest.raises(TooLarge):
-        list(bounded_lines(file, Path("maps"), 1))  # its size is 0
+        list(read_bounded_lines(file, Path("maps"), 1))  # its size is 0
     assert len(read_bounded(Path("/proc/self/maps"))) > 1
 
 
@@ -47,26 +47,26 @@ def test_what_is_no_regular_file_is_not_opened(tmp_path: Path, path: str) -> Non
     (tmp_path / "link").symlink_to(tmp_path / "pipe")
     with pytest.raises(OSError, match=r"such device|directory") as caught:
         open_regular(tmp_path / path)
-    assert is_no_file(caught.value)
+    assert is_no_file_error(caught.value)
 
 
 def test_lines_have_a_longest_length(tmp_path: Path) -> None:
     path = tmp_path / "lines"
     path.write_bytes(b"ab\ncd\nefg\n")
     with path.open("rb") as file:
-        assert list(bounded_lines(file, path, 4)) == [b"ab\n", b"cd\n", b"efg\n"]
+        assert list(read_bounded_lines(file, path, 4)) == [b"ab\n", b"cd\n", b"efg\n"]
     with path.open("rb") as file, pytest.raises(TooLarge, match=r"lines:3: a line of more than 3 bytes"):
-        list(bounded_lines(file, path, 3))
+        list(read_bounded_lines(file, path, 3))
 
 
 def test_data_is_unpacked_up_to_its_limit() -> None:
     data = bytes(1000)
-    assert unpacked(zlib.compress(data), 1000) == data
-    assert unpacked(gzip.compress(data), 1000, gzip=True) == data
+    assert unpack_bounded(zlib.compress(data), 1000) == data
+    assert unpack_bounded(gzip.compress(data), 1000, gzip=True) == data
     with pytest.raises(ValueError, match="more than 999 bytes"):
-        unpacked(zlib.compress(data), 999)
+        unpack_bounded(zlib.compress(data), 999)
     for damaged in (b"", b"x", zlib.compress(data)[:-1]):
         with pytest.raises(zlib.error):
-            unpacked(damaged, 1000)
+            unpack_bounded(damaged, 1000)
     with pytest.raises(zlib.error):
-        unpacked(gzip.compress(data) + b"x", 1000, gzip=True)
+        unpack_bounded(gzip.compress(data) + b"x", 1000, gzip=True)

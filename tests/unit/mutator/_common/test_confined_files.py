@@ -8,10 +8,10 @@ import pytest
 from mutator._common.confined_files import (
     check_library_name,
     check_name,
-    check_plain,
+    check_only_plain_files,
     entries_below,
     move_below,
-    move_plain,
+    move_plain_files,
     open_below,
     open_folder,
     read_below,
@@ -115,7 +115,7 @@ def test_a_link_is_deleted_and_not_followed(folder: Path) -> None:
 
 
 def test_a_folder_of_files_is_plain(folder: Path) -> None:
-    check_plain(folder)
+    check_only_plain_files(folder)
 
 
 @pytest.mark.parametrize("kind", ["link", "pipe"])
@@ -126,13 +126,13 @@ def test_a_folder_with_anything_else_is_not_plain(folder: Path, kind: str) -> No
     else:
         os.mkfifo(place)
     with pytest.raises(Outside, match="a/x: a link, a pipe"):
-        check_plain(folder)
+        check_only_plain_files(folder)
 
 
 def moved(source: Path, target: Path) -> None:
     target.mkdir()
     with open_folder(source) as one, open_folder(target) as other:
-        move_plain(one, other)
+        move_plain_files(one, other)
 
 
 def test_only_plain_files_are_moved(folder: Path) -> None:

@@ -23,7 +23,7 @@ def test_a_containers_quota_limits_the_cores(
     quota: str | None, usable: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(os, "sched_getaffinity", lambda pid: set(range(8)))
-    monkeypatch.setattr(cpu_cores, "_QUOTA", tmp_path / "cpu.max")
+    monkeypatch.setattr(cpu_cores, "_CPU_QUOTA_PATH", tmp_path / "cpu.max")
     if quota is not None:
         (tmp_path / "cpu.max").write_text(quota)
     assert cpu_cores.usable_cores() == usable

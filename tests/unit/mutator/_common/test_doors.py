@@ -34,7 +34,7 @@ def test_a_broken_addition_is_an_error_that_names_its_package(
     monkeypatch.delitem(sys.modules, "strange_door", raising=False)
     install(project(tmp_path, "strange", source))
     with pytest.raises(MutatorError, match=r"export 'strange' of package strange 2\.5") as error:
-        EXPORTS.find("strange")
+        EXPORTS.load("strange")
     monkeypatch.delitem(sys.modules, "strange_door", raising=False)
     assert words in str(error.value) and "uninstall this package" in str(error.value)
 
@@ -42,12 +42,12 @@ def test_a_broken_addition_is_an_error_that_names_its_package(
 def test_a_name_that_two_packages_use_is_refused(tmp_path: Path, install: Callable[[Path], None]) -> None:
     install(project(tmp_path, "csv", "THING = 3"))
     with pytest.raises(MutatorError, match=r"comes from mutator and strange 2\.5"):
-        EXPORTS.find("csv")
+        EXPORTS.load("csv")
 
 
 def test_an_unknown_name_lists_those_that_exist(door_examples: Path) -> None:
     with pytest.raises(MutatorError, match=r"no export 'cvs'.*csv.*counts"):
-        EXPORTS.find("cvs")
+        EXPORTS.load("cvs")
 
 
 def test_the_page_lists_every_door() -> None:
@@ -55,7 +55,7 @@ def test_the_page_lists_every_door() -> None:
     page = (CLONE / "docs" / "reference" / "doors.md").read_text()
     for door in DOORS:
         assert f'[project.entry-points."{door.group}"]' in page
-        assert all(f"| `{name}` |" in page for name in door.shipped())
+        assert all(f"| `{name}` |" in page for name in door.shipped_names())
 
 
 def test_no_other_module_looks_for_entry_points() -> None:

@@ -115,8 +115,8 @@ def test_a_study_whose_panel_fails_is_named_with_its_package(tmp_path: Path) -> 
 
 def test_only_the_code_of_other_packages_is_blamed() -> None:
     for door in DOORS:
-        for name in (*door.shipped(), *(["driving_agent_resilience"] if door is STUDIES else [])):
-            with pytest.raises(ZeroDivisionError), door.running(name):
+        for name in (*door.shipped_names(), *(["driving_agent_resilience"] if door is STUDIES else [])):
+            with pytest.raises(ZeroDivisionError), door.blaming_package(name):
                 _ = 1 / 0
 
 
@@ -125,6 +125,6 @@ def test_only_the_code_of_other_packages_is_blamed() -> None:
 )
 def test_an_interrupt_and_a_machine_that_is_full_are_no_failures_of_a_package(error: BaseException) -> None:
     for door, name in ((OPERATORS, "boom"), (EXPORTS, "tally")):
-        with pytest.raises(type(error)) as caught, door.running(name):
+        with pytest.raises(type(error)) as caught, door.blaming_package(name):
             raise error
         assert caught.value is error

@@ -164,7 +164,7 @@ def test_deleting_a_folder_that_is_moved_meanwhile_deletes_nothing_else(
     for folder in (run / "a" / "deep", run / "a" / "b", kept):
         folder.mkdir(parents=True)
     (kept / "file").touch()
-    real = files._emptied
+    real = files._delete_files_and_list_folders
 
     def moving(folder: int) -> list[str]:
         name, found = Path(f"/proc/self/fd/{folder}").readlink().name, real(folder)
@@ -172,6 +172,6 @@ def test_deleting_a_folder_that_is_moved_meanwhile_deletes_nothing_else(
             (run / "a" / "deep").rename(tmp_path / "deep")
         return sorted(found)  # the last one is emptied first
 
-    monkeypatch.setattr(files, "_emptied", moving)
+    monkeypatch.setattr(files, "_delete_files_and_list_folders", moving)
     remove_folder(run)
     assert (kept / "file").exists()

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import pytest
 
 from mutator import model
-from mutator._common.hashing import added, added_values, content_id, digest, from_json, plain
+from mutator._common.hashing import added_field, added_values, as_json_types, content_id, digest, parse_json
 from mutator.model import Anchor, AnchorKind, FaultLocation, Hold, Method
 
 LOCATION = FaultLocation(
@@ -19,22 +19,22 @@ CONDITION = "hwt <= 2.0"
 # The records of a later version, each with one more field.
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Injection(model.Injection):
-    every: int = added(1)
+    every: int = added_field(1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trigger(model.Trigger):
-    fade: Hold | None = added(None)
+    fade: Hold | None = added_field(None)
 
 
 @dataclass(frozen=True)
 class Fault(model.Fault):
-    tags: tuple[str, ...] = added(())
+    tags: tuple[str, ...] = added_field(())
 
 
 @dataclass(frozen=True)
 class Experiment(model.Experiment):
-    repeat: int = added(0)
+    repeat: int = added_field(0)
 
 
 def fault(kind: type[model.Fault], injection: type[model.Injection], **more: object) -> model.Fault:
@@ -62,7 +62,9 @@ def test_an_added_field_at_its_default_changes_no_id() -> None:
     new_fault = fault(Fault, Injection)
     new = experiment(Experiment, Trigger, new_fault)
     assert (new_fault.id, new.id) == (OLD_FAULT.id, OLD.id)
-    assert plain(new_fault) == plain(OLD_FAULT) and plain(new.trigger) == plain(OLD.trigger)
+    assert as_json_types(new_fault) == as_json_types(OLD_FAULT) and as_json_types(
+        new.trigger
+    ) == as_json_types(OLD.trigger)
     assert (added_values(new), added_values(OLD)) == ({}, {})
 
 
@@ -75,12 +77,12 @@ def test_an_added_field_with_another_value_changes_the_id() -> None:
     of_tagged = experiment(Experiment, Trigger, tagged)
     fading = replace(new, trigger=Trigger(name="C1", condition=CONDITION, fade=Hold.FOR))
     assert len({OLD.id, replace(new, repeat=1).id, fading.id, of_tagged.id}) == 4
-    assert plain(fading.trigger)["fade"] == "for"
+    assert as_json_types(fading.trigger)["fade"] == "for"
     assert added_values(replace(new, repeat=1)) == {"repeat": 1}
 
 
 def test_fields_of_the_first_release_are_hashed_even_at_their_defaults() -> None:
-    assert plain(Anchor(kind=AnchorKind.ENTRY)) == {"kind": "entry", "name": "", "nth": None}
+    assert as_json_types(Anchor(kind=AnchorKind.ENTRY)) == {"kind": "entry", "name": "", "nth": None}
 
 
 def test_values_of_different_types_have_different_digests() -> None:
@@ -94,10 +96,10 @@ def test_values_of_different_types_have_different_digests() -> None:
 )
 def test_json_is_read_as_the_standard_library_reads_it(text: str) -> None:
     """By itself, the faster JSON reader refuses NaN, infinities and lone surrogates."""
-    assert repr(from_json(text.encode())) == repr(json.loads(text))
+    assert repr(parse_json(text.encode())) == repr(json.loads(text))
 
 
 @pytest.mark.parametrize("data", [b"", b"{", b"\xff", b"[1,]"])
 def test_invalid_json_raises_a_value_error(data: bytes) -> None:
     with pytest.raises(ValueError):
-        from_json(data)
+        parse_json(data)

@@ -5,7 +5,7 @@ import pytest
 from mutator._common.message_text import operator_hint
 from mutator.campaigns.filters import compile_filter
 from mutator.errors import MutatorError
-from mutator.triggers.conditions import check_condition
+from mutator.triggers.conditions import canonical_condition
 
 
 @pytest.mark.parametrize(
@@ -24,7 +24,7 @@ def test_operators_of_other_languages_get_a_hint(text: str, hint: str) -> None:
 
 @pytest.mark.parametrize("text", ["t > 2 && v > 3", "t > 2 || v > 3", "!(t > 2)", "t = 2"])
 def test_errors_in_conditions_and_filters_contain_the_hint(text: str) -> None:
-    for refused in (check_condition, lambda text: compile_filter(text, ("t", "v"))):
+    for refused in (canonical_condition, lambda text: compile_filter(text, ("t", "v"))):
         with pytest.raises(MutatorError) as caught:
             refused(text)
         assert operator_hint(text) in str(caught.value)

@@ -16,8 +16,8 @@ from mutator.serve.job_events import EventReader, Link, Phase, Remark
 def pipe(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
     reading, writing = os.pipe()
     os.set_inheritable(writing, True)
-    monkeypatch.setenv(progress_events.EVENTS_FD, str(writing))
-    monkeypatch.setattr(progress_events, "_pipe", None)
+    monkeypatch.setenv(progress_events.EVENTS_FD_VARIABLE, str(writing))
+    monkeypatch.setattr(progress_events, "_events_pipe", None)
     yield reading
     os.close(writing)
     os.close(reading)
@@ -25,34 +25,34 @@ def pipe(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
 
 def test_the_reader_understands_every_event(pipe: int) -> None:
     progress_events.open_events()
-    progress_events.phase("golden runs", 1, 4, {"sdc": 2})
-    progress_events.warning("old")
-    progress_events.link("plot", Path("plots/a.svg"))
-    progress_events.result("verdict: sdc \udcff")
-    progress_events.error("x" * 9_999)
+    progress_events.report_phase("golden runs", 1, 4, {"sdc": 2})
+    progress_events.report_warning("old")
+    progress_events.report_link("plot", Path("plots/a.svg"))
+    progress_events.report_result("verdict: sdc \udcff")
+    progress_events.report_error("x" * 9_999)
     data = os.read(pipe, 65_536)
     assert [*EventReader().read(data)] == [
         Phase(event="phase", phase="golden runs", done=1, total=4, outcomes={"sdc": 2}),
         Remark(event="warning", text="old"),
         Link(event="link", kind="plot", path=str(Path.cwd() / "plots/a.svg")),
         Remark(event="result", text="verdict: sdc ?"),
-        Remark(event="error", text="x" * progress_events.LONGEST_TEXT),
+        Remark(event="error", text="x" * progress_events.MOST_TEXT_LENGTH),
     ]
     assert all(len(line) < 4_096 and json.loads(line)["event"] for line in data.splitlines())
 
 
 def test_child_processes_do_not_get_the_pipe(pipe: int) -> None:
     """A mutant could otherwise send events."""
-    fd = int(os.environ[progress_events.EVENTS_FD])
+    fd = int(os.environ[progress_events.EVENTS_FD_VARIABLE])
     assert os.get_inheritable(fd)
     progress_events.open_events()
-    assert progress_events.EVENTS_FD not in os.environ
+    assert progress_events.EVENTS_FD_VARIABLE not in os.environ
     assert not os.get_inheritable(fd)
 
 
 @pytest.mark.parametrize("text", ["", "x", "-1", "99999", "9" * 99])
 def test_anything_but_an_open_pipe_is_refused(monkeypatch: pytest.MonkeyPatch, text: str) -> None:
-    monkeypatch.setenv(progress_events.EVENTS_FD, text)
+    monkeypatch.setenv(progress_events.EVENTS_FD_VARIABLE, text)
     with pytest.raises(MutatorError, match=f"'{text}'"):
         progress_events.open_events()
 
@@ -60,7 +60,7 @@ def test_anything_but_an_open_pipe_is_refused(monkeypatch: pytest.MonkeyPatch, t
 def test_a_file_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Others could write to it."""
     with (tmp_path / "events").open("w") as file:
-        monkeypatch.setenv(progress_events.EVENTS_FD, str(file.fileno()))
+        monkeypatch.setenv(progress_events.EVENTS_FD_VARIABLE, str(file.fileno()))
         with pytest.raises(MutatorError, match="open pipe"):
             progress_events.open_events()
 
@@ -68,8 +68,8 @@ def test_a_file_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> N
 def test_a_command_goes_on_when_nobody_reads_its_events(monkeypatch: pytest.MonkeyPatch) -> None:
     reading, writing = os.pipe()
     os.close(reading)
-    monkeypatch.setattr(progress_events, "_pipe", writing)
-    progress_events.result("done")
-    progress_events.result("again")
-    assert progress_events._pipe is None
+    monkeypatch.setattr(progress_events, "_events_pipe", writing)
+    progress_events.report_result("done")
+    progress_events.report_result("again")
+    assert progress_events._events_pipe is None
     os.close(writing)

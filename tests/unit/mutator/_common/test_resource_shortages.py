@@ -5,7 +5,7 @@ import os
 
 import pytest
 
-from mutator._common.resource_shortages import shortage
+from mutator._common.resource_shortages import find_shortage
 from mutator.errors import EXIT_HARNESS_ERRORS
 
 
@@ -22,18 +22,18 @@ from mutator.errors import EXIT_HARNESS_ERRORS
     ],
 )
 def test_each_shortage_has_a_remedy(error: Exception, said: str) -> None:
-    found = shortage(error)
+    found = find_shortage(error)
     assert found is not None
     assert said in str(found)
     assert "the same command again" in str(found)
     assert found.exit_code == EXIT_HARNESS_ERRORS
     later = ValueError("x")
     later.__cause__ = error
-    assert str(shortage(later)) == str(found)
+    assert str(find_shortage(later)) == str(found)
 
 
 @pytest.mark.parametrize(
     "error", [ValueError("x"), ImportError("No module named 'x'"), OSError(errno.ENOENT, "")]
 )
 def test_other_errors_are_not_shortages(error: Exception) -> None:
-    assert shortage(error) is None
+    assert find_shortage(error) is None

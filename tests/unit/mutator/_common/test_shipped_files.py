@@ -7,11 +7,11 @@ from zipfile import ZipFile
 import pytest
 
 from mutator._common import shipped_files
-from mutator._common.shipped_files import refuse_shipped, shipped_folder, write_library
+from mutator._common.shipped_files import check_not_shipped, shipped_folder, write_new_library
 from mutator.errors import MutatorError
 from mutator.faults.spec_expansion import expand
 from mutator.mutants.mutant_building import build
-from mutator.triggers.trigger_kinds import always
+from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
 
 CLONE = Path(__file__).parents[4]
@@ -24,13 +24,13 @@ def archive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     with ZipFile(path, "w") as file:
         for name, data in FILES.items():
             file.writestr(name, data)
-    monkeypatch.setattr(shipped_files, "ARCHIVE", path)
+    monkeypatch.setattr(shipped_files, "ARCHIVE_PATH", path)
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
     return path
 
 
 def as_in_a_new_process() -> Path:
-    shipped_files._unpacked.cache_clear()
+    shipped_files._unpacked_folder.cache_clear()
     return shipped_folder()
 
 
@@ -114,15 +114,15 @@ def _first(seen: set[Path], path: Path) -> bool:
 
 
 def test_writing_to_the_shipped_library_is_refused(archive: Path, tmp_path: Path) -> None:
-    refuse_shipped(tmp_path / "library" / "reviews" / "openpilot.yaml")
+    check_not_shipped(tmp_path / "library" / "reviews" / "openpilot.yaml")
     with pytest.raises(MutatorError, match=r"ships with mutator.*mutator init DIR"):
-        refuse_shipped(shipped_folder() / "fault_library" / "reviews" / "openpilot.yaml")
+        check_not_shipped(shipped_folder() / "fault_library" / "reviews" / "openpilot.yaml")
 
 
 def test_a_moved_copy_of_the_library_still_finds_the_controller(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    write_library(tmp_path / "new")
+    write_new_library(tmp_path / "new")
     (tmp_path / "deep").mkdir()
     moved = (tmp_path / "new").rename(tmp_path / "deep" / "moved")
     for name in ("fault_library", "templates"):
@@ -139,7 +139,7 @@ def test_a_moved_copy_of_the_library_still_finds_the_controller(
 
 
 def test_edits_in_a_new_library_take_effect(tmp_path: Path) -> None:
-    write_library(tmp_path / "new")
+    write_new_library(tmp_path / "new")
     template = tmp_path / "new/templates/offset.py.j2"
     template.write_text(template.read_text().replace("{{ by | signed }}", "{{ by | signed }} * 1.0", 1))
     spec = tmp_path / "new/fault_library/faults/radar/chaff.yaml"
@@ -147,7 +147,7 @@ def test_edits_in_a_new_library_take_effect(tmp_path: Path) -> None:
     workspace = Workspace.find(tmp_path / "new")
     manifest, models = workspace.manifest("openpilot"), workspace.fault_models()
     fault = expand(workspace.spec("radar/chaff"), 0, "as_described", models=models, manifest=manifest)[0]
-    patch = build(manifest, models, fault, always(armed_after_s=1.5)).patch
+    patch = build(manifest, models, fault, always_trigger(armed_after_s=1.5)).patch
     assert f"v_rel = v_rel + {fault.value} * 1.0" in patch
 
 
@@ -160,5 +160,5 @@ def test_a_new_library_needs_an_empty_folder(tmp_path: Path, kind: str) -> None:
     else:
         place.write_text("mine")
     with pytest.raises(MutatorError, match="expected a new or empty folder"):
-        write_library(place / "below" if kind == "below a file" else place)
+        write_new_library(place / "below" if kind == "below a file" else place)
     assert [p.read_text() for p in (tmp_path.rglob("*")) if p.is_file()] == ["mine"]

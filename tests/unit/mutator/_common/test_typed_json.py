@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from mutator._common.hashing import added, plain
-from mutator._common.typed_json import from_plain
+from mutator._common.hashing import added_field, as_json_types
+from mutator._common.typed_json import from_json_types
 from mutator.errors import Misfit
 
 
@@ -35,7 +35,7 @@ class Whole:
     by_name: Mapping[str, Part] | None
     points: tuple[Point, ...]
     spans: tuple[tuple[int, int] | tuple[int, int, bool], ...]
-    more: tuple[str, ...] = added(())
+    more: tuple[str, ...] = added_field(())
     anything: Any
 
     def __post_init__(self) -> None:
@@ -55,10 +55,10 @@ WHOLE = Whole(
 
 def test_what_was_written_is_read() -> None:
     for whole in (WHOLE, Whole(parts=(), by_name=None, points=(), spans=(), more=("m",), anything=None)):
-        data = json.loads(json.dumps(plain(whole)))
-        found = from_plain(Whole, data)
+        data = json.loads(json.dumps(as_json_types(whole)))
+        found = from_json_types(Whole, data)
         assert found == whole
-        assert json.dumps(plain(found)) == json.dumps(data)
+        assert json.dumps(as_json_types(found)) == json.dumps(data)
 
 
 @pytest.mark.parametrize(
@@ -68,12 +68,12 @@ def test_what_was_written_is_read() -> None:
         ({"parts": [3]}, ["parts", 0], "3", "an object"),
         ({"parts": [{"name": "a"}]}, ["parts", 0], "no key 'size'", None),
         (
-            {"parts": [plain(PART) | {"x": 1}]},
+            {"parts": [as_json_types(PART) | {"x": 1}]},
             ["parts", 0],
             "an unknown key 'x'",
             "only name, size",
         ),
-        ({"parts": [plain(PART)] * 3}, [], "more than two parts", None),
+        ({"parts": [as_json_types(PART)] * 3}, [], "more than two parts", None),
         ({"by_name": {"a": {"name": 1, "size": 1}}}, ["by_name", "a", "name"], "1", "text"),
         ({"by_name": 7}, ["by_name"], "7", "an object or a list or null"),
         (
@@ -94,24 +94,24 @@ def test_what_was_written_is_read() -> None:
 def test_what_does_not_fit_is_refused_with_its_place(
     change: dict[str, Any], path: list[str | int] | None, got: str | None, expected: str | None
 ) -> None:
-    data = plain(WHOLE) | change
+    data = as_json_types(WHOLE) | change
     if path is None:
-        assert from_plain(Whole, data).more == tuple(change["more"])
+        assert from_json_types(Whole, data).more == tuple(change["more"])
         return
     with pytest.raises(Misfit) as refused:
-        from_plain(Whole, data)
+        from_json_types(Whole, data)
     assert (refused.value.path, refused.value.got, refused.value.expected) == (path, got, expected)
 
 
 def test_a_value_in_a_message_is_short_and_printable() -> None:
     with pytest.raises(Misfit) as refused:
-        from_plain(int, "\x1b[2J" * 99)
+        from_json_types(int, "\x1b[2J" * 99)
     assert refused.value.got.isprintable() and len(refused.value.got) < 70
 
 
 def test_text_that_no_file_can_have_is_refused() -> None:
     """JSON can spell half of a character, but UTF-8 has none."""
     with pytest.raises(Misfit) as error:
-        from_plain(Part, json.loads(r'{"name": "a\ud800", "size": null}'))
+        from_json_types(Part, json.loads(r'{"name": "a\ud800", "size": null}'))
     assert (error.value.got, error.value.path) == (r"'a\ud800'", ["name"])
-    assert from_plain(Part, json.loads(r'{"name": "\ud83d\ude00", "size": null}')).name == "\U0001f600"
+    assert from_json_types(Part, json.loads(r'{"name": "\ud83d\ude00", "size": null}')).name == "\U0001f600"

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common.folder_locks import owned
+from mutator._common.folder_locks import owning_run_folder
 from mutator.audit.run_repair import _put_aside, repair
 from mutator.errors import MutatorError, Outside
 from mutator.store import file_digests, plan_file
@@ -194,7 +194,7 @@ def kill(*_: object, **__: object) -> None:
 
 
 def test_a_folder_in_use_is_refused(run: Path) -> None:
-    with owned(run), pytest.raises(MutatorError, match="in use"):
+    with owning_run_folder(run), pytest.raises(MutatorError, match="in use"):
         repair(RunFolder.open_unverified(run))
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common.hashing import canonical
+from mutator._common.hashing import canonical_json
 from mutator.audit.seal import seal_or_why_not, seals_of, unsealed_facts
 from mutator.store import file_digests
 from mutator.store.approvals import write_approvals
@@ -150,7 +150,7 @@ def test_the_seal_covers_records_as_they_were_written(made: Path, run: Path) -> 
     """A field that a later version adds to records does not change the seal of an old run."""
     path = run / "records" / "0001-a.jsonl"
     lines = path.read_text().splitlines()
-    assert canonical(json.loads(lines[1])) != lines[1]  # the checksum is the first key
+    assert canonical_json(json.loads(lines[1])) != lines[1]  # the checksum is the first key
     assert sealed(run) == sealed(made)
 
 
@@ -158,7 +158,7 @@ NO_ERROR = '"detail":"","dev":[],"error":null'
 
 
 def crash(run: Path, detail: str, kind: str, message: str) -> None:
-    error = canonical({"kind": kind, "message": message, "place": ""})
+    error = canonical_json({"kind": kind, "message": message, "place": ""})
     edit(run / "records" / "0001-a.jsonl", NO_ERROR, f'"detail":"{detail}","dev":[],"error":{error}')
 
 

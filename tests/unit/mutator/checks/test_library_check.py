@@ -13,7 +13,7 @@ from mutator.mutants.mutant_building import build
 from mutator.mutants.probe import probe_path
 from mutator.mutants.splicing import unsplice
 from mutator.targets.source_tree import matches
-from mutator.triggers.trigger_kinds import always
+from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
 
 # Values per trigger of the published fault types.
@@ -178,7 +178,7 @@ def test_two_effects_act_in_the_order_of_the_spec(
 ) -> None:
     manifest, models = clone.manifest("openpilot"), clone.fault_models()
     fault = next(f for f in everything["as_described"] if f.fault_type == "rain_and_fog")
-    made = build(manifest, models, fault, always())
+    made = build(manifest, models, fault, always_trigger())
     text = made.files["selfdrive/sim/picture_camera.py"].decode()
     assert 0 < text.index(f"import Fog  # fi:{made.injection_ids[0]}") < text.index("lambda: Rain(5.0, ")
 

@@ -12,14 +12,14 @@ CLONE = Path(__file__).parents[4]
 
 
 def test_the_longest_suffix_of_a_key_is_its_unit() -> None:
-    assert units.split("offset_m") == ("offset", units.UNITS["m"])
-    assert units.split("per_step_kph") == ("per_step", units.UNITS["kph"])
-    assert units.split("by_per_m") == ("by", units.UNITS["per_m"])
-    assert units.split("per_m") == ("per", units.UNITS["m"])
-    assert units.split("torque_nm") == ("torque", units.UNITS["nm"])
-    assert units.split("target") == ("target", None)
-    assert units.split("nth_hit") == ("nth_hit", None)
-    assert units.split("_m") == ("_m", None)
+    assert units.split_unit("offset_m") == ("offset", units.UNITS["m"])
+    assert units.split_unit("per_step_kph") == ("per_step", units.UNITS["kph"])
+    assert units.split_unit("by_per_m") == ("by", units.UNITS["per_m"])
+    assert units.split_unit("per_m") == ("per", units.UNITS["m"])
+    assert units.split_unit("torque_nm") == ("torque", units.UNITS["nm"])
+    assert units.split_unit("target") == ("target", None)
+    assert units.split_unit("nth_hit") == ("nth_hit", None)
+    assert units.split_unit("_m") == ("_m", None)
 
 
 @pytest.mark.parametrize(
@@ -42,20 +42,20 @@ def test_the_longest_suffix_of_a_key_is_its_unit() -> None:
     ],
 )
 def test_values_are_converted_between_units(number: float, source: str, target: str, expected: float) -> None:
-    result = units.convert(number, units.UNITS[source], units.UNITS[target])
+    result = units.convert_unit(number, units.UNITS[source], units.UNITS[target])
     assert result == pytest.approx(expected, rel=1e-15)
     assert isinstance(result, float)
 
 
 def test_units_of_different_dimensions_cannot_be_converted() -> None:
     with pytest.raises(ValueError, match="m is not a unit of speed"):
-        units.convert(1, units.UNITS["m"], units.UNITS["mps"])
+        units.convert_unit(1, units.UNITS["m"], units.UNITS["mps"])
     with pytest.raises(ValueError, match="degC is not a unit of temperature in kelvin"):
-        units.convert(20, units.UNITS["degc"], units.UNITS["k"])
+        units.convert_unit(20, units.UNITS["degc"], units.UNITS["k"])
 
 
 def test_every_unit_is_recognized_as_a_suffix() -> None:
-    assert {suffix: units.split(f"by_{suffix}") for suffix in units.UNITS} == {
+    assert {suffix: units.split_unit(f"by_{suffix}") for suffix in units.UNITS} == {
         suffix: ("by", unit) for suffix, unit in units.UNITS.items()
     }
     assert len({unit.symbol for unit in units.UNITS.values()}) == len(units.UNITS)
@@ -65,5 +65,5 @@ def test_the_shipped_library_uses_only_expected_units() -> None:
     first = {"m", "mps", "kph", "mph", "mps2", "rad", "deg", "s", "ms", "mmph", "lx", "px"}
     for path in (*CLONE.glob("fault_library/faults/**/*.yaml"), *CLONE.glob("templates/*.yaml")):
         for key in re.findall(r"[{ ]([a-z][a-z0-9_]*):", path.read_text()):
-            unit = units.split(key)[1]
+            unit = units.split_unit(key)[1]
             assert unit is None or unit.suffix in first, f"{path}: {key}"

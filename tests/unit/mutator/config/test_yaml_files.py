@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from pydantic import Field
 
-from mutator._common.yaml_dataclasses import mapping, written
+from mutator._common.yaml_dataclasses import mapping_config, yaml_metadata
 from mutator.config import yaml_files
 from mutator.errors import MutatorError
 
@@ -26,24 +26,24 @@ class Car(yaml_files.StrictModel):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WheelRecord:
-    __pydantic_config__ = mapping("A wheel")
+    __pydantic_config__ = mapping_config("A wheel")
 
-    size: float = field(metadata=written("The radius.", alias="radius"))
+    size: float = field(metadata=yaml_metadata("The radius.", alias="radius"))
     spokes: int = 5
-    nuts: tuple[str, ...] = field(default=(), metadata=written(strict=False))
+    nuts: tuple[str, ...] = field(default=(), metadata=yaml_metadata(strict=False))
 
 
 class CarOfRecords(yaml_files.StrictModel):
     name: str
-    wheels: dict[str, yaml_files.Written[WheelRecord]] = Field(default_factory=dict)
-    spare: yaml_files.Written[WheelRecord] | None = None
+    wheels: dict[str, yaml_files.YamlRecord[WheelRecord]] = Field(default_factory=dict)
+    spare: yaml_files.YamlRecord[WheelRecord] | None = None
     tags: list[str] = Field(default_factory=list)
 
 
 def read(tmp_path: Path, text: str | bytes, model: type[Any] = Car) -> Any:
     path = tmp_path / "car.yaml"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
-    return yaml_files.read(path, model, "car/2")[0]
+    return yaml_files.load_yaml_model(path, model, "car/2")[0]
 
 
 def test_a_dataclass_in_a_file_is_read_as_it_is(tmp_path: Path) -> None:
@@ -148,7 +148,7 @@ def test_deep_nesting_and_huge_files_are_refused(tmp_path: Path) -> None:
 
 def test_a_missing_file_is_reported(tmp_path: Path) -> None:
     with pytest.raises(MutatorError, match="cannot be read"):
-        yaml_files.load(tmp_path / "none.yaml")
+        yaml_files.load_yaml(tmp_path / "none.yaml")
 
 
 def test_further_mistakes_are_counted(tmp_path: Path) -> None:

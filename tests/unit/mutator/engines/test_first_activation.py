@@ -10,7 +10,7 @@ from mutator.engines.first_activation import Observed, Start, first_active
 from mutator.model import Hold, Trigger
 from mutator.mutants.mutant_building import build
 from mutator.mutants.probe import Probe, probe_state_after
-from mutator.triggers.trigger_kinds import always, at_time
+from mutator.triggers.trigger_kinds import always_trigger, trigger_at_time
 from mutator.workspace import Workspace
 
 
@@ -33,10 +33,10 @@ SEEN = Observed(
 @pytest.mark.parametrize(
     ("trigger", "step"),
     [
-        (always(), 0),
-        (always(armed_after_s=0.1), 2),
-        (at_time(0.07), 2),
-        (at_time(9.0), None),
+        (always_trigger(), 0),
+        (always_trigger(armed_after_s=0.1), 2),
+        (trigger_at_time(0.07), 2),
+        (trigger_at_time(9.0), None),
         (Trigger(name="x", condition="d_rel <= 30.0"), 2),
         (Trigger(name="x", condition="hwt < 2.5", hold=Hold.FOR, hold_s=0.1), 3),
         (Trigger(name="x", condition="d_rel <= 30.0", armed_after_s=0.19), 4),
@@ -109,18 +109,18 @@ def test_the_two_parts_of_a_probe_equal_the_whole_probe(probe) -> None:
             assert parts[name].__code__ == thing.__code__
         elif isinstance(thing, str | float | list):
             assert parts[name] == thing
-    assert probe(trigger).in_two[1] == probe(always()).in_two[1]
+    assert probe(trigger).in_two[1] == probe(always_trigger()).in_two[1]
 
 
 def test_a_step_can_have_several_observations_or_none(probe) -> None:
     """The fork starts before the step in which the activating observation is made."""
     seen = Observed(values=SEEN.values, before=(0, 1, 3, 3, 6))
-    starts = [first_active(probe(at_time(0.05 * i)), seen) for i in range(6)]
+    starts = [first_active(probe(trigger_at_time(0.05 * i)), seen) for i in range(6)]
     assert [start.step for start in starts if start] == [0, 1, 1, 3, 3, 3]
     assert starts[4] == Start(step=3, observed=3, began=SEEN.values[0][0], t=SEEN.values[2][0])
 
 
-@pytest.mark.parametrize("trigger", [at_time(0.2), Trigger(name="x", condition="d_rel <= 20.0")])
+@pytest.mark.parametrize("trigger", [trigger_at_time(0.2), Trigger(name="x", condition="d_rel <= 20.0")])
 def test_a_probe_with_restored_state_equals_one_that_observed_the_steps(probe, trigger: Trigger) -> None:
     start = first_active(probe(trigger), SEEN)
     saw: dict = {}

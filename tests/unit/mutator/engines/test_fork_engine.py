@@ -16,7 +16,7 @@ from mutator.engines import fork_server_client
 from mutator.engines.engine_jobs import RunMode
 from mutator.engines.first_activation import Observed
 from mutator.model import Status, Trigger
-from mutator.triggers.trigger_kinds import at_time
+from mutator.triggers.trigger_kinds import trigger_at_time
 from mutator.workspace import Workspace
 
 from ..fork_on_toy import LIMITS, Edit, Fork
@@ -37,7 +37,7 @@ def gone(pid: int) -> bool:
 
 def test_forking_processes_have_one_thread_and_end_with_the_engine(fork: Fork) -> None:
     for time_s in (2.0, 4.0, 3.0):
-        assert fork.run(fork.job(at_time(time_s))).mode is RunMode.FORK
+        assert fork.run(fork.job(trigger_at_time(time_s))).mode is RunMode.FORK
     pids = fork.processes()
     assert len(pids) >= 4, "expected the guard, the server, and golden runs that wait at several steps"
     for pid in pids:
@@ -49,15 +49,15 @@ def test_forking_processes_have_one_thread_and_end_with_the_engine(fork: Fork) -
 
 
 def test_a_fork_starts_just_before_its_fault_and_few_processes_wait(fork: Fork) -> None:
-    starts = [fork.run(fork.job(at_time(0.05 * step))).start for step in (40, 41, 90, 10, 100, 0)]
+    starts = [fork.run(fork.job(trigger_at_time(0.05 * step))).start for step in (40, 41, 90, 10, 100, 0)]
     assert starts == [40, 41, 90, 10, 100, 0]
     for step in range(3, 100, 9):
-        fork.run(fork.job(at_time(0.05 * step)))
+        fork.run(fork.job(trigger_at_time(0.05 * step)))
     assert len(fork.processes()) <= 10
 
 
 def test_libraries_that_the_golden_run_imports_late_are_loaded_before_the_fork(fork: Fork) -> None:
-    fork.run(fork.job(at_time(2.0)))
+    fork.run(fork.job(trigger_at_time(2.0)))
     (seen,) = fork.engine._seen.values()
     assert isinstance(seen, Observed)
     assert "zipfile" in seen.libraries  # imported only to write the trace
@@ -66,13 +66,13 @@ def test_libraries_that_the_golden_run_imports_late_are_loaded_before_the_fork(f
 
 
 def test_an_experiment_that_never_triggers_gets_the_files_of_the_golden_run(fork: Fork) -> None:
-    execution = fork.run(fork.job(at_time(100.0)))
+    execution = fork.run(fork.job(trigger_at_time(100.0)))
     assert (execution.mode, execution.status, execution.cpu_s) == (RunMode.GOLDEN, Status.OK, 0.0)
     assert execution.out == fork.golden
 
 
 def test_a_killed_process_causes_a_harness_error_for_one_job_only(fork: Fork) -> None:
-    job = fork.job(at_time(2.0))
+    job = fork.job(trigger_at_time(2.0))
     for place in (0, -1):  # the first process, then a waiting one
         assert fork.run(job).status is Status.OK
         victims = fork.processes()
@@ -90,7 +90,7 @@ def test_a_killed_process_causes_a_harness_error_for_one_job_only(fork: Fork) ->
 
 
 def test_waiting_processes_end_with_the_server(fork: Fork) -> None:
-    fork.run(fork.job(at_time(2.0)))
+    fork.run(fork.job(trigger_at_time(2.0)))
     guard, first, *waiting = fork.processes()
     assert guard == fork.pool._process.pid
     assert waiting
@@ -99,11 +99,11 @@ def test_waiting_processes_end_with_the_server(fork: Fork) -> None:
 
 
 def test_a_killed_guard_is_reported_by_the_next_run(fork: Fork) -> None:
-    fork.run(fork.job(at_time(2.0)))
+    fork.run(fork.job(trigger_at_time(2.0)))
     pids = fork.processes()
     os.kill(fork.pool._process.pid, signal.SIGKILL)
     assert gone(fork.pool._process.pid)
-    execution = fork.run(fork.job(at_time(2.0)))
+    execution = fork.run(fork.job(trigger_at_time(2.0)))
     assert (execution.status, execution.detail) == (Status.HARNESS_ERROR, "the fork server is gone")
     assert all(map(gone, pids))
 
@@ -146,12 +146,12 @@ def test_the_cpu_limit_of_a_fork_excludes_the_time_before_it(fork: Fork, edit: E
         "        now = self.frame",
         "        sum(range(1_500_000))\n        now = self.frame",
     )
-    assert fork.run(fork.job(at_time(5.5))).mode is RunMode.FORK
+    assert fork.run(fork.job(trigger_at_time(5.5))).mode is RunMode.FORK
     fork.pool.close()
     fork.engine._pool, fork.engine._limits = None, replace(LIMITS, cpu_s=1)
-    execution = fork.run(fork.job(at_time(5.5)))
+    execution = fork.run(fork.job(trigger_at_time(5.5)))
     assert (execution.mode, execution.status) == (RunMode.FORK, Status.OK)
-    execution = fork.run(fork.job(at_time(0.5)))
+    execution = fork.run(fork.job(trigger_at_time(0.5)))
     assert (execution.mode, execution.status) == (RunMode.FORK, Status.TIMEOUT)
     assert execution.detail == "CPU time limit of 1 s"
 
@@ -181,6 +181,6 @@ def test_a_server_whose_first_message_was_exchanged_is_not_used(
 
     monkeypatch.setattr(fork_server_client.subprocess, "Popen", forging)
     monkeypatch.setattr(fork_server_client.Pool, "_welcome", putting_back)
-    execution = fork.run(fork.job(at_time(2.0)))
+    execution = fork.run(fork.job(trigger_at_time(2.0)))
     assert execution.status is Status.HARNESS_ERROR and originals
     assert execution.detail == "the tree of the fork server is not the pristine one"

@@ -6,7 +6,7 @@ import pytest
 
 from mutator.engines.engine_jobs import RunMode
 from mutator.model import Status
-from mutator.triggers.trigger_kinds import always, at_time
+from mutator.triggers.trigger_kinds import always_trigger, trigger_at_time
 
 from ..fork_on_toy import LIMITS, Edit, Fork
 
@@ -19,7 +19,7 @@ def test_a_target_with_threads_is_not_forked(fork: Fork, edit: Edit) -> None:
         "threading.Thread(target=wait, name='poll', daemon=True).start()\n"
         "class Drive:",
     )
-    execution = fork.run(fork.job(at_time(2.0)))
+    execution = fork.run(fork.job(trigger_at_time(2.0)))
     assert (execution.mode, execution.status) == (RunMode.REFERENCE, Status.OK)
     assert execution.why == (
         "once it is loaded, it has 2 threads, and only one can be forked: besides the main one, 'poll'"
@@ -31,7 +31,7 @@ def test_a_target_with_pandas_is_forked(fork: Fork, edit: Edit) -> None:
     pytest.importorskip("pyarrow")
     fork.limits = replace(LIMITS, memory_mb=4096)
     edit("tree/toycar/go.py", "class Drive:", "import pandas\nimport pyarrow\n\n\nclass Drive:")
-    execution = fork.run(fork.job(at_time(2.0)))
+    execution = fork.run(fork.job(trigger_at_time(2.0)))
     assert (execution.mode, execution.why) == (RunMode.FORK, "")
 
 
@@ -41,7 +41,7 @@ def test_a_target_that_cannot_be_imported_is_not_forked(fork: Fork, edit: Edit) 
         "class Drive:",
         "if __name__ != '__main__':\n    raise ValueError(3)\n\n\nclass Drive:",
     )
-    execution = fork.run(fork.job(at_time(2.0)))
+    execution = fork.run(fork.job(trigger_at_time(2.0)))
     assert (execution.mode, execution.status) == (RunMode.REFERENCE, Status.OK)
     assert "cannot be loaded: ValueError: 3 (toycar/go.py:" in execution.why
 
@@ -53,7 +53,7 @@ def test_the_stored_reason_is_printable(fork: Fork, edit: Edit) -> None:
         "        self.publish((gap",
         "        if gap > 45.0:\n            raise ValueError('\\udcff' * 1000)\n        self.publish((gap",
     )
-    execution = fork.run(fork.job(at_time(5.9)))
+    execution = fork.run(fork.job(trigger_at_time(5.9)))
     assert (execution.status, execution.mode) == (Status.CRASHED, RunMode.REFERENCE)
     assert (
         execution.why.startswith(r"ended as crashed: ValueError: \udcff\udcff")
@@ -68,7 +68,7 @@ def test_a_target_that_behaves_differently_step_by_step_is_not_forked(fork: Fork
         "    drive = begin(arguments)\n",
         "    drive = begin(arguments)\n    drive.steps -= 1\n",
     )
-    execution = fork.run(fork.job(at_time(2.0)))
+    execution = fork.run(fork.job(trigger_at_time(2.0)))
     assert execution.mode is RunMode.REFERENCE
     assert "its log.npz differs when it is driven step by step" in execution.why
 
@@ -82,7 +82,7 @@ def test_a_run_that_leaves_a_thread_is_repeated_by_the_reference_engine(fork: Fo
         "        if gap > 45.0:\n            import threading, time\n"
         "            threading.Thread(target=time.sleep, args=(100,)).start()\n        self.publish((gap",
     )
-    execution = fork.run(fork.job(at_time(5.9)))
+    execution = fork.run(fork.job(trigger_at_time(5.9)))
     assert (execution.status, execution.mode) == (Status.TIMEOUT, RunMode.REFERENCE)
     assert execution.why.startswith("at its end it has ") and "'Thread-1 (sleep)'" in execution.why
 
@@ -94,7 +94,7 @@ def test_a_run_that_writes_into_its_tree_is_repeated_by_the_reference_engine(for
         "        self.publish((gap",
         "        if gap > 45.0:\n            open(__file__, 'a').write('x')\n        self.publish((gap",
     )
-    execution = fork.run(fork.job(at_time(5.9)))
+    execution = fork.run(fork.job(trigger_at_time(5.9)))
     assert (execution.status, execution.mode) == (Status.HARNESS_ERROR, RunMode.REFERENCE)
     assert execution.why == "it writes into its own tree"
     assert "toycar/sensing.py in the tree that ran" in execution.detail
@@ -106,7 +106,7 @@ def test_a_fault_in_a_generator_is_not_forked(fork: Fork, edit: Edit) -> None:
         "    def publish(self",
         "    def walk(self):\n        gap = 0.0\n        yield gap\n\n    def publish(self",
     )
-    execution = fork.run(fork.job(at_time(2.0), function="Sensor.walk"))
+    execution = fork.run(fork.job(trigger_at_time(2.0), function="Sensor.walk"))
     assert (execution.status, execution.mode) == (Status.OK, RunMode.REFERENCE)
     assert execution.why == "Sensor.walk in toycar/sensing.py may be suspended between two steps"
 
@@ -118,7 +118,7 @@ def test_without_a_stepwise_golden_run_nothing_is_forked(fork: Fork, edit: Edit)
         "    return Drive(case)",
         "    return Drive(case if __name__ == '__main__' else {})",
     )
-    execution = fork.run(fork.job(at_time(2.0)))
+    execution = fork.run(fork.job(trigger_at_time(2.0)))
     assert (execution.mode, execution.status) == (RunMode.REFERENCE, Status.OK)
     assert execution.why.startswith("its golden run cannot be driven step by step: KeyError: ")
 
@@ -138,7 +138,7 @@ def test_a_target_that_observes_before_its_first_step_is_not_forked(fork: Fork, 
     """A fork would miss such observations."""
     edit("fault_library/targets/toycar.yaml", "function: Drive.step,", "function: Drive.look,")
     edit("tree/toycar/go.py", '\n        self.steps = int(case["steps"])\n', EARLY)
-    for trigger in (always(armed_after_s=-2.0), at_time(2.0)):
+    for trigger in (always_trigger(armed_after_s=-2.0), trigger_at_time(2.0)):
         execution = fork.run(fork.job(trigger))
         assert (execution.mode, execution.status) == (RunMode.REFERENCE, Status.OK)
         assert execution.why == "it observes before its first step"

@@ -8,7 +8,7 @@ import mutator
 from mutator.engines.engine_jobs import RunMode
 from mutator.engines.in_target.run_once import Harness
 from mutator.model import Status
-from mutator.triggers.trigger_kinds import at_time
+from mutator.triggers.trigger_kinds import trigger_at_time
 
 from ..fork_on_toy import Edit, Fork
 
@@ -58,7 +58,7 @@ def glued(fork: Fork, edit: Edit) -> Fork:
 
 
 def test_both_engines_give_the_same_bytes(glued: Fork) -> None:
-    job = glued.job(at_time(2.0))
+    job = glued.job(trigger_at_time(2.0))
     forked = glued.engine.execute(job, glued.folder / "work" / "forked")
     plain = glued.engine.reference.execute(job, glued.folder / "plain")
     assert (forked.status, forked.mode, forked.why) == (Status.OK, RunMode.FORK, "")
@@ -70,7 +70,7 @@ def test_both_engines_give_the_same_bytes(glued: Fork) -> None:
 
 def test_a_run_imports_the_glue_of_the_harness_that_started_it(glued: Fork) -> None:
     """Otherwise, a run could import another installed version of mutator."""
-    plain = glued.engine.reference.execute(glued.job(at_time(2.0)), glued.folder / "plain")
+    plain = glued.engine.reference.execute(glued.job(trigger_at_time(2.0)), glued.folder / "plain")
     assert Path(plain.log.strip()) == Path(mutator.__file__)
     assert "mutator" not in plain.modules
     assert "numpy" in plain.modules

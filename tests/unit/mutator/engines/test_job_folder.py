@@ -7,7 +7,7 @@ import pytest
 
 from mutator.engines.engine_jobs import Execution
 from mutator.model import Status
-from mutator.triggers.trigger_kinds import at_time
+from mutator.triggers.trigger_kinds import trigger_at_time
 
 from ..fork_on_toy import Edit, Fork
 
@@ -86,7 +86,7 @@ def test_engines_agree_on_what_a_mutant_does_to_its_folders(
     """The target misbehaves in runs whose folder has the name of a case."""
     anchor, bodies = "        offset = world.offset\n", {name: body for name, (_, _, body) in CASES.items()}
     edit("tree/toycar/sensing.py", anchor, anchor + BODY.format(bodies=bodies))
-    job, wrong = fork.job(at_time(2.0)), []
+    job, wrong = fork.job(trigger_at_time(2.0)), []
     for name in cases:
         found = []
         for engine in (fork.engine, fork.engine.reference):

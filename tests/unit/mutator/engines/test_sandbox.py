@@ -16,7 +16,7 @@ from mutator.engines.reference_engine import ReferenceEngine
 from mutator.engines.sandbox import Sandbox
 from mutator.errors import EXIT_WRONG_INPUT, MutatorError
 from mutator.model import Limits, Status
-from mutator.triggers.trigger_kinds import at_time
+from mutator.triggers.trigger_kinds import trigger_at_time
 from mutator.workspace import Workspace
 
 from ..fork_on_toy import Edit, Fork
@@ -153,7 +153,7 @@ def test_a_fork_server_and_its_mutants_share_a_sandbox(toycar: Workspace, tmp_pa
         f"        offset = world.offset\n{leaving}",
     )
     boxed = Fork(replace(toycar, sandbox=True), tmp_path)
-    job = boxed.job(at_time(3.0))
+    job = boxed.job(trigger_at_time(3.0))
     [(_, first)] = boxed.engine.run([job])
     [folder] = (tmp_path / "work").glob("*-fork")
     assert [path for path in (folder / "tmp").rglob("*") if path.is_file()] == []
@@ -201,7 +201,7 @@ def test_a_mutant_that_exchanges_its_folder_for_a_link_reaches_nothing(
         "tree/toycar/sensing.py", "        offset = world.offset\n", f"        offset = world.offset\n{body}"
     )
     boxed = Fork(replace(toycar, sandbox=True), tmp_path)
-    job = replace(boxed.job(at_time(3.0)), name="mutant")
+    job = replace(boxed.job(trigger_at_time(3.0)), name="mutant")
     [(_, execution)] = boxed.engine.run([job])
     boxed.close()
     assert (execution.status, execution.mode) == (Status.OK, RunMode.REFERENCE), "it runs again elsewhere"

@@ -7,7 +7,7 @@ import pytest
 
 from mutator.engines.engine_jobs import Job, RunMode
 from mutator.model import Status
-from mutator.triggers.trigger_kinds import at_time
+from mutator.triggers.trigger_kinds import trigger_at_time
 
 from ..fork_on_toy import Edit, Fork
 
@@ -27,7 +27,7 @@ def several(fork: Fork, edit: Edit) -> Fork:
 
 
 def test_both_engines_give_the_same_bytes(several: Fork) -> None:
-    job = several.job(at_time(2.0))
+    job = several.job(trigger_at_time(2.0))
     assert {path for path in job.files if path.endswith("_fi.py")} == {"_fi.py"}
     assert b"\nimport _fi  # fi:probe\n" in b"\n" + job.files["toycar/sensing.py"]
     forked = several.engine.execute(job, several.folder / "work" / "forked")

@@ -21,7 +21,7 @@ from mutator.mutants.mutant_building import build
 from mutator.outcomes.golden_comparison import until
 from mutator.targets.stop_code import stop_source
 from mutator.triggers import trace_formulas
-from mutator.triggers.trigger_kinds import always, at_time
+from mutator.triggers.trigger_kinds import always_trigger, trigger_at_time
 
 from ..fork_on_toy import Edit, Fork
 
@@ -62,7 +62,7 @@ def drive(fork: Fork, engine: Engine, after: AfterHazard, at: float = 2.0) -> Re
         scenario="A",
         scenario_digest=digest(fork.toy.scenario("A").read_bytes()),
         method=Method.GUIDED,
-        trigger=at_time(at),
+        trigger=trigger_at_time(at),
         seed=7,
         after_hazard=after,
     )
@@ -77,7 +77,7 @@ def drive(fork: Fork, engine: Engine, after: AfterHazard, at: float = 2.0) -> Re
 
 def test_a_stopped_run_equals_the_beginning_of_the_complete_run(stopping: Fork) -> None:
     fork = stopping.engine
-    null = build(stopping.manifest, stopping.models, None, always())
+    null = build(stopping.manifest, stopping.models, None, always_trigger())
     work = stopping.folder / "warm"
     work.mkdir()
     warm = ForkEngine(stopping.manifest, work, stopping.limits, null=null, warm=True)
@@ -183,7 +183,7 @@ def test_stopping_agrees_with_the_verdict_on_the_trace(stopping: Fork, edit: Edi
         values = {"t": t, "d_rel": gap, "near": gap, "speed": speed}
         trace = {name: np.array(value) for name, value in values.items()}
         judged = [r.when if r.terminal == "True" else r.terminal for r in manifest.rules if r.terminal]
-        expected = any(trace_formulas.holds(text, trace)[0] for text in judged)
+        expected = any(trace_formulas.condition_at_each_step(text, trace)[0] for text in judged)
         assert over({"time": t[0], "gap": gap[0], "speed": speed[0]}) is expected, numbers
 
 

@@ -19,7 +19,7 @@ from mutator.mutants.changed_file_reuse import (
 )
 from mutator.mutants.mutant_building import build, build_without_reuse
 from mutator.mutants.patch_rendering import render_changed_file
-from mutator.triggers.trigger_kinds import always
+from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
 
 TEXTS = [
@@ -112,8 +112,8 @@ def test_a_change_is_reused_for_another_number(toy: Workspace) -> None:
     known = reuse_cache(manifest.tree, SENSOR)
     counts = []
     for value in (1.0, 2.5, 1e-9, -1.0, float("nan"), 3, None):
-        assert build(manifest, models, fault(value), always()) == build_without_reuse(
-            manifest, models, fault(value), always()
+        assert build(manifest, models, fault(value), always_trigger()) == build_without_reuse(
+            manifest, models, fault(value), always_trigger()
         )
         counts.append(len(known))
     assert counts == [1, 1, 1, 2, 3, 4, 5]
@@ -126,7 +126,7 @@ def test_a_reused_change_gives_the_same_errors(toy: Workspace, tmp_path: Path) -
     )
     manifest = toy.manifest("toy")
     models = Workspace(library=toy.library, templates=templates).fault_models()
-    build(manifest, models, fault(2), always())
+    build(manifest, models, fault(2), always_trigger())
     for wrong in (
         fault(1),
         fault(2, function="Sensor.mesure"),
@@ -136,8 +136,8 @@ def test_a_reused_change_gives_the_same_errors(toy: Workspace, tmp_path: Path) -
         said = []
         for way in (build, build_without_reuse):
             with pytest.raises(MutatorError) as caught:
-                way(manifest, models, wrong, always())
+                way(manifest, models, wrong, always_trigger())
             said.append((type(caught.value), str(caught.value)))
         assert said[0] == said[1]
     with pytest.raises(InvalidMutant, match="does not compile"):
-        build(manifest, models, fault(1), always())
+        build(manifest, models, fault(1), always_trigger())

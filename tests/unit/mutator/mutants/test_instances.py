@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from mutator.config.instance_conditions import instance_condition
-from mutator.config.yaml_sources import Source
+from mutator.config.instance_conditions import canonical_instance_condition
+from mutator.config.yaml_sources import YamlSource
 from mutator.errors import MutatorError
 from mutator.faults.injection_model import InjectionModel
 from mutator.faults.injection_specs import InjectionSpec
@@ -142,7 +142,7 @@ def test_lines_with_a_selection_are_recognized_as_checking_the_probe(clone: Work
 )
 def test_an_invalid_instance_condition_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match=r".*"):
-        instance_condition(text)
+        canonical_instance_condition(text)
 
 
 def test_an_unknown_name_or_an_unsuitable_model_is_refused(clone: Workspace) -> None:
@@ -156,7 +156,7 @@ def test_an_unknown_name_or_an_unsuitable_model_is_refused(clone: Workspace) -> 
 def read(**given: Any) -> InjectionSpec:
     at = {"file": "m.py", "function": "f", "after_assign": "gap"}
     model = InjectionModel.model_validate({"at": at, "model": "omission", **given})
-    return model.injection(Source(path=Path("spec.yaml"), data={}, lines={}), ())
+    return model.injection(YamlSource(path=Path("spec.yaml"), data={}, lines={}), ())
 
 
 def test_a_condition_is_stored_in_canonical_form() -> None:

@@ -13,7 +13,7 @@ from mutator.mutants.anchors import parse_file
 from mutator.mutants.injection_edits import injection_edit
 from mutator.mutants.probe import build_probe_settings, render_probe
 from mutator.mutants.splicing import apply_edits, as_line_edits, join_pieces, unsplice
-from mutator.triggers.conditions import check_condition
+from mutator.triggers.conditions import canonical_condition
 from mutator.workspace import Workspace
 
 STEP_S = 0.1
@@ -32,7 +32,7 @@ class Toy:
             apply_edits(file, as_line_edits(file, [injection_edit(file, models, injection, "ab12")]))
         )
         assert unsplice(data) == file.data
-        trigger = Trigger(name="test", condition=check_condition("rs > 0"))
+        trigger = Trigger(name="test", condition=canonical_condition("rs > 0"))
         observation = clone.manifest("openpilot").observation
         settings = build_probe_settings("m", trigger, Hold.WHILE, ("ab12",), observation, STEP_S)
         self.text = data.decode()

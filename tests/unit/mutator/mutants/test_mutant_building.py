@@ -17,7 +17,7 @@ from mutator.mutants.mutant_building import Mutant, write_tree
 from mutator.mutants.probe import probe_path
 from mutator.mutants.splicing import unsplice
 from mutator.targets.source_tree import read_tree
-from mutator.triggers.trigger_kinds import always, at_time
+from mutator.triggers.trigger_kinds import always_trigger, trigger_at_time
 from mutator.workspace import Workspace
 
 GOLDEN = Path(__file__).parents[1] / "toy" / "golden"
@@ -109,8 +109,8 @@ def test_ids_depend_on_everything_that_determines_a_mutant(toy: Workspace) -> No
     others = [
         build(toy, faults["both"]),
         build(toy, None),
-        build(toy, faults["longer"], always()),
-        build(toy, faults["longer"], at_time(3.0)),
+        build(toy, faults["longer"], always_trigger()),
+        build(toy, faults["longer"], trigger_at_time(3.0)),
     ]
     target = toy.manifest("toy").root / "toycar" / "judge.py"
     target.write_text(target.read_text() + "\n")
@@ -143,7 +143,7 @@ def test_faults_are_active_once_their_trigger_fires(toy: Workspace, tmp_path: Pa
     assert null["report"]["injections"] == {}
     assert null["report"]["triggered"]["first"] == 0.5
     for name in ("longer", "silent", "both"):
-        made = build(toy, toy_faults(toy)[name], at_time(2.0))
+        made = build(toy, toy_faults(toy)[name], trigger_at_time(2.0))
         result = run(toy, made, tmp_path / name)
         gaps, golden = result["gaps"], null["gaps"]
         assert gaps[:20] == golden[:20] and gaps != golden

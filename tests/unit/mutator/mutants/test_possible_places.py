@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from mutator.config.location_model import AtModel
-from mutator.config.yaml_sources import Source
+from mutator.config.location_model import LocationModel
+from mutator.config.yaml_sources import YamlSource
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import ParamSchema
 from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS, Injection, Value
@@ -91,8 +91,10 @@ def test_an_ambiguous_place_is_listed_with_nth(listed: list[ListedPlace]) -> Non
 
 
 def test_each_listed_anchor_finds_its_own_line(listed: list[ListedPlace]) -> None:
-    source = Source(path=Path("spec.yaml"), data={}, lines={})
-    assert [AtModel(**one.at).location(source, ()) for one in listed] == [one.location for one in listed]
+    source = YamlSource(path=Path("spec.yaml"), data={}, lines={})
+    assert [LocationModel(**one.at).location(source, ()) for one in listed] == [
+        one.location for one in listed
+    ]
     file = parse_file("m.py", SOURCE, Path("x"))
     for one in listed:
         assert file.line_span(one.location)[0] + 1 == one.line or one.location.anchor.name == "value", one

@@ -14,7 +14,7 @@ import pytest
 from mutator.model import Hold, Trigger
 from mutator.mutants import probe as contract
 from mutator.targets.observed_values import Observation, Value
-from mutator.triggers.conditions import check_condition, evaluate
+from mutator.triggers.conditions import canonical_condition, evaluate_condition
 from mutator.workspace import Workspace
 
 
@@ -23,7 +23,7 @@ def probe(
 ) -> Any:
     """Return a new probe module with two injections, `a` and `b`."""
     observation = observation or clone.manifest("openpilot").observation
-    trigger = Trigger(name="test", condition=check_condition(condition))
+    trigger = Trigger(name="test", condition=canonical_condition(condition))
     settings = contract.build_probe_settings("m1", trigger, Hold.WHILE, ("a", "b"), observation, 0.1)
     module = types.ModuleType("_fi")
     models = clone.fault_models()
@@ -159,7 +159,7 @@ def test_the_probe_evaluates_conditions_like_the_harness(clone: Workspace) -> No
             speed, closing = values["v_ego"], values["v_ego"] - values["v_lead"]
             hwt = values["d_rel"] / speed if speed else math.inf
             known = {"t": i * 0.01, "hwt": hwt, "rs": closing, **values}
-            assert fi.active("a") == evaluate(check_condition(condition), known)
+            assert fi.active("a") == evaluate_condition(canonical_condition(condition), known)
 
 
 def test_drift_grows_with_steps_and_not_with_executions(clone: Workspace) -> None:

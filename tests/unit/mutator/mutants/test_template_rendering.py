@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mutator.config.yaml_sources import Source
+from mutator.config.yaml_sources import YamlSource
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel, ParamSchema, SnippetKind
 from mutator.model import Hold, Value
 from mutator.mutants.probe import build_probe_settings, render_probe
 from mutator.mutants.template_rendering import render_changed_value, render_snippet
-from mutator.triggers.trigger_kinds import always
+from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
 
-SOURCE = Source(path=Path("t.yaml"), data={}, lines={})
+SOURCE = YamlSource(path=Path("t.yaml"), data={}, lines={})
 
 
 def model(template: str, kind: SnippetKind = SnippetKind.INSERT) -> FaultModel:
@@ -255,7 +255,7 @@ def test_a_models_result_has_the_expected_value_and_type(
     before = copy.deepcopy(value)
     lines = render_snippet(models.get(name), given, "ab12")
     observation = clone.manifest("openpilot").observation
-    settings = build_probe_settings("m", always(), Hold.WHILE, ("ab12",), observation, 0.1)
+    settings = build_probe_settings("m", always_trigger(), Hold.WHILE, ("ab12",), observation, 0.1)
     probe = types.ModuleType("_fi")
     exec(render_probe(models.probe, settings).text, vars(probe))
     probe.observe(t=0.0, d_rel=1.0, v_ego=1.0, v_lead=1.0)

@@ -50,7 +50,7 @@ def test_executed_lines_are_cached(
     monkeypatch.setattr(executed_lines, "_measure", lambda *given: (runs.append("run"), measured(*given))[1])
     [first] = measure_executed_lines(manifest, [drive], LIMITS)
     assert [first] == measure_executed_lines(manifest, [drive], LIMITS) and len(runs) == 1
-    [entry] = shared_cache.of_lines().iterdir()
+    [entry] = shared_cache.lines_folder().iterdir()
     entry.write_text(entry.read_text().replace("[", "[1,", 1))
     assert [first] == measure_executed_lines(manifest, [drive], LIMITS) and len(runs) == 2
     broken = tmp_path / "broken.yaml"

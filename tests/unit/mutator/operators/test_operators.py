@@ -17,7 +17,7 @@ from mutator.operators.mutations import Mutation
 from mutator.operators.operator_lookup import find_operator, unique_operator_names
 from mutator.operators.statement_facts import facts_of
 from mutator.targets.source_tree import read_tree
-from mutator.triggers.trigger_kinds import always
+from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
 
 Make = Callable[..., list[Mutation]]
@@ -57,7 +57,7 @@ def test_an_operator_of_another_package_is_used_like_the_others(
     found = select_mutations(manifest, models, ["zero"], ["toycar/**"])
     fault = found.mutations[0].fault("as_described")
     assert fault.spec.startswith("operators/zero/") and str(fault.value).endswith(" -> 0")
-    assert build(manifest, models, fault, always()).patch
+    assert build(manifest, models, fault, always_trigger()).patch
 
 
 def test_an_expression_with_a_yield_has_no_mutations(make: Make) -> None:
@@ -101,7 +101,7 @@ def test_places_can_be_files_functions_and_globs(toycar: Workspace) -> None:
     manifest, models = toycar.manifest("toycar"), toycar.fault_models()
 
     def found(place: str, executed: dict[str, list[int]] | None = None) -> SelectedMutations:
-        return select_mutations(manifest, models, OPERATORS.shipped(), [place], executed)
+        return select_mutations(manifest, models, OPERATORS.shipped_names(), [place], executed)
 
     whole, part = found("toycar/sensing.py"), found("toycar/sensing.py::Sensor.*")
     assert part.mutations and set(part.mutations) <= set(whole.mutations)
@@ -122,7 +122,7 @@ def test_places_can_be_files_functions_and_globs(toycar: Workspace) -> None:
 
 def test_samples_are_stratified_and_reproducible(toycar: Workspace) -> None:
     manifest, models = toycar.manifest("toycar"), toycar.fault_models()
-    found = select_mutations(manifest, models, OPERATORS.shipped(), ["toycar/**"])
+    found = select_mutations(manifest, models, OPERATORS.shipped_names(), ["toycar/**"])
     drawn = sample_mutations(found, len(found.mutations) // 3, 4)
     assert (
         drawn
@@ -137,9 +137,11 @@ def test_samples_are_stratified_and_reproducible(toycar: Workspace) -> None:
 
 def test_every_mutant_of_the_toy_can_be_built(toycar: Workspace) -> None:
     manifest, models = toycar.manifest("toycar"), toycar.fault_models()
-    found = select_mutations(manifest, models, OPERATORS.shipped(), ["toycar/sensing.py", "toycar/driver.py"])
+    found = select_mutations(
+        manifest, models, OPERATORS.shipped_names(), ["toycar/sensing.py", "toycar/driver.py"]
+    )
     faults = [one.fault("as_described") for one in found.mutations]
     assert len({fault.id for fault in faults}) == len(faults)
     for fault in faults:
-        mutant = build(manifest, models, fault, always())
-        assert mutant == build_without_reuse(manifest, models, fault, always())
+        mutant = build(manifest, models, fault, always_trigger())
+        assert mutant == build_without_reuse(manifest, models, fault, always_trigger())

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from mutator._common.typed_json import from_plain
+from mutator._common.typed_json import from_json_types
 from mutator.errors import MutatorError
 from mutator.model import (
     Activation,
@@ -67,12 +67,12 @@ STRUCTURE = StructureModel.model_validate(
     }
 )
 CHANNELS = [
-    from_plain(ChannelFacts, ["seen", "m", "internal", "finder", ""]),
-    from_plain(ChannelFacts, ["wanted", "m/s", "internal", "speed", ""]),
-    from_plain(ChannelFacts, ["angle", "rad", "internal", "wheel", ""]),
-    from_plain(ChannelFacts, ["gas", "-", "actuator", "pedals", ""]),
-    from_plain(ChannelFacts, ["torque", "-", "actuator", "rack", ""]),
-    from_plain(ChannelFacts, ["place", "m", "truth", "car", ""]),
+    from_json_types(ChannelFacts, ["seen", "m", "internal", "finder", ""]),
+    from_json_types(ChannelFacts, ["wanted", "m/s", "internal", "speed", ""]),
+    from_json_types(ChannelFacts, ["angle", "rad", "internal", "wheel", ""]),
+    from_json_types(ChannelFacts, ["gas", "-", "actuator", "pedals", ""]),
+    from_json_types(ChannelFacts, ["torque", "-", "actuator", "rack", ""]),
+    from_json_types(ChannelFacts, ["place", "m", "truth", "car", ""]),
 ]
 WAYS = FaultPaths(CHANNELS, STRUCTURE)
 
@@ -231,7 +231,7 @@ def test_the_first_changed_input_decides_between_fault_and_feedback(
     left: dict[str, float], state: ComponentState
 ) -> None:
     """The car moved differently before the speed control changed."""
-    pace = from_plain(ChannelFacts, ["pace", "m/s", "internal", "gauge", ""])
+    pace = from_json_types(ChannelFacts, ["pace", "m/s", "internal", "gauge", ""])
     fault_paths = FaultPaths([*CHANNELS, pace], STRUCTURE)
     found = path("finder", "wheel", fault_paths=fault_paths, torque=1.0, place=1.1, wanted=1.5, **left)
     assert states(found)["speed"] is state
@@ -281,9 +281,9 @@ def test_a_chain_has_feedback_too() -> None:
     """The fault is injected after the interface, whose channels change only after the car."""
     fault_paths = FaultPaths(
         [
-            from_plain(ChannelFacts, ["seen", "", "internal", "interface", ""]),
-            from_plain(ChannelFacts, ["ask", "", "actuator", "control", ""]),
-            from_plain(ChannelFacts, ["gap", "", "truth", "car", ""]),
+            from_json_types(ChannelFacts, ["seen", "", "internal", "interface", ""]),
+            from_json_types(ChannelFacts, ["ask", "", "actuator", "control", ""]),
+            from_json_types(ChannelFacts, ["gap", "", "truth", "car", ""]),
         ],
         None,
     )

@@ -141,7 +141,7 @@ def test_a_forged_golden_run_is_ignored(
     told["goldens"]["A"] = output_digest_of(manifest, place)
     (cache / "checks.json").write_bytes(json_bytes(told))
     (cache / "sum").unlink()
-    (cache / "sum").write_bytes(cached_folders._sum(cache))
+    (cache / "sum").write_bytes(cached_folders._digest_of_files(cache))
     folder = freeze(make_plan(toy, "small"), tmp_path / "run", toy)
     with pytest.raises(RunStarted):
         run_checks(toy, folder)

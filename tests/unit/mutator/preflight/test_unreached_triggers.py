@@ -12,7 +12,7 @@ from mutator.campaigns.plan import make_plan
 from mutator.model import Experiment, Trigger
 from mutator.preflight.preflight_checks import describe_unreached_triggers, run_checks
 from mutator.preflight.unreached_triggers import describe_unreached, load_observations, save_observations
-from mutator.triggers.trigger_kinds import at_time
+from mutator.triggers.trigger_kinds import trigger_at_time
 from mutator.workspace import Workspace
 
 MakeExperiment = Callable[..., Experiment]
@@ -23,8 +23,8 @@ SEEN = [(0.0, 40.0, 20.0, 18.0), (1.0, 20.0, 20.0, 18.0), (2.0, 40.0, 20.0, 18.0
 @pytest.mark.parametrize(
     ("trigger", "said"),
     [
-        (at_time(2.0), []),
-        (at_time(2.1), ["the scenario ends before the time of", "(S1, which ends at 2 s: 2)"]),
+        (trigger_at_time(2.0), []),
+        (trigger_at_time(2.1), ["the scenario ends before the time of", "(S1, which ends at 2 s: 2)"]),
         (Trigger(name="near", condition="hwt <= 1.5"), []),
         (Trigger(name="near", condition="hwt <= 1.5", armed_after_s=1.5), ["near in S1: 2"]),
         (Trigger(name="nearer", condition="hwt <= 0.9"), ["no golden run reaches", "nearer in S1: 2"]),

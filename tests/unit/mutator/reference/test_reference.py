@@ -84,7 +84,7 @@ def test_every_model_and_key_is_described(kind: YamlFormat) -> None:
 
 def test_models_are_in_reading_order() -> None:
     names = order_models(schema_by_model(spec_model(Workspace.find(CLONE).readings())))
-    assert names == ["Spec", "Variant", "Draw", "Sweep", "Reading", "Injection", "At"]
+    assert names == ["Spec", "Variant", "Draw", "Sweep", "Reading", "Injection", "Location"]
 
 
 def test_every_command_is_in_a_group() -> None:
@@ -98,7 +98,7 @@ def test_library_files_follow_their_schema(kind: YamlFormat) -> None:
     assert files
     check = validator(kind.name)
     for file in files:
-        data = yaml_files.load(file).data
+        data = yaml_files.load_yaml(file).data
         assert data["schema"] == kind.schema, file
         assert not [f"{file}: {error.message}" for error in check.iter_errors(data)]
 
@@ -117,7 +117,7 @@ def test_library_files_follow_their_schema(kind: YamlFormat) -> None:
     ],
 )
 def test_a_schema_rejects_invalid_keys_and_values(keys: tuple[str | int, ...], value: Any) -> None:
-    data = yaml_files.load(CHAFF).data
+    data = yaml_files.load_yaml(CHAFF).data
     check = validator("fault_spec")
     assert check.is_valid(data)
     inner = data
@@ -128,7 +128,7 @@ def test_a_schema_rejects_invalid_keys_and_values(keys: tuple[str | int, ...], v
 
 
 def test_a_schema_accepts_a_users_fault_model() -> None:
-    data = yaml_files.load(CHAFF).data
+    data = yaml_files.load_yaml(CHAFF).data
     injection = data["variants"]["distance"]["as_described"]["injections"][0]
     injection |= {"model": "mine", "params": {"whatever_m": math.inf}}
     assert validator("fault_spec").is_valid(data)
@@ -136,7 +136,7 @@ def test_a_schema_accepts_a_users_fault_model() -> None:
 
 def test_pages_are_written_only_in_a_clone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """An installed wheel has no clone to write to."""
-    monkeypatch.setattr(shipped_files, "ARCHIVE", tmp_path)
+    monkeypatch.setattr(shipped_files, "ARCHIVE_PATH", tmp_path)
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
     library = tmp_path / "mutator" / "shipped" / "0" / "fault_library"
     with pytest.raises(MutatorError, match="ships with mutator"):

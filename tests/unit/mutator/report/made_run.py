@@ -4,7 +4,7 @@ import json
 from html.parser import HTMLParser
 from pathlib import Path
 
-from mutator._common.hashing import plain
+from mutator._common.hashing import as_json_types
 from mutator.results.table_columns import SINCE, result_columns
 from mutator.store import file_digests, plan_file
 from mutator.store.file_digests import DigestLedger
@@ -18,8 +18,8 @@ COLUMNS = result_columns(("H1", "H2", "H3"), COMPARED, (), SINCE)
 HEAD = made_head(
     campaign="night_<b>drive</b>",
     compared=COMPARED,
-    choices=plain(Choices(limit=3)),
-    stretches=[plain(Stretch(python="3.11.7", platform="Linux", packages={"numpy": "2.4.6"}))],
+    choices=as_json_types(Choices(limit=3)),
+    stretches=[as_json_types(Stretch(python="3.11.7", platform="Linux", packages={"numpy": "2.4.6"}))],
 )
 OK = {
     "module": "radar",

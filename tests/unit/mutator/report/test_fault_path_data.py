@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from math import inf
 
-from mutator._common.typed_json import from_plain
+from mutator._common.typed_json import from_json_types
 from mutator.model import Record
 from mutator.outcomes.fault_paths import (
     ComponentState,
@@ -21,9 +21,9 @@ from mutator.targets.target_facts import ChannelFacts
 from mutator.workspace import Workspace
 
 CHANNELS = [
-    from_plain(ChannelFacts, ["seen", "m", "internal", "eyes", "what is seen"]),
-    from_plain(ChannelFacts, ["gas", "-", "actuator", "pedals", ""]),
-    from_plain(ChannelFacts, ["gap", "m", "truth", "car", ""]),
+    from_json_types(ChannelFacts, ["seen", "m", "internal", "eyes", "what is seen"]),
+    from_json_types(ChannelFacts, ["gas", "-", "actuator", "pedals", ""]),
+    from_json_types(ChannelFacts, ["gap", "m", "truth", "car", ""]),
 ]
 
 

@@ -3,11 +3,11 @@
 from collections.abc import Iterator
 
 from mutator.report.experiment_list import scene_facts
-from mutator.triggers.formula_json import Tree
+from mutator.triggers.formula_json import JsonTree
 from mutator.workspace import Workspace
 
 
-def names(tree: Tree) -> Iterator[str]:
+def names(tree: JsonTree) -> Iterator[str]:
     if isinstance(tree, str):
         yield tree
     elif isinstance(tree, list):

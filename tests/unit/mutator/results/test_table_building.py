@@ -14,7 +14,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from mutator._common.files import half_written
+from mutator._common.files import writing_temporary_path
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plan import make_plan
 from mutator.errors import MutatorWarning
@@ -251,7 +251,7 @@ def test_an_interrupted_build_is_not_reported_as_an_edited_table(
 
         @contextmanager
         def written(path: Path, stop: str = killed_before) -> Iterator[Path]:
-            with half_written(path) as temporary:
+            with writing_temporary_path(path) as temporary:
                 yield temporary
                 if path.name == stop:
                     raise KeyboardInterrupt

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from mutator._common.hashing import plain
-from mutator._common.typed_json import from_plain
+from mutator._common.hashing import as_json_types
+from mutator._common.typed_json import from_json_types
 from mutator.model import Experiment, Method, Outcome, Record, Status
 from mutator.results.table_columns import (
     SEVERITY,
@@ -117,7 +117,7 @@ def test_a_scale_determines_the_columns_of_severity() -> None:
         severity = severity_columns(has_classes=has_classes)
         columns = [c.name for c in result_columns(("H1",), ("gas",), (), severity)]
         assert columns[columns.index("max_dev_gas") + 1 : columns.index("variant")] == names
-    assert from_plain(Scale, plain(SCALE)) == SCALE
+    assert from_json_types(Scale, as_json_types(SCALE)) == SCALE
     with pytest.raises(ValueError, match="no class of severity begins at 0"):
         replace(SCALE, classes=SCALE.classes[1:])
 

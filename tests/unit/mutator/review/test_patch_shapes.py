@@ -8,7 +8,7 @@ from mutator.faults.spec_expansion import expand
 from mutator.model import Fault, Hold, Trigger
 from mutator.mutants.mutant_building import build
 from mutator.review.patch_shapes import Shape, group_label, parameter_values, shapes, without_values
-from mutator.triggers.trigger_kinds import always, at_time
+from mutator.triggers.trigger_kinds import always_trigger, trigger_at_time
 from mutator.workspace import Workspace
 
 NEAR = Trigger(name="near", condition="hwt <= 2.0")
@@ -76,7 +76,7 @@ def test_place_model_and_bound_are_part_of_the_shape(toycar: Workspace) -> None:
 
 def test_triggers_are_not_part_of_the_shape(toycar: Workspace) -> None:
     longer = faults(toycar, "longer")[0]
-    triggers = (NEAR, replace(NEAR, hold=Hold.TO_END), at_time(3.0), always())
+    triggers = (NEAR, replace(NEAR, hold=Hold.TO_END), trigger_at_time(3.0), always_trigger())
     assert len(grouped(toycar, [(longer, trigger) for trigger in triggers])) == 1
 
 

@@ -8,7 +8,7 @@ from hashlib import sha256
 
 import pytest
 
-from mutator._common.hashing import canonical, plain
+from mutator._common.hashing import as_json_types, canonical_json
 from mutator.errors import MutatorError
 from mutator.model import AfterHazard, Experiment, Hold
 from mutator.store.plan_file import experiment_as_json
@@ -26,7 +26,7 @@ Make = Callable[..., Experiment]
 
 
 def line_of(experiment: Experiment) -> bytes:
-    return canonical(experiment_as_json(experiment)).encode() + b"\n"
+    return canonical_json(experiment_as_json(experiment)).encode() + b"\n"
 
 
 def with_id_of_its_text(line: bytes) -> bytes:
@@ -48,7 +48,7 @@ def test_a_line_in_the_usual_format_is_read_fast(experiment: Make) -> None:
         replace(experiment(), setting=("a", "b")),
     ):
         faults = {planned.fault.id: planned.fault}
-        line = canonical(experiment_as_json(planned)).encode() + b"\n"
+        line = canonical_json(experiment_as_json(planned)).encode() + b"\n"
         found = parse_canonical_experiment(line, faults)
         assert found == experiment_from_json(json.loads(line), faults) == planned
         assert found.id == planned.id and "id" in vars(found)
@@ -60,7 +60,7 @@ def test_a_line_in_the_usual_format_is_read_fast(experiment: Make) -> None:
         ):
             assert old in line and parse_canonical_experiment(line.replace(old, new), faults) is None
         assert parse_canonical_experiment(line, {}) is None
-    stopping = canonical(experiment_as_json(replace(planned, after_hazard=AfterHazard.STOP))).encode()
+    stopping = canonical_json(experiment_as_json(replace(planned, after_hazard=AfterHazard.STOP))).encode()
     assert parse_canonical_experiment(stopping, faults) is None
 
 
@@ -77,7 +77,7 @@ def test_a_missing_field_of_an_older_plan_has_its_default(experiment: Make) -> N
 def test_an_unknown_field_of_a_newer_plan_is_refused(experiment: Make, where: str) -> None:
     """An unknown field could change the experiment."""
     planned = experiment()
-    fault, line = plain(planned.fault), experiment_as_json(planned)
+    fault, line = as_json_types(planned.fault), experiment_as_json(planned)
     injection = fault["injections"][0]
     places = {"experiment": line, "trigger": line["trigger"], "fault": fault, "injection": injection}
     places["anchor"] = injection["location"]["anchor"]

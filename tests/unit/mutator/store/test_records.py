@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from mutator._common.hashing import canonical
+from mutator._common.hashing import canonical_json
 from mutator.errors import CheckFailed, MutatorError
 from mutator.model import Activation, Outcome, Record, RunError, Status
 from mutator.store.checksummed_lines import LineWriter
@@ -41,7 +41,7 @@ def test_a_line_equals_asdict(record: MakeRecord) -> None:
     activation = Activation(first=1.0, last=2.0, count=3)
     error = RunError(kind="ValueError", message="no", place="a.py:3")
     for one in (record(), replace(record(), activation=activation), replace(record(), error=error)):
-        assert canonical(record_as_json(one)) == canonical(asdict(one))
+        assert canonical_json(record_as_json(one)) == canonical_json(asdict(one))
 
 
 def test_a_record_without_an_error_has_no_such_key(tmp_path: Path, record: MakeRecord) -> None:

@@ -76,23 +76,26 @@ def test_a_unique_prefix_of_an_id_finds_the_experiment(folder: RunFolder) -> Non
 def test_a_run_folder_has_one_owner(folder: RunFolder) -> None:
     process = holder(folder, "owner")
     try:
-        for attempt in (lambda: folder_locks.owned(folder.path).__enter__(), lambda: delete_run(folder.path)):
+        for attempt in (
+            lambda: folder_locks.owning_run_folder(folder.path).__enter__(),
+            lambda: delete_run(folder.path),
+        ):
             with pytest.raises(MutatorError, match=f"in use by process {process.pid}"):
                 attempt()
     finally:
         process.kill()
         process.communicate()
-    with folder_locks.owned(folder.path):
+    with folder_locks.owning_run_folder(folder.path):
         assert (folder.path / "owner.lock").read_text().strip().isdigit()
 
 
 def test_a_new_owner_waits_for_workers_of_a_dead_command(folder: RunFolder) -> None:
     process = holder(folder, "worker", "1")
-    assert folder_locks.living_workers(folder.path) == [process.pid]
+    assert folder_locks.living_worker_pids(folder.path) == [process.pid]
     with pytest.raises(MutatorError, match=rf"workers of an earlier run .* {process.pid}\)"):
-        folder_locks.owned(folder.path, patience_s=0.2).__enter__()
-    with folder_locks.owned(folder.path):
-        assert folder_locks.living_workers(folder.path) == []
+        folder_locks.owning_run_folder(folder.path, patience_s=0.2).__enter__()
+    with folder_locks.owning_run_folder(folder.path):
+        assert folder_locks.living_worker_pids(folder.path) == []
     process.communicate()
 
 
@@ -103,16 +106,16 @@ def test_a_lock_that_is_not_a_file_is_refused(folder: RunFolder, name: str) -> N
     place.parent.mkdir(exist_ok=True)
     os.mkfifo(place)
     with pytest.raises(MutatorError, match=rf"{name}: not a regular file"):
-        folder_locks.owned(folder.path).__enter__()
+        folder_locks.owning_run_folder(folder.path).__enter__()
     place.unlink()
     place.mkdir(parents=True)
     with pytest.raises(MutatorError, match=rf"{name}: not a regular file"):
-        folder_locks.owned(folder.path).__enter__()
+        folder_locks.owning_run_folder(folder.path).__enter__()
     place.rmdir()
     head = (folder.path / "run.json").read_bytes()
     place.symlink_to(folder.path / "run.json")
     with pytest.raises(MutatorError, match=rf"{name}: not a regular file"):
-        folder_locks.owned(folder.path).__enter__()
+        folder_locks.owning_run_folder(folder.path).__enter__()
     assert (folder.path / "run.json").read_bytes() == head
 
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from mutator._common.hashing import plain
-from mutator._common.typed_json import from_plain
+from mutator._common.hashing import as_json_types
+from mutator._common.typed_json import from_json_types
 from mutator.errors import Misfit
 from mutator.store.work_stretches import (
     Blas,
@@ -34,7 +34,7 @@ def test_stretches_are_read_as_written() -> None:
         worker="w", mutator="0.2", host="h", python="3", platform="p", cpu=None, blas=BEFORE.blas, packages={}
     )
     for stretch in (BEFORE, replace(BEFORE, machines=(machine,))):
-        assert from_plain(Stretch, json.loads(json.dumps(plain(stretch)))) == stretch
+        assert from_json_types(Stretch, json.loads(json.dumps(as_json_types(stretch)))) == stretch
 
 
 @pytest.mark.parametrize(
@@ -42,13 +42,13 @@ def test_stretches_are_read_as_written() -> None:
     [
         ({}, "no key 'python'"),
         ({"python": "3"}, "no key 'packages'"),
-        (plain(BEFORE) | {"stranger": 1}, "an unknown key 'stranger'"),
+        (as_json_types(BEFORE) | {"stranger": 1}, "an unknown key 'stranger'"),
         (7, "7"),
     ],
 )
 def test_a_damaged_stretch_is_refused(stretch: Any, got: str) -> None:
     with pytest.raises(Misfit, match=got):
-        from_plain(Stretch, stretch)
+        from_json_types(Stretch, stretch)
 
 
 def test_every_difference_is_named() -> None:

@@ -3,11 +3,11 @@
 import pytest
 
 from mutator.stpa.context_coverage import measure_coverage
-from mutator.triggers.conditions import check_condition
+from mutator.triggers.conditions import canonical_condition
 
 
 def prove(*conditions: str):
-    return measure_coverage({f"C{i}": check_condition(text) for i, text in enumerate(conditions, 1)})
+    return measure_coverage({f"C{i}": canonical_condition(text) for i, text in enumerate(conditions, 1)})
 
 
 @pytest.mark.parametrize(

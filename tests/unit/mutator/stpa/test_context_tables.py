@@ -9,7 +9,7 @@ import pytest
 from mutator.errors import MutatorError
 from mutator.model import Hold, Trigger
 from mutator.stpa.context_tables import load_context_table
-from mutator.triggers.conditions import evaluate
+from mutator.triggers.conditions import evaluate_condition
 from mutator.workspace import Workspace
 
 
@@ -62,7 +62,7 @@ def test_the_shipped_table_covers_every_situation_exactly_once(clone: Workspace)
             for v_lead in (0.0, 10.0, 20.0, 30.0):
                 hwt = d_rel / v_ego if v_ego else math.inf
                 values = {"hwt": hwt, "rs": v_ego - v_lead}
-                assert sum(evaluate(t.condition, values) for t in triggers) == 1
+                assert sum(evaluate_condition(t.condition, values) for t in triggers) == 1
     cells = {
         (row.id, action): (v.provided, v.not_provided)
         for row in table.rows

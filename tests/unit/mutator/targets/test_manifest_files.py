@@ -11,7 +11,7 @@ from mutator.model import AnchorKind
 from mutator.mutants.mutant_building import build
 from mutator.targets.manifest_files import load_manifest
 from mutator.targets.source_tree import matches, read_tree
-from mutator.triggers.trigger_kinds import always
+from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
 
 FILM = 'film: {run: ["x={film}"], module: show, args: ["{out}"], still: ["{film}"]}'
@@ -88,7 +88,7 @@ def test_every_run_has_the_same_cache_folder(toy: Workspace) -> None:
     manifest = toy.manifest("toy")
     for independent in (False, True):
         given = manifest.arguments(scenario=Path("s"), seed=0, out=Path("o"), independent=independent)
-        assert given[given.index("--cache") + 1] == str(shared_cache.of_target("toy"))
+        assert given[given.index("--cache") + 1] == str(shared_cache.target_folder("toy"))
 
 
 def test_a_film_adds_arguments(toy: Workspace) -> None:
@@ -297,7 +297,7 @@ def test_linked_files_are_part_of_the_tree(toy: Workspace) -> None:
     spec = toy.library / "faults" / "sensor" / "distance.yaml"
     spec.write_text(spec.read_text().replace("toycar/sensor.py", "toycar/linked/sensor.py"))
     (fault, *_) = expand(toy.spec(spec), 0, models=toy.fault_models(), manifest=manifest)
-    assert "toycar/linked/sensor.py" in build(manifest, toy.fault_models(), fault, always()).files
+    assert "toycar/linked/sensor.py" in build(manifest, toy.fault_models(), fault, always_trigger()).files
     assert (outside / "sensor.py").read_bytes() == before
 
 

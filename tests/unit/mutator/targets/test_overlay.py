@@ -12,7 +12,7 @@ from mutator.faults.spec_expansion import expand
 from mutator.model import Outcome
 from mutator.mutants.mutant_building import build
 from mutator.report.film import Shot, _show
-from mutator.triggers.trigger_kinds import always
+from mutator.triggers.trigger_kinds import always_trigger
 from mutator.workspace import Workspace
 
 MANIFEST = "targets/pole.yaml"
@@ -83,7 +83,7 @@ def test_a_file_of_both_overlay_and_root_is_refused(pole: Workspace, name: str) 
 def test_an_overlay_cannot_have_the_probes_name(pole: Workspace) -> None:
     (pole.library / "overlays" / "pole" / "_fi.py").write_text("x = 1\n")
     with pytest.raises(MutatorError, match=r"the target has a file _fi.py; expected no file of this name"):
-        build(pole.manifest("pole"), pole.fault_models(), None, always())
+        build(pole.manifest("pole"), pole.fault_models(), None, always_trigger())
 
 
 def test_a_linked_overlay_works_like_the_original(pole: Workspace) -> None:
@@ -117,7 +117,7 @@ def test_errors_name_the_file_of_the_overlay(pole: Workspace) -> None:
     overlay = (pole.library / "overlays" / "pole").resolve()
     edit(pole.library / MANIFEST, "after_assign: now", "after_assign: then")
     with pytest.raises(MutatorError) as caught:
-        build(pole.manifest("pole"), pole.fault_models(), None, always())
+        build(pole.manifest("pole"), pole.fault_models(), None, always_trigger())
     assert caught.value.where == str(overlay / "drive.py")
     assert pole.manifest("pole").tree.named(caught.value.where) == "drive.py"
     (found,) = [finding for finding in examine_machine(pole) if finding.name == "target pole"]

@@ -8,7 +8,7 @@ from mutator.engines.engine_jobs import RunMode
 from mutator.errors import MutatorError
 from mutator.model import Status
 from mutator.report.film import Shot, _show
-from mutator.triggers.trigger_kinds import at_time
+from mutator.triggers.trigger_kinds import trigger_at_time
 from mutator.workspace import Workspace
 
 from ..fork_on_toy import Fork
@@ -27,7 +27,7 @@ def with_env(workspace: Workspace, env: str) -> Path:
 def test_reference_runs_and_the_fork_server_have_the_variables(fork: Fork) -> None:
     with_env(fork.toy, "{ROAD: wet, OMP_NUM_THREADS: '1'}")
     (fork.toy.library.parent / "tree" / "toycar" / "__init__.py").write_text(USE)
-    job = fork.job(at_time(2.0))
+    job = fork.job(trigger_at_time(2.0))
     forked = fork.run(job)
     assert (forked.status, forked.mode, forked.why) == (Status.OK, RunMode.FORK, "")
     plain = fork.engine.reference.execute(job, fork.folder / "plain")

@@ -2,8 +2,8 @@
 
 import pytest
 
-from mutator._common.hashing import plain
-from mutator._common.typed_json import from_plain
+from mutator._common.hashing import as_json_types
+from mutator._common.typed_json import from_json_types
 from mutator.errors import Misfit
 from mutator.targets.channels import Role
 from mutator.targets.target_facts import ChannelFacts, MetricFacts
@@ -11,14 +11,14 @@ from mutator.targets.target_facts import ChannelFacts, MetricFacts
 
 def test_facts_are_stored_as_the_list_of_their_values() -> None:
     channel = ["gas", "-", "actuator", "pedals", "how far the pedal is pressed"]
-    assert from_plain(ChannelFacts, channel).role is Role.ACTUATOR
-    assert plain(from_plain(ChannelFacts, channel)) == channel
+    assert from_json_types(ChannelFacts, channel).role is Role.ACTUATOR
+    assert as_json_types(from_json_types(ChannelFacts, channel)) == channel
     metric = ["margin_near", "m", "the smallest distance", "lower"]
-    assert from_plain(MetricFacts, metric).worse == "lower"
-    assert plain(from_plain(MetricFacts, metric)) == metric
+    assert from_json_types(MetricFacts, metric).worse == "lower"
+    assert as_json_types(from_json_types(MetricFacts, metric)) == metric
 
 
 @pytest.mark.parametrize("values", [["gas", "-", "driver", "", ""], ["gas", "-", "actuator", ""], []])
 def test_an_unknown_role_or_another_length_is_refused(values: list[str]) -> None:
     with pytest.raises(Misfit):
-        from_plain(ChannelFacts, values)
+        from_json_types(ChannelFacts, values)

@@ -6,12 +6,12 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.triggers.conditions import (
-    check_condition,
-    check_formula,
+    canonical_condition,
+    canonical_formula,
     divide,
-    evaluate,
+    evaluate_condition,
     names_in,
-    to_code,
+    to_python,
 )
 
 FOLLOWING = {"t": 3.0, "d_rel": 40.0, "v_ego": 20.0, "v_lead": 18.0, "hwt": 2.0, "rs": 2.0}
@@ -32,8 +32,8 @@ FOLLOWING = {"t": 3.0, "d_rel": 40.0, "v_ego": 20.0, "v_lead": 18.0, "hwt": 2.0,
     ],
 )
 def test_equal_conditions_have_one_canonical_text(text: str, canonical: str) -> None:
-    assert check_condition(text, {"safe": 3}) == canonical
-    assert check_condition(canonical) == canonical
+    assert canonical_condition(text, {"safe": 3}) == canonical
+    assert canonical_condition(canonical) == canonical
 
 
 @pytest.mark.parametrize(
@@ -64,13 +64,13 @@ def test_equal_conditions_have_one_canonical_text(text: str, canonical: str) -> 
 )
 def test_only_comparisons_of_observed_values_are_conditions(text: str, piece: str) -> None:
     with pytest.raises(MutatorError) as caught:
-        check_condition(text, variables=FOLLOWING)
+        canonical_condition(text, variables=FOLLOWING)
     assert piece in str(caught.value)
 
 
 def test_no_comparison_of_a_missing_value_holds() -> None:
-    assert evaluate("hwt == 2 and rs == 2", FOLLOWING)
-    assert not evaluate("gap > 1", FOLLOWING) and not evaluate("gap <= 1", FOLLOWING)
+    assert evaluate_condition("hwt == 2 and rs == 2", FOLLOWING)
+    assert not evaluate_condition("gap > 1", FOLLOWING) and not evaluate_condition("gap <= 1", FOLLOWING)
 
 
 @pytest.mark.parametrize(
@@ -88,14 +88,14 @@ def test_no_comparison_of_a_missing_value_holds() -> None:
 def test_formulas_have_a_canonical_text_and_code_that_cannot_raise(
     text: str, canonical: str, code: str
 ) -> None:
-    assert check_formula(text, FOLLOWING) == check_formula(canonical, FOLLOWING) == canonical
-    assert to_code(canonical, number=True) == code
+    assert canonical_formula(text, FOLLOWING) == canonical_formula(canonical, FOLLOWING) == canonical
+    assert to_python(canonical, number=True) == code
 
 
 @pytest.mark.parametrize("text", ["t > 1", "gap", "1 if t else 2", "(1 if t > 0 else 2) + 1", "hypot(t)"])
 def test_an_invalid_formula_is_refused(text: str) -> None:
     with pytest.raises(MutatorError):
-        check_formula(text, FOLLOWING)
+        canonical_formula(text, FOLLOWING)
 
 
 def test_names_come_in_the_order_of_the_text() -> None:
@@ -109,5 +109,5 @@ def test_division_by_zero_is_infinite(a: float, b: float, result: float) -> None
     """With IEEE 754, every condition is either true or false."""
     assert divide(a, b) == result
     assert math.isnan(divide(0.0, b))
-    assert evaluate("1 / t > 5", {**FOLLOWING, "t": 0.0})
-    assert to_code("1 / t > 5") == "_div(1.0, t) > 5.0"
+    assert evaluate_condition("1 / t > 5", {**FOLLOWING, "t": 0.0})
+    assert to_python("1 / t > 5") == "_div(1.0, t) > 5.0"

@@ -2,8 +2,8 @@
 
 import pytest
 
-from mutator.triggers.conditions import check_condition, check_formula
-from mutator.triggers.formula_json import tree
+from mutator.triggers.conditions import canonical_condition, canonical_formula
+from mutator.triggers.formula_json import formula_as_json
 
 KNOWN = ("t", "gap", "speed", "hwt", "risk")
 DERIVED = {"hwt": "(gap / speed)", "risk": "(1.0 / hwt)"}
@@ -21,7 +21,7 @@ DERIVED = {"hwt": "(gap / speed)", "risk": "(1.0 / hwt)"}
     ],
 )
 def test_a_formula_becomes_a_tree_of_operators(text: str, made: object) -> None:
-    assert tree(check_formula(text, KNOWN, over_time=True), DERIVED) == made
+    assert formula_as_json(canonical_formula(text, KNOWN, over_time=True), DERIVED) == made
 
 
 @pytest.mark.parametrize(
@@ -36,4 +36,4 @@ def test_a_formula_becomes_a_tree_of_operators(text: str, made: object) -> None:
     ],
 )
 def test_a_chain_of_comparisons_becomes_a_conjunction(text: str, made: object) -> None:
-    assert tree(check_condition(text, variables=KNOWN, over_time=True), {}) == made
+    assert formula_as_json(canonical_condition(text, variables=KNOWN, over_time=True), {}) == made

@@ -10,7 +10,7 @@ from mutator.campaigns.filters import compile_filter
 from mutator.errors import MutatorError
 from mutator.stpa.context_coverage import measure_coverage
 from mutator.triggers import temporal_logic
-from mutator.triggers.conditions import check_condition, check_formula
+from mutator.triggers.conditions import canonical_condition, canonical_formula
 from tests.costs import is_cheap, is_refused
 
 TEMPORAL = {
@@ -50,23 +50,23 @@ EXPRESSIONS = {
 @pytest.mark.parametrize("formula", TEMPORAL.values(), ids=TEMPORAL)
 def test_a_hostile_temporal_formula_ends_soon(formula: str) -> None:
     pytest.importorskip("rtamt")
-    is_cheap(lambda: temporal_logic.check(formula, ("x",), 0.01))
+    is_cheap(lambda: temporal_logic.check_stl_formula(formula, ("x",), 0.01))
     steps = np.arange(3000) * 0.01
     is_cheap(lambda: temporal_logic.robustness(formula, {"x": steps, "t": steps}, 0.01))
 
 
 def test_a_long_interval_is_refused_with_the_longest() -> None:
     pytest.importorskip("rtamt")
-    refused = is_refused(lambda: temporal_logic.check(TEMPORAL["a long past"], ("x",), 0.01))
+    refused = is_refused(lambda: temporal_logic.check_stl_formula(TEMPORAL["a long past"], ("x",), 0.01))
     assert "intervals of 99999999900 steps" in refused or "intervals of 999999999 steps" in refused
     assert "at most 3000 steps together, 30 s here" in refused
 
 
 CHECKS: dict[str, Callable[[str], object]] = {
-    "condition": lambda text: check_condition(text, variables=("x",), over_time=True),
-    "formula": lambda text: check_formula(text, ("x",), over_time=True),
+    "condition": lambda text: canonical_condition(text, variables=("x",), over_time=True),
+    "formula": lambda text: canonical_formula(text, ("x",), over_time=True),
     "filter": lambda text: compile_filter(text, ("x",))({"x": 1}),
-    "coverage": lambda text: measure_coverage({"a": check_condition(text, variables=("x",))}),
+    "coverage": lambda text: measure_coverage({"a": canonical_condition(text, variables=("x",))}),
 }
 
 

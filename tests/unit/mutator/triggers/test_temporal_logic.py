@@ -133,7 +133,7 @@ def test_an_invalid_formula_raises_and_prints_nothing(
     formula: str, message: str, caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]
 ) -> None:
     with caplog.at_level(logging.WARNING), pytest.raises(MutatorError, match=message) as found:
-        temporal_logic.check(formula, ["x", "y"], STEP)
+        temporal_logic.check_stl_formula(formula, ["x", "y"], STEP)
     assert "INVALID" not in str(found.value)
     assert (caplog.text, *capfd.readouterr()) == ("", "", "")
 
@@ -141,7 +141,7 @@ def test_an_invalid_formula_raises_and_prints_nothing(
 @pytest.mark.parametrize("formula", ["1 / (x - 1) < 3", "sqrt(0 - x) < 3", "next(x > 3) or rise(y < 2)"])
 def test_a_check_accepts_arithmetic_that_some_values_make_invalid(formula: str) -> None:
     """A check does not know the values."""
-    temporal_logic.check(formula, ["x", "y"], STEP)
+    temporal_logic.check_stl_formula(formula, ["x", "y"], STEP)
 
 
 def test_arithmetic_that_rtamt_cannot_compute_is_reported() -> None:

@@ -6,34 +6,34 @@ import pytest
 
 from mutator.errors import MutatorError
 from mutator.model import Hold
-from mutator.triggers.conditions import evaluate
-from mutator.triggers.trigger_kinds import always, at_time, draw_time, read_trigger
+from mutator.triggers.conditions import evaluate_condition
+from mutator.triggers.trigger_kinds import always_trigger, draw_time, parse_trigger, trigger_at_time
 
 FOLLOWING = {"t": 3.0, "d_rel": 40.0, "v_ego": 20.0, "v_lead": 18.0}
 
 
 def test_the_text_of_a_trigger_decides_its_kind() -> None:
-    assert read_trigger("always", 1.5, ("t", "hwt")) == always(armed_after_s=1.5)
-    assert read_trigger("12.5", 1.5, ("t", "hwt")) == at_time(12.5)
-    typed = read_trigger("hwt<=2", 1.5, ("t", "hwt"))
+    assert parse_trigger("always", 1.5, ("t", "hwt")) == always_trigger(armed_after_s=1.5)
+    assert parse_trigger("12.5", 1.5, ("t", "hwt")) == trigger_at_time(12.5)
+    typed = parse_trigger("hwt<=2", 1.5, ("t", "hwt"))
     assert (typed.condition, typed.armed_after_s, typed.hold) == ("hwt <= 2.0", 1.5, Hold.WHILE)
 
 
 @pytest.mark.parametrize("text", ["", "soon", "nan", "hwt", "1 +"])
 def test_invalid_text_is_refused(text: str) -> None:
     with pytest.raises(MutatorError):
-        read_trigger(text, 0.0, ("t", "hwt"))
+        parse_trigger(text, 0.0, ("t", "hwt"))
 
 
 def test_always_and_a_time_last_to_the_end_of_the_run() -> None:
-    assert always().hold is Hold.TO_END
-    assert at_time(3).condition == "t >= 3.0"
-    assert at_time(3).hold is Hold.TO_END
-    assert (at_time(3, hold_s=2.0).hold, at_time(3, hold_s=2.0).hold_s) == (Hold.FOR, 2.0)
+    assert always_trigger().hold is Hold.TO_END
+    assert trigger_at_time(3).condition == "t >= 3.0"
+    assert trigger_at_time(3).hold is Hold.TO_END
+    assert (trigger_at_time(3, hold_s=2.0).hold, trigger_at_time(3, hold_s=2.0).hold_s) == (Hold.FOR, 2.0)
     with pytest.raises(MutatorError, match="time nan"):
-        at_time(math.nan)
-    assert evaluate(at_time(3).condition, FOLLOWING)
-    assert not evaluate(at_time(3.01).condition, FOLLOWING)
+        trigger_at_time(math.nan)
+    assert evaluate_condition(trigger_at_time(3).condition, FOLLOWING)
+    assert not evaluate_condition(trigger_at_time(3.01).condition, FOLLOWING)
 
 
 def test_random_times_are_starts_of_steps() -> None:

@@ -23,7 +23,7 @@ from mutator.engines.reference_engine import ReferenceEngine
 from mutator.model import Anchor, AnchorKind, Fault, FaultLocation, Injection, Limits, Status
 from mutator.mutants.mutant_building import build
 from mutator.targets.source_tree import matches
-from mutator.triggers.trigger_kinds import at_time
+from mutator.triggers.trigger_kinds import trigger_at_time
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[4]
@@ -56,7 +56,7 @@ def drive(tmp_path: Path) -> Drive:
         params = (("by", -1000.0), ("target", name))
         injection = Injection(location=location, model="offset", params=params)
         fault = Fault("s", "m", "f", "as_described", None, "", "H1", (injection,))
-        made = build(manifest, models, fault, at_time(time_s))
+        made = build(manifest, models, fault, trigger_at_time(time_s))
         engine = ReferenceEngine(manifest, work, Limits(), independent=independent)
         job = Job(
             name="job",
@@ -75,7 +75,7 @@ def drive(tmp_path: Path) -> Drive:
 
 def memory() -> Path:
     """The folder where the harness lets the target store detections."""
-    return shared_cache.of_target("openpilot") / FILE
+    return shared_cache.target_folder("openpilot") / FILE
 
 
 def test_the_manifest_lists_every_file_that_affects_detection() -> None:
