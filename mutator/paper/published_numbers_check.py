@@ -5,8 +5,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from mutator.config.yaml_files import load
-from mutator.config.yaml_sources import Source
+from mutator.config.yaml_files import load_yaml
+from mutator.config.yaml_sources import YamlSource
 from mutator.errors import MutatorError
 from mutator.paper.published_numbers import FILE_NAMES, PublishedNumbers, load_published_numbers
 from mutator.statistics.tallies import Tally, sum_tallies
@@ -37,7 +37,7 @@ def check_published_numbers(workspace: Workspace) -> Iterator[MutatorError]:
     except MutatorError as error:
         yield error
         return
-    summary, coverage = (load(references / name) for name in FILE_NAMES[:2])
+    summary, coverage = (load_yaml(references / name) for name in FILE_NAMES[:2])
     faults_folder = workspace.library / "faults"
     fault_types = {
         path.relative_to(faults_folder).with_suffix("").as_posix() for path in workspace.spec_files()
@@ -56,7 +56,7 @@ def _fault_type_of(row: dict[str, Any]) -> str:
     return f"{row['module']}/{row['fault_type']}"
 
 
-def _duplicate_rows(source: Source, name_of: Callable[[dict[str, Any]], str]) -> Iterator[MutatorError]:
+def _duplicate_rows(source: YamlSource, name_of: Callable[[dict[str, Any]], str]) -> Iterator[MutatorError]:
     count_by_name: Counter[str] = Counter()
     for i, row in enumerate(source.data["rows"]):
         count_by_name[name_of(row)] += 1
@@ -67,7 +67,7 @@ def _duplicate_rows(source: Source, name_of: Callable[[dict[str, Any]], str]) ->
 
 
 def _unknown_names(
-    source: Source, name_of: Callable[[dict[str, Any]], str], what: str, valid_names: set[str]
+    source: YamlSource, name_of: Callable[[dict[str, Any]], str], what: str, valid_names: set[str]
 ) -> Iterator[MutatorError]:
     for i, row in enumerate(source.data["rows"]):
         if name_of(row) not in valid_names:
@@ -79,7 +79,9 @@ def _unknown_names(
             )
 
 
-def _unequal_sums(numbers: PublishedNumbers, coverage: Source, summary_path: Path) -> Iterator[MutatorError]:
+def _unequal_sums(
+    numbers: PublishedNumbers, coverage: YamlSource, summary_path: Path
+) -> Iterator[MutatorError]:
     """Yield differences between the sums of both tables, which count the same experiments."""
 
     def total_of(counts: dict[tuple[str, str], Tally], method: str) -> Tally:

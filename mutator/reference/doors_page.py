@@ -28,7 +28,11 @@ The package in `tests/fixtures/doors/` has an example of each but the study.
 """
 _EXAMPLE_BY_DOOR = {
     EXPORTS.addition: ("a format of `mutator export`", "counts", "door_examples.counts:EXPORT"),
-    IMPORTERS.addition: ("a format of traces; its name is the suffix", "jsonl", "door_examples.jsonl:IMPORTER"),
+    IMPORTERS.addition: (
+        "a format of traces; its name is the suffix",
+        "jsonl",
+        "door_examples.jsonl:IMPORTER",
+    ),
     DISTRIBUTORS.addition: (
         "a way to run experiments elsewhere, chosen by `--cluster NAME:WHERE`",
         "here",
@@ -127,4 +131,6 @@ def _door_section(door: Door) -> Iterator[str]:
     yield f'```toml\n[project.entry-points."{door.group}"]\n{example_name} = "{example_value}"\n```\n'
     shipped_rows = [(f"`{name}`", door.load(name).about) for name in door.shipped_names()]
     if shipped_rows:
-        yield TextTable(heads=(door.addition, "what it is"), rows=shipped_rows).as_markdown(escape=False) + "\n"
+        yield (
+            TextTable(heads=(door.addition, "what it is"), rows=shipped_rows).as_markdown(escape=False) + "\n"
+        )

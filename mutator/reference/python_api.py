@@ -65,7 +65,9 @@ class ApiMember:
 
 
 def render_api_page(workspace: Workspace) -> str:
-    shared = TextTable(heads=("argument", "what you can pass"), rows=_SHARED_ARGUMENTS).as_markdown(escape=False)
+    shared = TextTable(heads=("argument", "what you can pass"), rows=_SHARED_ARGUMENTS).as_markdown(
+        escape=False
+    )
     parts = [generated_page_head("Python API"), _INTRO, shared, "\n## Functions\n"]
     for name in _public_functions():
         parts += _function_section(name)

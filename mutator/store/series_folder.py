@@ -216,7 +216,9 @@ def load_index(path: Path) -> SeriesIndex:
     remedy = repair_remedy(path.parent.parent)
     try:
         packed = read_script(path)
-        data = json.loads(unpack_bounded(packed, _MOST_INDEX_RATIO * len(packed) + _MOST_INDEX_BYTES, gzip=True))
+        data = json.loads(
+            unpack_bounded(packed, _MOST_INDEX_RATIO * len(packed) + _MOST_INDEX_BYTES, gzip=True)
+        )
         if data["schema"] != SCHEMA:
             raise MutatorError(f"schema {data['schema']!r}", where=path, expected=SCHEMA, remedy=remedy)
         index = SeriesIndex.from_json(data)
