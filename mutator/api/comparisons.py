@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from mutator._common.confined_files import path_below
 from mutator._common.table_rendering import TextTable
-from mutator.api.html import text_html
+from mutator.api.notebook_html import text_html
 from mutator.api.runs import Run, known_alerts_note, load_run
 from mutator.comparison import comparison_files
 from mutator.comparison import run_comparison as comparing

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
-from mutator.api.html import diff_html, facts_html, text_html
+from mutator.api.notebook_html import diff_html, facts_html, text_html
 from mutator.figures.run_plot import draw_run, marks_of
 from mutator.model import Experiment, Fault, Outcome, Record, Status, Trigger
 from mutator.mutants.readable_patches import readable_patch

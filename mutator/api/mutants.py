@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mutator._common.files import make_folder
-from mutator.api.html import diff_html, text_html
+from mutator.api.notebook_html import diff_html, text_html
 from mutator.api.selection import Bench, FaultLike, TriggerLike, WorkspaceLike
 from mutator.errors import MutatorError
 from mutator.model import Fault, Trigger

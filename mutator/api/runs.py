@@ -10,7 +10,7 @@ from mutator._common.message_text import describe_choices, describe_seeds
 from mutator._common.table_rendering import TextTable
 from mutator.api.audits import Audit, verify
 from mutator.api.experiment_results import trace_frame
-from mutator.api.html import facts_html, text_html
+from mutator.api.notebook_html import facts_html, text_html
 from mutator.api.run_contents import RunContents
 from mutator.api.run_experiments import RunExperiment
 from mutator.api.selection import WorkspaceLike, open_workspace

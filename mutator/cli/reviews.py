@@ -9,7 +9,7 @@ from typer.core import TyperGroup
 
 import mutator
 from mutator._common.message_text import counted
-from mutator.cli import review_changes, review_view
+from mutator.cli import review_actions, review_view
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json, Place, with_place
 from mutator.cli.review_options import (
@@ -65,12 +65,12 @@ def register(app: typer.Typer) -> None:
         ("list", list_groups),
         ("show", show),
         ("status", status),
-        ("approve", review_changes.approve),
-        ("reject", review_changes.reject),
-        ("clear", review_changes.clear),
-        ("remark", review_changes.remark),
-        ("flag", review_changes.flag),
-        ("unflag", review_changes.unflag),
+        ("approve", review_actions.approve),
+        ("reject", review_actions.reject),
+        ("clear", review_actions.clear),
+        ("remark", review_actions.remark),
+        ("flag", review_actions.flag),
+        ("unflag", review_actions.unflag),
         ("walk", walk),
         ("page", page),
     ):
